@@ -157,12 +157,9 @@ def _action(kind, mission, team, i, data, sensors, nodes, circuit, chart, reach,
     if charge:
         home_x, home_y, _, wait = guard.parking_cell(mission, team, i, chart, memory)
     safe = guard.safe_moves(mission, team, i, chart, charge, home_x, home_y, wait, reach)
-    spare = guard.slots_needed(mission, u)
-    if charge:
-        spare = u.battery - 1 - guard.margin(mission, u) - wait
     node = _goal(
         kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home_x, home_y,
-        spare, reach,
+        wait, reach,
     )  # fmt: skip
     if node >= 0:
         home_x, home_y = nodes[node, 0], nodes[node, 1]
@@ -187,11 +184,14 @@ def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
 
 @inlined
 def _goal(
-    kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home_x, home_y, spare,
+    kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home_x, home_y, wait,
     reach,
 ):  # fmt: skip
-    """The goal of UAV ``i``: the best node for which it has battery to spare, or -1."""
+    """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
     u = team[i]
+    spare = guard.slots_needed(mission, u)
+    if charge:
+        spare = u.battery - 1 - guard.margin(mission, u) - wait
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best, node = 0.0, -1
     for k in range(mission.nodes):

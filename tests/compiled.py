@@ -73,13 +73,9 @@ def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):
     """The node that a heuristic chooses, and the way there."""
     charge = guard.must_charge(mission, uavs[i], rules.data_left(mission, residual))
     home_x, home_y, _, wait = parking_cell(mission, uavs, i, chart)
-    u = uavs[i]
-    spare = guard.slots_needed(mission, u)
-    if charge:
-        spare = u.battery - 1 - guard.margin(mission, u) - wait
     node = heuristics._goal(
         kind, mission, uavs, i, residual, sensors, nodes, np.zeros(0, np.int64), chart, charge,
-        home_x, home_y, spare, reach,
+        home_x, home_y, wait, reach,
     )  # fmt: skip
     return node
 

@@ -413,7 +413,8 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
     spare = margin(mission, u)
     reserve = spare + wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
-    # that lead nearest to the parking cell, and those that are not later than the margin allows.
+    # that lead nearest to the parking cell, and those after which it is reached if the margin and
+    # the slots for a pad are spent.
     clear = nearest = in_time = 0
     least = 1_000_000  # battery [%] that lacks on the way to the parking cell
     for action in range(5):
@@ -443,7 +444,7 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
     if nearest & clear and (least > 0 or u.overruled):
         return nearest & clear
     if least > 0 and clear & in_time:
-        # the margin is there to wait or step aside until the teammate has passed
+        # these slots are there to wait or step aside until the teammate has passed
         return clear & in_time
     return nearest
 
