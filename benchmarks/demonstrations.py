@@ -1,16 +1,19 @@
 """The training of ``any`` by imitation: planned missions on generated seas as examples.
 
-    python -m benchmarks.demonstrations --out runs/any
+    python -m benchmarks.demonstrations --out runs/imitation
+    dess train any --from runs/imitation --out runs/any
 
 A planner flies missions on the seas of the set ``train``, and another policy makes a share of the
 decisions, so that the planner also shows how to go on from there. In the first round that policy
 is random; then it is the network that has learned from the rounds before (S. Ross et al., *A
 reduction of imitation learning and structured prediction to no-regret online learning*, 2011). A
-network on sets learns the decisions of all rounds by cross entropy. The folder is a policy. The
-examples are kept in ``OUT-examples``, so a run that was cut off goes on from there.
+network on sets learns the decisions of all rounds by cross entropy. The folder is a policy, with
+which the second command begins. The examples are kept in ``OUT-examples``, so a run that was cut
+off goes on from there.
 """
 
 import argparse
+import copy
 import pickle
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -31,7 +34,7 @@ from dess.observations.states import CompactStates, compact_states, masks
 from dess.sea.families import FAMILIES, SETS
 from dess.view import View
 from policies.ddqn.config import MISSION_SEED, TrainingConfig, load_config
-from policies.ddqn.learner import Learner
+from policies.ddqn.learner import soft_update
 from policies.ddqn.network import SetNetwork
 from policies.ddqn.policy import DDQN
 from policies.ddqn.trained import save_policy
@@ -64,8 +67,9 @@ TEACHERS = {"large": LongPlanner}
 PARTS = 8  # seas of a minibatch
 BATCH = 512
 NEIGHBOURS = 0.1  # share of the seas, near in the number of nodes, that a minibatch is of
+AVERAGE = 0.001  # rate of the slow copy of the weights, which is what is learned
 RATES = (2e-3, 2e-5)  # learning rates of the first and the last update
-VALUE = 12.5  # of all states: about what a mission is worth from its beginning
+TEMPERATURE = 0.1  # by which values are divided to be logits
 
 
 class Examples(NamedTuple):
@@ -159,8 +163,8 @@ def imitate(
     torch.set_num_threads(1)
     generator = np.random.default_rng(config.seed)
     network = _network(config, weights)
-    learner = Learner(network, Sets, config, torch.device("cpu"))
-    assert learner.average is not None
+    average = copy.deepcopy(network).requires_grad_(False)
+    optimizer = torch.optim.Adam(network.parameters(), fused=True)
     shown = sorted(shown, key=lambda examples: len(examples.encoder.sea.nodes))
     near = round(NEIGHBOURS * len(shown))
     for update in tqdm(range(updates)):
@@ -168,27 +172,21 @@ def imitate(
         places = generator.integers(middle - near, middle + near + 1, PARTS)
         chosen = [shown[n] for n in places.clip(0, len(shown) - 1)]
         picks = [generator.integers(0, len(e.rows), BATCH // PARTS) for e in chosen]
-        at = [(e.states, e.rows[p], e.uavs[p]) for e, p in zip(chosen, picks, strict=True)]
-        seen = learner._observe((e.encoder, *rows) for e, rows in zip(chosen, at, strict=True))
-        allowed = torch.from_numpy(np.concatenate([masks(*rows) for rows in at]))
-        planned = np.concatenate([e.planned[p] for e, p in zip(chosen, picks, strict=True)])
-        logits = network(*seen) / config.imitation_temperature
-        loss = nn.functional.cross_entropy(
-            logits.masked_fill(~allowed, -1e9), torch.from_numpy(planned.astype(np.int64))
-        )
-        learner.optimizer.zero_grad(set_to_none=True)
-        loss.backward()
+        optimizer.zero_grad(set_to_none=True)
+        for examples, pick in zip(chosen, picks, strict=True):
+            at = examples.states, examples.rows[pick], examples.uavs[pick]
+            logits = network(*map(torch.from_numpy, examples.encoder.encode(*at))) / TEMPERATURE
+            planned = torch.from_numpy(examples.planned[pick].astype(np.int64))
+            allowed = torch.from_numpy(masks(*at))
+            loss = nn.functional.cross_entropy(logits.masked_fill(~allowed, -1e9), planned)
+            (loss / PARTS).backward()
         nn.utils.clip_grad_norm_(network.parameters(), config.gradient_norm)
         cosine = (1 + np.cos(np.pi * update / updates)) / 2
-        for group in learner.optimizer.param_groups:
+        for group in optimizer.param_groups:
             group["lr"] = RATES[1] + (RATES[0] - RATES[1]) * cosine
-        learner.optimizer.step()
-        rate = max(config.average_rate, 1 / (update + 1))
-        torch._foreach_lerp_([*learner.average.parameters()], [*network.parameters()], rate)
-    learned = learner.average.state_dict()
-    learned["value.weight"] *= 0.0  # it has learned no values
-    learned["value.bias"][:] = VALUE
-    return learned
+        optimizer.step()
+        soft_update(average, network, max(AVERAGE, 1 / (update + 1)))
+    return average.state_dict()
 
 
 def _network(config: TrainingConfig, weights: Path | None) -> SetNetwork:

@@ -1,8 +1,9 @@
-"""The learned policy: a double deep Q-network that all UAVs share, and its training.
+"""The learned policies: a network that all UAVs share, and its training.
 
 ``config`` has the settings of a training. ``observations`` and ``network`` compute Q-values,
 ``replay`` stores transitions, ``learner`` updates the network, ``training`` is Algorithm 1 of the
-paper, ``session`` runs a training in a folder, and ``policy`` is the trained policy.
+paper (double DQN), ``proximal`` the training for any sea (proximal policy optimization),
+``session`` runs a training in a folder, and ``policy`` is the trained policy.
 
 Files may come from anybody and are checked when they are read: ``checkpoint`` is a training that
 can go on (``ranges`` has the values that its missions may have), ``trained`` the folder of a

@@ -20,6 +20,7 @@ from dess.record import MISSION_RECORD
 from policies.ddqn import tensors
 from policies.ddqn.config import CHECKPOINT, TrainingConfig
 from policies.ddqn.description import Name, Number, Sha256
+from policies.ddqn.proximal import training_of
 from policies.ddqn.ranges import check_finite, check_replay, check_state
 from policies.ddqn.tensors import Tensors, array_of, bytes_of, part
 from policies.ddqn.trained import require_version
@@ -80,12 +81,10 @@ class Header(Document):
     observation_version: Number = Field(description="version of the encoding of observations")
     progress: Progress = Field(description="progress of the training")
     random: dict[str, Any] = Field(description="state of numpy's generator, which checks it")
-    stepper: Annotated[list[Number], Field(min_length=2)] = Field(
-        description="seed of the missions, and the next replication on each sea"
+    stepper: Annotated[list[Number], Field(max_length=2)] = Field(
+        description="seed and next replication of the missions in progress, if there are any"
     )
-    replay: list[Number] | Number | None = Field(
-        description="slots that were added to the replay memories"
-    )
+    replay: Number | None = Field(description="slots that were added to the replay memory")
     curve: list[Row] = Field(description="rows of the learning curve")
     sha256: Sha256 = Field(description="checksum of all else")
 
@@ -97,8 +96,9 @@ def save_training(path: Path, training: Training) -> None:
         InputError: If it cannot be written.
     """
     values = _arrays(training)
-    for index, state in training.learner.optimizer.state_dict()["state"].items():
-        values |= {f"optimizer.{index}.{key}": value for key, value in state.items()}
+    for optimizer, of_optimizer in training.learner.optimizers().items():
+        for index, state in of_optimizer.state_dict()["state"].items():
+            values |= {f"{optimizer}.{index}.{key}": value for key, value in state.items()}
     if training.finished:
         values["finished"] = bytes_of(np.concatenate(training.finished))
     for name in training.losses[0] if training.losses else ():
@@ -110,8 +110,10 @@ def save_training(path: Path, training: Training) -> None:
         "observation_version": training.observation.version,
         "progress": training.progress(),
         "random": training.generator.bit_generator.state,
-        "stepper": [training.stepper.seed, *(sea.stepper.replication for sea in training.seas)],
-        "replay": _counts([sea.replay.count for sea in training.seas], training.config),
+        "stepper": [
+            n for sea in training.seas for n in (sea.stepper.seed, sea.stepper.replication)
+        ],
+        "replay": _slots_held(training, [sea.replay.count for sea in training.seas]),
         "curve": training.curve,
     }
     header["sha256"] = tensors.digest(header, values)
@@ -139,7 +141,7 @@ def load_training(
         raise InputError(f"{path}: no checkpoint of a training; allowed: {CHECKPOINT} of one")
     header = Header.parse(metadata["dess"], str(path), fixed={"format": FORMAT})
     raw = parse_json(metadata["dess"], str(path))
-    training = Training(config, device)
+    training = training_of(config, device)
     settings = config.model_dump(mode="json") | {"scenario": training.space.model_dump(mode="json")}
     held = header.config.model_dump(mode="json") | {"scenario": header.scenario}
     if different := [key for key in settings if settings[key] != held[key]]:
@@ -174,9 +176,7 @@ def _check_progress(header: Header, training: Training, path: Path) -> None:
     begun, end = starts[index], starts[index + 1]
     evaluations = now.tick // config.evaluate_every - begun // config.evaluate_every
     evaluations += now.tick == config.ticks and now.tick % config.evaluate_every > 0
-    slots = training.simulated(now.tick - begun)
-    slots = [count + (config.learning_starts if now.tick > begun else 0) for count in slots]
-    seed, *replications = header.stepper
+    slots = now.tick - begun + (config.learning_starts if now.tick > begun else 0)
     right = {
         "phase_index": now.phase_index == index,
         "phase_start": now.phase_start == begun,
@@ -186,10 +186,12 @@ def _check_progress(header: Header, training: Training, path: Path) -> None:
         "best_score": (now.best_score is None) == (evaluations == 0),
         "curve": all(row.tick <= now.tick for row in header.curve)
         and len(header.curve) >= evaluations,
-        "replay": header.replay == _counts(slots, config),
-        "stepper": seed == training.stepper.seed
-        and len(replications) == len(training.seas)
-        and max(replications) < 2**32,
+        "replay": header.replay == _slots_held(training, [slots]),
+        "stepper": len(header.stepper) == 2 * len(training.seas)
+        and all(
+            seed == sea.stepper.seed and replication < 2**32
+            for sea, (seed, replication) in zip(training.seas, [header.stepper], strict=False)
+        ),
     }
     for name in (name for name, is_right in right.items() if not is_right):
         raise InputError(f"{path}: {name} does not fit the config; allowed: an undamaged file")
@@ -202,24 +204,23 @@ def _restore(training: Training, values: Tensors, header: dict[str, Any]) -> Non
         for name, network in _networks(training).items():
             for key, value in part(values, name).items():
                 network[key].copy_(value)
-    states: dict[int, Tensors] = {}
-    for key, value in part(values, "optimizer").items():
-        index, _, field = key.partition(".")
-        states.setdefault(int(index), {})[field] = value
-    groups = learner.optimizer.state_dict()["param_groups"]
-    learner.optimizer.load_state_dict({"state": states, "param_groups": groups})
-    counts = header["replay"] if len(training.seas) > 1 else [header["replay"]]
-    for number, sea in enumerate(training.seas):
-        place = _place(number)
-        sea.stepper.start_at(header["stepper"][0], header["stepper"][1 + number])
-        sea.early[...] = values["early" + place].numpy()
-        stored_state = part(values, "stepper" + place)
+    for optimizer, of_optimizer in learner.optimizers().items():
+        states: dict[int, Tensors] = {}
+        for key, value in part(values, optimizer).items():
+            index, _, field = key.partition(".")
+            states.setdefault(int(index), {})[field] = value
+        groups = of_optimizer.state_dict()["param_groups"]
+        of_optimizer.load_state_dict({"state": states, "param_groups": groups})
+    for sea in training.seas:
+        sea.stepper.start_at(*header["stepper"])
+        sea.early[...] = values["early"].numpy()
+        stored_state = part(values, "stepper")
         for name, array in sea.stepper.state._asdict().items():
             array[...] = array_of(stored_state[name], array.dtype).reshape(array.shape)
         check_state(sea.stepper.state, sea.space, sea.stepper)
         if training.config.checkpoint_replay:
-            sea.replay.count = counts[number]
-            stored_replay = part(values, "replay" + place)
+            sea.replay.count = header["replay"]
+            stored_replay = part(values, "replay")
             for name, array in sea.replay.arrays.items():
                 array[...] = stored_replay[name].numpy()
             check_replay(sea.replay.arrays, max(sea.space.size))
@@ -242,11 +243,13 @@ def _forms(training: Training, finished: int) -> Tensors:
         finished: The number of missions that ended since the last evaluation.
     """
     config, forms = training.config, _arrays(training)
-    if training.tick > training.phase_start:
-        for index, weight in enumerate(training.learner.online.parameters()):
-            forms[f"optimizer.{index}.step"] = torch.empty((), device="meta")
+    for optimizer, of_optimizer in training.learner.optimizers().items():
+        if training.tick - training.phase_start <= training.learner.waits(optimizer):
+            continue
+        for index, weight in enumerate(of_optimizer.param_groups[0]["params"]):
+            forms[f"{optimizer}.{index}.step"] = torch.empty((), device="meta")
             for name in ("exp_avg", "exp_avg_sq"):
-                forms[f"optimizer.{index}.{name}"] = torch.empty(weight.shape, device="meta")
+                forms[f"{optimizer}.{index}.{name}"] = torch.empty(weight.shape, device="meta")
     last = training.tick - training.tick % config.evaluate_every
     updates = (training.tick - max(last, training.phase_start)) * config.updates
     if updates and not training.done:
@@ -264,34 +267,22 @@ def _arrays(training: Training) -> Tensors:
     arrays: Tensors = {"random.torch": torch.get_rng_state()}
     for name, network in _networks(training).items():
         arrays |= {f"{name}.{key}": value for key, value in network.items()}
-    for place, sea in ((_place(number), sea) for number, sea in enumerate(training.seas)):
-        arrays[f"early{place}"] = torch.from_numpy(sea.early)
+    for sea in training.seas:
+        arrays["early"] = torch.from_numpy(sea.early)
         for name, array in sea.stepper.state._asdict().items():
-            arrays[f"stepper{place}.{name}"] = bytes_of(array)
+            arrays[f"stepper.{name}"] = bytes_of(array)
         if training.config.checkpoint_replay:
             for name, array in sea.replay.arrays.items():
-                arrays[f"replay{place}.{name}"] = torch.from_numpy(array)
+                arrays[f"replay.{name}"] = torch.from_numpy(array)
     return arrays
 
 
-def _place(number: int) -> str:
-    """What the names of the arrays of a sea end with, but for the first."""
-    return f"-{number}" if number else ""
-
-
-def _counts(slots: list[int], config: TrainingConfig) -> list[int] | int | None:
-    """What a header says of the replay memories, to which so many slots were added."""
-    if not config.checkpoint_replay:
-        return None
-    return slots if len(slots) > 1 else slots[0]
+def _slots_held(training: Training, slots: list[int]) -> int | None:
+    """What a header says of a replay memory to which so many slots were added."""
+    return slots[0] if training.seas and training.config.checkpoint_replay else None
 
 
 def _networks(training: Training) -> dict[str, Tensors]:
     """The weights of all networks of a training, by name."""
-    learner = training.learner
-    networks = {"online": learner.online.state_dict(), "target": learner.target.state_dict()}
-    if learner.average is not None:
-        networks["average"] = learner.average.state_dict()
-    if learner.anchor is not None:
-        networks["anchor"] = learner.anchor.state_dict()
+    networks = {name: of.state_dict() for name, of in training.learner.networks().items()}
     return networks | {"best": training.best}

@@ -39,10 +39,7 @@ MISSION_SEED = 500_000_000
 MOST_EVALUATIONS = 50_000
 
 # Settings that are newer than some policies, whose identifiers do not have them.
-_LATER = {
-    *("set", "seas", "seas_per_tick", "evaluation_seas", "imitates", "imitation_temperature"),
-    "anchor",
-}
+_LATER = {"set", "seas", "seas_per_tick", "evaluation_seas"}
 
 Count = Annotated[int, Field(strict=True, ge=1)]
 Width = Annotated[int, Field(strict=True, ge=1, le=4096)]
@@ -92,16 +89,10 @@ class Phase(_Settings):
         strict=True,
         ge=0.0,
         le=1e6,
-        description="of softmax exploration in scaled values; 0 for argmax",
+        description="of softmax exploration in scaled values; 0 for argmax, not with sets",
     )
     learning_rate: tuple[Rate, Rate] = Field(
         (1e-3, 1e-4), description="of Adam at the beginning and the end"
-    )
-    imitates: Literal["", "planner", "planner-long", "planner-short"] = Field(
-        "",
-        description="policy that decides and is imitated (planner-short searches a fifth as long "
-        "as planner); epsilon is then the share of "
-        "the decisions that the network makes all the same",
     )
 
     @model_validator(mode="after")
@@ -135,7 +126,7 @@ class TrainingConfig(_Settings):
     observation: Literal["vector", "nodes", "maps", "sets"] = Field(
         "vector",
         description="vector: (b); nodes: (b) and a row per node; maps: the paper's (a); sets: for "
-        "any sea",
+        "any sea, learned by proximal policy optimization and not by double DQN",
     )
     hidden: tuple[Width, ...] = Field(
         (512, 512),
@@ -146,17 +137,9 @@ class TrainingConfig(_Settings):
         "float32", description="of the hidden layers while training"
     )
 
-    imitation_temperature: Factor = Field(
-        0.1, description="by which scaled values are divided where a policy is imitated"
-    )
     guard: StrictBool = Field(True, description="whether the return guard masks actions")
     low_battery_starts: Share = Field(
         0.0, description="share of training missions that start in the zone on a low battery"
-    )
-    anchor: tuple[Share, Share] = Field(
-        (0.0, 0.0),
-        description="weight of the loss that keeps the decisions that a phase begins with, at its "
-        "beginning and its end; in phases that imitate nothing",
     )
     early_returns: Share = Field(
         0.0,
@@ -169,10 +152,13 @@ class TrainingConfig(_Settings):
         64, le=100_000, description="missions that are simulated side by side, on each sea"
     )
     seas_per_tick: Count = Field(
-        1, le=100, description="seas whose missions fly in a tick, and that a minibatch is of"
+        1, le=100, description="seas on which a tick has missions, and of which a minibatch is"
     )
     learning_starts: Count = Field(
-        1000, le=10**6, description="slots of random actions per environment before learning starts"
+        1000,
+        le=10**6,
+        description="slots of random actions per environment before learning starts;"
+        " with sets, ticks in which only the critic learns",
     )
     replay: Count = Field(
         8000, le=10**7, description="slots per environment that the replay memory holds"
@@ -229,6 +215,11 @@ class TrainingConfig(_Settings):
             )
         if self.observation == "sets" and len(self.hidden) != 3:
             raise ValueError(f"hidden: {list(self.hidden)} are not three; allowed: three for sets")
+        for phase in self.phases:
+            if self.observation == "sets" and not phase.temperature:
+                raise ValueError(
+                    f"phases: {phase.name} has no temperature; allowed: one above 0 with sets"
+                )
         if self.evaluation_seed == MISSION_SEED + self.seed:
             raise ValueError(
                 f"evaluation_seed: {self.evaluation_seed} is that of the training; allowed: another"

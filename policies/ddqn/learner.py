@@ -1,7 +1,7 @@
 """The double DQN update (eq. 26-29): Q-target, loss, optimizer step, soft target update."""
 
 import copy
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,6 @@ class Learner:
         target: The target network, whose weights follow those of ``online`` slowly.
         average: A copy that follows still more slowly, and that is evaluated and saved; None if
             ``average_rate`` is 1.
-        anchor: The network whose decisions are to be kept, with the weight of that loss; or None.
         optimizer: The optimizer Adam.
         device: The device on which all of them are.
     """
@@ -72,13 +71,24 @@ class Learner:
         self.target = copy.deepcopy(self.online).requires_grad_(False)
         self.average = copy.deepcopy(self.target) if settings.average_rate < 1.0 else None
         self.observation, self.settings, self.device = observation, settings, device
-        self.anchor: nn.Module | None = None
-        self.anchor_weight = 0.0
         self.restart()
 
     def restart(self) -> None:
         """Reset the optimizer."""
         self.optimizer = torch.optim.Adam(self.online.parameters(), fused=True)
+
+    def networks(self) -> dict[str, nn.Module]:
+        """The networks, by name."""
+        found = {"online": self.online, "target": self.target}
+        return found if self.average is None else found | {"average": self.average}
+
+    def optimizers(self) -> dict[str, torch.optim.Optimizer]:
+        """The optimizers, each by the name under which a checkpoint has it."""
+        return {"optimizer": self.optimizer}
+
+    def waits(self, optimizer: str) -> int:
+        """The ticks of a phase before an optimizer makes its first step."""
+        return 0
 
     @property
     def evaluated(self) -> nn.Module:
@@ -90,31 +100,25 @@ class Learner:
     ) -> torch.Tensor:
         """The (R, 5) action values of UAV ``uavs[r]`` in state ``missions[r]``."""
         parts = self.observation.encode(states, missions, uavs)
-        return network(*self._together([parts]))
+        return network(*map(self._tensor, parts))
 
-    def update(self, batch: Batch, learning_rate: float, *others: Batch) -> dict[str, torch.Tensor]:
+    def update(self, batch: Batch, learning_rate: float) -> dict[str, torch.Tensor]:
         """Make one gradient step on a minibatch; return loss, mean Q-value and gradient norm.
 
         Args:
             batch: The minibatch.
             learning_rate: Of the step.
-            *others: Parts of the minibatch on other seas.
 
         Raises:
             DivergenceError: If one of them is not finite; the weights are then as before.
         """
         settings = self.settings
-        loss, chosen = self.loss(batch, *others)
+        loss, chosen = self.loss(batch)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         norm = nn.utils.clip_grad_norm_(self.online.parameters(), settings.gradient_norm)
         done = {"loss": loss.detach(), "value": chosen.detach().mean(), "gradient_norm": norm}
-        for name, value in done.items():
-            if not torch.isfinite(value):
-                raise DivergenceError(
-                    f"the training diverged: its {name} is {float(value)}; the best policy so far "
-                    "is kept; allowed: a smaller learning_rate, reward_scale or reward"
-                )
+        check_finite(done)
         for group in self.optimizer.param_groups:
             group["lr"] = learning_rate
         self.optimizer.step()
@@ -123,67 +127,41 @@ class Learner:
             soft_update(self.average, self.online, settings.average_rate)
         return done
 
-    def loss(self, *batches: Batch) -> tuple[torch.Tensor, torch.Tensor]:
-        """The loss of the TD error on minibatches, and the (B,) values of the actions in them.
-
-        Where a policy is imitated, the loss is how unlikely its actions are if values are taken for
-        logits. The TD error of a quarter of the minibatches is added: so values have the right size
-        when the next phase begins. An anchor is imitated likewise, with its weight.
-        """
+    def loss(self, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
+        """The loss of the TD error on a minibatch, and the (B,) values of the actions in it."""
         settings = self.settings
-        now = self._observe((b.observation, b.state, b.rows, b.uav) for b in batches)
-        values = self.online(*now)
-        imitation = torch.zeros((), device=self.device)
-        if batches[0].planned is not None:
-            planned = self._joined([b.planned for b in batches if b.planned is not None]).long()
-            imitation = nn.functional.cross_entropy(self._logits(values, batches), planned)
-            batches = batches[: max(len(batches) // 4, 1)]
-        elif self.anchor is not None:
-            with torch.no_grad():
-                wanted = torch.softmax(self._logits(self.anchor(*now), batches), 1)
-            imitation = nn.functional.cross_entropy(self._logits(values, batches), wanted)
-            imitation = imitation * self.anchor_weight
-        allowed = self._joined([masks(b.state, b.later, b.uav) for b in batches])
-        reward = self._joined([b.reward for b in batches]) * settings.reward_scale
-        discount = self._joined([b.discount for b in batches])
-        action = self._joined([b.action for b in batches])
+        values = self.values(self.online, batch.state, batch.rows, batch.uav)
+        allowed = self._tensor(masks(batch.state, batch.later, batch.uav))
         with torch.no_grad():
-            later = self._observe((b.observation, b.state, b.later, b.uav) for b in batches)
+            later = [
+                *map(self._tensor, self.observation.encode(batch.state, batch.later, batch.uav))
+            ]
             q_target = double_dqn_target(
-                reward, discount, self.online(*later), self.target(*later), allowed
+                self._tensor(batch.reward) * settings.reward_scale,
+                self._tensor(batch.discount),
+                self.online(*later),
+                self.target(*later),
+                allowed,
             )
-        chosen = values[: len(action)].gather(1, action[:, None]).squeeze(1)
-        return _LOSSES[settings.loss](chosen, q_target) + imitation, chosen
+        chosen = values.gather(1, self._tensor(batch.action)[:, None]).squeeze(1)
+        return _LOSSES[settings.loss](chosen, q_target), chosen
 
-    def _logits(self, values: torch.Tensor, batches: Sequence[Batch]) -> torch.Tensor:
-        """Values as logits of the allowed actions."""
-        allowed = self._joined([masks(b.state, b.rows, b.uav) for b in batches])
-        return (values / self.settings.imitation_temperature).masked_fill(~allowed, -1e9)
-
-    def _observe(
-        self, rows: Iterable[tuple[Any, CompactStates, np.ndarray, np.ndarray]]
-    ) -> list[torch.Tensor]:
-        """Observations on the device, of an encoder (None for that of the learner) and states."""
-        encoded = [(encoder or self.observation).encode(*states) for encoder, *states in rows]
-        return self._together(encoded)
-
-    def _together(self, encoded: Sequence[tuple[np.ndarray, ...]]) -> list[torch.Tensor]:
-        """Observations on several seas, one after the other; sets are filled up with zeros."""
-        return [self._joined(_filled(parts)) for parts in zip(*encoded, strict=True)]
-
-    def _joined(self, arrays: Sequence[np.ndarray]) -> torch.Tensor:
-        return torch.from_numpy(np.concatenate(arrays)).to(self.device)
+    def _tensor(self, array: np.ndarray) -> torch.Tensor:
+        return torch.from_numpy(array).to(self.device)
 
 
-def _filled(arrays: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Arrays with zeros at the end of those axes, but for the first, that are longer in others."""
-    longest = np.max([array.shape for array in arrays], 0)[1:]
-    return [
-        np.pad(array, [(0, 0), *((0, n) for n in longest - array.shape[1:])])
-        if (longest > array.shape[1:]).any()
-        else array
-        for array in arrays
-    ]
+def check_finite(done: Mapping[str, torch.Tensor]) -> None:
+    """Refuse an update whose loss, value or gradient is no finite number.
+
+    Raises:
+        DivergenceError: If one of them is not finite.
+    """
+    for name, value in done.items():
+        if not torch.isfinite(value):
+            raise DivergenceError(
+                f"the training diverged: its {name} is {float(value)}; the best policy so far "
+                "is kept; allowed: a smaller learning_rate, reward_scale or reward"
+            )
 
 
 _LOSSES = {"huber": nn.functional.smooth_l1_loss, "mse": nn.functional.mse_loss}

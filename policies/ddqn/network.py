@@ -10,7 +10,7 @@ type of the weights.
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import torch
 from torch import Tensor, nn
@@ -200,6 +200,13 @@ class SetNetwork(nn.Module):
         value = self.value(state.to(self.value.weight.dtype))
         return value + advantage - advantage.mean(1, keepdim=True)
 
+    def of_state(self, own: Tensor, _: Tensor, *sets: Tensor) -> Tensor:
+        """The values (R,) of the states alone, the means of those of the actions."""
+        state = self.own(own)
+        for pool, rows, moves in zip(self.sets, sets[::2], sets[1::2], strict=True):
+            state += cast(_Pool, pool).of_state(own, rows, moves)
+        return self.value(torch.relu_(state)).squeeze(1)
+
 
 class _Pool(nn.Module):
     """What is best in a set: in the whole, and in what each move comes nearer to."""
@@ -215,11 +222,19 @@ class _Pool(nn.Module):
 
     def forward(self, own: Tensor, rows: Tensor, moves: Tensor) -> tuple[Tensor, Tensor]:
         """What (R, N, columns) mean for the state (R, joint) and for the moves (R, 4, joint)."""
-        each = torch.relu_(self.inputs(rows).add_(self.context(own)[:, None]))
-        each = torch.relu_(self.layer(each))
-        pooled = highest(torch.relu_(self.values(each)), moves)
+        pooled = highest(self.each(own, rows), moves)
         nearer, along = self.nearer(pooled[:, :4]), self.along(pooled[:, 4:8])
         return self.of_all(pooled[:, 8]), nearer.add_(along)
+
+    def of_state(self, own: Tensor, rows: Tensor, moves: Tensor) -> Tensor:
+        """What the rows mean for the state alone."""
+        return self.of_all(highest(self.each(own, rows), moves[:, 8:])[:, 0])
+
+    def each(self, own: Tensor, rows: Tensor) -> Tensor:
+        """What each of (R, N, columns) rows is worth (R, N, C), of which the highest counts."""
+        each = torch.relu_(self.inputs(rows).add_(self.context(own)[:, None]))
+        each = torch.relu_(self.layer(each))
+        return torch.relu_(self.values(each))
 
 
 def highest(values: Tensor, factors: Tensor) -> Tensor:

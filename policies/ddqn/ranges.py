@@ -96,8 +96,7 @@ def check_replay(arrays: Mapping[str, np.ndarray], grid: int) -> None:
     most[column.BATTERY] = 100
     most[[column.NEEDED, column.HOME]] = np.iinfo(np.int16).max
     most[column.MASK] = 2 ** len(ACTION_NAMES) - 1
-    highest_of = {"missions": 100, "uavs": most}
-    highest_of |= dict.fromkeys({"action", "planned"} & arrays.keys(), len(ACTION_NAMES) - 1)
+    highest_of = {"missions": 100, "uavs": most, "action": len(ACTION_NAMES) - 1}
     for name, highest in highest_of.items():
         if (arrays[name] < 0).any() or (arrays[name] > highest).any():
             raise ValueError(f"replay memory: {name} out of range")

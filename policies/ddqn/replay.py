@@ -27,8 +27,6 @@ class Batch(NamedTuple):
         action: (B,) action of the UAV.
         reward: (B,) float32, discounted sum of the UAV's rewards until the later state.
         discount: (B,) float32, factor of the later state's value; 0 if the UAV terminated.
-        planned: (B,) action of the policy that is imitated; None without one.
-        observation: The encoder of the states; None for that of the learner.
     """
 
     state: CompactStates
@@ -38,8 +36,6 @@ class Batch(NamedTuple):
     action: np.ndarray
     reward: np.ndarray
     discount: np.ndarray
-    planned: np.ndarray | None = None
-    observation: Any = None
 
 
 class ReplayMemory:
@@ -51,23 +47,20 @@ class ReplayMemory:
         arrays: The arrays of the memory, by name.
     """
 
-    def __init__(self, capacity: int, num_envs: int, uavs: int, nodes: int, imitates: bool = False):
+    def __init__(self, capacity: int, num_envs: int, uavs: int, nodes: int):
         self.capacity, self.num_envs, self.uavs = capacity, num_envs, uavs
         self.count = 0
         self._states = empty_states(capacity * num_envs, uavs, nodes)
         kinds: dict[str, type] = {"action": np.int8, "reward": np.float32}
-        kinds |= {"planned": np.int8} if imitates else {}
         kinds |= dict.fromkeys(("acted", "terminated", "truncated"), np.bool_)
         shape = (capacity * num_envs, uavs)
         outcomes: dict[str, Any] = {name: np.zeros(shape, kind) for name, kind in kinds.items()}
         self.arrays = self._states._asdict() | outcomes
 
     @staticmethod
-    def bytes_for(
-        capacity: int, num_envs: int, uavs: int, nodes: int, imitates: bool = False
-    ) -> int:
+    def bytes_for(capacity: int, num_envs: int, uavs: int, nodes: int) -> int:
         """The size of such a memory [bytes]."""
-        one = ReplayMemory(1, 1, uavs, nodes, imitates)
+        one = ReplayMemory(1, 1, uavs, nodes)
         return capacity * num_envs * sum(array.nbytes for array in one.arrays.values())
 
     def add(self, states: CompactStates, *outcome: np.ndarray) -> None:
@@ -75,8 +68,8 @@ class ReplayMemory:
 
         Args:
             states: The states before the slot.
-            *outcome: (N, I) arrays: actions, rewards, those of the policy that is imitated, if
-                there is one, and which UAVs acted, terminated and were truncated.
+            *outcome: (N, I) arrays: actions, rewards, and which UAVs acted, terminated and were
+                truncated.
         """
         first = self.count % self.capacity * self.num_envs
         here = slice(first, first + self.num_envs)
@@ -131,8 +124,7 @@ class ReplayMemory:
         known = (self.arrays[name] for name in ("reward", "terminated", "truncated"))
         _returns(row, uav, n_step, discount, self.num_envs, *known, later, reward, factor)
         action = self.arrays["action"][row, uav].astype(np.int64)
-        planned = self.arrays["planned"][row, uav] if "planned" in self.arrays else None
-        return Batch(self._states, row, later, uav, action, reward, factor, planned)
+        return Batch(self._states, row, later, uav, action, reward, factor)
 
 
 @kernel

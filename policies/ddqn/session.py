@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from policies.ddqn.checkpoint import load_training, save_training
 from policies.ddqn.config import CHECKPOINT, TrainingConfig
 from policies.ddqn.description import MODEL
 from policies.ddqn.network import units_of
+from policies.ddqn.proximal import training_of
 from policies.ddqn.replay import ReplayMemory
 from policies.ddqn.trained import load_policy, save_policy
 from policies.ddqn.training import Training, build
@@ -66,11 +68,22 @@ def device_of(name: str) -> torch.device:
 
 
 def memory_of(config: TrainingConfig) -> int:
-    """The size of the replay memory for a config [bytes]."""
-    sizes = [(space.uavs[1], len(space.nodes)) for space in config.spaces()]
-    imitates = any(phase.imitates for phase in config.phases)
-    slots = config.replay, config.num_envs
-    return sum(ReplayMemory.bytes_for(*slots, *size, imitates) for size in sizes)
+    """The size of the replay memory or, without one, of the states of a tick [bytes]."""
+    if config.observation != "sets":
+        space = config.space
+        slots = config.replay, config.num_envs
+        return ReplayMemory.bytes_for(*slots, space.uavs[1], len(space.nodes))
+    missions = config.num_envs * config.seas_per_tick
+    return max(
+        ReplayMemory.bytes_for(
+            # Missions with charging last about twice as long as it takes to fill the quota.
+            min(2 * ceil(space.quota / space.communication_slots), space.max_slots),
+            missions,
+            space.uavs[1],
+            len(space.nodes),
+        )
+        for space in config.spaces()
+    )
 
 
 def size_of(config: TrainingConfig) -> int:
@@ -94,8 +107,9 @@ def size_of(config: TrainingConfig) -> int:
     evaluation = config.evaluation_missions * (MISSION_RECORD.itemsize + fleet * 8 * 8)
     losses = _LOSS * config.updates * min(config.evaluate_every, config.ticks)
     held = 6 * 4 * weights + len(spaces) * config.num_envs * state
-    held += memory_of(config) if config.checkpoint_replay else 0
-    others = 0 if config.checkpoint_replay else memory_of(config)
+    is_held = config.checkpoint_replay and config.observation != "sets"
+    held += memory_of(config) if is_held else 0
+    others = 0 if is_held else memory_of(config)
     return 2 * held + others + 4 * weights + 4 * rows * row + evaluation + losses
 
 
@@ -148,7 +162,7 @@ def train(
             if resume:
                 training = load_training(path, config, place, size_of(config))
             else:
-                training = Training(config, place)
+                training = training_of(config, place)
                 if start:
                     training.begin_with(load_policy(Path(start)).network.state_dict())
                 save_training(path, training)

@@ -5,7 +5,6 @@ have the seed ``MISSION_SEED`` + the seed of the training, missions for selectin
 config's ``evaluation_seed``, and missions for evaluations should have any other seed.
 """
 
-import copy
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -20,28 +19,22 @@ from dess.env.stepper import MissionStepper
 from dess.errors import InputError
 from dess.observations import states as column
 from dess.observations.maps import POOL
-from dess.observations.observer import ENCODERS, encoder_of
+from dess.observations.observer import ENCODERS
 from dess.observations.sets import Sets
 from dess.observations.states import CompactStates, Layout, compact_states, layout_of, masks
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import FAR, spread
 from dess.state import HOVER, STEP_X, STEP_Y
-from dess.view import View
 from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
 from policies.ddqn.learner import Learner
 from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperNetwork, SetNetwork
 from policies.ddqn.policy import DDQN
-from policies.ddqn.replay import Batch, ReplayMemory
+from policies.ddqn.replay import ReplayMemory
 from policies.ddqn.tensors import require_forms
-from policies.planner import LongPlanner, Planner, ShortPlanner
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 MISSIONS_PER_PHASE = 2**28
 SELECT_BY = "collection_ratio_and_communication"
-# The data of the paper's nodes at the start [data units], as much as all data of a sea count where
-# there are several seas.
-DATA = 312.5
-STRETCH = 64  # ticks for which the missions of some seas fly, before those of the next seas do
 EARLY = 4  # the first evaluation comes after this part of the ticks between evaluations
 # The attributes of a training that are plain values, not arrays.
 _PROGRESS = (
@@ -67,39 +60,27 @@ def build(config: TrainingConfig, layout: Layout | None) -> tuple[Any, nn.Module
     return observation, DuelingNetwork(observation.shapes[0][0], config.hidden, precision)
 
 
-TEACHERS = {kind.name: kind for kind in (Planner, LongPlanner, ShortPlanner)}
-
-
 class Waters:
-    """The missions of a training on one sea.
+    """The missions of a phase.
 
     Attributes:
-        space: The scenario that they are drawn from, in the present phase.
-        observation: The encoder of their states.
+        space: The scenario that they are drawn from.
         stepper: The missions in progress.
         early: (N, I) which UAVs return early.
         replay: What has happened in them.
         home: (H + 2, W + 2) cells to the nearest zone, with a border around the grid.
     """
 
-    def __init__(self, training: "Training", space: ScenarioSpace, observation: Any):
-        config, phase = training.config, training.phase
-        fleet, nodes = space.uavs[1], len(space.nodes)
-        rewards = {}
-        if config.observation == "sets":  # what is collected counts as a share of all data
-            full = max(nodes * sum(space.initial_data) / 2, 1.0)
-            rewards = {"reward_data": space.reward_data * DATA / full}
-        cost = 1 if phase.battery else 0
-        self.space = ScenarioSpace.of(space, flight_cost=cost, **rewards)
-        self.observation = observation
+    def __init__(self, training: "Training"):
+        config, base = training.config, training.space
+        fleet = base.uavs[1]
+        self.space = ScenarioSpace.of(base, flight_cost=1 if training.phase.battery else 0)
         self.stepper = MissionStepper(self.space, config.num_envs, MISSION_SEED + config.seed)
         self.stepper.start_at(self.stepper.seed, training.phase_index * MISSIONS_PER_PHASE)
         self.early = np.zeros((config.num_envs, fleet), bool)
-        self.replay = ReplayMemory(
-            config.replay, config.num_envs, fleet, nodes, imitates=bool(phase.imitates)
-        )
-        zones = space.chart.zones
-        home = spread(zones, space.chart.parking)[0].reshape(zones.shape)
+        self.replay = ReplayMemory(config.replay, config.num_envs, fleet, len(base.nodes))
+        zones = self.space.chart.zones
+        home = spread(zones, self.space.chart.parking)[0].reshape(zones.shape)
         self.home = np.pad(home, 1, constant_values=FAR)
 
 
@@ -109,8 +90,7 @@ class Training:
     Attributes:
         config: The settings of the training.
         learner: The networks and the optimizer.
-        seas: The missions on each sea.
-        sea: Those that are simulated at present.
+        seas: The missions of the present phase; none in a training that keeps no missions.
         tick: Number of ticks done, over all phases.
         curve: One row per evaluation: progress, metrics and losses.
     """
@@ -123,7 +103,7 @@ class Training:
         self.space = self.spaces[0]
         self.layout = None if config.observation == "sets" else layout_of(self.space)
         self.observation, network = build(config, self.layout)
-        self.learner = Learner(network, self.observation, config, device)
+        self.learner = self._learner(network)
         self.tick = self.updates = self.uav_slots = 0
         self.seconds = 0.0
         self.curve: list[dict[str, Any]] = []
@@ -132,15 +112,18 @@ class Training:
         self.losses: list[dict[str, torch.Tensor]] = []
         self._enter_phase(0)
 
+    def _learner(self, network: nn.Module) -> Any:
+        return Learner(network, self.observation, self.config, self.device)
+
     @property
     def phase(self) -> Phase:
         """The phase to which the next tick belongs."""
         return self.config.phases[self.phase_index]
 
     @property
-    def phase_space(self) -> ScenarioSpace:
-        """The scenario of the present missions."""
-        return self.sea.space
+    def sea(self) -> Waters:
+        """The present missions, and what has happened in them."""
+        return self.seas[0]
 
     @property
     def stepper(self) -> MissionStepper:
@@ -170,23 +153,8 @@ class Training:
             self.seconds += time.perf_counter() - began
 
     def step(self) -> None:
-        """Run one tick: a slot of all environments, the updates and, if due, an evaluation."""
-        share = (self.tick - self.phase_start) / self.phase.ticks
-        epsilon = _between(self.phase.epsilon, share / self.phase.epsilon_decay)
-        begins_random = self.tick == 0 and self.config.observation != "sets"
-        for self.sea in [sea for sea in self.seas if sea.replay.count == 0]:  # noqa: B020
-            for _ in range(self.config.learning_starts):
-                self._collect(1.0 if begins_random else epsilon)
-        for self.sea in self._due(self.tick - self.phase_start):  # noqa: B020
-            self._collect(epsilon)
-        for _ in range(self.config.updates):
-            rate = _between(self.phase.learning_rate, share)
-            self.learner.anchor_weight = _between(
-                self.config.anchor, share / self.phase.epsilon_decay
-            )
-            first, *others = self._samples()
-            self.losses.append(self.learner.update(first, rate, *others))
-            self.updates += 1
+        """Run one tick: the missions, the updates and, if due, an evaluation."""
+        self._learn((self.tick - self.phase_start) / self.phase.ticks)
         self.tick += 1
         over = self.tick - self.phase_start == self.phase.ticks
         if over or self.tick % self.config.evaluate_every == 0:
@@ -194,36 +162,27 @@ class Training:
         elif self.tick == max(self.config.evaluate_every // EARLY, 1):
             self._evaluate_early()
         if over and not self.done:
-            for network in (self.learner.online, self.learner.target, self.learner.average):
-                if network is not None:
-                    network.load_state_dict(self.best)
+            for network in self.learner.networks().values():
+                network.load_state_dict(self.best)
             self._enter_phase(self.phase_index + 1)
 
-    def _due(self, tick: int) -> list[Waters]:
-        """The seas whose missions fly in a tick of the phase: some for a while, then the next."""
-        first = tick // STRETCH * self.config.seas_per_tick
-        order = range(first, first + self.config.seas_per_tick)
-        return [self.seas[number % len(self.seas)] for number in order]
+    def _learn(self, share: float) -> None:
+        """Simulate a slot of all environments, and update.
 
-    def simulated(self, ticks: int) -> list[int]:
-        """The slots of each sea that are simulated in the first ticks of a phase."""
-        seas, each = len(self.seas), self.config.seas_per_tick
-        turns, last = divmod(ticks, STRETCH)
-        counts = [STRETCH * ((turns * each - number + seas - 1) // seas) for number in range(seas)]
-        for number in range(turns * each, (turns + 1) * each):
-            counts[number % seas] += last
-        return counts
-
-    def _samples(self) -> list[Batch]:
-        """The parts of a minibatch, each of one sea."""
+        Args:
+            share: Of the phase that is over.
+        """
         config = self.config
-        chosen = self.seas
-        if len(chosen) > 1:
-            picks = self.generator.integers(0, len(chosen), config.seas_per_tick)
-            chosen = [self.seas[pick] for pick in picks]
-        each = config.batch // len(chosen)
-        draw = each, config.n_step, config.discount, self.generator
-        return [sea.replay.sample(*draw)._replace(observation=sea.observation) for sea in chosen]
+        epsilon = between(self.phase.epsilon, share / self.phase.epsilon_decay)
+        if self.replay.count == 0:
+            for _ in range(config.learning_starts):
+                self._collect(1.0 if self.tick == 0 else epsilon)
+        self._collect(epsilon)
+        rate = between(self.phase.learning_rate, share)
+        for _ in range(config.updates):
+            batch = self.replay.sample(config.batch, config.n_step, config.discount, self.generator)
+            self.losses.append(self.learner.update(batch, rate))
+            self.updates += 1
 
     def policy(self, weights: dict[str, torch.Tensor]) -> DDQN:
         """A policy with these weights."""
@@ -243,9 +202,8 @@ class Training:
         """
         learner = self.learner
         require_forms(weights, learner.online.state_dict(), "from")
-        for network in (learner.online, learner.target, learner.average, learner.anchor):
-            if network is not None:
-                network.load_state_dict(weights)
+        for network in learner.networks().values():
+            network.load_state_dict(weights)
         self.best = _weights(learner.evaluated)
 
     @property
@@ -266,20 +224,14 @@ class Training:
     def _enter_phase(self, index: int) -> None:
         """Begin a phase with new missions, an empty replay memory and a new optimizer."""
         self.phase_index, self.phase_start = index, self.tick
-        self.teacher = TEACHERS[self.phase.imitates]() if self.phase.imitates else None
-        self.seas: list[Waters] = []
-        for space in self.spaces:
-            encoder = self.observation if self.layout else encoder_of("sets", space)
-            self.sea = Waters(self, space, encoder)
-            self.seas.append(self.sea)
-            self._launch(self.stepper.indices)
+        self._begin_missions()
         self.learner.restart()
-        self.learner.anchor = None
-        if max(self.config.anchor) > 0.0 and not self.teacher:
-            self.learner.anchor = copy.deepcopy(self.learner.target)
-            self.learner.anchor.load_state_dict(self.learner.online.state_dict())
         self.scores: list[float] = []
         self.best_score: float | None = None
+
+    def _begin_missions(self) -> None:
+        self.seas = [Waters(self)]
+        self._launch(self.stepper.indices)
 
     def _launch(self, environments: np.ndarray) -> None:
         """Start new missions, some of them with a low battery; draw which UAVs return early."""
@@ -303,18 +255,11 @@ class Training:
             states.uavs[..., column.ACTIVE] > states.uavs[..., column.CHARGING]
         )
         actions = np.full(state.uavs.shape, HOVER)
-        planned = [actions.copy()] if self.teacher else []
-        if len(missions) and self.teacher:
-            view = View(state, self.stepper.world, missions, uavs)
-            planned[0][missions, uavs] = shown = self.teacher.act(view)
-            own = self._explore(states, missions, uavs, 0.0)
-            is_own = self.generator.random(len(own)) < epsilon
-            actions[missions, uavs] = np.where(is_own, own, shown)
-        elif len(missions):
+        if len(missions):
             actions[missions, uavs] = self._explore(states, missions, uavs, epsilon)
         outcome = self.stepper.step(actions)
         self.replay.add(
-            states, actions, outcome["reward"], *planned,
+            states, actions, outcome["reward"],
             *(outcome[n] for n in ("acted", "terminated", "truncated")),
         )  # fmt: skip
         self.uav_slots += int(outcome["acted"].sum())
@@ -334,7 +279,6 @@ class Training:
             return random
         with torch.no_grad():
             learner = self.learner
-            learner.observation = self.sea.observation
             values = learner.values(learner.online, states, missions, uavs).cpu().numpy()
         if self.phase.temperature > 0.0:  # Gumbel noise samples from the softmax
             values = values / self.phase.temperature - np.log(-np.log(noise))
@@ -387,7 +331,7 @@ class Training:
     def _selection_missions(self) -> np.ndarray:
         """The records of the selection missions under the present policy."""
         network = self.learner.evaluated
-        missions, cost = range(self.config.evaluation_missions), self.phase_space.flight_cost
+        missions, cost = range(self.config.evaluation_missions), 1 if self.phase.battery else 0
         spaces = [ScenarioSpace.of(s, flight_cost=cost) for s in self.config.spaces(True)]
         records = simulate_batch(
             [spaces[mission % len(spaces)] for mission in missions]
@@ -409,8 +353,8 @@ class Training:
             "uav_slots": self.uav_slots,
             "updates": self.updates,
             "seconds": self.seconds,
-            "epsilon": _between(self.phase.epsilon, share / self.phase.epsilon_decay),
-            "learning_rate": _between(self.phase.learning_rate, share),
+            "epsilon": between(self.phase.epsilon, share / self.phase.epsilon_decay),
+            "learning_rate": between(self.phase.learning_rate, share),
             "moving_average": average,
             "is_best": is_best,
         }
@@ -423,7 +367,7 @@ class Training:
         return row
 
 
-def _between(ends: tuple[float, float], share: float) -> float:
+def between(ends: tuple[float, float], share: float) -> float:
     """Linear interpolation between the ends, constant beyond a share of 1."""
     return ends[0] + (ends[1] - ends[0]) * min(max(share, 0.0), 1.0)
 

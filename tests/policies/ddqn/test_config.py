@@ -14,7 +14,7 @@ from policies.ddqn.config import (
     load_config,
     resume_command,
 )
-from tests.policies.ddqn.tiny import PHASES, TINY, tiny, write_config
+from tests.policies.ddqn.tiny import ON_SEAS, PHASES, TINY, tiny, write_config
 
 PHASE = PHASES[0]
 BAD: list[tuple[dict[str, Any], str]] = [
@@ -46,6 +46,10 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ),
     ({"phases": [PHASE | {"ticks": 10**18}]}, "phases.0.ticks: 1000000000000000000 is out of "),
     ({"phases": [PHASE | {"ticks": 10**8}]}, "evaluate_every: 25 makes more than 50,000 evalu"),
+    (
+        ON_SEAS | {"phases": [PHASE]},
+        "phases: harvest has no temperature; allowed: ",
+    ),
     ({"phases": [PHASE | {"temperature": 1e-320}]}, "phases.0: temperature: 1e-320 is too low"),
     ({"phases": [PHASE | {"learning_rate": [1e300, 1.0]}]}, "phases.0.learning_rate.0: "),
     ({"phases": [PHASE | {"name": "a\nb"}]}, "phases.0.name: 'a\\nb' has control characters"),

@@ -10,11 +10,11 @@ import torch
 
 from dess.observations.states import ACTIVE, CHARGING, compact_states, masks
 from dess.record import empty_records
-from dess.scenario import ScenarioSpace, load_scenario
+from dess.scenario import ScenarioSpace
 from policies.ddqn import training as module
 from policies.ddqn.checkpoint import load_training, save_training
 from policies.ddqn.replay import Batch
-from policies.ddqn.training import MISSION_SEED, SELECT_BY, STRETCH, Training
+from policies.ddqn.training import MISSION_SEED, SELECT_BY, Training
 from tests.policies.ddqn.tiny import (
     CPU,
     PHASES,
@@ -65,10 +65,6 @@ def test_a_stopped_training_goes_on_as_if_nothing_had_been(
     [
         {"average_rate": 1.0, "updates": 2, "precision": "bfloat16"},
         {"guard": False, "early_returns": 0.5, "observation": "nodes", "hidden": [8, 16, 16]},
-        {
-            **{"observation": "sets", "hidden": [8, 8, 8], "early_returns": 0.5, "num_envs": 2},
-            **{"seas": ["scattered:1001..1002", "bay"], "seas_per_tick": 2, "anchor": [0.1, 0.0]},
-        },
     ],
 )
 def test_so_do_others(changes: dict[str, Any], tmp_path: Path) -> None:
@@ -91,40 +87,6 @@ def test_without_its_memory_a_stopped_training_fills_a_new_one(tmp_path: Path) -
     resumed.run(1)
     assert resumed.replay.count == config.learning_starts + 1
     assert _trained(resumed, 1000).done
-
-
-# --- many seas ---
-
-SEAS: dict[str, Any] = {
-    **{"observation": "sets", "hidden": [8, 8, 8], "num_envs": 2, "learning_starts": 4},
-    **{"seas": ["scattered:1001..1002", "clustered:1002"], "seas_per_tick": 2},
-}
-
-
-def test_what_is_imitated_is_flown_and_known() -> None:
-    """With an epsilon of 0 the planner decides, and what it decides is in the memory."""
-    phases = [PHASES[1] | {"ticks": 3, "imitates": "planner-short", "epsilon": [0.0, 0.0]}]
-    training = _trained(Training(tiny(**SEAS, phases=phases), CPU), 2)
-    for sea in training.seas:
-        arrays = sea.replay.arrays
-        assert sea.replay.count in (4, 6)
-        assert (arrays["planned"] == arrays["action"]).all()
-        assert len(np.unique(arrays["planned"])) > 1
-
-
-def test_seas_fly_in_turn() -> None:
-    training = Training(tiny(**SEAS), CPU)
-    for ticks in (0, 1, STRETCH - 1, STRETCH, STRETCH + 1, 5 * STRETCH + 7):
-        due = [sea for tick in range(ticks) for sea in training._due(tick)]
-        assert training.simulated(ticks) == [due.count(sea) for sea in training.seas]
-
-
-def test_data_count_as_a_share_of_all_data_of_their_sea() -> None:
-    training = Training(tiny(**SEAS | {"seas": ["paper", "scattered:1001"]}), CPU)
-    assert training.seas[0].space.reward_data == load_scenario("paper").reward_data
-    for sea in training.seas:
-        data = len(sea.space.nodes) * sum(sea.space.initial_data) / 2
-        assert sea.space.reward_data * data == pytest.approx(1.3 * 312.5)
 
 
 # --- phases ---

@@ -33,6 +33,14 @@ TINY: dict[str, Any] = {
 }
 
 
+# A training for any sea.
+ON_SEAS: dict[str, Any] = {
+    **{"observation": "sets", "hidden": [8, 8, 8], "num_envs": 2, "learning_starts": 4},
+    **{"seas": ["scattered:1001..1002", "clustered:1002"], "seas_per_tick": 2, "updates": 2},
+    **{"evaluate_every": 5, "phases": [{"name": "improvement", "ticks": 8, "temperature": 0.1}]},
+}
+
+
 def tiny(**changes: Any) -> TrainingConfig:
     """The config of the tiny training, with other values."""
     return config_of(TINY | changes, "tiny")
@@ -55,11 +63,8 @@ def one_thread() -> Iterator[None]:
 
 
 def weights_of(training: Training) -> dict[str, torch.Tensor]:
-    """A copy of all weights of a training: online, target, average and best."""
-    learner = training.learner
-    networks = {"online": learner.online.state_dict(), "target": learner.target.state_dict()}
-    if learner.average is not None:
-        networks["average"] = learner.average.state_dict()
+    """A copy of all weights of a training: those of its networks, and the best."""
+    networks = {name: of.state_dict() for name, of in training.learner.networks().items()}
     networks["best"] = training.best
     return {
         f"{name}.{key}": value.clone()

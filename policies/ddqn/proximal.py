@@ -1,0 +1,336 @@
+"""The training of policies for any sea: proximal policy optimization of the product itself.
+
+A *tick* is a number of whole missions on some of the seas, followed by the updates. The policy is
+the softmax of the network's values of the allowed actions. A second network, the critic, learns
+what a mission will still collect. An action that brought more than the critic had expected becomes
+more likely, in small steps. The sum of a mission's rewards is its product: the share of all data
+that the team has collected, or 0 if it fails.
+
+Source: J. Schulman et al., *Proximal policy optimization algorithms*, 2017; advantages as in J.
+Schulman et al., *High-dimensional continuous control using generalized advantage estimation*, 2016.
+"""
+
+import copy
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import nn
+
+from dess.code.kernels import kernel
+from dess.env.stepper import MissionStepper
+from dess.errors import InputError
+from dess.observations import states as column
+from dess.observations.observer import encoder_of
+from dess.observations.sets import Sets
+from dess.observations.states import CompactStates, compact_states, masks
+from dess.record import MISSION_RECORD
+from dess.scenario import ScenarioSpace
+from dess.state import HOVER
+from policies.ddqn.config import MISSION_SEED, TrainingConfig
+from policies.ddqn.learner import check_finite, soft_update
+from policies.ddqn.network import SetNetwork
+from policies.ddqn.policy import ROWS
+from policies.ddqn.training import MISSIONS_PER_PHASE, SELECT_BY, Training, between
+
+TRACE = 0.95  # lambda of generalized advantage estimation
+CLIP = 0.2  # by which share an action may become more likely or less before it gains no more
+WORTH = 10.0  # by which products are multiplied, so that the critic's values have a usual size
+CRITIC_RATE = 1e-3  # learning rate of the critic, whose task changes all the time
+SEAS = 300  # of which the ways are kept in memory
+
+
+class Decisions(NamedTuple):
+    """What UAVs decided where they had a choice: R rows, all on one sea.
+
+    Attributes:
+        encoder: The encoder of the states.
+        states: The states of the missions.
+        missions, uavs: (R,) the states in which the UAVs decided.
+        actions: (R,) the actions.
+        likelihoods: (R,) logarithms of their probabilities.
+        advantages: (R,) how much more they brought than others, as far as the critic can tell.
+        returns: (R,) what the critic should have expected.
+    """
+
+    encoder: Sets
+    states: CompactStates
+    missions: np.ndarray
+    uavs: np.ndarray
+    actions: np.ndarray
+    likelihoods: np.ndarray
+    advantages: np.ndarray
+    returns: np.ndarray
+
+    def picked(self, rows: np.ndarray) -> "Decisions":
+        """Those in some of the rows."""
+        return Decisions(self.encoder, self.states, *(part[rows] for part in self[2:]))
+
+
+class ProximalLearner:
+    """The networks and the optimizers of a training.
+
+    Attributes:
+        online: The network that is trained, and whose values are the logits of the actions.
+        critic: The network that learns returns, as values of states.
+        average: A copy of ``online`` that follows it slowly, and that is evaluated and saved.
+    """
+
+    def __init__(self, network: SetNetwork, settings: TrainingConfig, device: torch.device):
+        self.online = network.to(device)
+        self.critic = copy.deepcopy(self.online)
+        self.average = copy.deepcopy(self.online).requires_grad_(False)
+        self.settings, self.device = settings, device
+        self.restart()
+
+    def restart(self) -> None:
+        """Reset the optimizers."""
+        self.optimizer = torch.optim.Adam(self.online.parameters(), fused=True)
+        self.critic_optimizer = torch.optim.Adam(
+            self.critic.parameters(), lr=CRITIC_RATE, fused=True
+        )
+
+    def networks(self) -> dict[str, nn.Module]:
+        """The networks, by name."""
+        return {"online": self.online, "critic": self.critic, "average": self.average}
+
+    def optimizers(self) -> dict[str, torch.optim.Optimizer]:
+        """The optimizers, each by the name under which a checkpoint has it."""
+        return {"optimizer": self.optimizer, "critic_optimizer": self.critic_optimizer}
+
+    def waits(self, optimizer: str) -> int:
+        """The ticks of a phase before an optimizer makes its first step."""
+        return self.settings.learning_starts if optimizer == "optimizer" else 0
+
+    @property
+    def evaluated(self) -> nn.Module:
+        """The network that is evaluated."""
+        return self.average
+
+    def judged(
+        self, seen: Sequence[np.ndarray], allowed: np.ndarray, temperature: float
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """The (R, 5) logarithms of the probabilities of actions, and the (R,) values of states."""
+        inputs = [*map(self._tensor, seen)]
+        return self._likelihoods(inputs, allowed, temperature), self.critic.of_state(*inputs)
+
+    def update(
+        self, parts: Sequence[Decisions], temperature: float, rate: float, decides: bool
+    ) -> dict[str, torch.Tensor]:
+        """Make a gradient step of both networks; return loss, mean value and gradient norm.
+
+        Args:
+            parts: The minibatch, by seas. Advantages are in standard deviations.
+            temperature: By which the values of actions are divided.
+            rate: The learning rate of the policy.
+            decides: Whether the policy learns as well, and not the critic alone.
+
+        Raises:
+            DivergenceError: If one of what it returns is not finite; the weights are then as
+                before.
+        """
+        rows = sum(len(part.actions) for part in parts)
+        learns = [*self.critic.parameters(), *(self.online.parameters() if decides else ())]
+
+        def of_part(part: Decisions) -> tuple[torch.Tensor, ...]:
+            loss, values = self._loss(part, temperature, decides)
+            gradients = torch.autograd.grad(loss / rows, learns, materialize_grads=True)
+            return loss.detach() / rows, values.detach().sum() / rows, *gradients
+
+        sums = [torch.stack(each).sum(0) for each in zip(*map(of_part, parts), strict=True)]
+        loss, mean, *gradients = sums
+        for weight, gradient in zip(learns, gradients, strict=True):
+            weight.grad = gradient
+        norms = [
+            nn.utils.clip_grad_norm_(network.parameters(), self.settings.gradient_norm)
+            for network in (self.critic, self.online)[: 1 + decides]
+        ]
+        done = {"loss": loss, "value": mean, "gradient_norm": norms[-1]}
+        check_finite(done)
+        self.critic_optimizer.step()
+        if decides:
+            for group in self.optimizer.param_groups:
+                group["lr"] = rate
+            self.optimizer.step()
+            soft_update(self.average, self.online, self.settings.average_rate)
+        return done
+
+    def _loss(
+        self, part: Decisions, temperature: float, decides: bool
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """The loss of decisions, summed, and the (R,) values of their states."""
+        seen = part.encoder.encode(part.states, part.missions, part.uavs)
+        inputs = [*map(self._tensor, seen)]
+        values = self.critic.of_state(*inputs)
+        loss = (values - self._tensor(part.returns)).pow(2).sum()
+        if not decides:
+            return loss, values
+        allowed = masks(part.states, part.missions, part.uavs)
+        likelihoods = self._likelihoods(inputs, allowed, temperature)
+        chosen = likelihoods.gather(1, self._tensor(part.actions)[:, None]).squeeze(1)
+        ratio = (chosen - self._tensor(part.likelihoods)).exp()
+        advantage = self._tensor(part.advantages)
+        gain = torch.min(ratio * advantage, ratio.clamp(1 - CLIP, 1 + CLIP) * advantage)
+        return loss - gain.sum(), values
+
+    def _likelihoods(
+        self, inputs: Sequence[torch.Tensor], allowed: np.ndarray, temperature: float
+    ) -> torch.Tensor:
+        logits = self.online(*inputs) / temperature
+        return torch.log_softmax(logits.masked_fill(~self._tensor(allowed), -1e9), 1)
+
+    def _tensor(self, array: np.ndarray) -> torch.Tensor:
+        return torch.from_numpy(array).to(self.device)
+
+
+class ProximalTraining(Training):
+    """A training in progress. Between two ticks there are no missions in progress."""
+
+    def _learner(self, network: Any) -> ProximalLearner:
+        return ProximalLearner(network, self.config, self.device)
+
+    def _begin_missions(self) -> None:
+        self.seas = []
+        self._sea = lru_cache(SEAS)(
+            lambda number: (self._space(number), encoder_of("sets", self._space(number)))
+        )
+
+    def _space(self, number: int) -> ScenarioSpace:
+        return ScenarioSpace.of(self.spaces[number], flight_cost=1 if self.phase.battery else 0)
+
+    def _learn(self, share: float) -> None:
+        """Simulate missions on some seas from beginning to end, and update."""
+        config, generator = self.config, self.generator
+        seas = config.seas_per_tick
+        numbers = generator.choice(len(self.spaces), seas, replace=len(self.spaces) < seas)
+        simulated = [self._simulated(place, int(number)) for place, number in enumerate(numbers)]
+        shown = [decisions for decisions, _ in simulated if len(decisions.actions)]
+        if not shown:
+            raise InputError(
+                "scenario: no UAV had a choice in any mission of a tick; "
+                "allowed: one in which there is more to decide"
+            )
+        self.finished += [records for _, records in simulated]
+        self.uav_slots += sum(int(records["uav_slots"].sum()) for _, records in simulated)
+        spread = np.concatenate([decisions.advantages for decisions in shown]).std() + 1e-6
+        shown = [d._replace(advantages=d.advantages / spread) for d in shown]
+        rate = between(self.phase.learning_rate, share)
+        decides = self.tick - self.phase_start >= config.learning_starts
+        each = max(config.batch // len(shown), 1)
+        for _ in range(config.updates):
+            rows = [generator.integers(0, len(d.actions), each) for d in shown]
+            parts = [d.picked(chosen) for d, chosen in zip(shown, rows, strict=True)]
+            self.losses.append(self.learner.update(parts, self.phase.temperature, rate, decides))
+            self.updates += 1
+
+    def _simulated(self, place: int, number: int) -> tuple[Decisions, np.ndarray]:
+        """Missions on a sea: the decisions in which UAVs had a choice, and the records.
+
+        Args:
+            place: The place of these missions in their tick.
+            number: The number of the sea.
+        """
+        config, (space, encoder) = self.config, self._sea(number)
+        generator = np.random.default_rng([config.seed, self.tick, place])
+        stepper = MissionStepper(space, config.num_envs, MISSION_SEED + config.seed)
+        first = (self.tick * config.seas_per_tick + place) * config.num_envs % MISSIONS_PER_PHASE
+        stepper.start_at(stepper.seed, self.phase_index * MISSIONS_PER_PHASE + first)
+        stepper.launch(stepper.indices)
+        missions, records = stepper.state.missions, np.zeros(config.num_envs, MISSION_RECORD)
+        collected = [np.zeros(config.num_envs)]
+        seen: list[CompactStates] = []
+        decided: list[tuple[np.ndarray, ...]] = []
+        while missions["active"].any():
+            states = compact_states(stepper.state, stepper.world.chart, config.guard)
+            at, uavs = np.nonzero(
+                states.uavs[..., column.ACTIVE] > states.uavs[..., column.CHARGING]
+            )
+            actions = np.full(states.uavs.shape[:2], HOVER)
+            actions[at, uavs], *known = self._drawn(encoder, states, at, uavs, generator)
+            decided.append((np.full(len(at), len(seen)), at, uavs, actions[at, uavs], *known))
+            seen.append(states)
+            outcome = stepper.step(actions)
+            collected.append(collected[-1] + outcome["team_collected"].max(1))
+            ended = np.nonzero((missions["active"] == 0) & outcome["acted"].any(1))[0]
+            records[ended] = stepper.records(ended).missions
+        states = CompactStates(*(np.concatenate(parts) for parts in zip(*seen, strict=True)))
+        columns = [np.concatenate(parts) for parts in zip(*decided, strict=True)]
+        shares = np.array(collected) / np.maximum(records["initial"] + records["arrived"], 1e-9)
+        return self._decisions(encoder, states, columns, WORTH * shares, records), records
+
+    def _decisions(
+        self,
+        encoder: Sets,
+        states: CompactStates,
+        columns: list[np.ndarray],
+        earned: np.ndarray,
+        records: np.ndarray,
+    ) -> Decisions:
+        """What was decided where there was a choice.
+
+        Args:
+            encoder: The encoder of the states.
+            states: Those of all missions, slot by slot.
+            columns: Of each decision the slot, the mission, the UAV, the action, the logarithm of
+                its probability and the value of the state.
+            earned: (T, N) what the missions had brought before each slot.
+            records: (N,) the missions.
+        """
+        slots, missions, uavs, actions, likelihoods, values = columns
+        products, fleet = WORTH * records[SELECT_BY], states.uavs.shape[1]
+        so_far, discount = earned[slots, missions], self.config.discount
+        advantages = _advantages(missions, uavs, so_far, values, products, discount, fleet)
+        centred = (advantages - advantages.mean()).astype(np.float32)
+        returns = (advantages + values).astype(np.float32)
+        rows = slots * len(records) + missions
+        known = Decisions(encoder, states, rows, uavs, actions, likelihoods, centred, returns)
+        return known.picked(np.flatnonzero(masks(states, rows, uavs).sum(1) > 1))
+
+    @torch.inference_mode()
+    def _drawn(
+        self,
+        encoder: Sets,
+        states: CompactStates,
+        missions: np.ndarray,
+        uavs: np.ndarray,
+        generator: np.random.Generator,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Actions drawn from the policy, logarithms of their probabilities, and values."""
+        allowed = masks(states, missions, uavs)
+        noise = -np.log(-np.log(generator.random(allowed.shape)))
+        found: list[Any] = []
+        for first in range(0, len(uavs), ROWS):
+            rows = slice(first, first + ROWS)
+            parts = encoder.encode(states, missions[rows], uavs[rows])
+            judged = self.learner.judged(parts, allowed[rows], self.phase.temperature)
+            found.append([part.cpu().numpy() for part in judged])
+        if not found:
+            return np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros(0, np.float32)
+        likelihoods, values = map(np.concatenate, zip(*found, strict=True))
+        drawn = (likelihoods + noise).argmax(1)
+        return drawn, likelihoods[np.arange(len(drawn)), drawn], values
+
+
+@kernel
+def _advantages(missions, uavs, earned, values, products, discount, fleet):
+    """Generalized advantages of (R,) decisions in the order of time.
+
+    What a UAV decides counts until it decides again, and its last decision until its mission ends.
+    """
+    out = np.empty(len(missions))
+    later = np.zeros((len(products), fleet, 3))  # advantage, value and what had been earned
+    for m in range(len(products)):
+        later[m, :, 2] = products[m]
+    for r in range(len(missions) - 1, -1, -1):
+        of_uav = later[missions[r], uavs[r]]
+        change = of_uav[2] - earned[r] + discount * of_uav[1] - values[r]
+        out[r] = change + discount * TRACE * of_uav[0]
+        of_uav[0], of_uav[1], of_uav[2] = out[r], values[r], earned[r]
+    return out
+
+
+def training_of(config: TrainingConfig, device: torch.device) -> Training:
+    """A new training: of a policy for any sea by this module, of others by double DQN."""
+    return (ProximalTraining if config.observation == "sets" else Training)(config, device)

@@ -1,0 +1,123 @@
+"""Proximal policy optimization: advantages by hand, what a step does, and going on after a stop."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from dess.observations.states import masks
+from policies.ddqn.checkpoint import load_training, save_training
+from policies.ddqn.proximal import (
+    CLIP,
+    TRACE,
+    WORTH,
+    ProximalTraining,
+    _advantages,
+    training_of,
+)
+from tests.policies.ddqn.tiny import CPU, ON_SEAS, assert_same, tiny, weights_of
+
+
+def _training(ticks: int = 0, **changes: object) -> ProximalTraining:
+    training = training_of(tiny(**ON_SEAS | changes), CPU)
+    assert isinstance(training, ProximalTraining)
+    training.run(ticks)
+    return training
+
+
+@pytest.mark.parametrize("stop", [2, 4, 6])
+def test_a_stopped_training_goes_on_as_if_nothing_had_been(stop: int, tmp_path: Path) -> None:
+    path, training = tmp_path / "checkpoint", _training(stop)
+    save_training(path, training)
+    torch.manual_seed(99)
+    resumed = load_training(path, training.config, CPU)
+    resumed.run(100)
+    assert resumed.done
+    assert_same(resumed, _training(100))
+
+
+def test_advantages_are_sums_of_what_the_critic_did_not_expect() -> None:
+    """Two missions of two UAVs; the second UAV of the first one decides only once."""
+    missions, uavs = np.array([0, 0, 1, 0, 1, 0]), np.array([0, 1, 0, 0, 0, 0])
+    earned = np.array([0.0, 0.0, 0.0, 0.3, 0.5, 0.6])
+    values = np.array([0.9, 0.7, 0.2, 0.6, 0.1, 0.4])
+    products, discount = np.array([1.1, 0.0]), 0.9  # the second mission fails: all is lost
+    found = _advantages(missions, uavs, earned, values, products, discount, 2)
+    last = 1.1 - 0.6 - 0.4
+    middle = 0.6 - 0.3 + discount * 0.4 - 0.6 + discount * TRACE * last
+    first = 0.3 - 0.0 + discount * 0.6 - 0.9 + discount * TRACE * middle
+    failed = 0.0 - 0.5 - 0.1
+    before = 0.5 - 0.0 + discount * 0.1 - 0.2 + discount * TRACE * failed
+    assert found == pytest.approx([first, 1.1 - 0.7, before, middle, failed, last])
+
+
+def test_returns_are_what_missions_still_bring() -> None:
+    """With a critic that expects nothing, the last returns of UAVs are what is then collected."""
+    training = _training(discount=1.0)
+    with torch.no_grad():
+        for weight in training.learner.critic.value.parameters():
+            weight.zero_()
+    decisions, records = training._simulated(0, 1)
+    products = WORTH * records["collection_ratio_and_communication"]
+    of_mission = decisions.missions % len(records)
+    uavs = zip(of_mission, decisions.uavs, strict=True)
+    last = {uav: row for row, uav in enumerate(uavs)}
+    for (mission, _), row in last.items():
+        assert 0.0 <= decisions.returns[row] <= products[mission] + 1e-5
+    assert (masks(decisions.states, decisions.missions, decisions.uavs).sum(1) > 1).all()
+
+
+def test_at_first_only_the_critic_learns() -> None:
+    training = _training()
+    before = weights_of(training)
+    training.run(training.config.learning_starts)
+    after = weights_of(training)
+    moved = {name.partition(".")[0] for name in before if (before[name] != after[name]).any()}
+    assert moved == {"critic"}
+    training.run(1)
+    now = weights_of(training)
+    moved = {name.partition(".")[0] for name in now if (now[name] != after[name]).any()}
+    assert {"online", "critic", "average"} <= moved
+
+
+def test_what_brought_more_becomes_likelier_but_not_by_much_more() -> None:
+    training = _training()
+    decisions, _ = training._simulated(0, 0)
+    temperature = training.phase.temperature
+    signs = np.where(np.arange(len(decisions.actions)) % 2, 1.0, -1.0).astype(np.float32)
+    shown = decisions._replace(advantages=signs)
+
+    def chances() -> np.ndarray:
+        seen = shown.encoder.encode(shown.states, shown.missions, shown.uavs)
+        allowed = masks(shown.states, shown.missions, shown.uavs)
+        with torch.no_grad():
+            logs, _ = training.learner.judged(seen, allowed, temperature)
+        return logs.numpy()[np.arange(len(signs)), shown.actions] - shown.likelihoods
+
+    assert np.abs(chances()).max() < 1e-4
+    training.learner.update([shown], temperature, 1e-4, True)
+    assert (signs * chances()).mean() > 0
+    # Beyond the clip there is no gradient: one decision alone stops soon after it.
+    alone = shown.picked(np.array([1]))
+    for _ in range(200):
+        training.learner.update([alone], temperature, 1e-3, True)
+    assert np.log(1 + CLIP) < chances()[1] < np.log(1 + CLIP) + 0.5
+
+
+def _gradients(training: ProximalTraining) -> list[torch.Tensor | None]:
+    networks = training.learner.online, training.learner.critic
+    return [weight.grad for network in networks for weight in network.parameters()]
+
+
+def test_parts_of_a_minibatch_count_as_one() -> None:
+    training, other = _training(), _training()
+    decisions, _ = training._simulated(0, 0)
+    rows = np.arange(40)
+    for learner, parts in (
+        (training.learner, [decisions.picked(rows)]),
+        (other.learner, [decisions.picked(rows[:13]), decisions.picked(rows[13:])]),
+    ):
+        learner.update(parts, 0.1, 1e-3, True)
+    for ours, theirs in zip(_gradients(training), _gradients(other), strict=True):
+        torch.testing.assert_close(ours, theirs, rtol=1e-3, atol=1e-6)
