@@ -9,7 +9,7 @@ import policies
 from benchmarks.conftest import MISSIONS, SEED
 from dess import load_scenario, simulate_batch
 from policies.ddqn.config import config_names, load_config
-from policies.ddqn.training import Training
+from policies.ddqn.proximal import training_of
 
 DEVICES = ["cpu", *(["cuda"] if torch.cuda.is_available() else [])]
 
@@ -25,10 +25,13 @@ def _one_thread() -> Iterator[None]:
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("name", config_names())
 def test_ticks(benchmark, name: str, device: str) -> None:
-    """A slot of all environments and one update; 20 of them per round."""
-    training = Training(load_config(name), torch.device(device))
-    training.run(20)
-    benchmark.pedantic(training.run, args=(20,), rounds=10)
+    """A slot of all environments and one update, 20 of them per round; a whole tick for any sea."""
+    config = load_config(name)
+    training, ticks = training_of(config, torch.device(device)), 20
+    if config.observation == "sets":
+        ticks = 1
+    training.run(ticks)
+    benchmark.pedantic(training.run, args=(ticks,), rounds=10)
 
 
 def test_decisions_of_ddqn(benchmark) -> None:

@@ -1,6 +1,7 @@
 """What the tests draw: scenarios off the paper's, and policies that stress them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -49,8 +50,13 @@ def _rectangles(draw: st.DrawFn, grid: int, rows: int, width: int, height: int) 
     return draw(st.integers(0, grid - width)), draw(st.integers(0, rows - height)), width, height
 
 
-def reached(start: Cell, grid: int, rows: int, no_fly: set[Cell]) -> dict[Cell, int]:
+def reached(start: Cell, grid: int, rows: int, no_fly: Iterable[Cell]) -> Mapping[Cell, int]:
     """The cells with a way from a cell, and the length of the shortest."""
+    return _reached(start, grid, rows, frozenset(no_fly))
+
+
+@lru_cache(maxsize=4096)
+def _reached(start: Cell, grid: int, rows: int, no_fly: frozenset[Cell]) -> Mapping[Cell, int]:
     ways, edge = {start: 0}, [start]
     for x, y in edge:
         for cell in ((x, y - 1), (x + 1, y), (x, y + 1), (x - 1, y)):

@@ -39,7 +39,7 @@ MISSION_SEED = 500_000_000
 MOST_EVALUATIONS = 50_000
 
 # Settings that are newer than some policies, whose identifiers do not have them.
-_LATER = {"set", "seas", "seas_per_tick", "evaluation_seas"}
+_LATER = {"set", "seas", "seas_per_tick", "evaluation_seas", "short_ranges"}
 
 Count = Annotated[int, Field(strict=True, ge=1)]
 Width = Annotated[int, Field(strict=True, ge=1, le=4096)]
@@ -140,6 +140,10 @@ class TrainingConfig(_Settings):
     guard: StrictBool = Field(True, description="whether the return guard masks actions")
     low_battery_starts: Share = Field(
         0.0, description="share of training missions that start in the zone on a low battery"
+    )
+    short_ranges: Share = Field(
+        0.0,
+        description="share of the seas of a tick with smaller batteries and quotas, with sets",
     )
     early_returns: Share = Field(
         0.0,

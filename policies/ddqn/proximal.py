@@ -28,6 +28,7 @@ from dess.observations.sets import Sets
 from dess.observations.states import CompactStates, compact_states, masks
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace
+from dess.sea.chart import spread
 from dess.state import HOVER
 from policies.ddqn.config import MISSION_SEED, TrainingConfig
 from policies.ddqn.learner import check_finite, soft_update
@@ -39,6 +40,8 @@ TRACE = 0.95  # lambda of generalized advantage estimation
 CLIP = 0.2  # by which share an action may become more likely or less before it gains no more
 WORTH = 10.0  # by which products are multiplied, so that the critic's values have a usual size
 CRITIC_RATE = 1e-3  # learning rate of the critic, whose task changes all the time
+# Ranges, in ways to the farthest node: 1.8 on the paper's sea, 2.8 or more on generated ones.
+RANGES = (1.4, 2.8)
 SEAS = 300  # of which the ways are kept in memory
 
 
@@ -234,6 +237,8 @@ class ProximalTraining(Training):
         """
         config, (space, encoder) = self.config, self._sea(number)
         generator = np.random.default_rng([config.seed, self.tick, place])
+        if generator.random() < config.short_ranges:
+            space = _with_range(space, generator.uniform(*RANGES))
         stepper = MissionStepper(space, config.num_envs, MISSION_SEED + config.seed)
         first = (self.tick * config.seas_per_tick + place) * config.num_envs % MISSIONS_PER_PHASE
         stepper.start_at(stepper.seed, self.phase_index * MISSIONS_PER_PHASE + first)
@@ -311,6 +316,22 @@ class ProximalTraining(Training):
         likelihoods, values = map(np.concatenate, zip(*found, strict=True))
         drawn = (likelihoods + noise).argmax(1)
         return drawn, likelihoods[np.arange(len(drawn)), drawn], values
+
+
+def _with_range(space: ScenarioSpace, times: float) -> ScenarioSpace:
+    """A scenario in which a charged battery lasts so many times the way to the farthest node.
+
+    The quota shrinks with the battery. If the battery is smaller already, nothing changes.
+    """
+    zones, nodes = space.chart.zones, np.array(space.nodes)
+    ways = spread(zones, space.chart.parking)[0].reshape(zones.shape)
+    far = ways[nodes[:, 1], nodes[:, 0]].max()
+    least, fields = space.charge_start[0], ("flying_time", "charge_start", "charge_complete")
+    share = max(times * far / np.mean(space.charge_complete), 2 * least / space.charge_complete[0])
+    if share >= 1.0:
+        return space
+    sizes = {name: [max(round(share * n), least) for n in getattr(space, name)] for name in fields}
+    return ScenarioSpace.of(space, quota=round(share * space.quota), **sizes)
 
 
 @kernel

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from dess.observations.states import masks
+from dess.observations.states import layout_of, masks
+from dess.scenario import load_scenario
 from policies.ddqn.checkpoint import load_training, save_training
 from policies.ddqn.proximal import (
     CLIP,
@@ -14,6 +15,7 @@ from policies.ddqn.proximal import (
     WORTH,
     ProximalTraining,
     _advantages,
+    _with_range,
     training_of,
 )
 from tests.policies.ddqn.tiny import CPU, ON_SEAS, assert_same, tiny, weights_of
@@ -121,3 +123,14 @@ def test_parts_of_a_minibatch_count_as_one() -> None:
         learner.update(parts, 0.1, 1e-3, True)
     for ours, theirs in zip(_gradients(training), _gradients(other), strict=True):
         torch.testing.assert_close(ours, theirs, rtol=1e-3, atol=1e-6)
+
+
+def test_a_range_is_a_number_of_ways_to_the_farthest_node() -> None:
+    space = load_scenario("paper")
+    farthest = layout_of(space).zone_slots(np.array(space.nodes)).max()
+    near = _with_range(space, 1.5)
+    assert np.mean(near.charge_complete) == pytest.approx(1.5 * farthest, abs=1)
+    share = near.quota / space.quota
+    assert np.array(near.flying_time) == pytest.approx(share * np.array(space.flying_time), abs=1)
+    assert near.charge_start[0] == space.charge_start[0]
+    assert _with_range(space, 2.0) == space  # its batteries are smaller already
