@@ -50,10 +50,7 @@ def test_the_wheel_holds_the_packages_with_all_their_files_and_nothing_else(whee
 def test_trained_policies_have_their_curves_and_model_cards() -> None:
     kinds = {"model.safetensors", "config.json", "training.parquet", "README.md"}
     for name in trained_names():
-        # ``any`` imitates recorded missions: no training in environments has left a curve
-        assert {path.name for path in (TRAINED / name).iterdir()} == kinds - (
-            {"training.parquet"} if name == "any" else set()
-        )
+        assert {path.name for path in (TRAINED / name).iterdir()} == kinds
 
 
 def test_every_library_that_is_imported_is_asked_for() -> None:
