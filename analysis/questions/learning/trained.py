@@ -35,12 +35,17 @@ class Trained(NamedTuple):
 def trained_policies(folder: Path) -> list[Trained]:
     """The trained policies in a folder that come with the curve of their training, by name.
 
+    Curves on many seas are left out: they do not compare with those on one.
+
     Raises:
         InputError: If a policy or a curve is damaged.
     """
+    paths = paths_in(folder, "*/training.parquet")
+    found = [(path, read_description(path.parent).training) for path in paths]
     return [
-        Trained(path.parent.name, read_description(path.parent).training, read_curve(path))
-        for path in paths_in(folder, "*/training.parquet")
+        Trained(path.parent.name, config, read_curve(path))
+        for path, config in found
+        if not config.seas
     ]
 
 

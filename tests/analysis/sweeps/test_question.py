@@ -6,6 +6,7 @@ import pytest
 
 from analysis import load_results, load_study, run_study
 from analysis.execution import dry_run, effort
+from analysis.study.best import BASELINE, SECONDS
 from analysis.sweeps.question import ask, file_of, folder_of, question
 from analysis.sweeps.values import values_of
 from dess import InputError
@@ -152,6 +153,15 @@ def test_what_cannot_be_asked_leaves_nothing(line, asking, tmp_path):
         asking(**REFUSED[line])
     assert "\n" not in str(error.value)
     assert files_of(tmp_path) == before
+
+
+def test_a_search_has_a_policy_for_the_missions_that_it_will_take() -> None:
+    """It takes more of them than the check of its answer, so it gets a faster policy."""
+    values = {"uavs": [1, 2, 3, 4, 5], "pads": [1, 2, 3, 4]}
+    same = question(values, "bay", missions=300)
+    search = question(values, "bay", prices={"uav": 20_000}, requirements={"success": 0.99})
+    assert SECONDS[search.policies[0]] < SECONDS[same.policies[0]]
+    assert search.policies[1:] == same.policies[1:] == (BASELINE,)
 
 
 def test_a_million_settings_are_refused_before_they_are_made(tmp_path):

@@ -9,18 +9,19 @@ import pytest
 from analysis.questions.learning import trained
 from analysis.questions.learning.files import CURVE
 from policies.registry import TRAINED
-from tests.policies.ddqn.tiny import tiny
+from tests.policies.ddqn.tiny import ON_SEAS, tiny
 
 SHIPPED = json.loads((TRAINED / "ddqn" / "config.json").read_text("utf-8"))
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Two trainings of one learner, one of another, and a policy without a curve."""
+    """Two trainings of one learner, one of another, one on many seas, and one without a curve."""
     for name, settings in {
         "one": {"seed": 1},
         "two": {"seed": 2},
         "other": {"seed": 1, "discount": 0.9},
+        "seas": ON_SEAS,
         "bare": {},
     }.items():
         (tmp_path / name).mkdir()
