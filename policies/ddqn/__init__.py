@@ -6,6 +6,6 @@ paper (double DQN), ``proximal`` the training for any sea (proximal policy optim
 ``session`` runs a training in a folder, and ``policy`` is the trained policy.
 
 Files may come from anybody and are checked when they are read: ``checkpoint`` is a training that
-can go on (``ranges`` has the values that its missions may have), ``trained`` the folder of a
-policy, ``description`` its ``config.json``, and ``tensors`` reads and writes arrays.
+can go on, ``trained`` the folder of a policy, ``description`` its ``config.json``, and ``tensors``
+reads and writes arrays.
 """
