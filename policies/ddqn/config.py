@@ -41,6 +41,13 @@ MOST_EVALUATIONS = 50_000
 # Settings that are newer than some policies, whose identifiers do not have them.
 _LATER = {"set", "seas", "seas_per_tick", "evaluation_seas", "short_ranges"}
 
+# Settings that only one of the two ways to learn has.
+_OF_PROXIMAL_LEARNING = {"seas", "evaluation_seas", "seas_per_tick", "short_ranges"}
+_OF_DOUBLE_DQN = {
+    *("low_battery_starts", "early_returns", "replay", "n_step", "reward_scale", "loss"),
+    *("target_rate", "checkpoint_replay", "epsilon", "epsilon_decay"),
+}
+
 Count = Annotated[int, Field(strict=True, ge=1)]
 Width = Annotated[int, Field(strict=True, ge=1, le=4096)]
 Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
@@ -197,6 +204,40 @@ class TrainingConfig(_Settings):
 
     @model_validator(mode="after")
     def _is_consistent(self) -> "TrainingConfig":
+        if self.observation == "nodes" and len(self.hidden) < 2:
+            raise ValueError(f"hidden: {list(self.hidden)} are too few; allowed: two or more")
+        if self.ticks // self.evaluate_every > MOST_EVALUATIONS:
+            raise ValueError(
+                f"evaluate_every: {self.evaluate_every} makes more than {MOST_EVALUATIONS:,} "
+                f"evaluations in {self.ticks:,} ticks; allowed: more ticks between evaluations"
+            )
+        if self.evaluation_seed == MISSION_SEED + self.seed:
+            raise ValueError(
+                f"evaluation_seed: {self.evaluation_seed} is that of the training; allowed: another"
+            )
+        names = [phase.name for phase in self.phases]
+        if len(set(names)) < len(names):
+            raise ValueError(f"phases: {shown(names)} are not distinct; allowed: distinct names")
+        return self
+
+    @model_validator(mode="after")
+    def _suits_its_learner(self) -> "TrainingConfig":
+        unused = _OF_DOUBLE_DQN if self.is_proximal else _OF_PROXIMAL_LEARNING
+        for part in (self, *self.phases):
+            fields = type(part).model_fields
+            for name in fields:
+                if name in unused and getattr(part, name) != fields[name].default:
+                    raise ValueError(
+                        f"{name}: {shown(getattr(part, name))} has no effect with the observation "
+                        f"{self.observation}; allowed: to leave it out"
+                    )
+        if self.is_proximal:
+            if len(self.hidden) != 3:
+                raise ValueError(f"hidden: {list(self.hidden)} are not three; allowed: three")
+            for phase in self.phases:
+                if not phase.temperature:
+                    raise ValueError(f"phases: {phase.name} has no temperature; allowed: above 0")
+            return self
         if self.replay < self.n_step + 2:  # of two slots an environment has simulated at least one
             raise ValueError(
                 f"replay: {self.replay} is too few; allowed: n_step {self.n_step} + 2 or more"
@@ -206,32 +247,12 @@ class TrainingConfig(_Settings):
                 f"learning_starts: {self.learning_starts} is too few; allowed: more than n_step "
                 f"{self.n_step}"
             )
-        if self.observation == "nodes" and len(self.hidden) < 2:
-            raise ValueError(f"hidden: {list(self.hidden)} are too few; allowed: two or more")
-        if self.ticks // self.evaluate_every > MOST_EVALUATIONS:
-            raise ValueError(
-                f"evaluate_every: {self.evaluate_every} makes more than {MOST_EVALUATIONS:,} "
-                f"evaluations in {self.ticks:,} ticks; allowed: more ticks between evaluations"
-            )
-        if self.seas and self.observation != "sets":
-            raise ValueError(
-                f"seas: {shown(list(self.seas))} need the observation sets; allowed: a scenario"
-            )
-        if self.observation == "sets" and len(self.hidden) != 3:
-            raise ValueError(f"hidden: {list(self.hidden)} are not three; allowed: three for sets")
-        for phase in self.phases:
-            if self.observation == "sets" and not phase.temperature:
-                raise ValueError(
-                    f"phases: {phase.name} has no temperature; allowed: one above 0 with sets"
-                )
-        if self.evaluation_seed == MISSION_SEED + self.seed:
-            raise ValueError(
-                f"evaluation_seed: {self.evaluation_seed} is that of the training; allowed: another"
-            )
-        names = [phase.name for phase in self.phases]
-        if len(set(names)) < len(names):
-            raise ValueError(f"phases: {shown(names)} are not distinct; allowed: distinct names")
         return self
+
+    @property
+    def is_proximal(self) -> bool:
+        """Whether the policy learns by proximal policy optimization, and not by double DQN."""
+        return self.observation == "sets"
 
     @property
     def ticks(self) -> int:

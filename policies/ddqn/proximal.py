@@ -354,4 +354,4 @@ def _advantages(missions, uavs, earned, values, products, discount, fleet):
 
 def training_of(config: TrainingConfig, device: torch.device) -> Training:
     """A new training: of a policy for any sea by this module, of others by double DQN."""
-    return (ProximalTraining if config.observation == "sets" else Training)(config, device)
+    return (ProximalTraining if config.is_proximal else Training)(config, device)

@@ -69,7 +69,7 @@ def device_of(name: str) -> torch.device:
 
 def memory_of(config: TrainingConfig) -> int:
     """The size of the replay memory or, without one, of the states of a tick [bytes]."""
-    if config.observation != "sets":
+    if not config.is_proximal:
         space = config.space
         slots = config.replay, config.num_envs
         return ReplayMemory.bytes_for(*slots, space.uavs[1], len(space.nodes))
@@ -93,7 +93,7 @@ def size_of(config: TrainingConfig) -> int:
     """
     spaces = config.spaces()
     fleet, nodes = (max(n) for n in zip(*((s.uavs[1], len(s.nodes)) for s in spaces), strict=True))
-    layout = None if config.observation == "sets" else layout_of(spaces[0])
+    layout = None if config.is_proximal else layout_of(spaces[0])
     with torch.device("meta"):  # the sizes of the network, without its memory
         observation, network = build(config, layout)
     shapes = observation.shapes
@@ -107,7 +107,7 @@ def size_of(config: TrainingConfig) -> int:
     evaluation = config.evaluation_missions * (MISSION_RECORD.itemsize + fleet * 8 * 8)
     losses = _LOSS * config.updates * min(config.evaluate_every, config.ticks)
     held = 6 * 4 * weights + len(spaces) * config.num_envs * state
-    is_held = config.checkpoint_replay and config.observation != "sets"
+    is_held = config.checkpoint_replay and not config.is_proximal
     held += memory_of(config) if is_held else 0
     others = 0 if is_held else memory_of(config)
     return 2 * held + others + 4 * weights + 4 * rows * row + evaluation + losses
@@ -137,7 +137,7 @@ def train(
         device: ``auto``, ``cpu`` or ``cuda``.
         accept_size: Whether to train even if that takes more memory than is available.
         start: The folder of a trained policy whose weights a new training begins with.
-        announce: Called before any large allocation with the size of the replay memory [bytes].
+        announce: Called before any large allocation with ``memory_of(config)``.
         progress: Called after each tick with the training and the ticks since the last call.
 
     Returns:

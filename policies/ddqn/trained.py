@@ -63,7 +63,7 @@ def save_policy(
     Raises:
         InputError: If a file cannot be written.
     """
-    layout = None if config.observation == "sets" else layout_of(space)
+    layout = None if config.is_proximal else layout_of(space)
     description = Description(
         format=FORMAT,
         name=config.name,
@@ -108,7 +108,7 @@ def load_policy(folder: Path) -> DDQN:
     values = description.layout and description.layout.model_dump()
     try:
         layout = None
-        if config.observation != "sets":
+        if not config.is_proximal:
             layout = layout_of(ScenarioSpace.of(uavs=1, **(values or {})))
         with torch.device("meta"):  # the forms of the weights, without their memory
             observation, network = build(config, layout)

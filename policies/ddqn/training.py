@@ -101,7 +101,7 @@ class Training:
         torch.manual_seed(config.seed)
         self.spaces = config.spaces()
         self.space = self.spaces[0]
-        self.layout = None if config.observation == "sets" else layout_of(self.space)
+        self.layout = None if config.is_proximal else layout_of(self.space)
         self.observation, network = build(config, self.layout)
         self.learner = self._learner(network)
         self.tick = self.updates = self.uav_slots = 0

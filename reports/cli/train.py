@@ -64,9 +64,10 @@ def train(
     from policies.ddqn.session import EVENTS, train
 
     def announce(memory: int) -> None:
-        """Print the size of the replay memory [bytes], and how to see the curves."""
+        """Print how much memory [bytes] the missions take, and how to see the curves."""
         view = missing("tensorboard", "a live view of the curves")
-        console.say(f"replay memory: {memory / 2**20:,.0f} MiB", sys.stderr)
+        what = "missions of a tick" if config.is_proximal else "replay memory"
+        console.say(f"{what}: {memory / 2**20:,.0f} MiB", sys.stderr)
         console.say(view or f"curves: tensorboard --logdir {out / EVENTS}", sys.stderr)
 
     command = resume_command(config, name, out, device)

@@ -14,7 +14,7 @@ from policies.ddqn.config import (
     load_config,
     resume_command,
 )
-from tests.policies.ddqn.tiny import ON_SEAS, PHASES, TINY, tiny, write_config
+from tests.policies.ddqn.tiny import PHASES, TINY, tiny, tiny_on_seas, write_config
 
 PHASE = PHASES[0]
 BAD: list[tuple[dict[str, Any], str]] = [
@@ -46,10 +46,8 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ),
     ({"phases": [PHASE | {"ticks": 10**18}]}, "phases.0.ticks: 1000000000000000000 is out of "),
     ({"phases": [PHASE | {"ticks": 10**8}]}, "evaluate_every: 25 makes more than 50,000 evalu"),
-    (
-        ON_SEAS | {"phases": [PHASE]},
-        "phases: harvest has no temperature; allowed: ",
-    ),
+    ({"observation": "sets"}, "low_battery_starts: 0.2 has no effect with the observation sets"),
+    ({"short_ranges": 0.5}, "short_ranges: 0.5 has no effect with the observation vector; allow"),
     ({"phases": [PHASE | {"temperature": 1e-320}]}, "phases.0: temperature: 1e-320 is too low"),
     ({"phases": [PHASE | {"learning_rate": [1e300, 1.0]}]}, "phases.0.learning_rate.0: "),
     ({"phases": [PHASE | {"name": "a\nb"}]}, "phases.0.name: 'a\\nb' has control characters"),
@@ -71,6 +69,11 @@ def test_what_is_wrong_is_named(changes: dict[str, Any], complaint: str, tmp_pat
         load_config(path)
     assert str(error.value).startswith(f"{path}: {complaint}")
     assert "\n" not in str(error.value)
+
+
+def test_a_policy_for_any_sea_needs_chance_to_learn() -> None:
+    with pytest.raises(InputError, match="tiny: phases: harvest has no temperature; allowed: "):
+        tiny_on_seas(phases=[PHASE])
 
 
 def test_a_file_holds_what_it_says(tmp_path: Path) -> None:

@@ -18,11 +18,11 @@ from policies.ddqn.proximal import (
     _with_range,
     training_of,
 )
-from tests.policies.ddqn.tiny import CPU, ON_SEAS, assert_same, tiny, weights_of
+from tests.policies.ddqn.tiny import CPU, assert_same, tiny_on_seas, weights_of
 
 
 def _training(ticks: int = 0, **changes: object) -> ProximalTraining:
-    training = training_of(tiny(**ON_SEAS | changes), CPU)
+    training = training_of(tiny_on_seas(**changes), CPU)
     assert isinstance(training, ProximalTraining)
     training.run(ticks)
     return training

@@ -16,25 +16,21 @@ PHASES: list[dict[str, Any]] = [
     {"name": "harvest", "ticks": 80, "battery": False},
     {"name": "battery", "ticks": 80, "epsilon": [0.5, 0.01], "epsilon_decay": 0.5},
 ]
-TINY: dict[str, Any] = {
-    "name": "tiny",
+BRIEF: dict[str, Any] = {
+    **{"name": "tiny", "batch": 32, "average_rate": 0.01},
+    **{"evaluate_every": 25, "evaluation_missions": 4, "window": 2},
+}
+TINY: dict[str, Any] = BRIEF | {
     "hidden": [16, 16],
     "num_envs": 8,
     "learning_starts": 60,
     "replay": 80,
-    "batch": 32,
     "n_step": 3,
-    "average_rate": 0.01,
-    "evaluate_every": 25,
-    "evaluation_missions": 4,
-    "window": 2,
     "low_battery_starts": 0.2,
     "phases": PHASES,
 }
-
-
 # A training for any sea.
-ON_SEAS: dict[str, Any] = {
+ON_SEAS: dict[str, Any] = BRIEF | {
     **{"observation": "sets", "hidden": [8, 8, 8], "num_envs": 2, "learning_starts": 4},
     **{"seas": ["scattered:1001..1002", "clustered:1002"], "seas_per_tick": 2, "updates": 2},
     **{"evaluate_every": 5, "phases": [{"name": "improvement", "ticks": 8, "temperature": 0.1}]},
@@ -44,6 +40,11 @@ ON_SEAS: dict[str, Any] = {
 def tiny(**changes: Any) -> TrainingConfig:
     """The config of the tiny training, with other values."""
     return config_of(TINY | changes, "tiny")
+
+
+def tiny_on_seas(**changes: Any) -> TrainingConfig:
+    """The config of the tiny training for any sea, with other values."""
+    return config_of(ON_SEAS | changes, "tiny")
 
 
 def write_config(folder: Path, **changes: Any) -> Path:

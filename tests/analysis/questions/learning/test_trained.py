@@ -9,7 +9,7 @@ import pytest
 from analysis.questions.learning import trained
 from analysis.questions.learning.files import CURVE
 from policies.registry import TRAINED
-from tests.policies.ddqn.tiny import ON_SEAS, tiny
+from tests.policies.ddqn.tiny import tiny, tiny_on_seas
 
 SHIPPED = json.loads((TRAINED / "ddqn" / "config.json").read_text("utf-8"))
 
@@ -17,15 +17,15 @@ SHIPPED = json.loads((TRAINED / "ddqn" / "config.json").read_text("utf-8"))
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Two trainings of one learner, one of another, one on many seas, and one without a curve."""
-    for name, settings in {
-        "one": {"seed": 1},
-        "two": {"seed": 2},
-        "other": {"seed": 1, "discount": 0.9},
-        "seas": ON_SEAS,
-        "bare": {},
+    for name, config in {
+        "one": tiny(seed=1),
+        "two": tiny(seed=2),
+        "other": tiny(seed=1, discount=0.9),
+        "seas": tiny_on_seas(),
+        "bare": tiny(),
     }.items():
         (tmp_path / name).mkdir()
-        training = tiny(**settings).model_dump(mode="json")
+        training = config.model_dump(mode="json")
         description = json.dumps(SHIPPED | {"training": training})
         (tmp_path / name / "config.json").write_text(description, "utf-8")
         if name == "bare":
