@@ -189,13 +189,20 @@ class ProximalLearner:
 
 
 class ProximalTraining(Training):
-    """A training in progress. Between two ticks there are no missions in progress."""
+    """A training in progress. Between two ticks there are no missions in progress.
+
+    Attributes:
+        shares: Of the seas in the missions, on average.
+    """
 
     def _learner(self, network: Any) -> ProximalLearner:
         return ProximalLearner(network, self.config, self.device)
 
     def _begin_missions(self) -> None:
         self.seas = []
+        # A UAV more makes more decisions in a mission, so large fleets have fewer missions.
+        weights = np.array([1 / np.mean(space.uavs) for space in self.spaces])
+        self.shares = weights / weights.sum()
         self._sea = lru_cache(SEAS)(
             lambda number: (self._space(number), encoder_of("sets", self._space(number)))
         )
@@ -207,7 +214,7 @@ class ProximalTraining(Training):
         """Simulate missions on some seas from beginning to end, and update."""
         config, generator = self.config, self.generator
         seas = config.seas_per_tick
-        numbers = generator.choice(len(self.spaces), seas, replace=len(self.spaces) < seas)
+        numbers = generator.choice(len(self.spaces), seas, len(self.spaces) < seas, self.shares)
         simulated = [self._simulated(place, int(number)) for place, number in enumerate(numbers)]
         shown = [decisions for decisions, _ in simulated if len(decisions.actions)]
         if not shown:

@@ -47,11 +47,15 @@ def test_the_planner_does_the_same_in_any_engine_and_batch(
     space: ScenarioSpace, team: list[Any], seed: int, numbers: list[int], batch_size: int
 ) -> None:
     team = team[: space.uavs[1]]
-    records = simulate_batch(
-        space, team, seed, numbers, batch_size=batch_size, workers=1 + batch_size % 2
-    )
+    records = simulate_batch(space, team, seed, numbers, batch_size=batch_size)
     for job, number in enumerate(numbers):
         _same(simulate(space, team, seed, number), records, job)
+
+
+def test_the_planner_does_the_same_in_two_processes() -> None:
+    space = load_scenario("paper", quota=80)
+    alone, together = (simulate_batch(space, QUICK, 5, 4, workers=n) for n in (1, 2))
+    assert together.missions.tobytes() == alone.missions.tobytes()
 
 
 def test_a_call_of_compiled_code_takes_a_moment_on_any_sea(monkeypatch: pytest.MonkeyPatch) -> None:
