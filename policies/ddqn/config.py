@@ -45,7 +45,7 @@ _LATER = {"set", "seas", "seas_per_tick", "evaluation_seas", "short_ranges"}
 _OF_PROXIMAL_LEARNING = {"seas", "evaluation_seas", "seas_per_tick", "short_ranges"}
 _OF_DOUBLE_DQN = {
     *("low_battery_starts", "early_returns", "replay", "n_step", "reward_scale", "loss"),
-    *("target_rate", "checkpoint_replay", "epsilon", "epsilon_decay"),
+    *("target_rate", "discount", "checkpoint_replay", "epsilon", "epsilon_decay"),
 }
 
 Count = Annotated[int, Field(strict=True, ge=1)]

@@ -292,8 +292,8 @@ class ProximalTraining(Training):
         """
         slots, missions, uavs, actions, likelihoods, values = columns
         products, fleet = WORTH * records[SELECT_BY], states.uavs.shape[1]
-        so_far, discount = earned[slots, missions], self.config.discount
-        advantages = _advantages(missions, uavs, so_far, values, products, discount, fleet)
+        so_far = earned[slots, missions]
+        advantages = _advantages(missions, uavs, so_far, values, products, fleet)
         centred = (advantages - advantages.mean()).astype(np.float32)
         returns = (advantages + values).astype(np.float32)
         rows = slots * len(records) + missions
@@ -342,10 +342,11 @@ def _with_range(space: ScenarioSpace, times: float) -> ScenarioSpace:
 
 
 @kernel
-def _advantages(missions, uavs, earned, values, products, discount, fleet):
+def _advantages(missions, uavs, earned, values, products, fleet):
     """Generalized advantages of (R,) decisions in the order of time.
 
     What a UAV decides counts until it decides again, and its last decision until its mission ends.
+    Rewards are not discounted: a mission's product is worth as much whenever data are collected.
     """
     out = np.empty(len(missions))
     later = np.zeros((len(products), fleet, 3))  # advantage, value and what had been earned
@@ -353,8 +354,7 @@ def _advantages(missions, uavs, earned, values, products, discount, fleet):
         later[m, :, 2] = products[m]
     for r in range(len(missions) - 1, -1, -1):
         of_uav = later[missions[r], uavs[r]]
-        change = of_uav[2] - earned[r] + discount * of_uav[1] - values[r]
-        out[r] = change + discount * TRACE * of_uav[0]
+        out[r] = of_uav[2] - earned[r] + of_uav[1] - values[r] + TRACE * of_uav[0]
         of_uav[0], of_uav[1], of_uav[2] = out[r], values[r], earned[r]
     return out
 

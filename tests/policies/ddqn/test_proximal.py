@@ -44,19 +44,19 @@ def test_advantages_are_sums_of_what_the_critic_did_not_expect() -> None:
     missions, uavs = np.array([0, 0, 1, 0, 1, 0]), np.array([0, 1, 0, 0, 0, 0])
     earned = np.array([0.0, 0.0, 0.0, 0.3, 0.5, 0.6])
     values = np.array([0.9, 0.7, 0.2, 0.6, 0.1, 0.4])
-    products, discount = np.array([1.1, 0.0]), 0.9  # the second mission fails: all is lost
-    found = _advantages(missions, uavs, earned, values, products, discount, 2)
+    products = np.array([1.1, 0.0])  # the second mission fails: all is lost
+    found = _advantages(missions, uavs, earned, values, products, 2)
     last = 1.1 - 0.6 - 0.4
-    middle = 0.6 - 0.3 + discount * 0.4 - 0.6 + discount * TRACE * last
-    first = 0.3 - 0.0 + discount * 0.6 - 0.9 + discount * TRACE * middle
+    middle = 0.6 - 0.3 + 0.4 - 0.6 + TRACE * last
+    first = 0.3 - 0.0 + 0.6 - 0.9 + TRACE * middle
     failed = 0.0 - 0.5 - 0.1
-    before = 0.5 - 0.0 + discount * 0.1 - 0.2 + discount * TRACE * failed
+    before = 0.5 - 0.0 + 0.1 - 0.2 + TRACE * failed
     assert found == pytest.approx([first, 1.1 - 0.7, before, middle, failed, last])
 
 
 def test_returns_are_what_missions_still_bring() -> None:
     """With a critic that expects nothing, the last returns of UAVs are what is then collected."""
-    training = _training(discount=1.0)
+    training = _training()
     with torch.no_grad():
         for weight in training.learner.critic.value.parameters():
             weight.zero_()
