@@ -33,6 +33,7 @@ TINY: dict[str, Any] = BRIEF | {
 ON_SEAS: dict[str, Any] = BRIEF | {
     **{"observation": "sets", "hidden": [8, 8, 8], "num_envs": 2, "learning_starts": 4},
     **{"seas": ["scattered:1001..1002", "clustered:1002"], "seas_per_tick": 2, "updates": 2},
+    "set": {"quota": 160},
     **{"evaluate_every": 5, "phases": [{"name": "improvement", "ticks": 8, "temperature": 0.1}]},
 }
 
