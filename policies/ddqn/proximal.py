@@ -36,7 +36,7 @@ from policies.ddqn.network import SetNetwork
 from policies.ddqn.policy import ROWS
 from policies.ddqn.training import MISSIONS_PER_PHASE, SELECT_BY, Training, between
 
-TRACE = 0.95  # lambda of generalized advantage estimation
+TRACE = 0.98  # lambda of generalized advantage estimation
 CLIP = 0.2  # by which share an action may become more likely or less before it gains no more
 WORTH = 10.0  # by which products are multiplied, so that the critic's values have a usual size
 CRITIC_RATE = 1e-3  # learning rate of the critic, whose task changes all the time
