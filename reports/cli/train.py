@@ -109,7 +109,7 @@ def _bar(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
 
         def show(training: "Training", done: int) -> None:
             if bar.n == 0:  # a resumed training begins at its tick
-                bar.initial = bar.n = training.tick - done
+                bar.initial = bar.n = bar.last_print_n = training.tick - done
             bar.update(training.tick - bar.n)
             if training.curve:
                 last = training.curve[-1]

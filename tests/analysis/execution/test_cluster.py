@@ -109,15 +109,15 @@ def test_a_study_goes_on_after_its_scheduler_was_killed(tmp_path, monkeypatch, c
     assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
 
 
-def test_a_cluster_without_workers_is_waited_for(tmp_path, monkeypatch, caplog):
+def test_a_cluster_without_workers_is_waited_for_and_leaves_the_same_bytes(tmp_path, monkeypatch):
     monkeypatch.setattr(clusters, "LOOK", 0.1)
-    study = small_study(tmp_path)
+    study = small_study(tmp_path, logged=1)
     with distributed.LocalCluster(n_workers=0, **OPTIONS) as cluster:
         notes = []
 
         def note(*words):
             notes.append(words)
-            cluster.scale(1)
+            cluster.scale(2)
 
         monkeypatch.setattr(clusters.log, "warning", note)
         run_study(study, tmp_path / "out", scheduler=cluster.scheduler_address)

@@ -73,16 +73,6 @@ def test_equal_runs_have_equal_bytes_under_any_number_of_workers(tmp_path):
     assert str(tmp_path) not in (tmp_path / "1" / "manifest.json").read_text()
 
 
-def test_dask_leaves_the_same_bytes(tmp_path):
-    distributed = pytest.importorskip("distributed")
-    study = small_study(tmp_path, logged=1)
-    run_study(study, tmp_path / "here")
-    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
-    with distributed.LocalCluster(**options) as cluster:
-        run_study(study, tmp_path / "dask", scheduler=cluster.scheduler_address)
-    assert files_of(tmp_path / "here") == files_of(tmp_path / "dask")
-
-
 def test_raising_the_missions_tops_up_and_lowering_loads_fewer(tmp_path):
     few, many = (small_study(tmp_path, missions=n) for n in (10, 21))
     at_once = run_study(many, tmp_path / "at_once")

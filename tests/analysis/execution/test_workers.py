@@ -38,10 +38,9 @@ def check_that_the_rest_is_there(study, out, policy, missing):
     assert done[0] == study.missions * len(study.policies) - missing
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_chunk_that_raises_is_recorded_and_the_rest_goes_on(workers, plugin, tmp_path):
+def test_a_chunk_that_raises_is_recorded_and_the_rest_goes_on(plugin, tmp_path):
     study = small_study(tmp_path, policies=["raising", "greedy"])
-    failure = failing(study, tmp_path / "out", workers=workers)
+    failure = failing(study, tmp_path / "out")
     assert failure.policy == "raising"
     assert failure.missions == 4
     assert failure.error == "ZeroDivisionError: nothing to divide by"
@@ -73,14 +72,19 @@ def test_an_event_log_that_fails_is_recorded_too(plugin, tmp_path):
     assert sorted(failure.missions for failure in error.value.failures.values()) == [1, 2]
 
 
-def test_a_killed_worker_is_replaced(plugin, tmp_path):
-    study = small_study(tmp_path, policies=["killed-once", "greedy"])
+def test_a_killed_worker_is_replaced_and_one_that_raises_goes_on(plugin, tmp_path):
+    study = small_study(tmp_path, policies=["killed-once", "raising", "greedy"])
     done: list[int] = []
-    run_study(study, tmp_path / "out", workers=2, progress=done.append)
+    failure = failing(study, tmp_path / "out", workers=2, progress=done.append)
     assert (tmp_path / "plugin" / "killed").exists()
-    assert sum(done) == 20
-    run_study(study, tmp_path / "undisturbed")  # it has been killed, so it hovers
-    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+    assert (failure.policy, failure.missions, sum(done)) == ("raising", 4, 30)
+    assert "in trouble" in failure.traceback
+    failing(study, tmp_path / "undisturbed")  # it has been killed, so it hovers
+    ours, undisturbed = (
+        {name: content for name, content in files_of(tmp_path / run).items() if "fail" not in name}
+        for run in ("out", "undisturbed")
+    )
+    assert ours == undisturbed
 
 
 @pytest.mark.slow

@@ -158,7 +158,7 @@ def test_what_cannot_be_asked_leaves_nothing(line, asking, tmp_path):
 def test_a_search_has_a_policy_for_the_missions_that_it_will_take() -> None:
     """It takes more of them than the check of its answer, so it gets a faster policy."""
     values = {"uavs": [1, 2, 3, 4, 5], "pads": [1, 2, 3, 4]}
-    same = question(values, "bay", missions=300)
+    same = question(values, "bay", missions=30)
     search = question(values, "bay", prices={"uav": 20_000}, requirements={"success": 0.99})
     assert SECONDS[search.policies[0]] < SECONDS[same.policies[0]]
     assert search.policies[1:] == same.policies[1:] == (BASELINE,)
