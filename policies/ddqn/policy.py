@@ -13,11 +13,10 @@ from dess.observations.states import Layout, compact_states, masks
 from dess.view import View
 
 # The rounding errors of a network depend on the number of rows that it evaluates together, but the
-# action must not. So if the two best values differ by less than CLOSE, the values are computed
-# again in double precision and rounded to DECIMALS.
-CLOSE, DECIMALS = 1e-3, 9
-# The same for networks on sets, which are small: their rounding errors are some 1e-6.
-CLOSE_ON_SETS = 1e-4
+# action must not. So if the two best values differ by less than a share CLOSE of the best one (and
+# of 1), some thirty times the largest error seen, the values are computed again in double precision and
+# rounded to DECIMALS.
+CLOSE, DECIMALS = 1e-5, 9
 # How many rows with sets a network evaluates together: what it computes stays in the cache.
 ROWS = 256
 
@@ -69,7 +68,7 @@ class DDQN:
         values = np.where(allowed, _values(self.network, parts).astype(np.float64), -np.inf)
         if self.exact is not None:
             second, best = np.partition(values, -2)[:, -2:].T
-            close = best - second < (CLOSE if self.layout else CLOSE_ON_SETS)
+            close = best - second < CLOSE * (1 + np.abs(best))
             if close.any():
                 exact = _values(self.exact, [part[close] for part in parts]).round(DECIMALS)
                 values[close] = np.where(allowed[close], exact, -np.inf)
@@ -90,10 +89,10 @@ class DDQN:
                 yield of_kind[first : first + ROWS], encoder
 
     def _require_layout(self, view: View, layout: Layout) -> None:
-        missions = view.state.missions[np.unique(view.mission)]
         learned = (layout.grid, *layout.zone)
         for field, value in zip(_PLACE, learned, strict=True):
-            others = missions[field][missions[field] != value]
+            of_missions = view.state.missions[field][view.mission]
+            others = of_missions[of_missions != value]
             if len(others):
                 raise InputError(
                     f"policy {self.name}: has learned {field} {value}, not {others[0]}; "

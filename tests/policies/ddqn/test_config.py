@@ -105,7 +105,7 @@ def test_fields_of_the_scenario_are_set(tmp_path: Path) -> None:
 
 
 def test_the_shipped_policies_keep_the_identity_of_their_learner() -> None:
-    assert learner_of(load_config("ddqn")) == "ddqn 55f4b0b3"
+    assert learner_of(load_config("ddqn")) == "ddqn 99eea6f9"
     names = ["ddqn", "ddqn-2", "ddqn-3"]
     assert {policies.load(name).learner for name in names} == {learner_of(load_config("ddqn"))}
 
