@@ -14,8 +14,8 @@ from dess.view import View
 
 # The rounding errors of a network depend on the number of rows that it evaluates together, but the
 # action must not. So if the two best values differ by less than a share CLOSE of the best one (and
-# of 1), some thirty times the largest error seen, the values are computed again in double precision and
-# rounded to DECIMALS.
+# of 1), some thirty times the largest error seen, the values are computed again in double precision
+# and rounded to DECIMALS.
 CLOSE, DECIMALS = 1e-5, 9
 # How many rows with sets a network evaluates together: what it computes stays in the cache.
 ROWS = 256
