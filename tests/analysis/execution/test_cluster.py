@@ -109,7 +109,7 @@ def test_a_study_goes_on_after_its_scheduler_was_killed(tmp_path, monkeypatch, c
     assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
 
 
-def test_a_cluster_without_workers_is_waited_for_and_leaves_the_same_bytes(tmp_path, monkeypatch):
+def test_dask_waits_for_workers_and_leaves_the_same_bytes(tmp_path, monkeypatch):
     monkeypatch.setattr(clusters, "LOOK", 0.1)
     study = small_study(tmp_path, logged=1)
     with distributed.LocalCluster(n_workers=0, **OPTIONS) as cluster:

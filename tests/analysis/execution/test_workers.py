@@ -72,7 +72,7 @@ def test_an_event_log_that_fails_is_recorded_too(plugin, tmp_path):
     assert sorted(failure.missions for failure in error.value.failures.values()) == [1, 2]
 
 
-def test_a_killed_worker_is_replaced_and_one_that_raises_goes_on(plugin, tmp_path):
+def test_a_killed_worker_is_replaced(plugin, tmp_path):
     study = small_study(tmp_path, policies=["killed-once", "raising", "greedy"])
     done: list[int] = []
     failure = failing(study, tmp_path / "out", workers=2, progress=done.append)
