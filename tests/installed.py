@@ -5,6 +5,7 @@ install all libraries into an empty environment.
 """
 
 import os
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -51,5 +52,10 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # are not read.
     here = "\n".join(dict.fromkeys(map(sysconfig.get_path, ("purelib", "platlib"))))
     (libraries / "libraries-of-the-tests.pth").write_text(here, "utf-8")
+    for package in ("analysis", "dess", "policies"):  # the same code need not be compiled again
+        for compiled in ROOT.glob(f"{package}/**/__pycache__/*.nb[ci]"):
+            target = libraries / compiled.relative_to(ROOT)
+            target.parent.mkdir(exist_ok=True)
+            shutil.copy(compiled, target)
     (folder / "venv" / "share").symlink_to(Path(sys.prefix, "share"))  # templates of nbconvert
     return commands / "dess"

@@ -170,7 +170,7 @@ def test_a_batch_is_small_where_a_mission_is_large(monkeypatch: pytest.MonkeyPat
     assert BATCH_SIZE * batch.work_of(load_scenario("paper")) < MOST_WORK
 
 
-@given(st.lists(spaces(), min_size=2, max_size=5), st.data(), seeds, st.integers(1, 2))
+@given(st.lists(spaces(), min_size=2, max_size=3), st.data(), seeds, st.integers(1, 2))
 def test_scenarios_of_different_worlds_fly_in_one_batch(
     worlds: list[ScenarioSpace], data: st.DataObject, seed: int, workers: int
 ) -> None:

@@ -145,7 +145,7 @@ def _any(seed: int = 1) -> DDQN:
     return _exact(DDQN("any", Sets, SetNetwork(Sets.shapes, [16, 8, 16]), True, None))
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(spaces(), seeds, st.integers(1, 5))
 def test_on_any_sea_a_mission_does_not_depend_on_those_beside_it(
     space: ScenarioSpace, seed: int, batch_size: int

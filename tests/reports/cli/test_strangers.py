@@ -124,6 +124,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cross_check, "simulate_missions", simulated)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few")
 def test_the_page_of_the_verification_leaves_out_a_python_file_that_only_results_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
