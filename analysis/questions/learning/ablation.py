@@ -27,7 +27,7 @@ LADDER = {
     "with the return guard": "no low-battery starts, no early returns",
     "and low-battery starts": "no early returns",
     "and early returns (quick)": BASELINE,
-    f"{SHIPPED}, wider and longer": SHIPPED,
+    f"{SHIPPED}, trained longer": SHIPPED,
 }
 
 

@@ -86,12 +86,12 @@ def test_the_ladder_goes_from_the_paper_to_the_shipped_policy_and_counts_who_lea
     assert [*rungs["variant"].unique()] == [
         "the paper's methods",
         "and early returns (quick)",
-        "ddqn, wider and longer",
+        "ddqn, trained longer",
     ]
     assert answer(rungs) == (
-        "The product rises from 10.0 % (the paper's methods) to 90.0 % (ddqn, wider and longer); "
+        "The product rises from 10.0 % (the paper's methods) to 90.0 % (ddqn, trained longer); "
         "the largest step: and early returns (quick). Trainings that learn to charge: 1 of 2 "
-        "(the paper's methods), 1 of 1 (and early returns (quick)) and 1 of 1 (ddqn, wider and "
+        "(the paper's methods), 1 of 1 (and early returns (quick)) and 1 of 1 (ddqn, trained "
         "longer)."
     )
     assert {*of_equal_budget(last, "quick")["variant"]} == {"quick", "other", "none of the three"}
