@@ -10,6 +10,7 @@ draw many fresh ones, and count as slow tests, so that ``nox -s verify`` runs th
 
 import os
 import signal
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,7 @@ settings.register_profile("verify", max_examples=1000, deadline=None, print_blob
 settings.load_profile("default")
 
 
+@cache
 def is_in(path: Path, places: tuple[str, ...]) -> bool:
     """Whether a path is one of some places in the folder of the tests, or in one of them."""
     return any(path.is_relative_to(HERE / place) for place in places)
