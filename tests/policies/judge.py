@@ -190,7 +190,7 @@ class Replay:
     def _hopeful(self, own: np.ndarray, missions: np.ndarray) -> np.ndarray:
         """Whether the battery may last to a zone, for the quota, or until the horizon."""
         cost = missions["flight_cost"]
-        if missions[0]["has_failures"] or not cost.all():
+        if missions["has_failures"].any() or not cost.all():
             return own["active"].copy()
         slots = -(-own["battery"] // cost)
         reaches = slots > self._home[own["y"], own["x"]]
