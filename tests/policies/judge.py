@@ -24,7 +24,7 @@ import numpy as np
 
 from dess.env.stepper import MissionStepper
 from dess.scenario import Scenario, ScenarioSpace
-from dess.state import BATTERY, HOVER, QUOTA, TRUNCATED, State
+from dess.state import BATTERY, QUOTA, TRUNCATED, State
 from dess.view import decide, team_of
 from tests import compiled
 
