@@ -12,7 +12,7 @@ from analysis import numbers
 from analysis.results.event_log import Events, battery_levels, duration, uav_slots
 from dess.scenario import Scenario
 from dess.sea.chart import spread
-from dess.state import types_of
+from dess.sections.fleet import type_of
 
 
 def causes(events: Events, scenario: Scenario, first: int = 1) -> list[str]:
@@ -38,7 +38,7 @@ def _cause(log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int,
     flown = slots[slots["uav"] == uav]
     end, last = duration(log), flown.iloc[-1]
     after, cell = int(last["slot"]) + 1, f"({last['x']}, {last['y']})"
-    quota = types_of(scenario, scenario.uavs)[uav]["quota"]
+    quota = type_of(scenario.fleet, uav).quota or scenario.quota
     left = quota - (own["event"] == "communication").sum()
     to_go = f"with {left} of {quota} communication slots to go"
     name = f"UAV {first + uav}"
@@ -74,7 +74,7 @@ def _names(uavs: pd.Series, first: int) -> str:
 
 def _way(since: pd.DataFrame, scenario: Scenario, uav: int, home: np.ndarray) -> list[str]:
     """When the battery last covered the way to a zone, and what the wind cost."""
-    slots_per_cell = types_of(scenario, scenario.uavs)[uav]["slots_per_cell"]
+    slots_per_cell = type_of(scenario.fleet, uav).slots_per_cell
     cells = home[since["from_y"], since["from_x"]]
     covers = since[since["before"] > cells * slots_per_cell * scenario.flight_cost]
     facts = []
