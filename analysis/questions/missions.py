@@ -17,8 +17,8 @@ import pyarrow as pa
 
 from analysis import numbers
 from analysis.names import PRODUCT, RATIO
-from analysis.questions.causes import causes
 from analysis.results import parquet
+from analysis.results.causes import causes
 from analysis.results.resimulate import resimulate
 from analysis.results.tables import Results
 from analysis.stats.intervals import summary

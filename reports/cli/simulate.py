@@ -219,7 +219,7 @@ class _Mission:
     @property
     def outcome(self) -> str:
         from analysis.numbers import percent
-        from analysis.questions.causes import causes
+        from analysis.results.causes import causes
 
         ends = [uav["end"] for uav in self.record.uav_rows()]
         outcome = (
@@ -270,7 +270,7 @@ def _write_page(mission: _Mission, path: Path) -> None:
 
 def _print_mission(mission: _Mission) -> None:
     from analysis.names import MEASURES
-    from analysis.questions.causes import causes
+    from analysis.results.causes import causes
 
     record = mission.record
     metrics = record.metrics

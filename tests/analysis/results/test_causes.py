@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from analysis.questions.causes import causes
+from analysis.results.causes import causes
 from dess.scenario import Scenario
 from tests.dess.flights import CHANNEL, flown
 
