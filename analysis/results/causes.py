@@ -79,7 +79,7 @@ def _cause(log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int,
 
 
 def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'s' * (number != 1)}"
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _names(uavs: pd.Series, first: int) -> str:
