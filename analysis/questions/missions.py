@@ -18,6 +18,7 @@ import pyarrow as pa
 from analysis import numbers
 from analysis.names import PRODUCT, RATIO
 from analysis.results import parquet
+from analysis.results.causes import causes
 from analysis.results.resimulate import resimulate
 from analysis.results.tables import Results
 from analysis.stats.intervals import summary
@@ -54,18 +55,17 @@ class LoggedMission:
         return f"{self.scenario.uavs} UAV{'s' * (self.scenario.uavs > 1)}"
 
     @property
+    def causes(self) -> str:
+        """What ended the mission of each UAV that did not fill its quota, as sentences."""
+        return " ".join(f"{cause}." for cause in causes(self.log, self.scenario))
+
+    @property
     def caption(self) -> str:
         """What happened in the mission, as the caption of a figure."""
         policy, replication = self.row["policy"], self.row["replication"]
-        depleted = self.log[self.log["event"] == "battery_empty"]
-        fates = [
-            f"the battery of UAV {row.uav + 1} is depleted in slot {row.time:.0f} at "
-            f"({row.x:.0f}, {row.y:.0f})"
-            for row in depleted.itertuples()
-        ]
         return (
             f"{policy} in mission {replication}, a single one (n = 1): "
-            f"{'; '.join(fates) or 'no battery is depleted'}. "
+            f"{self.causes or 'All UAVs filled their quota.'} "
             f"{self.collected} in {self.row['slots']} mission slots."
         )
 

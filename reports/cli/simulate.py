@@ -112,7 +112,7 @@ def simulate(
     with console.outputs(paths) as temporaries:
         with console.compile_notice():
             which = asked.seed, asked.replication
-            record = simulate(asked.space, asked.team, *which, events=bool(paths))
+            record = simulate(asked.space, asked.team, *which, events=bool(paths) or not as_json)
         mission = _Mission(record, sample_scenario(asked.space, *which), asked.title)
         for path, temporary in zip(paths, temporaries, strict=True):
             with writable(path):
@@ -122,7 +122,7 @@ def simulate(
         measured = {"operations": record.measured} if record.operations is not None else {}
         print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
     elif not is_binary:
-        _print_mission(record)
+        _print_mission(mission)
 
 
 @dataclass(frozen=True)
@@ -219,13 +219,15 @@ class _Mission:
     @property
     def outcome(self) -> str:
         from analysis.numbers import percent
+        from analysis.results.causes import causes
 
         ends = [uav["end"] for uav in self.record.uav_rows()]
-        return (
+        outcome = (
             f"{percent(self.record.collection_ratio)} of the data collected in "
             f"{self.record.slots} mission slots; {ends.count('quota')} of {len(ends)} UAVs filled "
             "their quota."
         )
+        return " ".join([outcome, *(f"{c}." for c in causes(self.log, self.scenario))])
 
 
 def _write_log(mission: _Mission, path: Path, kind: str) -> None:
@@ -266,9 +268,11 @@ def _write_page(mission: _Mission, path: Path) -> None:
     writing.fill(path, page)
 
 
-def _print_mission(record: "MissionRecord") -> None:
+def _print_mission(mission: _Mission) -> None:
     from analysis.names import MEASURES
+    from analysis.results.causes import causes
 
+    record = mission.record
     metrics = record.metrics
     rows = [[name, f"{metrics[name].item():g}"] for name in metrics.dtype.names or ()]
     console.print_table(["", "mission"], rows)
@@ -278,3 +282,5 @@ def _print_mission(record: "MissionRecord") -> None:
     uavs = record.uav_rows()
     rows = [[str(number), *map(str, row.values())] for number, row in enumerate(uavs)]
     console.print_table(["UAV", *uavs[0]], rows)
+    for cause in causes(mission.log, mission.scenario, first=0):  # as in the table
+        console.say(f"{cause}.")

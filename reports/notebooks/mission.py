@@ -56,7 +56,7 @@ def played(mission: missions.LoggedMission, name: str) -> html.HTML:
     title = f"{mission.fleet}, {policy_name}: {numbers.percent(mission.row[RATIO])} collected"
     caption = (
         f"n = 1 mission of {policy_name}, replication {replication} of seed {seed}, "
-        f"{mission.row['slots']} mission slots."
+        f"{mission.row['slots']} mission slots. {mission.causes}"
     )
     return player(mission.log, mission.scenario, name, title, caption)
 
@@ -118,7 +118,7 @@ html.gallery([captioned(point) for point in points])
 # %%
 caption = (
     f"n = 1 mission of {best}, replication {replication} of seed {fig1.manifest['seed']}: "
-    f"{example.row['slots']} mission slots, {example.collected}."
+    f"{example.row['slots']} mission slots, {example.collected}. {example.causes}"
 )
 alt = "Map of the mission; battery, residual data and charging"
 html.gallery([(mission_figure(example.log, example.scenario), alt, caption)])

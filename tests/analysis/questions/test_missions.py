@@ -60,16 +60,14 @@ def test_logs_of_other_results_and_of_other_records_are_not_shown(
     assert missions.kept_missions(other, WANTED[:1], tmp_path) == []
 
 
-def test_a_caption_says_where_batteries_are_depleted(shown: list[missions.LoggedMission]) -> None:
+def test_a_caption_says_what_ended_a_mission(shown: list[missions.LoggedMission]) -> None:
     mission = shown[1]
-    kept = mission.log[mission.log["event"] != "battery_empty"]
-    assert ": no battery is depleted. " in replace(mission, log=kept).caption
-    rows = [{"time": 7.0 + n, "event": "battery_empty", "uav": n, "x": n, "y": 5} for n in (0, 2)]
-    text = replace(mission, log=pd.concat([kept, pd.DataFrame(rows)])).caption
-    assert (
-        "UAV 1 is depleted in slot 7 at (0, 5); the battery of UAV 3 is depleted in slot 9" in text
-    )
-    assert f"{mission.collected} in {mission.row['slots']} mission slots." in text
+    filled = mission.log.assign(event=mission.log["event"].replace("battery_empty", "quota_filled"))
+    assert ": All UAVs filled their quota. " in replace(mission, log=filled).caption
+    end = (filled["event"] == "quota_filled") & (filled["uav"] == 2)
+    failed = filled.assign(event=filled["event"].mask(end, "battery_empty"))
+    assert ": UAV 3 ran empty after " in replace(mission, log=failed).caption
+    assert f". {mission.collected} in {mission.row['slots']} mission slots." in mission.caption
 
 
 def test_outcomes_are_those_of_the_record(shown: list[missions.LoggedMission]) -> None:

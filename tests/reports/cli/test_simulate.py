@@ -46,6 +46,17 @@ def test_simulate_prints_the_contract(dess_json):
     assert total == pytest.approx(mission["collected"] + mission["residual"], abs=1e-9)
 
 
+def test_what_ended_a_mission_is_printed_and_on_its_page(dess, tmp_path):
+    """Printed with the numbers of the table, on the page with those of the drawings."""
+    failing = ("--policy", "random-unguarded", "--set", "uavs=2", "--set", "max_slots=9")
+    code, out, _ = dess("simulate", "--scenario", "small.toml", *failing, "--animation", "m.html")
+    lines = [f"UAV {uav} was still active at the horizon of 9 slots, with" for uav in range(3)]
+    assert code == 0
+    assert [line in out for line in lines] == [True, True, False]
+    page = (tmp_path / "m.html").read_text("utf-8")
+    assert [line in page for line in lines] == [False, True, True]
+
+
 def test_a_mission_of_a_study_can_be_simulated_alone(dess, dess_json, tmp_path):
     assert dess("study", "run", "trial.toml", "--out", "out", "--policy", "greedy,random")[0] == 0
     row = load_results(tmp_path / "out").missions.iloc[6]
