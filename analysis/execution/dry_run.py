@@ -18,8 +18,8 @@ from analysis.execution.effort import (
 from analysis.execution.engines import simulate_missions
 from analysis.results.chunks import bound_parts, check_parts, missions_in, parts_of
 from analysis.results.store import Store, sources
-from analysis.study.cheapest import Cheapest
 from analysis.study.best import decisions
+from analysis.study.cheapest import Cheapest
 from analysis.study.study import Study
 from dess import InputError
 from policies.registry import load_team
