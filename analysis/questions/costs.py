@@ -177,10 +177,11 @@ def answers(results: Results, table: pd.DataFrame, policies: int = 1) -> list[st
     for rows, required in ((table, wanted), (together, {})):
         for (condition, policy), part in rows.groupby(["condition", "policy"], sort=False):
             where = f"{condition}, `{policy}`" if condition else f"`{policy}`"
-            text = f"{where[:1].upper()}{where[1:]}: {_answer(part, required, currency)}"
             choice = _choice(results, str(policy))
             found = choice.answers[conditions.index(condition) if required else -1]
-            sentences.append(text + _trust(results, choice, found, policies))
+            trust = _trust(results, choice, found, policies)
+            text = _answer(part, required, currency, trust)
+            sentences.append(f"{where[:1].upper()}{where[1:]}: {text}")
     return sentences
 
 
@@ -247,13 +248,14 @@ def selections(results: Results) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*columns, "guarantee"]).astype({"point": "Int64"})
 
 
-def _answer(rows: pd.DataFrame, wanted: Mapping[Any, float], currency: str) -> str:
+def _answer(rows: pd.DataFrame, wanted: Mapping[Any, float], currency: str, trust: str) -> str:
     """The answer for one policy under one condition.
 
     Args:
         rows: The rows of ``judged`` or ``everywhere``, the cheapest first.
         wanted: The requirements, for what the rows have of their metrics.
         currency: The currency of the costs.
+        trust: What else is to be said about the answer.
     """
     best = rows[rows["selected"]]
     if len(best):
@@ -267,6 +269,7 @@ def _answer(rows: pd.DataFrame, wanted: Mapping[Any, float], currency: str) -> s
         leads = pd.DataFrame({metric: rows[metric] - least for metric, least in wanted.items()})
         cheaper = rows.loc[leads.min(axis=1).nlargest(1).index]
         text, which = "no setting is known to meet the requirements.", "closest"
+    text += trust
     for _, row in cheaper.iterrows():
         text += f" The {which} one, {_told(row, wanted, currency)}, {_WHY_NOT[row['verdict']]}."
     return text
@@ -278,13 +281,12 @@ def _trust(results: Results, choice: CheapestChoice, answer: Answer, policies: i
     assert isinstance(rule, Cheapest)
     if answer.points:
         least = [
-            f"{METRICS[metric].lower()} is at least {numbers.level(q - rule.tolerance)}"
+            f"{METRICS[metric].lower()} of at least {numbers.level(q - rule.tolerance)}"
             for metric, q in rule.requirements.items()
         ]
         where = " under every condition" * (answer.condition is None)
-        text = (
-            f" Its {numbers.words(least)}{where}, shown at {numbers.level(rule.shown(policies))}."
-        )
+        sure = numbers.level(rule.shown(policies))
+        text = f" It has a {numbers.words(least)}{where}, shown at {sure}."
         point = answer.points[0]
         text += edge(results, point, _ends(results, point), "a cheaper one")
     if choice.done and not answer.settled:

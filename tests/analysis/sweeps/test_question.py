@@ -171,9 +171,8 @@ def test_a_million_settings_are_refused_before_they_are_made(tmp_path):
 
 
 def test_missions_of_other_sweeps_take_no_time(asking, tmp_path, monkeypatch):
-    monkeypatch.setattr(dry_run, "FEW", 20)
-    monkeypatch.setattr(effort, "FEW", 20)
     monkeypatch.setattr(effort, "LONG_RUN", 0.0)
+    monkeypatch.setattr(dry_run, "LONG_RUN", 0.0)
     study = sweep_of(FIELDS, tmp_path, missions=6)
     with pytest.raises(InputError, match="24 missions to simulate"):
         ask(study, tmp_path / "results")
