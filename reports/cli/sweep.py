@@ -62,7 +62,7 @@ def sweep(
 
     Args:
         settings: The values of a field: 2..5, 0.01..0.05:5 (five values) or 1,2,4. A field with
-            one value is fixed; repeatable.
+            one value is fixed; zones.pads are the pads of all further zones; repeatable.
         policy: Policies to compare; repeatable.  [default: the best that five minutes allow, and
             greedy]
         metric: The metric that ranks the settings: success, ratio, product, reward, cost, or
@@ -72,7 +72,8 @@ def sweep(
         price: A price: uav, pad, charge, hour or lost_uav; also currency, missions (planned for
             the fleet) and slot_seconds; repeatable.
         require: Search for the cheapest setting whose mean of a metric (success, ratio,
-            product) is at least this; repeatable.
+            product) is at least this; repeatable. It may be half a point below; the answer says
+            what is guaranteed.
         name: Name of the sweep.  [default: its fields and a hash]
         results: Folder in which the results are stored, as sweeps/NAME.
         out: Folder of the page.
