@@ -53,7 +53,8 @@ def test_what_takes_too_much_is_refused_before_it_begins(monkeypatch, handed):
     monkeypatch.setattr(effort, "LONG_RUN", 500.0)
     check_evaluation([Asked(SPACE, "random", 1_000_000)])
     two = [Asked(SPACE, team, 10**9, workers=4) for team in ("random", "greedy")]
-    line = r"evaluate: 2,000,000,000 missions \(policies: 2, workers: 4\), about 89 minutes to 13 hours; allowed"
+    line = r"evaluate: 2,000,000,000 missions \(policies: 2, workers: 4\), "
+    line += "about 89 minutes to 13 hours; allowed"
     with pytest.raises(InputError, match=f"{line}: --yes, or less"):
         check_evaluation(two)
     check_evaluation([Asked(SPACE, "random", 10**9)], yes=True)
