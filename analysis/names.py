@@ -8,7 +8,7 @@ import numpy as np
 
 from dess.errors import form_of, kind_of
 from dess.record import OPERATIONS
-from dess.scenario import SAMPLED, Scenario, ScenarioSpace, fields_of
+from dess.scenario import SAMPLED, ZONE_PADS, Scenario, ScenarioSpace, fields_of
 
 SUCCESS, RATIO = "success", "collection_ratio"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
@@ -122,6 +122,7 @@ _OTHERS = {
     "pads": Parameter("Number of charging pads", "Pads"),
     "zone": Parameter("Start and charging zone", "Zone"),
     "zones": Parameter("Further charging zones", "Zones"),
+    ZONE_PADS: Parameter("Pads of each further zone", "Further pads"),
     "nodes": Parameter("Sensor nodes", "Nodes"),
     "quota": Parameter("Communication quota", "Quota", "communication slots"),
     "arrival_rate": Parameter("Arrival rate", "Arrivals", "data units per node and slot"),
@@ -138,7 +139,7 @@ _OTHERS = {
 
 # The fields that an operator decides on. All other fields are conditions that a fleet has to meet.
 DECISIONS = (
-    *("uavs", "pads", "zone", "zones", "forbid_swaps", "altitude"),
+    *("uavs", "pads", "zone", "zones", ZONE_PADS, "forbid_swaps", "altitude"),
     *("flying_time", "charge_start", "charge_complete", "charge_rate"),
 )
 

@@ -17,7 +17,7 @@ from pydantic import (
     model_validator,
 )
 
-from dess.errors import InputError, validation_line
+from dess.errors import InputError, shown, validation_line
 from dess.sea.chart import FAR, Cell, Chart, Rectangle, chart_at, parking_of, spread, zones_of
 from dess.sections.age import MOST_TEETH, Age
 from dess.sections.arrivals import Arrivals
@@ -50,6 +50,7 @@ MOST_ENTRIES = 2**30
 EXTENSIONS = ("arrivals", "age", "charging", "failures", "wind", "fleet")
 # The fields of seas that the paper does not have; records are the same with and without them.
 GEOMETRY = ("rows", "zones", "no_fly")
+ZONE_PADS = "zones.pads"  # sets the pads of the zones of ``zones``, and leaves their cells
 
 # A reward per event. Sums of many of them are still finite, and so are their squares.
 Reward = Annotated[Number, Field(ge=-(10**9), le=10**9)]
@@ -69,7 +70,9 @@ class Zone(Strict):
 
     cells: Rectangle = Field(description="[x, y, width, height] in cells")
     pads: Integer | None = Field(
-        None, ge=1, description="charging pads; without it, as many as the zone has cells"
+        None,
+        ge=1,
+        description="charging pads of a further zone; without it, as many as the zone has cells",
     )
 
 
@@ -269,6 +272,8 @@ class Constants(Strict):
 
     def value(self, field: str) -> Any:
         """The value of a field; ``failures.uav_rate`` is the field of a section."""
+        if field == ZONE_PADS:
+            return self.zone_pads[1:]
         section, _, name = field.rpartition(".")
         return getattr(getattr(self, section) if section else self, name)
 
@@ -282,7 +287,13 @@ class Constants(Strict):
 
 
 def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
-    """Values on top of others; ``failures.uav_rate`` and a table replace parts of a section."""
+    """Values on top of others; ``failures.uav_rate`` and a table replace parts of a section.
+
+    ``zones.pads`` replaces the pads of the further zones: a number for all, or one for each.
+
+    Raises:
+        InputError: If ``zones.pads`` has another length than ``zones``.
+    """
     result: dict[str, Any] = {}
     for name, value in (dotted(base) | dotted(values)).items():
         section, _, part = name.partition(".")
@@ -291,6 +302,13 @@ def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
             table[part] = value
         else:
             result[name] = value
+    if ZONE_PADS in result:
+        pads, zones = result.pop(ZONE_PADS), result.get("zones") or ()
+        each = pads if isinstance(pads, list | tuple) else [pads] * len(zones)
+        if not zones or len(each) != len(zones):
+            allowed = f"a number, or a list of {len(zones)}" if zones else "with further zones"
+            raise InputError(f"{ZONE_PADS}: {shown(pads)} does not fit; allowed: {allowed}")
+        result["zones"] = [{**zone, "pads": n} for zone, n in zip(zones, each, strict=True)]
     return result
 
 
@@ -298,7 +316,7 @@ def dotted(values: dict[str, Any]) -> dict[str, Any]:
     """Values by field: the table of a section becomes fields such as ``failures.uav_rate``."""
     fields: dict[str, Any] = {}
     for name, value in values.items():
-        if name in EXTENSIONS and isinstance(value, dict):
+        if name in (*EXTENSIONS, "zones") and isinstance(value, dict):
             fields |= {f"{name}.{part}": of_part for part, of_part in value.items()}
         else:
             fields[name] = value

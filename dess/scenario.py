@@ -23,7 +23,9 @@ from dess.constants import (
     MOST_NODES,
     MOST_SLOTS,
     MOST_UAVS,
+    ZONE_PADS,
     Constants,
+    Zone,
     dotted,
     is_number,
     merged,
@@ -50,6 +52,7 @@ __all__ += [
     "Number",
 ]
 __all__ += ["EXTENSIONS", "GEOMETRY", "MOST_CELLS", "MOST_NODES", "MOST_SLOTS", "MOST_UAVS"]
+__all__ += ["ZONE_PADS"]
 
 # The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
 SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
@@ -87,7 +90,7 @@ class _Sampled(Constants):
     @property
     def numeric(self) -> list[str]:
         """The fields that hold a number, or a range of numbers."""
-        others = (*SAMPLED, "initial_data", "pads")
+        others = (*SAMPLED, "initial_data", "pads", *([ZONE_PADS] if self.zones else []))
         return [
             name for name in fields_of(type(self)) if name in others or is_number(self.value(name))
         ]
@@ -109,6 +112,7 @@ class _Sampled(Constants):
         between = {
             "uavs": (1, min(cells, MOST_UAVS)),
             "pads": (1, cells),
+            ZONE_PADS: (1, min((w * h for *_, w, h in self.rectangles[1:]), default=1)),
             "initial_data": (0, MOST_DATA),
         }
         limits = fields_of(Scenario)[field].metadata
@@ -171,6 +175,8 @@ def fields_of(model: type[Constants]) -> dict[str, FieldInfo]:
             found |= {f"{name}.{part}": inner for part, inner in kind.model_fields.items()}
         else:
             found[name] = field
+        if name == "zones":
+            found[ZONE_PADS] = Zone.model_fields["pads"]
     return found
 
 

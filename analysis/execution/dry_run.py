@@ -1,35 +1,31 @@
 """The plan of a run: how many missions are needed, how many are present, how long it takes."""
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, partial, reduce
 from pathlib import Path
 
-from analysis.bound import upper_bound
 from analysis.execution.effort import (
-    FEW,
-    TRIAL_SEED,
-    Clock,
-    are_few,
+    BOUND,
+    LONG_RUN,
+    START,
+    Range,
     check_time,
     check_workers,
     check_workers_memory,
-    seconds_per_mission,
+    seconds_of,
 )
 from analysis.execution.engines import simulate_missions
 from analysis.results.chunks import bound_parts, check_parts, missions_in, parts_of
 from analysis.results.store import Store, sources
+from analysis.study.best import decisions
 from analysis.study.cheapest import Cheapest
 from analysis.study.study import Study
 from dess import InputError
-from dess.scenario import ScenarioSpace
 from policies.registry import load_team
 
 # The memory [bytes] of a design point and of a mission, measured on studies of many of either.
 POINT_MEMORY, MISSION_MEMORY = 12_000, 1_200
-
-FEW_BOUNDS = 300  # upper bounds that need no estimate of their time
 
 
 @dataclass(frozen=True)
@@ -41,14 +37,16 @@ class Planned:
         missions: Number of missions needed; a lower bound if a rule decides it.
         present: Number of these missions that are already in the results folder.
         logs: Number of missing event logs.
-        seconds: Estimated time of what is missing [s]; 0 before it is estimated.
+        most: The largest number of missions that a rule may ask for; without one, ``missions``.
+        seconds: Estimated time of what is missing on one core.
     """
 
     policy: str
     missions: int
     present: int
     logs: int = 0
-    seconds: float = 0.0
+    most: int = 0
+    seconds: Range = Range()
 
     @property
     def missing(self) -> int:
@@ -60,8 +58,8 @@ def plan_study(
     study: Study,
     out: str | Path,
     workers: int = 1,
-    clock: Clock = time.perf_counter,
     accept_code: bool = False,
+    reuse: Sequence[Path] = (),
 ) -> list[Planned]:
     """Plan a run; nothing is written.
 
@@ -69,8 +67,8 @@ def plan_study(
         study: The study.
         out: The results folder, which need not exist.
         workers: Number of processes.
-        clock: Returns the time [s].
         accept_code: Whether missions that other code has simulated count as present.
+        reuse: As for ``run_study``.
 
     Returns:
         What the run would do for every policy and, if the study has bounds, for these.
@@ -79,8 +77,16 @@ def plan_study(
         InputError: If the folder contains something else, or ``workers`` is below 1.
     """
     check_workers(workers)
-    counted = _counted(study, Store.peek(study, out, accept_code))
-    return [replace(planned, seconds=_seconds(study, planned, clock)) for planned in counted]
+    store = Store.peek(study, out, accept_code)
+    for source in sources(reuse, store.manifest):
+        store.count(source)
+    return [replace(p, seconds=_seconds(study, p)) for p in _counted(study, store)]
+
+
+def total(plan: Sequence[Planned], workers: int) -> Range:
+    """The time of a plan with so many workers."""
+    low, high = reduce(Range.plus, (planned.seconds for planned in plan), Range())
+    return Range(low / workers, high / workers + (START if high else 0.0))
 
 
 def check_run(
@@ -107,7 +113,6 @@ def check_effort(
     study: Study,
     out: str | Path,
     workers: int = 1,
-    clock: Clock = time.perf_counter,
     accept_code: bool = False,
     reuse: Sequence[Path] = (),
     yes: bool = False,
@@ -118,7 +123,6 @@ def check_effort(
         study: The study.
         out: The results folder, which need not exist.
         workers: Number of processes.
-        clock: Returns the time [s].
         accept_code: As for ``run_study``.
         reuse: As for ``run_study``.
         yes: Whether any time and memory is allowed.
@@ -131,29 +135,19 @@ def check_effort(
             the number of missions and the estimate), the folder contains something else, or
             ``workers`` is out of range.
     """
-    check_workers(workers)
-    store, teams = Store.peek(study, out, accept_code), len(study.policies)
-    parts = _counted(study, store)
-    if sum(planned.missing for planned in parts[:teams]) > FEW:
-        for source in sources(reuse, store.manifest):
-            store.count(source)
-        parts = _counted(study, store)
-    missing = sum(planned.missing for planned in parts[:teams])
+    plan, teams = plan_study(study, out, workers, accept_code), len(study.policies)
+    if reuse and total(plan, workers).low > LONG_RUN:
+        plan = plan_study(study, out, workers, accept_code, reuse)
+    missing = sum(planned.missing for planned in plan[:teams])
     what = (
         f"study {study.name}: {'at least ' if study.rule else ''}{missing:,} missions to "
         f"simulate (policies: {teams}, design points: {study.size:,}, workers: {workers:,})"
     )
-    work = sum(planned.missing + planned.logs for planned in parts)
-    if yes or not work:
+    if yes or not any(planned.missing + planned.logs for planned in plan):
         return missing
-    ends = [study.points[number].scenario for number in (0, -1)]
-    bounds = parts[-1].missing if study.bounds else 0
-    few = all(are_few(work - bounds, space) for space in ends)
-    estimated = [] if few else parts[:teams]
-    estimated += parts[teams:] if bounds > FEW_BOUNDS else []
-    seconds = sum(_seconds(study, planned, clock) for planned in estimated) / workers
-    check_time(what, seconds)
+    check_time(what, total(plan, workers))
     held = study.size * (POINT_MEMORY + study.first * teams * MISSION_MEMORY)
+    ends = [study.points[number].scenario for number in (0, -1)]
     check_workers_memory(what, workers, ends, held)
     return missing
 
@@ -188,45 +182,35 @@ def _counted(study: Study, store: Store) -> list[Planned]:
         parts = parts_of(manifest, team) + check_parts(manifest, team)
         needed, missing = missions_in(parts), missions_in(store.missing("missions", parts))
         logs = missions_in(store.missing("events", parts_of(manifest, team, logged)))
-        plan.append(Planned(policy, needed, needed - missing, logs))
+        most = _most(study) if study.rule and missing else needed
+        plan.append(Planned(policy, needed, needed - missing, logs, max(most, needed)))
     if study.bounds:
         parts = bound_parts(manifest)
         missing = missions_in(store.missing("bounds", parts))
-        plan.append(Planned("upper bounds", missions_in(parts), missions_in(parts) - missing))
+        needed = missions_in(parts)
+        plan.append(Planned("upper bounds", needed, needed - missing, most=needed))
     return plan
 
 
 def budget(study: Study) -> int:
     """Largest number of missions that a study may need, which a rule decides if it has one."""
-    each = study.most * study.size
-    if study.selection:
-        checked = study.size if isinstance(study.selection, Cheapest) else 1
-        each = study.selection.budget + study.selection.check * checked
-    return len(study.policies) * each
+    return len(study.policies) * _most(study)
 
 
-def _seconds(study: Study, planned: Planned, clock: Clock) -> float:
-    """Estimated time [s] on one core of the missing missions and event logs, or of the bounds."""
+def _most(study: Study) -> int:
+    """The largest number of missions of a policy."""
+    if not study.selection:
+        return study.most * study.size
+    checked = study.size if isinstance(study.selection, Cheapest) else 1
+    return study.selection.budget + study.selection.check * checked
+
+
+def _seconds(study: Study, planned: Planned) -> Range:
+    """Estimated time on one core of the missing missions and event logs, or of the bounds."""
+    spaces, most = [point.scenario for point in study.points], planned.most - planned.present
     if planned.policy not in study.policies:
-        return planned.missing * _seconds_per_bound(study, clock) if planned.missing else 0.0
-    team = load_team(planned.policy)
-
-    def spaces_of(missions: int) -> list[ScenarioSpace]:
-        """The scenarios of missions that are spread over the design points."""
-        places = [(n * study.size) // missions for n in range(missions)]
-        return [study.points[place].scenario for place in places]
-
-    return sum(
-        count * seconds_per_mission(spaces_of, team, engine, clock)
-        for engine, count in ((study.engine, planned.missing), ("events", planned.logs))
-        if count
-    )
-
-
-def _seconds_per_bound(study: Study, clock: Clock) -> float:
-    """The time of an upper bound [s], measured on one."""
-    space = study.points[0].scenario
-    upper_bound(space, TRIAL_SEED, 0, iterations=1)  # compiles
-    begin = clock()
-    upper_bound(space, TRIAL_SEED, 0)
-    return clock() - begin
+        made = planned.missing * sum(map(decisions, spaces)) / len(spaces)
+        return Range(*(made * each for each in BOUND))
+    logs = seconds_of(spaces, planned.policy, (planned.logs, planned.logs), "events")
+    missions = planned.missing, max(most, 0)
+    return seconds_of(spaces, planned.policy, missions, study.engine).plus(logs)

@@ -1,43 +1,67 @@
 """What work takes, in time and in memory: what takes too much is refused before it begins.
 
-The command line refuses what would take more than ``LONG_RUN`` or more memory than is available,
-unless ``--yes`` is given. Functions of Python have the same checks where they have the argument
-``yes``; ``run_study``, ``evaluate`` and ``simulate_batch`` do what they are asked to do.
+Times are ranges, computed from the times of decisions that were measured once for every shipped
+policy: nothing is compiled or simulated for them, so they take no time, and are the same each time.
+Another machine, sea or mission may take ``SPREAD`` times as long or as short.
+
+The command line refuses what would take more than ``LONG_RUN`` by the lower end of its range or
+more memory than is available, unless ``--yes`` is given. Functions of Python have the same checks
+where they have the argument ``yes``; ``run_study``, ``evaluate`` and ``simulate_batch`` do what
+they are asked to do.
 """
 
 import math
-import time
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, Self
 
 from analysis import numbers
-from analysis.execution.engines import simulate_missions
+from analysis.study.best import SECONDS, decisions
 from dess import InputError
 from dess.code.memory import check_memory
 from dess.scenario import ScenarioSpace
-
-Clock = Callable[[], float]
+from policies.registry import SHIPPED, folder_of
 
 MAX_WORKERS = 1024
 # The memory [bytes] of a process, without what processes share: 119 MiB were measured with greedy,
 # 297 with a learned policy.
 WORKER_MEMORY = 300 * 2**20
 
-# Missions that are timed to estimate the time of all: ONE, if it takes longer than SLOW seconds;
-# otherwise TRIAL, or LONG_TRIAL if TRIAL missions take less than ENOUGH seconds.
-ONE, TRIAL, LONG_TRIAL = 1, 48, 240
-SLOW, ENOUGH = 5.0, 0.2
-TRIAL_SEED = 400_000_000
+# A run that takes longer than this [s] has to be confirmed.
+LONG_RUN = 3600.0
+SPREAD = 3.0  # how much longer or shorter than here missions may take elsewhere
 
-# A run that takes longer than this [s] has to be confirmed. Few missions need no estimate.
-LONG_RUN, FEW = 3600.0, 10_000
-ORDINARY = 3 * 500  # UAVs times mission slots of the missions that FEW counts
+# The times of a decision [s] on one core, of the shipped policies, of other trained ones, and of
+# classes of others, in which anything may happen.
+_SECONDS = SECONDS | {"planner-long": 3e-3, "ddqn-paper": 7e-5}
+_SECONDS |= dict.fromkeys(("ddqn", "ddqn-2", "ddqn-3"), 6e-6)
+_HEURISTIC, _TRAINED, _OTHER = (2e-6, 2e-6), (5e-6, 7e-5), (2e-6, 1e-3)
+START = 15.0  # what a run may take to start its workers and to write its results [s]
+BOUND = (1e-4, 1e-2)  # the time of an upper bound [s] for every decision of its mission
 
 # In the SimPy engine: the time of an event [s], with its share of the decisions, and the memory of
 # a packet [bytes], with its share of the event log.
 EVENT, PACKET_MEMORY = 5e-5, 400
+EVENTS = 1e-5  # what it takes in addition for a decision [s]
 
 CONFIRMED = "--yes, or less"  # in Python: yes=True
+
+
+class Range(NamedTuple):
+    """A time [s] that lies between two ends."""
+
+    low: float = 0.0
+    high: float = 0.0
+
+    def plus(self, other: Self) -> "Range":
+        """This time and another one."""
+        return Range(self.low + other.low, self.high + other.high)
+
+    def __str__(self) -> str:
+        """The ends in words, such as ``5 seconds to 2 minutes``."""
+        low, high = (numbers.duration(max(end, 2.0)) for end in self)
+        if self.low < 2.0:
+            return f"up to {high}"
+        return f"{low.removesuffix(high[high.index(' ') :])} to {high}"
 
 
 def check_workers(workers: int) -> None:
@@ -50,42 +74,40 @@ def check_workers(workers: int) -> None:
         raise InputError(f"workers: {workers} is out of range; allowed: 1..{MAX_WORKERS:,}")
 
 
-def are_few(missions: int, space: ScenarioSpace) -> bool:
-    """Whether missions are so few and so short that no estimate of their time is needed."""
-    longer = (space.uavs[1] * space.max_slots + space.packets) / ORDINARY
-    return missions * max(longer, 1.0) <= FEW
-
-
-def seconds_per_mission(
-    spaces_of: Callable[[int], Sequence[ScenarioSpace]],
-    team: Sequence[Any],
+def seconds_of(
+    spaces: Sequence[ScenarioSpace],
+    team: str,
+    missions: tuple[float, float],
     engine: str = "batch",
-    clock: Clock = time.perf_counter,
-) -> float:
-    """The mean time of a mission [s], measured on some missions.
+    workers: int = 1,
+) -> Range:
+    """The time of missions that are spread evenly over scenarios.
 
     Args:
-        spaces_of: Returns the scenarios of that many missions.
-        team: The policies.
+        spaces: The scenarios.
+        team: ``"P"`` or ``"P,P,..."``.
+        missions: The least and the largest number of missions.
         engine: ``batch`` or ``events``.
-        clock: Returns the time [s].
+        workers: Number of processes or threads.
     """
-
-    def trial(missions: int) -> float:
-        spaces = spaces_of(missions)
-        begin = clock()
-        simulate_missions(engine, spaces, team, TRIAL_SEED, range(missions))
-        return (clock() - begin) / missions
-
-    trial(ONE)  # compiles
-    if (seconds := trial(ONE)) > SLOW:
-        return seconds
-    seconds = trial(TRIAL)
-    return trial(LONG_TRIAL) if seconds * TRIAL < ENOUGH else seconds
+    each = [_decision(name) for name in team.split(",")]
+    more = EVENTS if engine == "events" else 0.0
+    made = sum(map(decisions, spaces)) / len(spaces) / workers
+    low, high = (sum(of) / len(each) + more for of in zip(*each, strict=True))
+    return Range(missions[0] * made * low / SPREAD, missions[1] * made * high * SPREAD)
 
 
-def check_time(what: str, seconds: float, allowed: str = CONFIRMED) -> None:
-    """Refuse work that takes long.
+def _decision(policy: str) -> tuple[float, float]:
+    """The least and the largest time of a decision of a policy [s]."""
+    if policy in _SECONDS:
+        return _SECONDS[policy], _SECONDS[policy]
+    if policy in SHIPPED:
+        return _HEURISTIC
+    return _TRAINED if folder_of(policy) else _OTHER
+
+
+def check_time(what: str, seconds: float | Range, allowed: str = CONFIRMED) -> None:
+    """Refuse work that takes long, by the lower end of its range.
 
     Args:
         what: The work and its size.
@@ -95,8 +117,9 @@ def check_time(what: str, seconds: float, allowed: str = CONFIRMED) -> None:
     Raises:
         InputError: If it takes more than ``LONG_RUN``.
     """
-    if seconds > LONG_RUN:
-        raise InputError(f"{what}, about {numbers.duration(seconds)}; allowed: {allowed}")
+    if (seconds.low if isinstance(seconds, Range) else seconds) > LONG_RUN:
+        text = seconds if isinstance(seconds, Range) else numbers.duration(seconds)
+        raise InputError(f"{what}, about {text}; allowed: {allowed}")
 
 
 def check_missions(what: str, spaces: Sequence[ScenarioSpace], earlier: float = 0.0) -> float:

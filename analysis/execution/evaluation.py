@@ -1,19 +1,19 @@
 """Evaluate single teams: many missions of one scenario, kept as records or as means alone."""
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 
 from analysis.execution.effort import (
-    Clock,
-    are_few,
+    Range,
     check_time,
     check_workers,
     check_workers_memory,
-    seconds_per_mission,
+    seconds_of,
 )
 from analysis.execution.engines import CHUNK, simulate_missions
 from analysis.execution.jobs import Job, MissionsJob, Problem, Progress
@@ -31,6 +31,8 @@ from dess.view import check_team
 from policies.registry import TypedByUser, load_team
 
 METRICS = (*SHARES, *MEANS)
+
+Clock = Callable[[], float]
 
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
 # sums depend on it.
@@ -174,15 +176,12 @@ def _metrics(records: Records) -> dict[str, np.ndarray]:
     return {metric: of for metric, of in values.items() if len(of)}
 
 
-def check_evaluation(
-    asked: Sequence[Asked], yes: bool = False, clock: Clock = time.perf_counter
-) -> None:
+def check_evaluation(asked: Sequence[Asked], yes: bool = False) -> None:
     """Refuse ``means`` of several teams that could not come to their end, before the first mission.
 
     Args:
         asked: For each team its missions, which differ in nothing else.
         yes: Whether any time and memory is allowed.
-        clock: Returns the time [s].
 
     Raises:
         InputError: If a team is unknown or cannot act in the scenario, or a number is out of range;
@@ -195,16 +194,13 @@ def check_evaluation(
     what = f"evaluate: {missions:,} missions (policies: {len(asked)}, workers: {workers:,})"
     if not yes:
         check_workers_memory(what, workers, [scenario], 4 * MEMORY, engine == "events")
-    if yes or are_few(missions, scenario):
-        for one in asked[1:]:  # the first one is refused at its first mission
-            simulate_missions(engine, [scenario], load_team(one.team), one.seed, [0])
-        return
-    seconds = sum(
-        one.missions
-        * seconds_per_mission(lambda n: [scenario] * n, load_team(one.team), engine, clock)
-        for one in asked
-    )
-    check_time(what, seconds / workers)
+        times = [
+            seconds_of([scenario], one.team, (one.missions, one.missions), engine, workers)
+            for one in asked
+        ]
+        check_time(what, reduce(Range.plus, times))
+    for one in asked[1:]:  # the first one is refused at its first mission
+        simulate_missions(engine, [scenario], load_team(one.team), one.seed, [0])
 
 
 def _together(scenario: ScenarioSpace) -> int:

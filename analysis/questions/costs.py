@@ -16,18 +16,22 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import is_numeric_dtype
 
 from analysis import numbers
 from analysis.names import COST, DECISIONS, METRICS, SUCCESS
-from analysis.questions.settings import points, ranked, value_in_words
+from analysis.questions.settings import edge, ends, points, ranked, value_in_words
 from analysis.results.tables import Results
 from analysis.stats.front import membership, on_front
+from analysis.study.candidates import Answer
 from analysis.study.cheapest import Cheapest, CheapestChoice
 from analysis.study.costs import PARTS, Costs
 from dess.errors import InputError, one_of
+from dess.scenario import ZONE_PADS
 
 MISSED, OPEN, MET = "missed", "open", "met"  # the most serious first
 VERDICTS = {MET: "shown", OPEN: "not shown", MISSED: "refuted"}  # the words used in tables
+COUNTED = ("uavs", "pads", ZONE_PADS)  # the numbers of what has a price
 EVERYWHERE = "all conditions"
 _WHY_NOT = {
     MET: "meets the requirements as well, and saves less than the indifference",
@@ -152,49 +156,74 @@ def everywhere(results: Results, table: pd.DataFrame) -> pd.DataFrame:
     return fleets.sort_values(COST, kind="stable", ignore_index=True)
 
 
-def answers(results: Results, table: pd.DataFrame) -> list[str]:
+def sentences(results: Results) -> list[str]:
+    """In words: the cheapest setting of all policies, then that of each policy and condition."""
+    lines = answers(results, judged(results))
+    return lines if len(results.policies) == 1 else [answer(results), *lines]
+
+
+def answers(results: Results, table: pd.DataFrame, policies: int = 1) -> list[str]:
     """In words: the cheapest setting for each policy and condition, and why no cheaper one.
 
     Args:
         results: The study.
         table: The result of ``judged``.
+        policies: Of how many policies the answer is the cheapest, for its confidence.
     """
     rule, currency = results.store.manifest.selection, _prices(results).currency
     wanted = rule.requirements if isinstance(rule, Cheapest) else {}
     together = everywhere(results, table).assign(condition=f"{EVERYWHERE} together")
-    sentences = []
+    sentences, conditions = [], [*dict.fromkeys(_conditions(results))]
     for rows, required in ((table, wanted), (together, {})):
         for (condition, policy), part in rows.groupby(["condition", "policy"], sort=False):
             where = f"{condition}, `{policy}`" if condition else f"`{policy}`"
-            sentences.append(f"{where[:1].upper()}{where[1:]}: {_answer(part, required, currency)}")
+            choice = _choice(results, str(policy))
+            found = choice.answers[conditions.index(condition) if required else -1]
+            trust = _trust(results, choice, found, policies)
+            text = _answer(part, required, currency, trust)
+            sentences.append(f"{where[:1].upper()}{where[1:]}: {text}")
     return sentences
 
 
 def answer(results: Results) -> str:
-    """In words: the cheapest setting of the first policy, and what the others would have said.
+    """In words: the cheapest setting of all policies, and what the others would have said.
 
     If there are several conditions, it is the setting for all of them together.
     """
-    table, first = judged(results), results.policies[0]
-    return " ".join([answers(results, table[table["policy"] == first])[-1], *dependence(results)])
+    table, best, count = judged(results), best_policy(results), len(results.policies)
+    return " ".join(
+        [answers(results, table[table["policy"] == best], count)[-1], *dependence(results)]
+    )
+
+
+def best_policy(results: Results) -> str:
+    """The policy whose fleet is the cheapest that meets the requirements under every condition."""
+    costs = priced(results).set_index(["policy", "point"])[COST]
+
+    def cost(policy: str) -> float:
+        points = _choice(results, policy).answers[-1].points
+        return float(np.mean([costs[policy, point] for point in points])) if points else np.inf
+
+    return min(results.policies, key=cost)
 
 
 def dependence(results: Results) -> list[str]:
-    """A sentence for each further policy: what its cheapest fleet is, so how much depends on it."""
+    """A sentence for each other policy: what its cheapest fleet is, so how much depends on it."""
     fleets = selections(results).groupby("policy", sort=False)["setting"].last()
-    first, *others = results.policies
+    best = best_policy(results)
     return [
         f"`{policy}` gives the same answer."
-        if fleets[policy] == fleets[first]
+        if fleets[policy] == fleets[best]
         else f"With `{policy}`, it would be **{fleets[policy]}**."
-        for policy in others
+        for policy in results.policies
+        if policy != best
     ]
 
 
 def cheapest_fleet(results: Results) -> str:
-    """The cheapest fleet of the first policy that meets the requirements under every condition."""
+    """The cheapest fleet of all policies that meets the requirements under every condition."""
     found = selections(results)
-    return str(found[found["policy"] == results.policies[0]]["setting"].iloc[-1])
+    return str(found[found["policy"] == best_policy(results)]["setting"].iloc[-1])
 
 
 def selections(results: Results) -> pd.DataFrame:
@@ -219,13 +248,14 @@ def selections(results: Results) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*columns, "guarantee"]).astype({"point": "Int64"})
 
 
-def _answer(rows: pd.DataFrame, wanted: Mapping[Any, float], currency: str) -> str:
+def _answer(rows: pd.DataFrame, wanted: Mapping[Any, float], currency: str, trust: str) -> str:
     """The answer for one policy under one condition.
 
     Args:
         rows: The rows of ``judged`` or ``everywhere``, the cheapest first.
         wanted: The requirements, for what the rows have of their metrics.
         currency: The currency of the costs.
+        trust: What else is to be said about the answer.
     """
     best = rows[rows["selected"]]
     if len(best):
@@ -239,15 +269,57 @@ def _answer(rows: pd.DataFrame, wanted: Mapping[Any, float], currency: str) -> s
         leads = pd.DataFrame({metric: rows[metric] - least for metric, least in wanted.items()})
         cheaper = rows.loc[leads.min(axis=1).nlargest(1).index]
         text, which = "no setting is known to meet the requirements.", "closest"
+    text += trust
     for _, row in cheaper.iterrows():
         text += f" The {which} one, {_told(row, wanted, currency)}, {_WHY_NOT[row['verdict']]}."
     return text
 
 
+def _trust(results: Results, choice: CheapestChoice, answer: Answer, policies: int) -> str:
+    """What is guaranteed about an answer, what would settle it, and at which ends it lies."""
+    rule, text = results.store.manifest.selection, ""
+    assert isinstance(rule, Cheapest)
+    if answer.points:
+        least = [
+            f"{METRICS[metric].lower()} of at least {numbers.level(q - rule.tolerance)}"
+            for metric, q in rule.requirements.items()
+        ]
+        where = " under every condition" * (answer.condition is None)
+        sure = numbers.level(rule.shown(policies))
+        text = f" It has a {numbers.words(least)}{where}, shown at {sure}."
+        point = answer.points[0]
+        text += edge(results, point, _ends(results, point), "a cheaper one")
+    if choice.done and not answer.settled:
+        enough = f"about {float(f'{choice.enough:.2g}'):,.0f}" if choice.enough else "far more"
+        text += (
+            f" The budget of {rule.budget:,} missions ended before this was decided; {enough} "
+            "would settle it."
+        )
+    return text
+
+
+def _ends(results: Results, point: int) -> dict[str, str]:
+    """The ends of the swept values at which a fleet lies and beyond which one may be cheaper.
+
+    With more UAVs or pads a fleet is cheaper only if that saves enough of the others.
+    """
+    table, space, prices = points(results), results.scenario(point), _prices(results)
+    of = {"uavs": prices.uav, "pads": prices.pad, ZONE_PADS: prices.pad * len(space.zones)}
+    of = {field: price for field, price in of.items() if field in table}
+    spent = {
+        f: price * (table[f][point] - 1) for f, price in of.items() if is_numeric_dtype(table[f])
+    }
+    return {
+        field: end
+        for field, end in ends(results, point, DECISIONS).items()
+        if end == "least" or not of.get(field) or sum(spent.values()) - spent[field] > of[field]
+    }
+
+
 def _told(row: pd.Series, wanted: Mapping[Any, float], currency: str) -> str:
     """A setting, its cost, and its metrics with the requirements, in words."""
     metrics = [
-        f"{'success' if metric == SUCCESS else METRICS[metric].lower()} "
+        f"{METRICS[metric].lower()} "
         f"{numbers.interval(*row[[metric, f'{metric}_low', f'{metric}_high']])} "
         f"({numbers.level(least)} required)"
         for metric, least in wanted.items()
@@ -284,8 +356,18 @@ def _samples(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:
 
 
 def _fleets(results: Results) -> list[str]:
-    """The fleet of every design point in words."""
-    return [numbers.words(row) or "the fleet of the scenario" for row in _words(results, True)]
+    """The fleet of every design point in words: all that has a price or varies."""
+    prices, table, fleets = _prices(results), points(results), []
+    for point, others in enumerate(_words(results, True)):
+        space, words = results.scenario(point), []
+        if prices.uav or prices.lost_uav or "uavs" in table:
+            low, high = space.uavs
+            words.append(value_in_words("uavs", low if low == high else [low, high]))
+        if prices.pad or {"pads", ZONE_PADS} & {*table}:
+            for zone, pads in enumerate(space.zone_pads, 1):
+                words.append(value_in_words("pads", pads) + f" in zone {zone}" * (zone > 1))
+        fleets.append(numbers.words([*words, *others]) or "the fleet of the scenario")
+    return fleets
 
 
 def _conditions(results: Results) -> list[str]:
@@ -294,9 +376,13 @@ def _conditions(results: Results) -> list[str]:
 
 
 def _words(results: Results, decisions: bool) -> list[list[str]]:
-    """The fields of every design point that an operator decides on, or all others, in words."""
+    """The fields of every design point that are decided on, or the rest; none of ``COUNTED``."""
     rows = points(results).to_dict("records")
     return [
-        [value_in_words(str(f), v) for f, v in r.items() if (f in DECISIONS) == decisions]
+        [
+            value_in_words(str(f), v)
+            for f, v in r.items()
+            if (f in DECISIONS) == decisions and f not in COUNTED
+        ]
         for r in rows
     ]

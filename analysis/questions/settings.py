@@ -8,7 +8,7 @@ All functions compare settings on common replications: every setting meets the s
 ``metric`` is a column of ``results.missions``.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ from analysis.stats.differences import column_tests
 from analysis.stats.intervals import column_intervals, stratified
 from analysis.stats.screening import may_be_best
 from dess.errors import InputError, one_of
+from dess.scenario import ZONE_PADS
 
 AS_IT_IS = "the scenario"  # a design point in words, if the design varies nothing
 _UNITS = {"uavs": "UAV", "pads": "pad"}  # fields that are counts
@@ -93,6 +94,51 @@ def dependence(results: Results, ranked: pd.DataFrame, metric: str) -> list[str]
         for policy, point, of_metric in named
         if len(words) > 1
     ]
+
+
+def ends(results: Results, point: int, fields: Iterable[str] | None = None) -> dict[str, str]:
+    """The fields that have the least or the largest of their values at a design point.
+
+    Beyond such an end there may be a better setting. An end that is a limit of the scenario itself,
+    such as one UAV, or as many pads as the zone has cells, does not count.
+
+    Args:
+        results: The study.
+        point: The design point.
+        fields: The fields that are looked at; by default all that the design varies.
+
+    Returns:
+        For each of these fields ``least`` or ``largest``.
+    """
+    table, space, found = points(results), results.scenario(point), {}
+    for field in table if fields is None else [name for name in table if name in fields]:
+        values = table[field]
+        if is_numeric_dtype(values) and field in space.numeric:
+            limits = space.limits(field)
+            for word, end, limit in zip(
+                ("least", "largest"), (values.min(), values.max()), limits, strict=True
+            ):
+                if values[point] == end != limit:
+                    found[str(field)] = word
+    return found
+
+
+def edge(
+    results: Results, point: int, found: Mapping[str, str], better: str = "a better one"
+) -> str:
+    """A sentence that says at which ends a design point lies; empty if at none.
+
+    Args:
+        results: The study.
+        point: The design point.
+        found: Its ``ends``.
+        better: What may lie beyond.
+    """
+    values = points(results).loc[point]
+    named = [f"{value_in_words(f, values[f])} is the {word}" for f, word in found.items()]
+    return f" Of the values asked for, {numbers.words(named)}; {better} may lie beyond." * bool(
+        named
+    )
 
 
 def value_in_words(field: str, value: Any) -> str:
@@ -344,6 +390,8 @@ def _texts(field: str, values: Sequence[Any]) -> list[Any]:
     if field == "nodes":
         maps, _ = pd.factorize(pd.Series(map(str, values)))
         return [f"{len(nodes)} cells (map {n})" for nodes, n in zip(values, maps + 1, strict=True)]
+    if field == ZONE_PADS:
+        return [" + ".join(map(str, v)) if isinstance(v, list | tuple) else v for v in values]
     if field == "zone":
         return [f"{width} x {height} at ({x}, {y})" for x, y, width, height in values]
     plain = [

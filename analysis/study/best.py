@@ -34,16 +34,17 @@ def policies_for(spaces: Iterable[ScenarioSpace], missions: int) -> tuple[str, .
         missions: Number of missions of every design point.
     """
     spaces = [*spaces]
-    decisions = missions * sum(map(_decisions, spaces))
+    made = missions * sum(map(decisions, spaces))
     is_small = mean(mean(space.uavs) for space in spaces) <= SMALL
     ranked = OF_SMALL_FLEETS if is_small else OF_LARGE_FLEETS
-    best, *others = [*(name for name in ranked if decisions * SECONDS[name] <= BUDGET), BASELINE]
+    best, *others = [*(name for name in ranked if made * SECONDS[name] <= BUDGET), BASELINE]
     if best in trained_names() and (absent := missing("learning", f"policy {best}")):
         best = others[0]
         logging.getLogger(__name__).warning("note: %s; %s answers", absent, best)
     return tuple(dict.fromkeys((best, BASELINE)))
 
 
-def _decisions(space: ScenarioSpace) -> float:
+def decisions(space: ScenarioSpace) -> float:
     """About the decisions of a mission: every UAV flies until its quota is filled."""
-    return sum(space.uavs) / 2 * ceil(space.quota / space.communication_slots)
+    slots = min(ceil(space.quota / space.communication_slots), space.max_slots)
+    return sum(space.uavs) / 2 * slots

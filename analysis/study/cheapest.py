@@ -50,6 +50,9 @@ from analysis.study.selection import Selection, based_on, check_begun, needed
 from analysis.study.stopping import MOST, Samples, StrictTable, of_its_kind
 from dess.scenario import Integer, Number, ScenarioSpace
 
+# How much longer a search may take for which it is estimated: times its missions, and missions.
+FURTHER, MOST_FURTHER = 64, 10_000_000
+
 Share = Literal["success", "collection_ratio", "collection_ratio_and_communication"]
 
 
@@ -82,6 +85,8 @@ class CheapestChoice:
         answers: One answer for every condition, in the order of the design and, if there are
             several conditions, one for all of them together.
         verdicts: For each design point, ``met``, ``missed`` or ``open``.
+        enough: About how many missions would settle all questions, if the budget has ended before
+            and it is no more than ``FURTHER`` times the budget; otherwise None.
     """
 
     counts: tuple[int, ...]
@@ -90,6 +95,7 @@ class CheapestChoice:
     guarantee: str
     answers: tuple[Answer, ...]
     verdicts: tuple[Verdict, ...]
+    enough: int | None
 
     @property
     def missions(self) -> int:
@@ -178,7 +184,30 @@ class Cheapest(StrictTable):
             guarantee=self._guarantee(search),
             answers=tuple(question.answer for question in search.questions),
             verdicts=tuple(search.verdicts),
+            enough=self._enough(search),
         )
+
+    def shown(self, policies: int = 1) -> float:
+        """The confidence that what was found to meet the requirements does, over all policies."""
+        return 1 - policies * (1 - self.confidence) / 2
+
+    def _enough(self, search: "_Search") -> int | None:
+        """About how many missions would settle all questions, if all were like those so far.
+
+        The search goes on with the same missions again and again.
+        """
+        if not search.done or all(question.settled for question in search.questions):
+            return None
+        endless, names = self.model_copy(update={"budget": MOST}), ["cost", *self.requirements]
+        points = [*zip(search.samples, search.counts, strict=True)]
+        times = 2
+        while times <= FURTHER and times * search.counts.sum() <= MOST_FURTHER:
+            again = [{m: np.tile(of[m][:n], times) for m in names} for of, n in points]
+            further = _Search(endless, again, search.settings)
+            if further.done:
+                return int(further.counts.sum())
+            times *= 2
+        return None
 
     def _guarantee(self, search: "_Search") -> str:
         if not search.done:

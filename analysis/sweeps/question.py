@@ -167,10 +167,15 @@ def ask(
         ChunkError: As for ``run_study``.
     """
     out = folder_of(study, folder)
-    others = [path.parent for path in paths_in(out.parent, f"*/{MANIFEST}") if path.parent != out]
-    check_run(study, out, workers, reuse=others, yes=yes)
+    reuse = others(out)
+    check_run(study, out, workers, reuse=reuse, yes=yes)
     write(study, folder)
-    return run_study(study, out, workers, None, progress, announce, reuse=others)
+    return run_study(study, out, workers, None, progress, announce, reuse=reuse)
+
+
+def others(out: Path) -> list[Path]:
+    """The results folders of the other sweeps beside one, whose missions are copied."""
+    return [path.parent for path in paths_in(out.parent, f"*/{MANIFEST}") if path.parent != out]
 
 
 def write(study: Study, folder: str | Path) -> Path:

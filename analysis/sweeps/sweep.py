@@ -79,19 +79,20 @@ class Sweep:
     def answers(self) -> list[str]:
         """The best setting and what other policies would have said, in sentences.
 
-        With requirements: the cheapest fleets that meet them, and why cheaper ones do not.
+        With requirements: the cheapest fleet of all policies first, then those of each policy and
+        condition, and why cheaper ones do not meet them.
         """
         if not self.study.selection:
             ranked, words = self.table(), settings.in_words(self.results)
-            best = f"The best setting is {ranked['policy'][0]} with {words[ranked['point'][0]]}."
-            others = settings.dependence(self.results, ranked, PRODUCT)
-            return [best, *others] if others else []
-        lines = costs.answers(self.results, costs.judged(self.results))
-        lines += costs.dependence(self.results)
+            point, others = ranked["point"][0], settings.dependence(self.results, ranked, PRODUCT)
+            edge = settings.edge(self.results, point, settings.ends(self.results, point))
+            best = f"The best setting is {ranked['policy'][0]} with {words[point]}.{edge}"
+            return [best, *others] if others or edge else []
+        lines = costs.sentences(self.results)
         return [line.replace("**", "").replace("`", "") for line in lines]
 
     def cheapest(self) -> str:
-        """With requirements: the cheapest fleet of the first policy for all conditions."""
+        """With requirements: the cheapest fleet of all policies for all conditions."""
         return costs.cheapest_fleet(self.results) if self.study.selection else ""
 
     @property

@@ -22,6 +22,7 @@ from reports.cli.settings import (
     WorkersOption,
     command,
 )
+from reports.cli.study.run import print_plan
 from reports.folders import PREFIX, check_pages
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ def sweep(
     name: str | None = None,
     results: Annotated[Path, typer.Option(metavar="DIR")] = RESULTS,
     out: Annotated[Path, typer.Option(metavar="DIR")] = PAGES,
+    dry_run: Annotated[bool, typer.Option("--dry-run")] = False,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -60,7 +62,7 @@ def sweep(
 
     Args:
         settings: The values of a field: 2..5, 0.01..0.05:5 (five values) or 1,2,4. A field with
-            one value is fixed; repeatable.
+            one value is fixed; zones.pads are the pads of all further zones; repeatable.
         policy: Policies to compare; repeatable.  [default: the best that five minutes allow, and
             greedy]
         metric: The metric that ranks the settings: success, ratio, product, reward, cost, or
@@ -70,11 +72,14 @@ def sweep(
         price: A price: uav, pad, charge, hour or lost_uav; also currency, missions (planned for
             the fleet) and slot_seconds; repeatable.
         require: Search for the cheapest setting whose mean of a metric (success, ratio,
-            product) is at least this; repeatable.
+            product) is at least this; repeatable. It may be half a point below; the answer says
+            what is guaranteed.
         name: Name of the sweep.  [default: its fields and a hash]
         results: Folder in which the results are stored, as sweeps/NAME.
         out: Folder of the page.
+        dry_run: Only print the plan and the range of its time.
     """
+    from analysis.execution.dry_run import plan_study
     from analysis.names import ALIASES, PRODUCT
     from analysis.sweeps import question
     from analysis.sweeps.sweep import Sweep
@@ -93,8 +98,12 @@ def sweep(
     if ranking not in study.metrics:
         allowed = one_of(metric, [*ALIASES, *study.metrics])
         raise InputError(f"--metric: {shown(metric)} is not measured{allowed}")
-    check_pages(out, f"{PREFIX}{study.name}")
     folder, file = question.folder_of(study, results), question.file_of(study, results)
+    if dry_run:
+        plan = plan_study(study, folder, workers, reuse=question.others(folder))
+        print_plan(plan, study, folder, workers)
+        return
+    check_pages(out, f"{PREFIX}{study.name}")
     found = complete(
         study.name,
         lambda progress, announce: question.ask(study, results, workers, progress, announce, yes),

@@ -56,7 +56,7 @@ html.lead(*costs.deciding(answer.results))
 html.say("{lines}", lines=html.composed("\n".join(f"- {line}" for line in answer.answers())))
 
 # %%
-policy = answer.results.policies[0]
+policy = questions.best_policy(answer.results)
 mission = mission_of(load_scenario(scenario, **example), load_team(policy), seed)
 map_of_mission = mission_figure(mission.events, mission.scenario)
 

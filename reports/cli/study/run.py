@@ -49,7 +49,7 @@ def run(
         scheduler: Run on the cluster of this dask.distributed scheduler.
         missions: Missions per design point and policy.
         policy: Policies in place of those of the study; repeatable.
-        dry_run: Only print the plan and the estimated time.
+        dry_run: Only print the plan and the range of its time.
         accept_code: Keep missions that other code has simulated; the results say so.
     """
     from analysis.execution.dry_run import check_run, plan_study
@@ -64,10 +64,9 @@ def run(
         folders = [(out or RESULTS) / study.name for study in studies]
     runs = [*zip(studies, folders, strict=True)]
     if dry_run:
-        with console.compile_notice():
-            for study, folder in runs:
-                plan = plan_study(study, folder, workers, accept_code=accept_code)
-                _print_plan(plan, study, folder, workers)
+        for study, folder in runs:
+            plan = plan_study(study, folder, workers, accept_code)
+            print_plan(plan, study, folder, workers)
         return
     if page:
         needs("reports", "--report")
@@ -100,20 +99,22 @@ def _run(study: "Study", out: Path, workers: int, scheduler: str | None, accept:
     console.say(f"more: dess study show {out}")
 
 
-def _print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
-    """Print the missions that a run would simulate, and an estimate of the time."""
-    from analysis.execution.dry_run import budget
+def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
+    """Print the missions that a run would simulate, and the range of its time."""
+    from analysis.execution.dry_run import budget, total
 
-    rows = [[p.policy, f"{p.missions:,}", f"{p.present:,}", f"{p.seconds:,.0f} s"] for p in plan]
+    rows = [[p.policy, f"{p.missions:,}", f"{p.present:,}", str(p.seconds)] for p in plan]
     console.print_table(["policy", "missions", "present", "time on one core"], rows)
-    per_cell, more = f"{study.first} replications", ""
+    per_cell = f"{study.first} replications"
     if study.rule:
-        rule, more = "selection" if study.selection else "precision", "at least "
+        rule = "selection" if study.selection else "precision"
         per_cell += f" and more, up to {budget(study):,} missions, as {rule} asks"
     missions = sum(p.missions for p in plan[: len(study.policies)])
     console.say(
         f"{out}: {missions:,} missions of study {study.name} ({len(study.policies)} policies "
         f"x {study.size:,} design points x {per_cell})"
     )
-    seconds = sum(p.seconds for p in plan) / workers
-    console.say(f"about {more}{seconds:,.0f} s with {workers} at work")
+    console.say(
+        f"{total(plan, workers)} with {workers} at work, by the usual speed of such missions; "
+        "compiling, on the first run, takes a few minutes more"
+    )

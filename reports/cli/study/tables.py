@@ -43,7 +43,7 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         selected = summary.selections(results)
         _print_selections(selected)
         if results.store.manifest.costs and "condition" in selected:
-            for text in costs.answers(results, costs.judged(results)):
+            for text in costs.sentences(results):
                 console.say(f" {text.translate(str.maketrans('', '', '*`'))}")
         if len(results.checks):
             means, checks = summary.checks(results), study["selection"]["check"]

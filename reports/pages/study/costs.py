@@ -59,7 +59,7 @@ def drawn(results: Results, fronts: Fronts, marks: str = MARKS) -> list[Drawing]
 def deciding(results: Results) -> Drawing:
     """The cost against the metric whose requirement asks for the most expensive fleet."""
     rows, least = questions.judged(results), required(results)
-    rows = rows[rows["policy"] == results.policies[0]].assign(on_front=rows["selected"])
+    rows = rows[rows["policy"] == questions.best_policy(results)].assign(on_front=rows["selected"])
     rows["probability"] = 0.4 + 0.6 * (rows["verdict"] == questions.MET)
     parts = [(m, part) for m in least for _, part in rows.groupby("condition", sort=False)]
     cheapest = [min(part[COST][part[m] >= least[m]], default=inf) for m, part in parts]
@@ -100,7 +100,7 @@ def parts_table(results: Results) -> HTML:
 
 def cheapest(results: Results) -> list[str]:
     """The cheapest settings that meet the requirements, with reasons, a sentence each."""
-    return questions.answers(results, questions.judged(results))
+    return questions.sentences(results)
 
 
 def reasons(results: Results) -> html.Marked:

@@ -97,7 +97,8 @@ def answer(results: Results, ranked: pd.DataFrame, metric: str) -> str:
         )
     best_one = f"The best {what} is {names[0]}: {metric_name(metric).lower()} {value}, "
     policies = settings.dependence(results, ranked, metric) if len(results.policies) == 2 else []
-    return " ".join([f"{best_one}n = {best['n']:,}.{rest}", *policies])
+    edge = settings.edge(results, best["point"], settings.ends(results, best["point"]))
+    return " ".join([f"{best_one}n = {best['n']:,}.{rest}{edge}", *policies])
 
 
 def of_variance(results: Results, metric: str) -> str:

@@ -1,23 +1,12 @@
 import pytest
 
 from analysis import run_study
-from analysis.execution import dry_run, effort
-from analysis.execution.dry_run import budget, check_effort, plan_study
-from analysis.execution.effort import LONG_TRIAL, ONE, TRIAL
+from analysis.execution import effort
+from analysis.execution.dry_run import budget, check_effort, plan_study, total
+from analysis.execution.effort import BOUND, SPREAD, START, Range
 from dess import InputError
 from dess.code import memory
 from tests.analysis.small import files_of, grid, small_study
-
-
-class Clock:
-    """Every look at it is that many seconds after the last one."""
-
-    def __init__(self, step):
-        self.now, self.step = 0.0, step
-
-    def __call__(self):
-        self.now += self.step
-        return self.now
 
 
 def test_a_plan_counts_and_writes_nothing(tmp_path):
@@ -38,21 +27,35 @@ def test_a_plan_knows_what_is_there(tmp_path):
     assert [(p.missions, p.present) for p in plan] == [(25, 10), (25, 0)]
     assert files_of(tmp_path / "out") == before
     done = plan_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "out")
-    assert [p.seconds for p in done] == [0.0]
+    assert [p.seconds for p in done] == [(0.0, 0.0)]
+    assert total(done, 1) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize(("step", "trial"), [(60.0, ONE), (1.0, TRIAL), (0.01, LONG_TRIAL)])
-def test_the_time_is_that_of_a_trial(step, trial, tmp_path):
-    plan = plan_study(small_study(tmp_path), tmp_path / "out", clock=Clock(step))
-    assert [p.seconds for p in plan] == pytest.approx([10 * step / trial] * 2)
+DECISIONS = 2 * 60 / 4  # of a mission of the small scenario
+
+
+def test_the_time_is_a_range_and_nothing_is_simulated(tmp_path, monkeypatch):
+    monkeypatch.setattr("analysis.execution.engines.simulate", None)
+    monkeypatch.setattr("analysis.execution.engines.simulate_batch", None)
+    study = small_study(tmp_path, policies=["greedy", "planner"])
+    plan = plan_study(study, tmp_path / "out")
+    expected = [10 * DECISIONS * each for each in (2e-6, 4e-4)]
+    for planned, seconds in zip(plan, expected, strict=True):
+        assert planned.seconds == pytest.approx((seconds / SPREAD, seconds * SPREAD))
+    ends = sum(expected) / 2 / SPREAD, sum(expected) / 2 * SPREAD + START
+    assert total(plan, 2) == pytest.approx(ends)
+    assert str(Range(1.0, 90.0)) == "up to 90 seconds"
+    assert str(Range(5.0, 90.0)) == "5 to 90 seconds"
+    assert str(Range(5.0, 240.0)) == "5 seconds to 4 minutes"
 
 
 def test_event_logs_take_time_as_well(tmp_path):
-    logged = small_study(tmp_path, logged=4)
-    plan = plan_study(logged, tmp_path / "out", clock=Clock(1.0))
-    assert [p.seconds for p in plan] == pytest.approx([(10 + 4) / TRIAL] * 2)
+    logged, plain = small_study(tmp_path, logged=4), small_study(tmp_path)
+    plans = [plan_study(study, tmp_path / "out") for study in (logged, plain)]
+    for more, less in zip(*plans, strict=True):
+        assert more.seconds.low - less.seconds.low == pytest.approx(4 * DECISIONS * 1.2e-5 / SPREAD)
     run_study(logged, tmp_path / "out")
-    assert [p.seconds for p in plan_study(logged, tmp_path / "out")] == [0.0, 0.0]
+    assert [p.seconds for p in plan_study(logged, tmp_path / "out")] == [(0.0, 0.0)] * 2
 
 
 def test_a_rule_has_a_least_and_a_most(tmp_path):
@@ -78,37 +81,39 @@ def test_a_plan_refuses_what_a_run_would(tmp_path):
         plan_study(small_study(tmp_path), tmp_path / "out", workers=0)
 
 
-def test_a_long_run_has_to_be_confirmed(tmp_path, monkeypatch):
+def test_a_run_that_is_surely_long_has_to_be_confirmed(tmp_path, monkeypatch):
+    """The lower end of the range decides; what may be long is run."""
     study, out = small_study(tmp_path), tmp_path / "out"
-    check_effort(study, out, clock=Clock(1e9))  # few missions are run without a trial
-    monkeypatch.setattr(dry_run, "FEW", 19)
-    monkeypatch.setattr(effort, "FEW", 19)
-    check_effort(study, out, clock=Clock(1.0))
+    ends = total(plan_study(study, out, workers=2), 2)
+    monkeypatch.setattr(effort, "LONG_RUN", ends.low * 1.01)
+    check_effort(study, out, workers=2)
+    monkeypatch.setattr(effort, "LONG_RUN", ends.low * 0.99)
     before = files_of(tmp_path)
     line = (
         r"study trial: 20 missions to simulate \(policies: 2, design points: 1, workers: 2\), "
-        r"about 3 hours; allowed: --yes, or less"
+        r"about up to 15 seconds; allowed: --yes, or less"
     )
     with pytest.raises(InputError, match=line):
-        check_effort(study, out, workers=2, clock=Clock(3 * 3600 * 2 / 20))
-    check_effort(study, out, clock=Clock(1e9), yes=True)
+        check_effort(study, out, workers=2)
+    check_effort(study, out, yes=True)
     assert files_of(tmp_path) == before
     run_study(study, out)
-    check_effort(study, out, clock=Clock(1e9))  # all of it is there
+    check_effort(study, out)  # all of it is there
 
 
 def test_missions_are_counted_and_not_listed(tmp_path, monkeypatch):
     study = small_study(tmp_path, missions=10**9)
     monkeypatch.setattr(memory, "available_memory", lambda: 2**40)
+    monkeypatch.setattr(effort, "LONG_RUN", 1e9)
     line = r"2,000,000,000 missions .*: about 2,23\d\.\d GiB of memory, of which 1,024.0 are avail"
     with pytest.raises(InputError, match=line):
-        check_effort(study, tmp_path / "out", clock=Clock(0.0))
+        check_effort(study, tmp_path / "out")
     assert [p.missions for p in plan_study(study, tmp_path / "out")] == [10**9] * 2
 
 
-def test_bounds_are_part_of_the_plan_and_of_the_time(tmp_path, monkeypatch):
-    monkeypatch.setattr(dry_run, "upper_bound", lambda *_, **__: None)
+def test_bounds_are_part_of_the_plan_and_of_the_time(tmp_path):
     study = small_study(tmp_path, bounds=True)
-    plan = plan_study(study, tmp_path / "out", clock=Clock(60.0))
-    assert (plan[2].missions, plan[2].present, plan[2].seconds) == (10, 0, 600.0)
+    plan = plan_study(study, tmp_path / "out")
+    assert (plan[2].missions, plan[2].present) == (10, 0)
+    assert plan[2].seconds == pytest.approx([10 * DECISIONS * each for each in BOUND])
     assert len(plan_study(small_study(tmp_path), tmp_path / "out")) == 2

@@ -50,13 +50,13 @@ def test_the_missions_that_are_simulated_together_do_not_grow(handed):
 
 
 def test_what_takes_too_much_is_refused_before_it_begins(monkeypatch, handed):
-    ticks = iter(range(0, 10**9, 1))  # a trial takes a second
     monkeypatch.setattr(effort, "LONG_RUN", 500.0)
-    check_evaluation([Asked(SPACE, "random", 10_000)], clock=lambda: next(ticks))
+    check_evaluation([Asked(SPACE, "random", 1_000_000)])
     two = [Asked(SPACE, team, 10**9, workers=4) for team in ("random", "greedy")]
-    line = r"evaluate: 2,000,000,000 missions \(policies: 2, workers: 4\), about \d+ days; allowed"
+    line = r"evaluate: 2,000,000,000 missions \(policies: 2, workers: 4\), "
+    line += "about 89 minutes to 13 hours; allowed"
     with pytest.raises(InputError, match=f"{line}: --yes, or less"):
-        check_evaluation(two, clock=lambda: next(ticks))
+        check_evaluation(two)
     check_evaluation([Asked(SPACE, "random", 10**9)], yes=True)
     monkeypatch.setattr(memory, "available_memory", lambda: 2**20)
     with pytest.raises(InputError, match=r"GiB of memory, of which 0.0 are available"):

@@ -75,8 +75,9 @@ def test_a_fleet_is_judged_over_all_conditions(searched):
     assert fleets["selected"].any()  # or this test says little
 
 
-def test_the_answer_says_why_no_cheaper_fleet_will_do(searched):
-    """The rows are made by hand, on the frame of the study."""
+def test_the_answer_says_why_no_cheaper_fleet_will_do(searched, monkeypatch):
+    """The rows are made by hand, on the frame of the study, whose guarantee is left out."""
+    monkeypatch.setattr(costs, "_trust", lambda *_: "")
     table = costs.judged(searched)
     one = table[(table["condition"] == "communication quota 60") & (table["policy"] == "greedy")]
     one = one.iloc[:3].assign(
@@ -141,7 +142,7 @@ def test_prices_of_zero_leave_what_is_paid_for(tmp_path):
     results = run_study(study, tmp_path / "out")
     assert set(results.missions["cost"]) == {21.0}
     table = costs.front(results)
-    assert table["fleet"].tolist() == ["the fleet of the scenario"] * 2
+    assert table["fleet"].tolist() == ["2 UAVs"] * 2  # what has a price is named
     assert table["condition"].tolist() == ["", ""]
 
 
@@ -157,3 +158,67 @@ def test_settings_are_priced_condition_by_condition(fixed):
     missions = fixed.missions.query(f"policy == '{row['policy']}' and point == {row['point']}")
     ends = row[["cost", "cost_low", "cost_high"]].tolist()
     assert ends == pytest.approx(mean_interval(missions["cost"]))
+
+
+# A sea with a second zone, whose pads are paid for.
+TWO_ZONES = {"zones": [{"cells": [0, 6, 2, 2], "pads": 1}]}
+
+
+def searched_sea(folder, policies, requirements, values, **rule):
+    """The answer of a search on a sea with two zones."""
+    rule = {**RULE, "requirements": requirements, "check": 0, **rule}
+    study = small_study(
+        folder, policies=policies, selection=rule, design={"kind": "grid", "values": values},
+        set=TWO_ZONES, costs={"uav": 1000, "pad": 100},
+    )  # fmt: skip
+    return run_study(study, folder / "out")
+
+
+def test_an_answer_says_what_is_guaranteed_names_all_that_is_paid_and_its_ends(tmp_path):
+    values = {"uavs": [2, 3], "pads": [1, 2], "zones.pads": [1, 3]}
+    found = searched_sea(tmp_path, ["greedy", "random"], {"success": 0.6}, values)
+    text = costs.answer(found)
+    assert "**2 UAVs, 1 pad and 1 pad in zone 2** for 2,200 EUR" in text
+    assert "It has a success of at least 50 %, shown at 95 %." in text  # of two policies
+    assert "success of at least 50 %, shown at 97.5 %." in costs.sentences(found)[1]
+    assert "Of the values asked for, 2 UAVs is the least; a cheaper one may lie beyond." in text
+    assert {*costs.priced(found)["cost"]} == {
+        1000 * u + 100 * p for u in (2, 3) for p in (2, 3, 4, 5)
+    }
+    assert "1 pad and 3 pads in zone 2" in "".join(costs.priced(found)["fleet"])
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_the_answer_is_the_cheapest_fleet_of_any_policy(first, tmp_path):
+    """The other policy meets the requirement, but with a dearer fleet."""
+    policies, values = ["greedy", "nearest"], {"uavs": [1, 3], "pads": [1], "quota": [30]}
+    asked = {"collection_ratio": 0.365}
+    found = searched_sea(tmp_path, policies[:: 1 - 2 * first], asked, values, tolerance=0.01)
+    fleets = costs.selections(found).set_index("policy")["setting"].to_dict()
+    one, three = (f"{uavs}, 1 pad and 1 pad in zone 2" for uavs in ("1 UAV", "3 UAVs"))
+    assert fleets == {"greedy": one, "nearest": three}  # or this test says little
+    assert costs.answer(found).startswith("`greedy`: the cheapest")
+    assert costs.answer(found).endswith(f"With `nearest`, it would be **{three}**.")
+    assert costs.sentences(found)[0] == costs.answer(found)
+    assert costs.cheapest_fleet(found) == one
+    assert "Of the values" not in costs.answer(found)  # one UAV is the least of all
+
+
+def test_an_answer_says_what_would_have_settled_it(tmp_path):
+    ratio = run_study(small_study(tmp_path, missions=400, policies=["random"]), tmp_path / "known")
+    near = round(float(ratio.missions["collection_ratio"].mean()), 3)
+    values = {"uavs": [[1, 3]], "pads": [1]}
+    short = {"tolerance": 0.02, "budget": 40}
+    found = searched_sea(tmp_path, ["random"], {"collection_ratio": near}, values, **short)
+    (text,) = costs.sentences(found)
+    enough = found.cheapest("random").enough
+    assert 40 < enough < 40 * 64
+    assert "The budget of 40 missions ended before this was decided; about" in text
+    longer = found.store.manifest.selection.model_copy(update={"budget": 10 * enough})
+    samples = small_study(tmp_path, missions=10 * enough, policies=["random"], set=TWO_ZONES)
+    done = run_study(samples, tmp_path / "longer").missions
+    columns = {name: done[name].to_numpy() for name in ("collection_ratio",)}
+    choice = longer.choice([columns | {"cost": done["uavs"] * 0.0}], found.store.manifest.settings)
+    assert choice.answers[0].settled
+    assert choice.missions < 10 * enough
+    assert choice.enough is None

@@ -80,3 +80,14 @@ def test_progress_counts_missions(asking, capsys, monkeypatch):
     assert capsys.readouterr().err == ""  # nothing is simulated
     monkeypatch.setattr(tqdm.auto, "tqdm", partial(tqdm.auto.tqdm, disable=True))  # as on pages
     assert len(asking(progress=True, uavs=[1, 3]).results.missions) == 2 * 2 * 6
+
+
+def test_the_best_setting_at_an_end_of_the_values_says_so(tmp_path):
+    """More data can be collected by more UAVs; with one UAV nothing is left to leave out."""
+    asked = {"scenario": write_scenario(tmp_path, quota=30), "policies": ["greedy"]}
+    asked |= {"missions": 100, "folder": tmp_path / "results", "progress": False}
+    (text,) = sweep(uavs=[1, 2], **asked).answers()
+    assert text.endswith(
+        "Of the values asked for, 2 UAVs is the largest; a better one may lie beyond."
+    )
+    assert sweep(uavs=[1, 6], **asked).answers() == []  # the zone has no more cells
