@@ -42,7 +42,7 @@ def distribution(
     expanded for the size of the tail. It is reliable with about 30 missions or more in the tail
     (600 missions for the worst 5 %), and too narrow with fewer. Where all resamples agree, a metric
     from 0 to 1 has the interval of a bounded mean of as many values as the tail has. The quantiles
-    have the intervals of ``quantile_interval``, whose ends may be infinite.
+    have the intervals of ``quantile_interval``; an end that no observation limits is nan.
 
     Args:
         missions: A row per mission, with the metric and the fields of ``by``.
@@ -76,7 +76,7 @@ def distribution(
     rows = []
     for group, part in groups(missions, by):
         values = part[metric].to_numpy(float)
-        views = [("quantile", q, quantile_interval(values, q, level)) for q in quantiles]
+        views = [("quantile", q, _known(quantile_interval(values, q, level))) for q in quantiles]
         expanded = expanded_level(level, tail * len(values))
         risk = bootstrap_interval(values, worst_mean, generator, expanded, resamples=resamples)
         if metric in METRICS and risk.low == risk.high:
@@ -86,6 +86,11 @@ def distribution(
         rows += [(*group, metric, view, q, *ends, len(part)) for view, q, ends in views]
     columns = [*by, "metric", "view", "share", "value", "low", "high", "n"]
     return pd.DataFrame(rows, columns=columns)
+
+
+def _known(interval: Interval) -> Interval:
+    """The interval with nan in place of the ends that are infinite."""
+    return Interval(*(end if np.isfinite(end) else np.nan for end in interval))
 
 
 def quantile_interval(

@@ -54,7 +54,7 @@ def test_summary_has_a_row_per_group_and_metric():
     rows = table.set_index(["policy", "metric"])
     ends = ["mean", "low", "high"]
     assert tuple(rows.loc[("tour", "success"), ends]) == wilson(2, 3)
-    assert tuple(rows.loc[("tour", "reward"), ends]) == mean_interval([1.0, 2.0, 3.0])
+    assert tuple(rows.loc[("tour", "reward"), ends]) == interval_of("reward", [1.0, 2.0, 3.0])
     assert tuple(rows.loc[("greedy", "collection_ratio"), ends]) == bounded_interval([0.5, 0.5])
     assert rows.loc["tour", "n"].tolist() == [3] * 4
 
