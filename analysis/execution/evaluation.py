@@ -166,19 +166,17 @@ def means(
                 moments[metric][int(fleet)] = old.with_others(new) if old else new
         uav_slots, seconds = uav_slots + piece.uav_slots, seconds + piece.seconds
     low, high = asked.scenario.uavs
-    means = {
+    over_space = {
         metric: _over_space(of, asked.missions, range(low, high + 1))
         for metric, of in moments.items()
     }
-    return Means(asked.team, means, uav_slots, seconds)
+    return Means(asked.team, over_space, uav_slots, seconds)
 
 
 def _over_space(fleets: dict[int, Moments], missions: int, drawn: range) -> Moments:
     """The moments of a metric over a space; what some missions lack has a plain mean."""
     whole = sum(of.n for of in fleets.values()) == missions
-    return Moments.of_space(
-        [fleets.get(n) for n in (drawn if whole else fleets)] + [None] * (not whole)
-    )
+    return Moments.of_space([fleets.get(n) for n in drawn], post_stratify=whole)
 
 
 def _metrics(records: Records) -> dict[str, np.ndarray]:
@@ -186,7 +184,7 @@ def _metrics(records: Records) -> dict[str, np.ndarray]:
     values = {metric: records.missions[metric] for metric in METRICS}
     if len(records.operations):
         measured = {name: records.operations[name] for name in OPERATIONS.names or ()}
-        values |= {name: of for name, of in measured.items()}
+        values |= measured
     return {metric: of.astype(float) for metric, of in values.items()}
 
 

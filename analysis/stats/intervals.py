@@ -82,12 +82,13 @@ class Moments(NamedTuple):
         )
 
     @classmethod
-    def of_space(cls, fleets: Sequence[Self | None]) -> Self:
+    def of_space(cls, fleets: Sequence[Self | None], post_stratify: bool = True) -> Self:
         """The moments of the linearised values of ``post_stratified``.
 
         Args:
             fleets: For every number of UAVs that may be drawn the moments of its missions; None
                 where it has none.
+            post_stratify: Whether they are all missions, and not those that have measured it.
         """
         drawn = [of for of in fleets if of]
         whole = drawn[0]
@@ -95,7 +96,7 @@ class Moments(NamedTuple):
             whole = whole.with_others(of)
         counts = np.array([of.n if of else 0 for of in fleets])
         weights = weights_of_fleets(counts)
-        if weights is None:
+        if weights is None or not post_stratify:
             return whole
         mean = float(np.mean([of.mean for of in drawn]))
         spread = weights**2 * counts / (counts - 1) * (1 - 1 / whole.n)

@@ -211,7 +211,14 @@ def test_equal_design_points_count_once(results, tmp_path):
 
 
 def test_the_missions_that_check_a_selection_are_compared(tmp_path):
-    rule = {"procedure": "kn", "first": 8, "indifference": 0.05, "budget": 900, "check": 9}
+    rule = {
+        "procedure": "kn",
+        "metric": "collection_ratio",
+        "first": 8,
+        "indifference": 0.05,
+        "budget": 900,
+        "check": 9,
+    }
     results = results_of(tmp_path, "out", selection=rule, design=grid(quota=[20, 60]))
     found = diff(results, results)
     assert found.identical

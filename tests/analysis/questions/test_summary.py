@@ -134,7 +134,14 @@ def test_checkpoints_of_one_learner_are_one_learner(tmp_path, trained_twice):
 
 
 def test_the_selected_point_and_its_check(tmp_path):
-    rule = {"procedure": "kn", "first": 8, "indifference": 0.02, "budget": 2000, "check": 9}
+    rule = {
+        "procedure": "kn",
+        "metric": "collection_ratio",
+        "first": 8,
+        "indifference": 0.02,
+        "budget": 2000,
+        "check": 9,
+    }
     study = small_study(tmp_path, selection=rule, design=grid(quota=[20, 40, 80]))
     results = run_study(study, tmp_path / "out")
     table = summary.selections(results)

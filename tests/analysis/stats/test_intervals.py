@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from analysis.stats.distribution import quantile_interval
-from analysis.stats.intervals import bounded_interval, mean_interval, summary, wilson
+from analysis.stats.intervals import bounded_interval, interval_of, mean_interval, summary, wilson
 
 
 def test_wilson_of_nine_in_ten():
