@@ -76,7 +76,7 @@ MEANS = (RATIO, PRODUCT, REWARD)
 COST = "cost"  # of a study with prices
 # Of a study with bounds: the bound, and the bound minus the product.
 BOUND, GAP = "upper_bound", "optimality_gap"
-BOUNDED = (RATIO, PRODUCT, UTILISATION, GAP)  # those whose values lie between 0 and 1
+BOUNDED = (RATIO, PRODUCT, UTILISATION)  # those whose values lie between 0 and 1
 LESS_IS_BETTER = (COST, GAP, *(name for name, of in MEASURES.items() if of.less_is_better))
 
 

@@ -145,8 +145,8 @@ class Precision(StrictTable):
 
     After stopping, the coverage of the intervals is about as good as with a fixed number of
     missions. It is lower where a rare event changes another metric strongly, because Student's
-    interval is too narrow until the event occurs. A larger ``first`` helps. The intervals named above
-    allow for failures that no mission has shown yet, so a narrow one takes many missions: a
+    interval is too narrow until the event occurs. A larger ``first`` helps. The intervals named
+    above allow for failures that no mission has shown yet, so a narrow one takes many missions: a
     half-width of one percentage point takes about 100 to 200 missions even if none of them fails.
 
     Source: K. Hoad, S. Robinson, R. Davies, Automated selection of the number of replications for
