@@ -234,6 +234,35 @@ def test_equal_means_are_seldom_told_apart_where_one_policy_fails(share, n, tria
     assert np.mean(p < 0.05) <= 0.05 + error(trials, 0.05)
 
 
+def of_pairs(a: np.ndarray, b: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """The ends of the intervals of differences: Student's, one with 1 and -1 added, and ours."""
+    d = a - b
+    more = np.concatenate([d, np.tile([1.0, -1.0], (len(d), 1))], axis=1)
+    low, high, _ = compared(a, b, PRODUCT)
+    return {"Student's t": student(d), "1 and -1 added": student(more), "ours": (low, high)}
+
+
+def table_of_rare_failures() -> str:
+    """Coverage and mean length [points] of intervals of differences: a table in Markdown."""
+    lines = [
+        "| B fails, A never | n | Student's t | 1 and -1 added | rare differences added |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for share, n in RARE:
+        cells = []
+        for low, high in of_pairs(*lone(0.0, share, 1.0, n, 1000)).values():
+            coverage = np.mean((low <= 0.8 * share) & (0.8 * share <= high))
+            cells.append(f"{100 * coverage:.1f} %, {100 * np.mean(high - low):.1f}")
+        lines.append(f"| {100 * share:g} % | {n} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+@pytest.mark.slow
+def test_the_table_of_rare_failures_of_the_docs_is_measured():
+    page = Path(__file__).parents[2] / "docs" / "concepts" / "confidence-intervals.md"
+    assert table_of_rare_failures() in page.read_text("utf-8")
+
+
 # Many comparisons
 
 
