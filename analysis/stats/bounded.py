@@ -94,7 +94,7 @@ def rare_differences(metric: str, a: Any, b: Any) -> tuple[Any, Any] | None:
         The (...) highest and the (...) lowest differences; None if they are not known.
     """
     if metric in SHARES:
-        return np.ones_like(a), -np.ones_like(a)
+        return 0 * (a - b) + 1, 0 * (a - b) - 1
     if metric in BOUNDED:
         return np.maximum(a, 1 - b), -np.maximum(b, 1 - a)
     if metric == REWARD:

@@ -76,7 +76,7 @@ def distribution(
     rows = []
     for group, part in groups(missions, by):
         values = part[metric].to_numpy(float)
-        views = [("quantile", q, _known(quantile_interval(values, q, level))) for q in quantiles]
+        views = [("quantile", q, quantile_interval(values, q, level)) for q in quantiles]
         expanded = expanded_level(level, tail * len(values))
         risk = bootstrap_interval(values, worst_mean, generator, expanded, resamples=resamples)
         if metric in METRICS and risk.low == risk.high:
@@ -85,12 +85,7 @@ def distribution(
         views.append(("worst mean", tail, risk))
         rows += [(*group, metric, view, q, *ends, len(part)) for view, q, ends in views]
     columns = [*by, "metric", "view", "share", "value", "low", "high", "n"]
-    return pd.DataFrame(rows, columns=columns)
-
-
-def _known(interval: Interval) -> Interval:
-    """The interval with nan in place of the ends that are infinite."""
-    return Interval(*(end if np.isfinite(end) else np.nan for end in interval))
+    return pd.DataFrame(rows, columns=columns).replace([-np.inf, np.inf], np.nan)
 
 
 def quantile_interval(

@@ -37,9 +37,8 @@ def may_be_best(values: np.ndarray, metric: str = "", level: float = LEVEL) -> n
     """
     check_share("level", level)
     present = np.isfinite(values)
-    means = np.nan_to_num(np.nansum(values, axis=0) / np.maximum(present.sum(axis=0), 1))
-    sign = -1.0 if metric in LESS_IS_BETTER else 1.0
-    values = sign * values
+    values = -values if metric in LESS_IS_BETTER else values
+    means = np.nansum(values, axis=0) / np.maximum(present.sum(axis=0), 1)
     # What a replication adds to all settings cancels in their differences.
     centre = np.nanmean(np.where(present.any(1, keepdims=True), values, 0.0), axis=1, keepdims=True)
     centred, mask = np.where(present, values - centre, 0.0), present.astype(float)
@@ -48,9 +47,8 @@ def may_be_best(values: np.ndarray, metric: str = "", level: float = LEVEL) -> n
     parts = []
     for b in blocks:
         block = slice(b, b + _BLOCK)
-        rare = rare_differences(metric, *np.meshgrid(means, means[block]))
-        added = None if rare is None else (sign * rare[0], sign * rare[1])
-        parts.append(_unbeaten(block, centred, mask, added, alpha))
+        rare = rare_differences(metric, means, means[block, None])
+        parts.append(_unbeaten(block, centred, mask, rare, alpha))
     return np.concatenate(parts) if parts else np.zeros(0, bool)
 
 
