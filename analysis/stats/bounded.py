@@ -10,10 +10,8 @@ as high as 1. The result has four properties that Student's t lacks: it lies in 
 positive length for every sample, holds the mean of the sample, and covers the mean where failures
 are rare, few, or all that there is (measured in ``tests/analysis/test_coverage.py``).
 
-The reward has no bounds, but a failure costs a known amount of it. So two values further from the
-mean by this amount are added to its sample, one on each side (``reward_half``). A difference of two
-policies gets one value for a mission in which A alone does well, and one for a mission in which B
-alone does (``rare_differences``).
+A difference of two policies gets one value for a mission in which A alone does well, and one for a
+mission in which B alone does (``rare_differences``).
 
 The betting interval of I. Waudby-Smith and A. Ramdas (Journal of the Royal Statistical Society B 86
 (2024) 1-27) has a guarantee for every distribution, for which it is longer by a third to three
@@ -53,29 +51,13 @@ def bounded_ends(mean: Any, variance: Any, n: Any, level: float = LEVEL) -> tupl
     Returns:
         (...) lower and (...) upper ends, with 0 <= low <= mean <= high <= 1 and low < high.
     """
-    added = _added(level)
+    added = float(ndtri((1 + level) / 2) ** 2 / 4)
     size = n + 2 * added
     centre = (n * mean + added) / size
     squares = n * (variance + (mean - centre) ** 2) + added * (centre**2 + (1 - centre) ** 2)
     half = stdtrit(size - 1, (1 + level) / 2) * np.sqrt(squares / (size - 1) / size)
     low, high = np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0)
     return np.minimum(low, mean), np.maximum(high, mean)
-
-
-def reward_half(squares: Any, n: Any, level: float = LEVEL) -> Any:
-    """The half-widths of the confidence intervals of mean rewards, nan for a single mission.
-
-    Args:
-        squares: (...) sums of squared deviations of the samples from their means.
-        n: (...) numbers of values.
-        level: Confidence level.
-    """
-    added = _added(level)
-    size = n + 2 * added
-    half = stdtrit(size - 1, (1 + level) / 2) * np.sqrt(
-        (squares + 2 * added * FAILURE_COST**2) / (size - 1) / size
-    )
-    return np.where(np.asarray(n) > 1, half, np.nan)
 
 
 def rare_differences(metric: str, a: Any, b: Any) -> tuple[Any, Any] | None:
@@ -100,7 +82,3 @@ def rare_differences(metric: str, a: Any, b: Any) -> tuple[Any, Any] | None:
     if metric == REWARD:
         return a - b + FAILURE_COST, a - b - FAILURE_COST
     return None
-
-
-def _added(level: float) -> float:
-    return float(ndtri((1 + level) / 2) ** 2 / 4)

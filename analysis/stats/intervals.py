@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.names import BOUNDED, REWARD, SHARES, metrics_in
+from analysis.names import BOUNDED, SHARES, metrics_in
 from analysis.stats.bounded import LEVEL as LEVEL
-from analysis.stats.bounded import bounded_ends, reward_half
+from analysis.stats.bounded import bounded_ends
 from dess.errors import InputError, one_of
 
 LEAST = 5  # missions of every number of UAVs for a post-stratified mean
@@ -107,9 +107,6 @@ class Moments(NamedTuple):
         """The mean of a metric with the interval of ``interval_of``."""
         if metric in SHARES and self._are_outcomes:
             return wilson(int(self.total), self.n, level)
-        if metric == REWARD:
-            half = float(reward_half(self.squares, self.n, level))
-            return Interval(self.mean, self.mean - half, self.mean + half)
         is_bounded = metric in SHARES or metric in BOUNDED
         return self.bounded(level) if is_bounded else self.student(level)
 
@@ -174,7 +171,7 @@ def interval_of(
     """The mean of a metric of missions with the interval that is fit for it.
 
     Wilson's interval for outcomes of ``success``, the ``bounded_interval`` for the collection ratio
-    and the product, that of ``reward_half`` for the reward, and Student's t for all others.
+    and the product, and Student's t for all others.
 
     Raises:
         ValueError: If there are no values.
@@ -216,11 +213,8 @@ def stratified(values: np.ndarray, metric: str, level: float = LEVEL) -> Interva
         return Interval(mean, float(low), float(high))
     replications = int(present.any(axis=1).sum())
     freedom = max(replications - 1, 1)
-    if metric == REWARD:
-        half = float(reward_half(common * replications**2, replications, level))
-    else:
-        error = np.sqrt(common * replications / freedom)
-        half = float(stats.t.isf((1 - level) / 2, freedom) * error) if replications > 1 else np.nan
+    error = np.sqrt(common * replications / freedom)
+    half = float(stats.t.isf((1 - level) / 2, freedom) * error) if replications > 1 else np.nan
     return Interval(mean, mean - half, mean + half)
 
 
@@ -268,8 +262,6 @@ def column_intervals(values: pd.DataFrame, metric: str = "", level: float = LEVE
     """
     n, mean = values.count(), values.mean()
     half = values.sem() * stats.t.isf((1 - level) / 2, np.maximum(n - 1, 1))
-    if metric == REWARD:
-        half = pd.Series(reward_half(values.var(ddof=0) * n, n, level), values.columns)
     table = pd.DataFrame({"mean": mean, "low": mean - half, "high": mean + half, "n": n})
     if metric in SHARES or metric in BOUNDED:
         some = n > 0

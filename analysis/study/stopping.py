@@ -16,8 +16,8 @@ from pydantic import (
 )
 from scipy.special import ndtri, stdtrit
 
-from analysis.names import BOUNDED, MEANS, MEASURES, REWARD, SHARES
-from analysis.stats.bounded import LEVEL, bounded_ends, reward_half
+from analysis.names import BOUNDED, MEANS, MEASURES, SHARES
+from analysis.stats.bounded import LEVEL, bounded_ends
 from dess.errors import InputError, listed, one_of, shown, validation_line
 from dess.scenario import Integer, Number
 
@@ -131,7 +131,7 @@ class Precision(StrictTable):
 
     The half-widths are half the lengths of the intervals of ``stats.intervals.interval_of``:
     Wilson's interval for ``success``, the interval of a bounded mean for the collection ratio and
-    the product, that of ``reward_half`` for the reward. They are not post-stratified by the number
+    the product, Student's t for the reward. They are not post-stratified by the number
     of UAVs, so where it is drawn, the printed intervals are narrower. The *stopping point* is the
     first n >= ``first`` at which all targets are met with n, n + 1, ..., n + ``look_ahead``
     missions. Without the look-ahead, a sample whose interval is narrow by chance would stop too
@@ -144,9 +144,9 @@ class Precision(StrictTable):
     in the order of their replications, so it is the same whether or not a run was interrupted.
 
     After stopping, the coverage of the intervals is about as good as with a fixed number of
-    missions. It is lower where a rare event changes another metric strongly, because Student's
-    interval is too narrow until the event occurs. A larger ``first`` helps. The intervals named
-    above allow for failures that no mission has shown yet, so a narrow one takes many missions: a
+    missions. It is lower where a rare event changes the reward strongly, because Student's
+    interval is too narrow until the event occurs. A larger ``first`` helps. The other intervals
+    allow for failures that no mission has shown yet, so a narrow one takes many missions: a
     half-width of one percentage point takes about 100 to 200 missions even if none of them fails.
 
     Source: K. Hoad, S. Robinson, R. Davies, Automated selection of the number of replications for
@@ -286,8 +286,6 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
         return sample[:1] + means, (high - low) / 2
     freedom = np.maximum(counts - 1, 1)
     widths = _student(len(sample)) * np.sqrt(squares / freedom / counts)
-    if metric == REWARD:
-        widths = reward_half(squares, counts)
     widths[:1] = np.inf
     return sample[:1] + means, widths
 

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from analysis.stats.distribution import quantile_interval
-from analysis.stats.intervals import bounded_interval, interval_of, mean_interval, summary, wilson
+from analysis.stats.intervals import bounded_interval, mean_interval, summary, wilson
 
 
 def test_wilson_of_nine_in_ten():
@@ -54,7 +54,7 @@ def test_summary_has_a_row_per_group_and_metric():
     rows = table.set_index(["policy", "metric"])
     ends = ["mean", "low", "high"]
     assert tuple(rows.loc[("tour", "success"), ends]) == wilson(2, 3)
-    assert tuple(rows.loc[("tour", "reward"), ends]) == interval_of("reward", [1.0, 2.0, 3.0])
+    assert tuple(rows.loc[("tour", "reward"), ends]) == mean_interval([1.0, 2.0, 3.0])
     assert tuple(rows.loc[("greedy", "collection_ratio"), ends]) == bounded_interval([0.5, 0.5])
     assert rows.loc["tour", "n"].tolist() == [3] * 4
 
