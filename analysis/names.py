@@ -73,10 +73,10 @@ MEASURES = {
 # All metrics of a mission: shares of missions, and means over missions.
 SHARES = (SUCCESS,)
 MEANS = (RATIO, PRODUCT, REWARD)
-BOUNDED = (RATIO, PRODUCT, UTILISATION)  # those of the means whose values lie between 0 and 1
 COST = "cost"  # of a study with prices
 # Of a study with bounds: the bound, and the bound minus the product.
 BOUND, GAP = "upper_bound", "optimality_gap"
+BOUNDED = (RATIO, PRODUCT, UTILISATION)  # those whose values lie between 0 and 1
 LESS_IS_BETTER = (COST, GAP, *(name for name, of in MEASURES.items() if of.less_is_better))
 
 

@@ -9,6 +9,13 @@ from analysis.names import METRICS
 
 # What a spreadsheet takes as the beginning of a formula.
 _FORMULA = re.compile(r"^[=+\-@\t\r]")
+_NAN = re.compile(r"\bnan\b")
+
+
+def why_nan(cells: Iterable[object]) -> str:
+    """Why a table has nan, in words; empty if no cell has."""
+    found = any(_NAN.search(str(cell)) for cell in cells)
+    return "nan: the missions are too few, or too much alike, to estimate it" if found else ""
 
 
 def percent(value: float) -> str:

@@ -16,7 +16,8 @@ from analysis import load_study, numbers
 from analysis.names import METRICS, PRODUCT
 from analysis.questions.learning.files import read_curve
 from analysis.replication import paper
-from analysis.stats.intervals import interval_of, mean_interval
+from analysis.stats.intervals import interval_of, post_stratified
+from analysis.stats.paired import paired
 from dess import load_scenario, simulate_batch
 from dess.files.reading import read_text
 from dess.files.writing import write_file
@@ -71,7 +72,12 @@ def card(folder: Path, command: str, missions: int) -> str:
         curve=curve.assign(**{name: curve[of] for name, of in evaluated.items()}).iloc[shown],
         random_missions=_means({folder.name: learned} | fleets | others),
         gains={
-            name: tuple(mean_interval(100 * (learned[PRODUCT] - other[PRODUCT])))
+            name: tuple(
+                100 * x
+                for x in paired(*(_values(of, PRODUCT) for of in (learned, other)), metric=PRODUCT)[
+                    :3
+                ]
+            )
             for name, other in others.items()
         },
         cases=_means(cases),
@@ -82,9 +88,15 @@ def card(folder: Path, command: str, missions: int) -> str:
 def _means(of: dict[str, np.ndarray]) -> dict[str, list[str]]:
     """Success, collection ratio and product of missions, with their intervals."""
     return {
-        name: [numbers.interval(*interval_of(metric, missions[metric])) for metric in METRICS]
+        name: [
+            numbers.interval(*interval_of(metric, _values(missions, metric))) for metric in METRICS
+        ]
         for name, missions in of.items()
     }
+
+
+def _values(missions: np.ndarray, metric: str) -> np.ndarray:
+    return post_stratified(missions[metric].astype(float), missions["uavs"])
 
 
 def main() -> None:

@@ -156,15 +156,29 @@ def means(
         InputError: As for ``evaluate``.
     """
     asked.check()
-    moments: dict[str, Moments] = {}
+    moments: dict[str, dict[int, Moments]] = {}
     uav_slots, seconds, size = 0, 0.0, _together(asked.scenario)
     pieces = (range(n, min(n + size, asked.missions)) for n in range(0, asked.missions, size))
     for piece in _evaluations(asked, pieces, progress, clock):
         for metric, values in _metrics(piece.records).items():
-            new = Moments.of(values)
-            moments[metric] = moments[metric].with_others(new) if metric in moments else new
+            fleets = piece.records.missions["uavs"]
+            for fleet in np.unique(fleets[~np.isnan(values)]):
+                new = Moments.of(values[(fleets == fleet) & ~np.isnan(values)])
+                old = moments.setdefault(metric, {}).get(fleet)
+                moments[metric][int(fleet)] = old.with_others(new) if old else new
         uav_slots, seconds = uav_slots + piece.uav_slots, seconds + piece.seconds
-    return Means(asked.team, moments, uav_slots, seconds)
+    low, high = asked.scenario.uavs
+    over_space = {
+        metric: _over_space(of, asked.missions, range(low, high + 1))
+        for metric, of in moments.items()
+    }
+    return Means(asked.team, over_space, uav_slots, seconds)
+
+
+def _over_space(fleets: dict[int, Moments], missions: int, drawn: range) -> Moments:
+    """The moments of a metric over a space; what some missions lack has a plain mean."""
+    whole = sum(of.n for of in fleets.values()) == missions
+    return Moments.of_space([fleets.get(n) for n in drawn], post_stratify=whole)
 
 
 def _metrics(records: Records) -> dict[str, np.ndarray]:
@@ -172,8 +186,8 @@ def _metrics(records: Records) -> dict[str, np.ndarray]:
     values = {metric: records.missions[metric] for metric in METRICS}
     if len(records.operations):
         measured = {name: records.operations[name] for name in OPERATIONS.names or ()}
-        values |= {name: of[~np.isnan(of)] for name, of in measured.items()}
-    return {metric: of for metric, of in values.items() if len(of)}
+        values |= measured
+    return {metric: of.astype(float) for metric, of in values.items()}
 
 
 def check_evaluation(asked: Sequence[Asked], yes: bool = False) -> None:

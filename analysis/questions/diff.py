@@ -118,6 +118,7 @@ def effects(found: Diff, by: Sequence[str] = ("policy_a",)) -> pd.DataFrame:
     keys, sides = ["policy_a", "point_a", "replication"], []
     for side in "ab":
         metrics = {f"{name}_{side}": name for name in METRICS}
+        metrics["uavs_a"] = "uavs"  # by which means are post-stratified
         side_missions = found.missions[[*keys, *metrics]].rename(columns=metrics)
         sides.append(side_missions.assign(policy=side, point=side_missions["point_a"]))
     table = compare(pd.concat(sides), "a", [*METRICS], by).drop(columns=["policy", "baseline"])

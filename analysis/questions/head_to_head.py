@@ -21,7 +21,7 @@ from analysis.names import METRICS, PARAMETERS, PRODUCT, RATIO, SUCCESS, paramet
 from analysis.questions.summary import learners, ranked_policies
 from analysis.results.tables import Results
 from analysis.stats.correction import for_choice
-from analysis.stats.intervals import wilson
+from analysis.stats.intervals import by_replication, wilson
 from analysis.stats.paired import compare
 from dess.errors import InputError, one_of
 
@@ -64,7 +64,8 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
         if given is not None and given not in results.policies:
             allowed = one_of(given, results.policies)
             raise InputError(f"{name}: {given!r} is not in the study{allowed}")
-    means = results.missions.groupby("policy")[PRODUCT].mean()
+    means = by_replication(results.missions, PRODUCT, ["policy", "point"]).mean()
+    means = means.groupby("policy").mean()
     trained = sorted(learners(results).values(), key=lambda trainings: -means[trainings].mean())
     ranked, of_learners = ranked_policies(results.missions), {*sum(trained, [])}
     firsts = [trainings[0] for trainings in trained]

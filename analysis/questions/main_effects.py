@@ -19,7 +19,7 @@ from analysis.names import PRODUCT, parameter, value_text
 from analysis.questions import summary
 from analysis.results.tables import Results
 from analysis.stats.correction import with_adjusted
-from analysis.stats.intervals import LEVEL
+from analysis.stats.intervals import LEVEL, by_replication
 from analysis.stats.paired import paired
 from dess import InputError
 
@@ -97,8 +97,7 @@ def changes(
     missions = results.missions[results.missions["policy"] == policy]
     missions = missions[missions["point"].isin(positions.index)]
     missions = missions[missions["uavs"] >= fewest_uavs]
-    values = missions.pivot(index="replication", columns="point", values=metric).dropna()
-    values = values.rename(columns=positions).astype(float)
+    values = by_replication(missions, metric, "point").dropna().rename(columns=positions)
     couples = [*combinations(sorted(values), 2)]
     at_once = 1 - (1 - LEVEL) / max(len(couples), 1)
     rows = []

@@ -16,6 +16,7 @@ from analysis.questions import settings
 from analysis.results.event_log import duration
 from analysis.results.tables import Results
 from analysis.stats.differences import column_tests
+from analysis.stats.intervals import by_replication
 from analysis.stats.paired import relative_change
 from dess.errors import InputError
 
@@ -75,7 +76,7 @@ def changes(
         )
     rows = []
     for policy, missions in results.missions.groupby("policy", sort=False):
-        wide = missions.pivot(index="replication", columns="point", values=metric).astype(float)
+        wide = by_replication(missions, metric, "point")
         for point, partner in _pairs(table, field, reference):
             both = wide[[point, partner]].dropna()
             if both.empty:

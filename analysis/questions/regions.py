@@ -17,7 +17,7 @@ from analysis import numbers
 from analysis.names import PARAMETERS, PRODUCT, parameter, value_text
 from analysis.questions.head_to_head import OF_BASELINE
 from analysis.stats.correction import for_choice, with_adjusted
-from analysis.stats.intervals import wilson
+from analysis.stats.intervals import values_within, wilson
 from analysis.stats.paired import paired
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
 
@@ -112,7 +112,9 @@ def _compared(missions: pd.DataFrame, columns: list[str], candidates: int) -> pd
     """A row for every group of missions with the same labels: the labels and the comparison."""
     rows = []
     for labels, part in missions.groupby(columns, sort=False):
-        of_policy, of_baseline = (part[PRODUCT + end].to_numpy() for end in ("", OF_BASELINE))
+        of_policy, of_baseline = (
+            values_within(part, PRODUCT + end, ()) for end in ("", OF_BASELINE)
+        )
         pair = paired(of_policy, of_baseline, metric=PRODUCT)
         behind = wilson(int((part["difference"] < 0).sum()), len(part))
         rows.append((*labels, pair.difference, pair.low, pair.high, pair.p, len(part), *behind))

@@ -72,9 +72,9 @@ def index_table(indices: pd.DataFrame) -> pd.DataFrame:
     """Sobol indices as text, with their intervals.
 
     Args:
-        indices: Rows of ``questions.summary.sensitivities``; rows with nan are left out.
+        indices: Rows of ``questions.summary.sensitivities``.
     """
-    rows = indices.dropna(subset=["first"])
+    rows = indices
     columns = {
         "Policy": rows["policy"],
         "Metric": rows["metric"].map(METRIC_NAMES),

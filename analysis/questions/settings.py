@@ -21,7 +21,6 @@ from analysis.names import (
     LESS_IS_BETTER,
     METRICS,
     PRODUCT,
-    SHARES,
     metrics_in,
     parameter,
     value_text,
@@ -29,7 +28,7 @@ from analysis.names import (
 from analysis.results.tables import Results
 from analysis.stats.correction import with_adjusted
 from analysis.stats.differences import column_tests
-from analysis.stats.intervals import column_intervals, stratified
+from analysis.stats.intervals import by_replication, column_intervals, stratified
 from analysis.stats.screening import may_be_best
 from dess.errors import InputError, one_of
 from dess.scenario import ZONE_PADS
@@ -173,7 +172,7 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
     table = table.join(points(results), on="point")
     others = [name for name in metrics_in(missions) if name != metric]
     for name in (*others, metric):
-        wide = missions.pivot(index="replication", columns=cell, values=name)
+        wide = by_replication(missions, name, cell)
         wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[cell]))
         ends = column_intervals(wide, name)
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
@@ -286,7 +285,7 @@ def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) 
     for metric in metrics:
         parts = []
         for policy, missions in _missions(results, metric, None).groupby("policy", sort=False):
-            wide = missions.pivot(index="replication", columns="point", values=metric).astype(float)
+            wide = by_replication(missions, metric, "point")
             tests = column_tests(wide.drop(columns=point), wide[point], metric)
             tests = tests[tests["n"] > 0].join(points(results)).reset_index()
             parts.append(tests.assign(metric=metric, policy=policy))
@@ -318,7 +317,7 @@ def _averaged(
         if sampled:
             ends = column_intervals(wide, metric)
         else:
-            at_points = part.pivot(index="replication", columns="point", values=metric)
+            at_points = by_replication(part, metric, "point")
             ends = _over_points(at_points.reindex(columns=range(len(cell_of))), cell_of, metric)
         table = pd.concat([cells, ends], axis=1)
         table = table.assign(points=sizes, tied=_tied(wide, metric))
@@ -364,8 +363,7 @@ def _missions(results: Results, metric: str, policy: str | None) -> pd.DataFrame
 
 
 def _tied(values: pd.DataFrame, metric: str) -> np.ndarray:
-    sign = -1.0 if metric in LESS_IS_BETTER else 1.0
-    return may_be_best(sign * values.to_numpy(float), metric in SHARES)
+    return may_be_best(values.to_numpy(float), metric)
 
 
 def _ordered(values: pd.Series) -> list[Any]:

@@ -32,7 +32,7 @@ from analysis.results.chunks import parts_of
 from analysis.results.tables import Results
 from analysis.stats.correction import for_choice
 from analysis.stats.distribution import distribution
-from analysis.stats.intervals import summary
+from analysis.stats.intervals import by_replication, summary, values_within
 from analysis.stats.learners import compare_learners
 from analysis.stats.paired import compare
 from analysis.stats.screening import may_be_best
@@ -90,10 +90,8 @@ def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
     for (metric, point), rows in means.groupby(["metric", "point"], sort=False):
         if len(rows) > 1:
             missions = results.missions[results.missions["point"] == point]
-            wide = missions.pivot(index="replication", columns="policy", values=metric)
-            sign = -1.0 if metric in LESS_IS_BETTER else 1.0
-            values = sign * wide[rows["policy"]].to_numpy(float)
-            may_be = may_be_best(values, metric in SHARES)
+            wide = by_replication(missions, str(metric), "policy")
+            may_be = may_be_best(wide[rows["policy"]].to_numpy(float), str(metric))
             best = TIED if may_be.sum() > 1 else BEST
             verdicts[rows.index] = np.where(may_be, best, WORSE)
     return means.assign(verdict=verdicts)
@@ -197,7 +195,9 @@ def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) 
         among: The policies to rank; by default all.
     """
     among = missions["policy"].unique() if among is None else [*among]
-    at_points = missions.groupby(["policy", "point"], sort=False)[PRODUCT].mean()
+    cell = ["policy", "point"]
+    values = missions[cell].assign(value=values_within(missions, PRODUCT, cell))
+    at_points = values.groupby(cell, sort=False)["value"].mean()
     means = (
         at_points.groupby("policy", sort=False).mean().sort_values(ascending=False, kind="stable")
     )

@@ -38,7 +38,7 @@ def bootstrap_interval(
     Returns:
         The statistic of the samples as ``mean``, and its interval. Where BCa is not defined or does
         not contain the statistic, the interval is that of the percentiles. If all resamples agree,
-        it is degenerate (low = mean = high).
+        it is degenerate (low = mean = high). The ends of a single value are nan.
 
     Raises:
         ValueError: If there are no values.
@@ -49,7 +49,7 @@ def bootstrap_interval(
         raise ValueError("bootstrap_interval: no values")
     estimate = float(statistic(*arrays))
     if n == 1:
-        return Interval(estimate, estimate, estimate)
+        return Interval(estimate, np.nan, np.nan)
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.simplefilter("ignore", stats.DegenerateDataWarning)
         result = stats.bootstrap(

@@ -10,6 +10,9 @@ as high as 1. The result has four properties that Student's t lacks: it lies in 
 positive length for every sample, holds the mean of the sample, and covers the mean where failures
 are rare, few, or all that there is (measured in ``tests/analysis/test_coverage.py``).
 
+A difference of two policies gets one value for a mission in which A alone does well, and one for a
+mission in which B alone does (``rare_differences``).
+
 The betting interval of I. Waudby-Smith and A. Ramdas (Journal of the Royal Statistical Society B 86
 (2024) 1-27) has a guarantee for every distribution, for which it is longer by a third to three
 times; and it depends on the order of the missions. This one depends on the mean, the variance and
@@ -23,7 +26,13 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
+from analysis.names import BOUNDED, REWARD, SHARES
+from dess.scenario import ScenarioSpace
+
 LEVEL = 0.95
+# What a failure costs: the reward of a filled quota is not earned, that of an empty battery is.
+_FIELDS = ScenarioSpace.model_fields
+FAILURE_COST = _FIELDS["reward_quota"].default - _FIELDS["reward_depleted"].default
 
 
 def bounded_ends(mean: Any, variance: Any, n: Any, level: float = LEVEL) -> tuple[Any, Any]:
@@ -49,3 +58,27 @@ def bounded_ends(mean: Any, variance: Any, n: Any, level: float = LEVEL) -> tupl
     half = stdtrit(size - 1, (1 + level) / 2) * np.sqrt(squares / (size - 1) / size)
     low, high = np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0)
     return np.minimum(low, mean), np.maximum(high, mean)
+
+
+def rare_differences(metric: str, a: Any, b: Any) -> tuple[Any, Any] | None:
+    """The differences A - B of missions in which only one of two policies does well.
+
+    For outcomes, they are 1 and -1. Of a metric from 0 to 1, one value falls to 0 or rises to 1,
+    and the other one stays at its mean: what goes further counts. A reward changes by the cost of
+    a failure.
+
+    Args:
+        metric: The metric.
+        a: (...) means of A.
+        b: (...) means of B.
+
+    Returns:
+        The (...) highest and the (...) lowest differences; None if they are not known.
+    """
+    if metric in SHARES:
+        return 0 * (a - b) + 1, 0 * (a - b) - 1
+    if metric in BOUNDED:
+        return np.maximum(a, 1 - b), -np.maximum(b, 1 - a)
+    if metric == REWARD:
+        return a - b + FAILURE_COST, a - b - FAILURE_COST
+    return None

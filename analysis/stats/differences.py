@@ -1,17 +1,23 @@
 """Tests of paired differences: Student's t test, McNemar's test for shares, and the sign test.
 
-Differences of values from 0 to 1 have Student's t, cut off at -1 and 1. Missions in which only one
-of two policies fails occur on both sides, so the mean of the differences is less skewed than the
-mean of the values.
+A sample of missions in which neither policy fails alone, or only one of them does, knows too little
+of lone failures: Student's t is far too narrow then. So one mission in which A alone does well and
+one in which B alone does are added to the differences (``stats.bounded.rare_differences``) before
+Student's t is taken, as D. G. Bonett and R. M. Price (Statistical Methods in Medical Research 21
+(2012) 449-466) add them to paired outcomes. The interval and the p-value rest on the same sample,
+so p is below 0.05 where the 95 % interval leaves out 0. Paired outcomes 0 and 1 have the exact
+p-value of McNemar, which may be on the other side of 0.05 where the interval ends close to 0.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.names import BOUNDED, SHARES
+from analysis.names import REWARD, SHARES
+from analysis.stats.bounded import rare_differences
 from analysis.stats.intervals import LEVEL, Interval, column_intervals, mean_interval
 
 _ROUNDING = 64 * np.finfo(float).eps  # relative tolerance below which differences count as equal
@@ -30,7 +36,8 @@ def differences_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def t_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
     """The mean difference with Student's interval, and the p-value of "no difference".
 
-    If all differences are equal, the interval is degenerate and p is that of the sign test.
+    If all differences are equal, the interval is degenerate and p is that of the sign test. The
+    interval of a single difference is nan.
     """
     mean = mean_interval(differences, level)
     if np.ptp(differences) == 0:
@@ -39,35 +46,33 @@ def t_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
     return mean, float(2 * stats.t.sf(t, differences.size - 1))
 
 
-def share_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
-    """The mean difference of shares with its interval, and the p-value of "no difference".
+def difference_test(
+    a: np.ndarray, b: np.ndarray, metric: str, level: float
+) -> tuple[Interval, float]:
+    """The mean difference A - B of pairs, the interval that suits the metric, and the p-value.
 
-    One gain and one loss are added before Student's t is used (as by Bonett and Price 2012), so
-    that the interval has a length even if there are few discordant pairs, or none. The p-value of
-    outcomes 0 and 1 is that of McNemar's exact test.
+    Args:
+        a: (n,) values of A.
+        b: (n,) values of B.
+        metric: The metric; Student's t, if nothing is known of its rare differences.
+        level: Confidence level.
     """
-    smooth, p = t_test(smoothed(differences), level)
-    if np.isin(differences, (-1, 0, 1)).all():
-        gains, losses = int(np.sum(differences > 0)), int(np.sum(differences < 0))
-        p = float(stats.binomtest(gains, gains + losses).pvalue) if gains + losses else 1.0
+    differences = differences_of(a, b)
+    rare = rare_differences(metric, a.mean(), b.mean())
+    if rare is None or (metric == REWARD and differences.size == 1):
+        return t_test(differences, level)
+    smooth, p = t_test(smoothed(differences, rare), level)
+    if metric in SHARES and np.isin(differences, (-1, 0, 1)).all():
+        p = mcnemar(int(np.sum(differences > 0)), int(np.sum(differences < 0)))
+    limit = np.inf if metric == REWARD else 1.0
     mean = float(differences.mean())
-    return Interval(mean, max(smooth.low, -1.0), min(smooth.high, 1.0)), p
+    return Interval(mean, max(smooth.low, -limit), min(smooth.high, limit)), p
 
 
-def bounded_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
-    """The mean difference of values from 0 to 1 with its interval, and the p-value.
-
-    The interval is Student's t, cut off at -1 and 1. If all differences are equal, one gain and one
-    loss are added as for shares, because missions with another difference may just be too rare to
-    be in the sample.
-    """
-    mean, p = t_test(smoothed(differences) if np.ptp(differences) == 0 else differences, level)
-    return Interval(float(differences.mean()), max(mean.low, -1.0), min(mean.high, 1.0)), p
-
-
-def difference_test(metric: str) -> Callable[[np.ndarray, float], tuple[Interval, float]]:
-    """The test of paired differences that suits a metric of missions."""
-    return share_test if metric in SHARES else bounded_test if metric in BOUNDED else t_test
+@cache
+def mcnemar(gains: int, losses: int) -> float:
+    """The p-value of McNemar's exact test."""
+    return float(stats.binomtest(gains, gains + losses).pvalue) if gains + losses else 1.0
 
 
 def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") -> pd.DataFrame:
@@ -85,24 +90,35 @@ def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") ->
     size = values.abs().max().clip(lower=baseline.abs().max())
     constant = differences.max() - differences.min() <= _ROUNDING * size
     differences = differences.mask(differences.abs().le(_ROUNDING * size, axis=1), 0.0)
+    present = differences.notna()
     table = column_intervals(differences).rename(columns={"mean": "difference"})
-    t = (table["difference"] / differences.sem()).abs()
-    table["p"] = 2 * stats.t.sf(t, np.maximum(table["n"] - 1, 1))
-    known: dict[tuple[int, int, int], tuple[Interval, float]] = {}
-    exact = {}  # columns for which Student's t is not suitable
-    for column in differences if metric in SHARES else differences.columns[constant]:
-        own = differences[column].dropna().to_numpy()
-        if metric in SHARES and len(own):
-            key = len(own), int((own > 0).sum()), int((own < 0).sum())  # all that the test needs
-            known[key] = known.get(key) or share_test(own, LEVEL)
-            exact[column] = (*known[key][0], known[key][1])
-        elif len(own):
-            mean, p = difference_test(metric)(np.full_like(own, own[0]), LEVEL)
-            exact[column] = (*mean, p)
-    if exact:
-        table.loc[[*exact], ["difference", "low", "high", "p"]] = np.array([*exact.values()])
-    if metric in BOUNDED:
+    n, mean = table["n"], table["difference"]
+    own = values.where(present).mean()
+    rare = rare_differences(metric, own, own - mean)
+    if rare is None:
+        t = (mean / differences.sem()).abs()
+        table["p"] = 2 * stats.t.sf(t, np.maximum(n - 1, 1))
+        for column in differences.columns[constant & (n > 0)]:
+            table.loc[column, "p"] = sign_test(differences[column].dropna().to_numpy())
+            if n[column] > 1:
+                table.loc[column, ["low", "high"]] = mean[column]
+        return table
+    size = n + 2
+    centre = (n * mean + rare[0] + rare[1]) / size
+    squares = n * (differences.var(ddof=0) + (mean - centre) ** 2)
+    squares += (rare[0] - centre) ** 2 + (rare[1] - centre) ** 2
+    error = np.sqrt(squares / (size - 1) / size)
+    half = stats.t.isf((1 - LEVEL) / 2, size - 1) * error
+    table["low"], table["high"] = centre - half, centre + half
+    table["p"] = 2 * stats.t.sf((centre / error).abs(), size - 1)
+    if metric == REWARD:
+        table.loc[n == 1, ["low", "high", "p"]] = np.nan, np.nan, 1.0
+    else:
         table[["low", "high"]] = table[["low", "high"]].clip(-1, 1)
+    if metric in SHARES:
+        gains, losses = (differences > 0).sum(), (differences < 0).sum()
+        exact = (differences.isin((-1, 0, 1)) | ~present).all() & (n > 0)
+        table.loc[exact, "p"] = [*map(mcnemar, gains[exact], losses[exact])]
     return table
 
 
@@ -111,7 +127,7 @@ def sign_test(equal: np.ndarray) -> float:
     return min(1.0, 2 * 0.5 ** len(equal)) if equal[0] else 1.0
 
 
-def smoothed(differences: np.ndarray) -> np.ndarray:
-    """The differences with one gain and one loss added, along the last axis."""
-    more = np.broadcast_to([1.0, -1.0], (*differences.shape[:-1], 2))
+def smoothed(differences: np.ndarray, rare: Sequence[float] = (1.0, -1.0)) -> np.ndarray:
+    """The differences with rare ones added, along the last axis: one gain and one loss."""
+    more = np.broadcast_to(np.asarray(rare, float), (*differences.shape[:-1], 2))
     return np.concatenate([differences, more], axis=-1)

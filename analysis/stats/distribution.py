@@ -42,7 +42,7 @@ def distribution(
     expanded for the size of the tail. It is reliable with about 30 missions or more in the tail
     (600 missions for the worst 5 %), and too narrow with fewer. Where all resamples agree, a metric
     from 0 to 1 has the interval of a bounded mean of as many values as the tail has. The quantiles
-    have the intervals of ``quantile_interval``, whose ends may be infinite.
+    have the intervals of ``quantile_interval``; an end that no observation limits is nan.
 
     Args:
         missions: A row per mission, with the metric and the fields of ``by``.
@@ -85,7 +85,7 @@ def distribution(
         views.append(("worst mean", tail, risk))
         rows += [(*group, metric, view, q, *ends, len(part)) for view, q, ends in views]
     columns = [*by, "metric", "view", "share", "value", "low", "high", "n"]
-    return pd.DataFrame(rows, columns=columns)
+    return pd.DataFrame(rows, columns=columns).replace([-np.inf, np.inf], np.nan)
 
 
 def quantile_interval(

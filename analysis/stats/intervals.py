@@ -19,6 +19,8 @@ from analysis.stats.bounded import LEVEL as LEVEL
 from analysis.stats.bounded import bounded_ends
 from dess.errors import InputError, one_of
 
+LEAST = 5  # missions of every number of UAVs for a post-stratified mean
+
 
 class Interval(NamedTuple):
     """An estimate and the ends of its confidence interval."""
@@ -64,14 +66,14 @@ class Moments(NamedTuple):
         """The mean of the values."""
         return self.total / self.n
 
-    def with_others(self, others: "Moments") -> "Moments":
+    def with_others(self, others: Self) -> Self:
         """The moments of these values and others together.
 
         Source: T. F. Chan, G. H. Golub, R. J. LeVeque, Algorithms for computing the sample
         variance, The American Statistician 37 (1983) 242-247, eq. 1.5b.
         """
         n, apart = self.n + others.n, others.mean - self.mean
-        return Moments(
+        return type(self)(
             n,
             self.total + others.total,
             self.squares + others.squares + apart**2 * (self.n / n) * others.n,
@@ -79,11 +81,40 @@ class Moments(NamedTuple):
             max(self.most, others.most),
         )
 
+    @classmethod
+    def of_space(cls, fleets: Sequence[Self | None], post_stratify: bool = True) -> Self:
+        """The moments of the linearised values of ``post_stratified``.
+
+        Args:
+            fleets: For every number of UAVs that may be drawn the moments of its missions; None
+                where it has none.
+            post_stratify: Whether they are all missions, and not those that have measured it.
+        """
+        drawn = [of for of in fleets if of]
+        whole = drawn[0]
+        for of in drawn[1:]:
+            whole = whole.with_others(of)
+        counts = np.array([of.n if of else 0 for of in fleets])
+        weights = weights_of_fleets(counts)
+        if weights is None or not post_stratify:
+            return whole
+        mean = float(np.mean([of.mean for of in drawn]))
+        spread = weights**2 * counts / (counts - 1) * (1 - 1 / whole.n)
+        squares = float(spread @ [of.squares for of in drawn])
+        return whole._replace(total=mean * whole.n, squares=squares)
+
     def interval(self, metric: str, level: float = LEVEL) -> Interval:
         """The mean of a metric with the interval of ``interval_of``."""
-        if metric in SHARES:
+        if metric in SHARES and self._are_outcomes:
             return wilson(int(self.total), self.n, level)
-        return self.bounded(level) if metric in BOUNDED else self.student(level)
+        is_bounded = metric in SHARES or metric in BOUNDED
+        return self.bounded(level) if is_bounded else self.student(level)
+
+    @property
+    def _are_outcomes(self) -> bool:
+        """Whether all values may be 0 or 1: they have the sum and the spread of such."""
+        spread = self.total * (self.n - self.total) / self.n
+        return self.total.is_integer() and bool(np.isclose(self.squares, spread, atol=1e-9))
 
     def bounded(self, level: float = LEVEL) -> Interval:
         """The mean of values from 0 to 1 with the interval of ``bounded_interval``."""
@@ -93,7 +124,8 @@ class Moments(NamedTuple):
     def student(self, level: float = LEVEL) -> Interval:
         """The mean with the interval of ``mean_interval``."""
         if self.least == self.most:
-            return Interval(self.mean, self.mean, self.mean)
+            half = 0.0 if self.n > 1 else np.nan
+            return Interval(self.mean, self.mean - half, self.mean + half)
         error = np.sqrt(self.squares / (self.n - 1)) / np.sqrt(self.n)
         low, high = stats.t.interval(level, self.n - 1, self.mean, error)
         return Interval(self.mean, float(low), float(high))
@@ -124,8 +156,8 @@ def mean_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) ->
     """Mean with its Student t interval: for values without bounds, and for paired differences.
 
     It is fit for skewed metrics from some 30 values on. The mean of values from 0 to 1 has the
-    ``bounded_interval``. A single value, or values without variance, give a degenerate interval
-    (low = mean = high): the sample says nothing about the spread.
+    ``bounded_interval``. Equal values give a degenerate interval (low = mean = high). The ends of
+    a single value are nan, because it says nothing about the spread.
 
     Raises:
         ValueError: If there are no values.
@@ -138,8 +170,8 @@ def interval_of(
 ) -> Interval:
     """The mean of a metric of missions with the interval that is fit for it.
 
-    Wilson's interval for ``success``, the ``bounded_interval`` for the collection ratio and the
-    product, and Student's t for all others.
+    Wilson's interval for outcomes of ``success``, the ``bounded_interval`` for the collection ratio
+    and the product, and Student's t for all others.
 
     Raises:
         ValueError: If there are no values.
@@ -181,7 +213,8 @@ def stratified(values: np.ndarray, metric: str, level: float = LEVEL) -> Interva
         return Interval(mean, float(low), float(high))
     replications = int(present.any(axis=1).sum())
     freedom = max(replications - 1, 1)
-    half = float(stats.t.isf((1 - level) / 2, freedom) * np.sqrt(common * replications / freedom))
+    error = np.sqrt(common * replications / freedom)
+    half = float(stats.t.isf((1 - level) / 2, freedom) * error) if replications > 1 else np.nan
     return Interval(mean, mean - half, mean + half)
 
 
@@ -227,8 +260,8 @@ def column_intervals(values: pd.DataFrame, metric: str = "", level: float = LEVE
     Returns:
         (K, 4): ``mean``, ``low``, ``high``, ``n``, with the columns as index; nan without values.
     """
-    n, mean, errors = values.count(), values.mean(), values.sem().fillna(0.0)
-    half = errors * stats.t.isf((1 - level) / 2, np.maximum(n - 1, 1))
+    n, mean = values.count(), values.mean()
+    half = values.sem() * stats.t.isf((1 - level) / 2, np.maximum(n - 1, 1))
     table = pd.DataFrame({"mean": mean, "low": mean - half, "high": mean + half, "n": n})
     if metric in SHARES or metric in BOUNDED:
         some = n > 0
@@ -263,8 +296,88 @@ def groups(missions: pd.DataFrame, by: Sequence[str]) -> Iterator[tuple[tuple, p
 def _interval(missions: pd.DataFrame, metric: str, level: float, strata: bool) -> Interval:
     """The mean of a group: over its missions, or over the points that these are at."""
     if strata and missions["point"].nunique() > 1:
-        wide = missions.pivot(index="replication", columns="point", values=metric)
-        wide = wide.dropna(axis="columns", how="all")
+        wide = by_replication(missions, metric, "point").dropna(axis="columns", how="all")
         if (wide.count() > 1).all():
             return stratified(wide.to_numpy(float), metric, level)
-    return interval_of(metric, missions[metric].dropna().to_numpy(), level)
+    values = values_within(missions, metric, ())
+    return interval_of(metric, values[~np.isnan(values)], level)
+
+
+def weights_of_fleets(counts: np.ndarray) -> np.ndarray | None:
+    """The weights of the missions of every number of UAVs, relative to those of a plain mean.
+
+    Every number of UAVs of a scenario space is equally probable, so all have the same weight in a
+    mean over the space, however many missions have drawn each: the mean is post-stratified
+    (Cochran, Sampling Techniques, 1977, Section 5A.9).
+
+    Args:
+        counts: (K,) numbers of missions with each number of UAVs that may be drawn.
+
+    Returns:
+        (K,) the weights. None, for a plain mean, if the number is not drawn, or if one of the
+        numbers has fewer missions than ``LEAST``, which tell too little about their spread.
+    """
+    if len(counts) == 1 or counts.min() < LEAST:
+        return None
+    return counts.sum() / len(counts) / counts
+
+
+def post_stratified(values: np.ndarray, fleets: np.ndarray) -> np.ndarray:
+    """Values whose mean, and its standard error, are post-stratified by the number of UAVs.
+
+    They are the linearised values: the mean of the strata's means, and the weighted deviations from
+    the mean of the own stratum. So what tells an interval or a test from a sample of missions takes
+    them in place of the values.
+
+    Args:
+        values: (n,) values of missions of one scenario space.
+        fleets: (n,) their numbers of UAVs; those from the smallest to the largest may be drawn.
+
+    Returns:
+        (n,) the linearised values. The values themselves, if ``weights_of_fleets`` gives none, or
+        if some are nan: then a mean is over the missions that have measured it, whose fleets have
+        unknown weights.
+    """
+    if not values.size or np.isnan(values).any():
+        return values
+    stratum = fleets.astype(int) - int(fleets.min())
+    counts = np.bincount(stratum)
+    weights = weights_of_fleets(counts)
+    if weights is None:
+        return values
+    means = np.bincount(stratum, values) / counts
+    spread = weights * np.sqrt(counts / (counts - 1) * (1 - 1 / len(values)))
+    return means.mean() + spread[stratum] * (values - means[stratum])
+
+
+def values_within(missions: pd.DataFrame, metric: str, spaces: Sequence[str]) -> np.ndarray:
+    """The values of a metric, ``post_stratified`` in every scenario space by itself.
+
+    Args:
+        missions: A row per mission; without a column ``uavs``, the values are taken as they are.
+        metric: The metric.
+        spaces: The columns that tell the spaces apart, such as ``point``.
+    """
+    values = missions[metric].to_numpy(float).copy()
+    if "uavs" in missions:
+        fleets = missions["uavs"].to_numpy()
+        table = missions[[*spaces]].reset_index(drop=True)
+        for _, part in groups(table, spaces):
+            rows = part.index.to_numpy()
+            values[rows] = post_stratified(values[rows], fleets[rows])
+    return values
+
+
+def by_replication(
+    missions: pd.DataFrame, metric: str, columns: str | Sequence[str]
+) -> pd.DataFrame:
+    """A metric with a row per replication and a column per setting, ``post_stratified``.
+
+    Args:
+        missions: A row per mission.
+        metric: The metric.
+        columns: What tells the settings apart, such as ``point``.
+    """
+    names = [columns] if isinstance(columns, str) else [*columns]
+    table = missions[["replication", *names]].assign(value=values_within(missions, metric, names))
+    return table.pivot(index="replication", columns=columns, values="value")

@@ -12,9 +12,16 @@ import numpy as np
 import pandas as pd
 from scipy import optimize, stats
 
-from analysis.names import BOUNDED, MEANS, SHARES
+from analysis.names import MEANS, REWARD, SHARES
+from analysis.stats.bounded import rare_differences
 from analysis.stats.correction import Correction, with_adjusted
-from analysis.stats.differences import differences_of, share_test, sign_test, smoothed, t_test
+from analysis.stats.differences import (
+    difference_test,
+    differences_of,
+    sign_test,
+    smoothed,
+    t_test,
+)
 from analysis.stats.intervals import LEVEL, check_share
 from analysis.stats.matching import check_same_missions, matched, metrics_by_treatment, select
 from dess import InputError
@@ -62,10 +69,9 @@ def crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
         The intervals, the p-value of "no expected difference", and the components as standard
         deviations. If all differences are equal, the intervals are degenerate and p is that of the
         sign test over the trainings, 2^(1 - S). With a single training, the interval is about this
-        training only (Student's t over the missions), the interval for a new training is infinite,
-        and the deviations of training and rest are nan (unknown). With a single mission, the
-        interval is degenerate, the interval for a new training is infinite, p is 1 and all
-        deviations are nan.
+        training only (Student's t over the missions); the interval for a new training and the
+        deviations of training and rest are nan (unknown). With a single mission, all is nan but the
+        difference and p, which is 1.
 
     Raises:
         ValueError: If there are no values.
@@ -78,7 +84,7 @@ def crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
     mean = of_missions.mean
     if trainings == 1 or missions == 1:
         spread = float(d.std(ddof=1)) if missions > 1 else np.nan
-        return Crossed(*of_missions, -np.inf, np.inf, p, np.nan, spread, np.nan)
+        return Crossed(*of_missions, np.nan, np.nan, p, np.nan, spread, np.nan)
     if np.ptp(d) == 0:
         return Crossed(*of_missions, mean, mean, sign_test(d[:, 0]), 0.0, 0.0, 0.0)
     row, column = d.mean(axis=1, keepdims=True), d.mean(axis=0, keepdims=True)
@@ -129,8 +135,8 @@ def compare_learners(
         and ``n``, the number of missions (of replications, where ``compare`` would take means).
         ``about`` says what ``low``, ``high`` and ``p`` are about: the expected difference over all
         trainings of ``the learner``, or ``this checkpoint``, the only one there is. ``new_low`` and
-        ``new_high`` bound the difference of one new training. Shares have the intervals and the
-        p-value with one gain and one loss added, as in ``paired``.
+        ``new_high`` bound the difference of one new training. Rare differences are added as in
+        ``paired``.
 
     Raises:
         InputError: As for ``compare``, and if a learner has no checkpoint, or one twice.
@@ -150,12 +156,8 @@ def compare_learners(
             check_same_missions(tables, checkpoint, baseline)
         for group, (b, *parts) in matched([reference, *trained], by):
             for metric in metrics:
-                differences = differences_of(np.stack([a[metric] for a in parts]), b[metric])
-                result = crossed(differences, level)
-                if metric in SHARES or (metric in BOUNDED and np.ptp(differences) == 0):
-                    result = _as_share(result, differences, level)
-                elif metric in BOUNDED:
-                    result = _within(result)
+                of_learner = np.stack([a[metric] for a in parts])
+                result, differences = _compared(of_learner, b[metric], metric, level)
                 about = LEARNER if len(parts) > 1 else CHECKPOINT
                 labels = (learner, baseline, *group, metric, about)
                 rows.append((*labels, *result, *differences.shape))
@@ -163,13 +165,22 @@ def compare_learners(
     return with_adjusted(pd.DataFrame(rows, columns=columns), correction)
 
 
-def _as_share(result: Crossed, differences: np.ndarray, level: float) -> Crossed:
-    """The result with the intervals and the p-value of shares."""
-    if len(differences) == 1:
-        mean, p = share_test(differences[0], level)
-        return result._replace(low=mean.low, high=mean.high, p=p)
-    smooth = _within(crossed(smoothed(differences), level))
-    return result._replace(**{name: getattr(smooth, name) for name in _ENDS}, p=smooth.p)
+def _compared(
+    a: np.ndarray, b: np.ndarray, metric: str, level: float
+) -> tuple[Crossed, np.ndarray]:
+    """A learner (S, R) compared with a baseline (R,) by a metric, and the differences."""
+    differences = differences_of(a, b)
+    result = crossed(differences, level)
+    if len(a) == 1:
+        mean, p = difference_test(a[0], b, metric, level)
+        return result._replace(low=mean.low, high=mean.high, p=p), differences
+    rare = rare_differences(metric, a.mean(), b.mean())
+    if rare is None or (metric == REWARD and b.size == 1):
+        return result, differences
+    smooth = crossed(smoothed(differences, rare), level)
+    smooth = smooth if metric == REWARD else _within(smooth)
+    ends = {name: getattr(smooth, name) for name in _ENDS}
+    return result._replace(**ends, p=smooth.p), differences
 
 
 def _within(result: Crossed) -> Crossed:

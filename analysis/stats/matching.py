@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.names import MEASURES
-from analysis.stats.intervals import check_columns, groups
+from analysis.stats.intervals import check_columns, groups, values_within
 from dess import InputError
 
 Treatment = Literal["policy", "point"]
@@ -38,10 +38,10 @@ def metrics_by_treatment(
     if twice.any():
         first = _first_row(missions.loc[twice, [of, *keys]])
         raise InputError(f"missions: {first} is there twice; allowed: every mission once")
-    return {
-        name: part.set_index(keys)[list(metrics)].astype(float)
-        for (name,), part in groups(missions, [of])
-    }
+    spaces = [of, *(key for key in keys if key in (*by, "policy", "point", "seed"))]
+    values = {metric: values_within(missions, metric, spaces) for metric in metrics}
+    table = missions[[of, *keys]].assign(**values)
+    return {name: part.set_index(keys)[[*values]] for (name,), part in groups(table, [of])}
 
 
 def select(tables: Mapping[Any, pd.DataFrame], of: str, name: str | int) -> pd.DataFrame:

@@ -54,13 +54,13 @@ def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str = "")
         metric: The metric of the values; by default one without bounds.
 
     Returns:
-        The interval of Student's t and the p-value of the paired t test; those of
-        ``differences.share_test`` for ``success``, and of ``differences.bounded_test`` for metrics
-        from 0 to 1. No result is nan:
+        The interval and the p-value of ``differences.difference_test``: of Student's t, with
+        rare differences added for the success, metrics from 0 to 1 and the reward.
 
-        - If all differences of a metric without bounds are equal (up to rounding), n = 1 included,
-          the interval is degenerate (low = difference = high). p is that of the sign test,
-          2^(1 - n), which is 1 for a single pair; it is 1 if all differences are 0.
+        - If all differences of another metric are equal (up to rounding), the interval is
+          degenerate (low = difference = high). p is that of the sign test, 2^(1 - n); it is 1 if
+          all differences are 0.
+        - A single pair of a metric without bounds has no interval: its ends are nan, and p is 1.
         - If A or B is constant, their correlation is 0. If both are, the variance reduction is 0.
 
     Raises:
@@ -71,8 +71,13 @@ def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str = "")
         raise ValueError(f"paired: {a.size} and {b.size} values; allowed: as many, at least one")
     if metric in SHARES and (min(a.min(), b.min()) < 0 or max(a.max(), b.max()) > 1):
         raise ValueError("paired: no shares; allowed: values from 0 to 1")
+    return _paired(a, b, level, metric)
+
+
+def _paired(a: np.ndarray, b: np.ndarray, level: float, metric: str) -> Paired:
+    """The comparison; linearised values of shares may lie outside [0, 1]."""
+    mean, p = difference_test(a, b, metric, level)
     differences = differences_of(a, b)
-    mean, p = difference_test(metric)(differences, level)
     of_a, of_b, of_differences = map(_variance, (a, b, differences))
     correlation = float(np.corrcoef(a, b)[0, 1]) if of_a and of_b else 0.0
     reduction = 1 - of_differences / (of_a + of_b) if of_a + of_b else 0.0
@@ -92,7 +97,7 @@ def relative_change(values: np.ndarray, reference: np.ndarray, level: float = LE
     """
     ratio, n = float(values.mean() / reference.mean()), len(values)
     if n == 1:
-        return Interval(ratio - 1, ratio - 1, ratio - 1)
+        return Interval(ratio - 1, np.nan, np.nan)
     error = np.std(values - ratio * reference, ddof=1) / np.sqrt(n) / abs(reference.mean())
     half = float(stats.t.isf((1 - level) / 2, n - 1) * error)
     return Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
@@ -126,7 +131,8 @@ def compare(
         is above that of the baseline. What a mission of a pair did not measure is left out. If a
         group has several missions of a replication (at several
         design points, which share its random draws), their means are compared, and ``n`` is the
-        number of replications.
+        number of replications. Where the number of UAVs is drawn, means and differences are
+        post-stratified by it (``stats.intervals.post_stratified``).
 
     Raises:
         InputError: If a column is missing or does not contain numbers, the baseline is missing or
@@ -146,7 +152,7 @@ def compare(
             for metric in metrics:
                 measured = ~np.isnan(a[metric]) & ~np.isnan(b[metric])
                 if measured.any():
-                    result = paired(a[metric][measured], b[metric][measured], level, metric)
+                    result = _paired(a[metric][measured], b[metric][measured], level, metric)
                     rows.append((name, baseline, *group, metric, *result))
     columns = [of, "baseline", *by, "metric", *Paired._fields]
     return with_adjusted(pd.DataFrame(rows, columns=columns), correction)

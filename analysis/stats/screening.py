@@ -3,13 +3,15 @@
 import numpy as np
 from scipy import stats
 
+from analysis.names import LESS_IS_BETTER
+from analysis.stats.bounded import rare_differences
 from analysis.stats.intervals import LEVEL, check_share
 
 _BLOCK = 512  # settings that are compared with all others at once, which limits the memory
 _ROUNDING = 1e-12  # variances and differences below this, relative to the values, count as 0
 
 
-def may_be_best(values: np.ndarray, share: bool = False, level: float = LEVEL) -> np.ndarray:
+def may_be_best(values: np.ndarray, metric: str = "", level: float = LEVEL) -> np.ndarray:
     """The settings that no other setting is significantly better than.
 
     With probability ``level``, the setting with the highest true mean is among them, for all
@@ -20,10 +22,10 @@ def may_be_best(values: np.ndarray, share: bool = False, level: float = LEVEL) -
     assumes that the number of missions does not depend on their results.
 
     Args:
-        values: (R, K) values of K settings in R replications; higher is better, and nan means that
-            a setting lacks a replication. Two settings are compared on the replications of both.
-        share: Whether the values are outcomes 0 or 1, or means of outcomes. Then one gain and one
-            loss are added to the differences, as in ``analysis.compare``.
+        values: (R, K) values of K settings in R replications; nan means that a setting lacks a
+            replication. Two settings are compared on the replications of both.
+        metric: The metric, of which more is better but for those of ``LESS_IS_BETTER``. Its rare
+            differences are added, as in ``analysis.compare``.
         level: The probability.
 
     Returns:
@@ -35,26 +37,40 @@ def may_be_best(values: np.ndarray, share: bool = False, level: float = LEVEL) -
     """
     check_share("level", level)
     present = np.isfinite(values)
+    values = -values if metric in LESS_IS_BETTER else values
+    means = np.nansum(values, axis=0) / np.maximum(present.sum(axis=0), 1)
     # What a replication adds to all settings cancels in their differences.
     centre = np.nanmean(np.where(present.any(1, keepdims=True), values, 0.0), axis=1, keepdims=True)
     centred, mask = np.where(present, values - centre, 0.0), present.astype(float)
     alpha = (1 - level) / max(values.shape[1] - 1, 1)
     blocks = range(0, values.shape[1], _BLOCK)
-    parts = [_unbeaten(slice(b, b + _BLOCK), centred, mask, share, alpha) for b in blocks]
+    parts = []
+    for b in blocks:
+        block = slice(b, b + _BLOCK)
+        rare = rare_differences(metric, means, means[block, None])
+        parts.append(_unbeaten(block, centred, mask, rare, alpha))
     return np.concatenate(parts) if parts else np.zeros(0, bool)
 
 
 def _unbeaten(
-    block: slice, values: np.ndarray, mask: np.ndarray, share: bool, alpha: float
+    block: slice,
+    values: np.ndarray,
+    mask: np.ndarray,
+    rare: tuple[np.ndarray, np.ndarray] | None,
+    alpha: float,
 ) -> np.ndarray:
-    """Which settings of a block are not ruled out by any other setting."""
+    """Which settings of a block are not ruled out by any other setting.
+
+    ``rare`` has the differences that are added, of the other settings minus those of the block.
+    """
     own, here = values[:, block], mask[:, block]
     n = here.T @ mask
     lead = here.T @ values - own.T @ mask  # of the other settings, summed over common replications
     squares = here.T @ values**2 + (own**2).T @ mask
     spread = np.maximum(squares - 2 * own.T @ values, 0.0)
-    if share:
-        n, spread, squares = n + 2 * (n > 0), spread + 2.0, squares + 2.0
+    if rare is not None:
+        n, lead, more = n + 2 * (n > 1), lead + rare[0] + rare[1], rare[0] ** 2 + rare[1] ** 2
+        spread, squares = spread + more, squares + more
     with np.errstate(divide="ignore", invalid="ignore"):
         deviations = spread - lead**2 / n
         constant = deviations <= _ROUNDING * squares

@@ -15,7 +15,8 @@ that was not ruled out before the stage. The procedure ends when one point is le
 more than h2 S2_il / delta^2 for all pairs that are left. It uses the variances of differences and
 adds the errors up (Bonferroni). So it is valid under common random numbers, and needs fewer
 missions with them. It assumes normal values. Where missions fail rarely, all of the first n0
-missions may succeed, so that their variance is too small; then the guarantee does not hold.
+missions may succeed, so that their variance is too small; then the guarantee does not hold, so
+success and product are refused.
 
 ``kn-bounded`` is the same procedure for metrics between 0 and 1 with rare failures. The variances
 are estimated from all missions so far, again whenever r has grown by half (as in Kim and Nelson's
@@ -40,7 +41,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from analysis.names import BOUNDED, LESS_IS_BETTER, SHARES
+from analysis.names import BOUNDED, LESS_IS_BETTER, PRODUCT, SHARES
 from analysis.study.stopping import MOST, Metric, Samples, StrictTable, values_in
 from dess import InputError
 from dess.scenario import Integer, Number
@@ -144,6 +145,11 @@ class Selection(StrictTable):
     def _fits_the_procedure(self) -> Self:
         if self.procedure == "kn-bounded" and self.metric not in (*SHARES, *BOUNDED):
             raise ValueError(f"metric: {self.metric} is not bounded; allowed: procedure kn with it")
+        if self.procedure == "kn" and self.metric in (*SHARES, PRODUCT):
+            raise ValueError(
+                f"metric: {self.metric} falls to 0 in rare failures, for which kn guarantees "
+                "nothing; allowed: procedure kn-bounded with it"
+            )
         return self
 
     def wanted(self, samples: Samples, settings: Sequence[Any] = ()) -> list[int]:

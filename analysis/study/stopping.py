@@ -129,10 +129,11 @@ class Reached(NamedTuple):
 class Precision(StrictTable):
     """The rule that missions are added to a cell until its 95 % intervals are narrow enough.
 
-    The half-widths are half the lengths of the intervals that all tables and pages print, as of
-    ``stats.intervals.interval_of``: Wilson's interval for ``success``, the interval of a bounded
-    mean for the collection ratio and the product, Student's t for the reward. The *stopping point*
-    is the first n >= ``first`` at which all targets are met with n, n + 1, ..., n + ``look_ahead``
+    The half-widths are half the lengths of the intervals of ``stats.intervals.interval_of``:
+    Wilson's interval for ``success``, the interval of a bounded mean for the collection ratio and
+    the product, Student's t for the reward. They are not post-stratified by the number
+    of UAVs, so where it is drawn, the printed intervals are narrower. The *stopping point* is the
+    first n >= ``first`` at which all targets are met with n, n + 1, ..., n + ``look_ahead``
     missions. Without the look-ahead, a sample whose interval is narrow by chance would stop too
     early. The cell keeps the missions of the look-ahead.
 
@@ -143,10 +144,10 @@ class Precision(StrictTable):
     in the order of their replications, so it is the same whether or not a run was interrupted.
 
     After stopping, the coverage of the intervals is about as good as with a fixed number of
-    missions. It is lower where a rare event changes the reward strongly, because Student's interval
-    is too narrow until the event occurs. A larger ``first`` helps. The other intervals allow for
-    failures that no mission has shown yet, so a narrow one takes many missions: a half-width of one
-    percentage point takes about 100 to 200 missions even if none of them fails.
+    missions. It is lower where a rare event changes the reward strongly, because Student's
+    interval is too narrow until the event occurs. A larger ``first`` helps. The other intervals
+    allow for failures that no mission has shown yet, so a narrow one takes many missions: a
+    half-width of one percentage point takes about 100 to 200 missions even if none of them fails.
 
     Source: K. Hoad, S. Robinson, R. Davies, Automated selection of the number of replications for
     a discrete-event simulation, J. Oper. Res. Soc. 61 (2010) 1632-1644. In contrast to the article,

@@ -1,5 +1,6 @@
 """The order in which UAVs are given charging pads, and the power that the pads share."""
 
+import math
 from typing import Any, Literal
 
 import numpy as np
@@ -99,5 +100,5 @@ def write_use(mission, uavs, out):
         charged += uavs[i].slots_charging
     out.pad_requests = mission.pad_requests
     out.queue = waited / mission.slot
-    out.waiting = waited / mission.pad_requests if mission.pad_requests > 0 else 0.0
+    out.waiting = waited / mission.pad_requests if mission.pad_requests > 0 else math.nan
     out.utilisation = charged / (mission.pads * mission.slot)

@@ -147,6 +147,10 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int 
     for columns in _blocks(widths):
         shown = ("  ".join(line[number] for number in columns).rstrip() for line in aligned)
         print("", *shown, "", sep="\n")
+    if any("nan" in cell for line in lines for cell in line):
+        from analysis.numbers import why_nan  # which loads pandas
+
+        print("".join(f" {why}\n" for why in [why_nan(sum(lines, []))] if why), end="")
 
 
 def _blocks(widths: Sequence[int]) -> Iterator[list[int]]:

@@ -1,6 +1,7 @@
 """``dess evaluate``: metrics of many missions, with intervals."""
 
 import json
+from math import nan
 from typing import Annotated, Any, Literal
 
 import typer
@@ -44,6 +45,7 @@ def evaluate(
     """
     from analysis.execution.evaluation import Asked, check_evaluation, means
     from analysis.study.engine import engine_of
+    from dess.record import measures_of
     from policies.registry import typed
 
     space, policy = load_space(scenario, settings), typed(policy)
@@ -53,6 +55,7 @@ def evaluate(
         check_evaluation(asked, yes)
     with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
         evaluations = [means(of_team, bar.update) for of_team in asked]
+    unknown = dict.fromkeys(("mean", "low", "high"), nan)
     rows = [
         {
             "policy": evaluation.policy,
@@ -63,12 +66,20 @@ def evaluate(
             "seconds": evaluation.seconds,
         }
         | {name: of.interval(name)._asdict() for name, of in evaluation.moments.items()}
+        | {name: unknown for name in measures_of(space) if name not in evaluation.moments}
         for evaluation in evaluations
     ]
     if as_json:
-        print(json.dumps(rows, indent=2))
+        print(json.dumps([_without_nan(row) for row in rows], indent=2, allow_nan=False))
     else:
         _print_rows(rows)
+
+
+def _without_nan(row: Any) -> Any:
+    """A row in which null stands for nan, which JSON does not have."""
+    if isinstance(row, dict):
+        return {name: _without_nan(value) for name, value in row.items()}
+    return None if row != row else row
 
 
 def _print_rows(rows: list[dict[str, Any]]) -> None:

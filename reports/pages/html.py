@@ -203,6 +203,7 @@ def table(
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
     html = _EMPTY_HEADER.sub("<td></td>", html)
+    caption = ". ".join(filter(None, [caption, numbers.why_nan(frame.to_numpy().flat)]))
     if caption:
         html = html.replace(">", f"><caption>{escape(caption)}</caption>", 1)
     below = "" if data is None else _downloads(caption, data, frame)

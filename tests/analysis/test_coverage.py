@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.names import PRODUCT
+from analysis.names import PRODUCT, REWARD
 from analysis.stats.bounded import bounded_ends
 from analysis.stats.correction import adjust
 from analysis.stats.distribution import quantile_interval
@@ -189,6 +189,78 @@ def test_the_paired_interval_covers_and_its_test_keeps_its_level(n, trials):
     results = [paired(*pairs(generator, n, 0.0)) for _ in range(trials)]
     assert holds(covered(((r.low, r.high) for r in results), 0.0), trials)
     assert np.mean([r.p <= 0.05 for r in results]) == pytest.approx(0.05, abs=error(trials, 0.05))
+
+
+# Failures of one policy alone, which are rare
+
+
+def lone(
+    a_fails: float, b_fails: float, scale: float, n: int, trials: int
+) -> tuple[np.ndarray, ...]:
+    """Products (trials, n) of two policies in the same missions, of which those of B are scaled."""
+    generator = rng(21, n)
+    ratio = generator.beta(60, 15, (trials, n))
+    a, b = ratio + generator.normal(0, 0.02, (2, trials, n))
+    fails = generator.random((2, trials, n)) < np.array([a_fails, b_fails])[:, None, None]
+    return np.where(fails[0], 0.0, a.clip(0, 1)), np.where(fails[1], 0.0, scale * b.clip(0, 1))
+
+
+def compared(a: np.ndarray, b: np.ndarray, metric: str) -> tuple[np.ndarray, ...]:
+    """The low and high ends of the differences, and the p-values, by trial."""
+    rows = [paired(*pair, metric=metric) for pair in zip(a, b, strict=True)]
+    return tuple(np.array([getattr(row, name) for row in rows]) for name in ("low", "high", "p"))
+
+
+RARE = [(0.02, 50), (0.01, 100), (0.003, 300), (0.001, 1000), (0.03, 100), (0.06, 100)]
+
+
+@pytest.mark.parametrize("trials", QUICK)
+@pytest.mark.parametrize("metric", [PRODUCT, REWARD])
+@pytest.mark.parametrize(("share", "n"), RARE)
+def test_paired_intervals_cover_where_one_policy_never_fails(share, n, metric, trials):
+    a, b = lone(0.0, share, 1.0, n, trials)
+    truth = share * 0.8
+    if metric == REWARD:  # a product of 0 is a failure, which costs 400 and the data
+        a, b, truth = 300 * a - 400 * (a == 0), 300 * b - 400 * (b == 0), share * (240 + 400)
+    low, high, p = compared(a, b, metric)
+    assert np.mean((low <= truth) & (truth <= high)) >= 0.95 - error(trials)
+    assert ((p < 0.05) == ((low > 0) | (high < 0))).all()
+
+
+@pytest.mark.parametrize("trials", QUICK)
+@pytest.mark.parametrize(("share", "n"), RARE)
+def test_equal_means_are_seldom_told_apart_where_one_policy_fails(share, n, trials):
+    p = compared(*lone(share, 0.0, 1 - share, n, trials), PRODUCT)[2]
+    assert np.mean(p < 0.05) <= 0.05 + error(trials, 0.05)
+
+
+def of_pairs(a: np.ndarray, b: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """The ends of the intervals of differences: Student's, one with 1 and -1 added, and ours."""
+    d = a - b
+    more = np.concatenate([d, np.tile([1.0, -1.0], (len(d), 1))], axis=1)
+    low, high, _ = compared(a, b, PRODUCT)
+    return {"Student's t": student(d), "1 and -1 added": student(more), "ours": (low, high)}
+
+
+def table_of_rare_failures() -> str:
+    """Coverage and mean length [points] of intervals of differences: a table in Markdown."""
+    lines = [
+        "| B fails, A never | n | Student's t | 1 and -1 added | rare differences added |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for share, n in RARE:
+        cells = []
+        for low, high in of_pairs(*lone(0.0, share, 1.0, n, 1000)).values():
+            coverage = np.mean((low <= 0.8 * share) & (0.8 * share <= high))
+            cells.append(f"{100 * coverage:.1f} %, {100 * np.mean(high - low):.1f}")
+        lines.append(f"| {100 * share:g} % | {n} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+@pytest.mark.slow
+def test_the_table_of_rare_failures_of_the_docs_is_measured():
+    page = Path(__file__).parents[2] / "docs" / "concepts" / "confidence-intervals.md"
+    assert table_of_rare_failures() in page.read_text("utf-8")
 
 
 # Many comparisons

@@ -20,7 +20,7 @@ from analysis.questions.missions import estimate
 from analysis.questions.settings import value_in_words
 from analysis.questions.what_if.question import BASELINE, SIDES, VARIATION, fields, settings_of
 from analysis.results.tables import Results
-from analysis.stats.intervals import LEVEL
+from analysis.stats.intervals import LEVEL, by_replication
 from analysis.stats.paired import compare
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position
 
@@ -87,7 +87,7 @@ def answers(results: Results) -> pd.DataFrame:
         table = compare(rows, BASELINE, metrics, correction=None, of="point")
         table = table.set_index("metric").reindex(metrics).rename_axis("metric").reset_index()
         table["n"] = table["n"].fillna(0).astype(int)
-        sides = rows.groupby("point")[metrics].mean()
+        sides = pd.DataFrame({m: by_replication(rows, m, "point").mean() for m in metrics})
         table.insert(0, "policy", policy)
         table["before"] = table["metric"].map(sides.loc[BASELINE])
         table["after"] = table["metric"].map(sides.loc[VARIATION])
@@ -118,7 +118,7 @@ def missions_needed(answer: Any) -> float:
         The number with which the interval excludes 0 with probability ``POWER``; infinite if there
         is no difference, or its variance is unknown.
     """
-    if not answer.difference or answer.low == answer.high:
+    if not answer.difference or not answer.low < answer.high:
         return np.inf
     quantile = stats.norm.isf((1 - LEVEL) / 2)
     half = (answer.high - answer.low) / 2 / abs(answer.difference)

@@ -161,7 +161,7 @@ def one_at_a_time(results: Results) -> list[Drawing]:
 def sensitivity(results: Results, metric: str = PRODUCT) -> list[Drawing]:
     """Sobol indices of every parameter for every policy."""
     table = summary.sensitivities(results)
-    rows = table[table["metric"] == metric].dropna()
+    rows = table[table["metric"] == metric]
     return [
         (
             figures.sensitivity(part, str(policy)),

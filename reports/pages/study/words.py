@@ -110,6 +110,8 @@ def of_variance(results: Results, metric: str) -> str:
         f"{numbers.percent(row.total)}"
         for row in rows.nlargest(3, "total").itertuples()
     ]
+    if not parts:
+        return f"The {metric_name(metric).lower()} is the same in all missions: no variance."
     return (
         f"Of the variance of the {metric_name(metric).lower()} of {results.policies[0]}, with all "
         f"interactions: {numbers.words(parts)}."

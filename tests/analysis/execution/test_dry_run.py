@@ -65,7 +65,14 @@ def test_a_rule_has_a_least_and_a_most(tmp_path):
     study = small_study(tmp_path, precision=precise, design=design)
     assert [p.missions for p in plan_study(study, tmp_path / "out")] == [2 * 5] * 2
     assert budget(study) == 2 * 2 * 50
-    rule = {"procedure": "kn", "first": 8, "indifference": 0.1, "budget": 200, "check": 7}
+    rule = {
+        "procedure": "kn",
+        "metric": "collection_ratio",
+        "first": 8,
+        "indifference": 0.1,
+        "budget": 200,
+        "check": 7,
+    }
     study = small_study(tmp_path, selection=rule, design=design)
     assert [p.missions for p in plan_study(study, tmp_path / "out")] == [2 * 8] * 2
     assert budget(study) == 2 * (200 + 7)

@@ -160,7 +160,14 @@ def precise(folder, **changes):
 
 def selecting(folder, **changes):
     """A study that selects the best of some settings."""
-    rule = {"procedure": "kn", "first": 8, "indifference": 0.02, "budget": 400, "check": 5}
+    rule = {
+        "procedure": "kn",
+        "metric": "collection_ratio",
+        "first": 8,
+        "indifference": 0.02,
+        "budget": 400,
+        "check": 5,
+    }
     return small_study(folder, selection=rule, design=grid(quota=[20, 40, 60, 80]), **changes)
 
 
@@ -258,7 +265,14 @@ def test_every_row_has_a_command_that_simulates_it_again(tmp_path, monkeypatch):
 
 def test_points_that_are_one_scenario_share_their_missions(tmp_path):
     """Where a list holds the scenario's own value, or drawn integers fall together."""
-    rule = {"procedure": "kn", "first": 4, "indifference": 0.02, "budget": 60, "check": 0}
+    rule = {
+        "procedure": "kn",
+        "metric": "collection_ratio",
+        "first": 4,
+        "indifference": 0.02,
+        "budget": 60,
+        "check": 0,
+    }
     values = {"quota": [20, 60], "flying_time": [[20, 30], 20]}
     design = {"kind": "one-at-a-time", "values": values}
     study = small_study(tmp_path, selection=rule, design=design)

@@ -118,8 +118,10 @@ def test_the_effects_are_paired_differences_b_minus_a(results):
     assert (first["policy_a"], first["point_a"], first["differ"]) == ("random", 1, 10)
     ratios = table[table["metric"] == "collection_ratio"]
     assert ratios["difference"].tolist() == pytest.approx([-0.25, 0, 0, 0])
-    # one gain and one loss are added, since all differences are equal: ten of -0.25, 1 and -1
-    p = stats.ttest_1samp([-0.25] * 10 + [1, -1], 0).pvalue
+    # a mission in which B alone does well is added, and one in which A alone does
+    a = results.missions.loc[chosen, "collection_ratio"].mean()
+    rare = [max(a - 0.25, 1 - a), -max(a, 1.25 - a)]
+    p = stats.ttest_1samp([-0.25] * 10 + rare, 0).pvalue
     assert ratios["p"].tolist() == pytest.approx([p, 1, 1, 1])
     assert ratios["p_adjusted"].tolist() == pytest.approx([min(12 * p, 1), 1, 1, 1])
     overall = effects(found)
@@ -211,7 +213,14 @@ def test_equal_design_points_count_once(results, tmp_path):
 
 
 def test_the_missions_that_check_a_selection_are_compared(tmp_path):
-    rule = {"procedure": "kn", "first": 8, "indifference": 0.05, "budget": 900, "check": 9}
+    rule = {
+        "procedure": "kn",
+        "metric": "collection_ratio",
+        "first": 8,
+        "indifference": 0.05,
+        "budget": 900,
+        "check": 9,
+    }
     results = results_of(tmp_path, "out", selection=rule, design=grid(quota=[20, 60]))
     found = diff(results, results)
     assert found.identical

@@ -2,12 +2,13 @@
 
 import pandas as pd
 import pytest
-from scipy import stats
 
 from analysis import run_study
 from analysis.names import METRICS, PRODUCT
 from analysis.questions import head_to_head
 from analysis.questions.head_to_head import Pair
+from analysis.stats.intervals import by_replication
+from analysis.stats.paired import paired
 from dess import InputError, simulate
 from policies import load_team
 from tests.analysis.questions.test_regions import missions_of
@@ -93,13 +94,11 @@ def test_duels_of_several_design_points_are_refused(tmp_path):
 def test_overall_is_a_paired_t_test_that_allows_for_the_choice(results):
     pair = Pair("random", "greedy", 3)
     table = head_to_head.overall(results, pair).set_index("metric")
-    values = results.missions.pivot(index="replication", columns="policy", values=PRODUCT)
-    test = stats.ttest_rel(values["random"], values["greedy"])
-    ends = test.confidence_interval()
+    values = by_replication(results.missions, PRODUCT, "policy")
+    test = paired(*(values[policy].to_numpy() for policy in ("random", "greedy")), metric=PRODUCT)
     row = table.loc[PRODUCT]
-    difference = (values["random"] - values["greedy"]).mean()
-    assert [row["difference"], row["low"], row["high"]] == pytest.approx([difference, *ends])
-    assert row["p"] == pytest.approx(test.pvalue)
+    assert [row["difference"], row["low"], row["high"]] == pytest.approx([*test[:3]])
+    assert row["p"] == pytest.approx(test.p)
     smallest = table["p"].idxmin()  # by Holm times three metrics, by Bonferroni times three pairs
     assert table.loc[smallest, "p_adjusted"] == pytest.approx(min(1, 9 * table["p"].min()))
 

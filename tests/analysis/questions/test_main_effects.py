@@ -9,7 +9,8 @@ from analysis.names import PRODUCT
 from analysis.questions import main_effects
 from analysis.questions.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
 from analysis.stats.correction import adjust
-from analysis.stats.intervals import mean_interval
+from analysis.stats.intervals import by_replication, interval_of, post_stratified
+from analysis.stats.paired import paired
 from dess import InputError
 from tests.analysis.small import grid, small_study
 
@@ -53,7 +54,8 @@ def test_effects_are_the_means_by_value(results, table):
     row = table.query("field == 'initial_data' and position == 2 and policy == 'random'")
     missions = results.missions.query("point == 4 and policy == 'random'")
     ends = row.set_index("metric").loc["reward", ["mean", "low", "high"]]
-    assert tuple(ends) == mean_interval(missions["reward"])
+    values = post_stratified(missions["reward"].to_numpy(), missions["uavs"].to_numpy())
+    assert tuple(ends) == interval_of("reward", values)
 
 
 def test_a_design_of_several_fields_is_refused(tmp_path):
@@ -91,9 +93,11 @@ def test_changes_are_paired_by_replication(results, table):
     """Intervals that hold for all three pairs at once are wider, by Bonferroni."""
     pairs = main_effects.changes(results, table, "greedy", "initial_data", "collection_ratio")
     assert pairs[["first", "second"]].to_numpy().tolist() == [[0, 1], [0, 2], [1, 2]]
-    missions = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
-    gaps = missions.loc[4, "collection_ratio"] - missions.loc[3, "collection_ratio"]
-    expected = [*mean_interval(gaps), *mean_interval(gaps, 1 - 0.05 / 3)[1:]]
+    missions = results.missions.query("policy == 'greedy'")
+    values = by_replication(missions, "collection_ratio", "point")
+    sides = values[4].to_numpy(), values[3].to_numpy()
+    one, all_three = (paired(*sides, level, "collection_ratio") for level in (0.95, 1 - 0.05 / 3))
+    expected = [*one[:3], *all_three[1:3]]
     columns = ["difference", "low", "high", "wide_low", "wide_high"]
     assert pairs.loc[2, columns].tolist() == pytest.approx(expected)
     assert pairs["p_adjusted"].tolist() == adjust(pairs["p"].to_numpy(), "holm").tolist()

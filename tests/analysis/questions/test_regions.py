@@ -4,11 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.names import METRICS, PARAMETERS
+from analysis.names import METRICS, PARAMETERS, PRODUCT
 from analysis.questions import regions
+from analysis.questions.head_to_head import OF_BASELINE
 from analysis.questions.regions import AHEAD, BEHIND
 from analysis.stats.correction import adjust
-from analysis.stats.intervals import mean_interval, wilson
+from analysis.stats.intervals import wilson
+from analysis.stats.paired import paired
 from analysis.stats.verdict import INCONCLUSIVE
 
 
@@ -56,8 +58,9 @@ def test_along_a_parameter_the_difference_is_that_of_its_missions():
     by_uavs = table.query("field == 'uavs'").set_index("value")
     assert by_uavs["verdict"].to_dict() == {"1": BEHIND, "2": INCONCLUSIVE, "3": AHEAD}
     part = missions.query("uavs == 3")
-    ends = mean_interval(part["difference"])
-    assert by_uavs.loc["3", ["mean", "low", "high"]].tolist() == pytest.approx(list(ends))
+    sides = (part[PRODUCT + end].to_numpy() for end in ("", OF_BASELINE))
+    ends = paired(*sides, metric=PRODUCT)[:3]
+    assert by_uavs.loc["3", ["mean", "low", "high"]].tolist() == pytest.approx([*ends])
     lost = wilson(int((part["difference"] < 0).sum()), len(part))
     assert tuple(by_uavs.loc["3", ["behind", "behind_low", "behind_high"]]) == lost
     expected = np.minimum(1, 2 * adjust(table["p"].to_numpy(), "holm"))

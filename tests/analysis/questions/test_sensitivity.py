@@ -4,9 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.questions.sensitivity import (
-    sensitivity,
-)
+from analysis.figures.settings import sensitivity as figure
+from analysis.names import RATIO
+from analysis.numbers import why_nan
+from analysis.questions.sensitivity import index_table, sensitivity
 from analysis.study.design import Saltelli
 from dess import InputError
 
@@ -135,3 +136,14 @@ def test_intervals_are_symmetric_and_depend_on_nothing_else():
         half = alone[f"{index}_high"] - alone[index]
         assert (half > 0).all()
         assert half.to_numpy() == pytest.approx((alone[index] - alone[f"{index}_low"]).to_numpy())
+
+
+def test_the_indices_of_a_constant_metric_are_nan_in_its_table_and_its_figure():
+    design = unit(1, 4)
+    missions = evaluated(design, **{RATIO: lambda x, noise: np.full_like(x, 0.5)})
+    table = sensitivity(design, missions, [RATIO]).assign(policy="tour")
+    shown = index_table(table)
+    assert len(shown) == 2
+    assert {*shown["Alone"]} == {"nan % [nan, nan]"}
+    assert why_nan(shown.to_numpy().flat).startswith("nan: ")
+    assert figure(table, "tour").axes

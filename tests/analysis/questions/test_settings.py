@@ -70,13 +70,13 @@ def test_ranked_settings_have_the_estimates_of_the_summary(results):
 
 
 def test_a_planted_best_is_found_and_those_that_equal_it_are_tied(results):
-    """Policy 1 at point 2 leads, its twin at point 4 equals it, all else is behind by 0.1."""
+    """Policy 1 at point 2 leads, its twin at point 4 equals it, all else is behind by 0.5."""
 
     def metric(policy, point, replication):
-        luck = np.random.default_rng(0).random(100)[replication]
+        luck = 0.4 * np.random.default_rng(0).random(100)[replication]
         noise = np.random.default_rng(1).normal(size=len(point)) * 1e-3
         lead = (policy == 1) & np.isin(point, (2, 4))
-        return luck + 0.1 * lead + noise * ~lead
+        return luck + 0.5 * lead + noise * ~lead
 
     table = settings.ranked(planted(results, metric))
     tied = table[table["tied"]]

@@ -36,7 +36,14 @@ BAD: list[Any] = [
 def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Results with a selection, a design and prices."""
     folder = tmp_path_factory.mktemp("sound")
-    rule = {"procedure": "kn", "indifference": 0.2, "first": 5, "check": 3, "budget": 40}
+    rule = {
+        "procedure": "kn",
+        "metric": "collection_ratio",
+        "indifference": 0.2,
+        "first": 5,
+        "check": 3,
+        "budget": 40,
+    }
     changes = {"selection": rule, "design": grid(uavs=[1, 2]), "costs": {"uav": 10.0}, "logged": 1}
     run_study(small_study(folder, **changes), folder / "out")
     return folder / "out"

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from analysis.stats.differences import share_test
+from analysis.names import SUCCESS
+from analysis.stats.differences import difference_test
 from analysis.stats.screening import may_be_best
 
 
@@ -50,8 +51,8 @@ def test_shares_are_judged_as_the_test_of_shares_does():
     """Of 12 missions one lost more is no evidence, eight are."""
     sure = np.ones((12, 3))
     sure[:1, 1], sure[:8, 2] = 0, 0
-    assert may_be_best(sure, share=True).tolist() == [True, True, False]
-    interval, _ = share_test(sure[:, 0] - sure[:, 2], 1 - 2 * 0.05 / 2)
+    assert may_be_best(sure, SUCCESS).tolist() == [True, True, False]
+    interval, _ = difference_test(sure[:, 0], sure[:, 2], SUCCESS, 1 - 2 * 0.05 / 2)
     assert interval.low > 0  # the one-sided test at 0.05 / 2
 
 

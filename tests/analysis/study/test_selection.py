@@ -250,3 +250,12 @@ def test_a_choice_needs_the_missions_of_round_one():
 def test_what_makes_no_sense_is_refused(fields, complaint):
     with pytest.raises(ValidationError, match=complaint):
         Selection.model_validate(fields)
+
+
+@pytest.mark.parametrize("metric", ["success", "collection_ratio_and_communication", None])
+def test_what_falls_to_0_in_rare_failures_is_refused_without_an_allowance_for_them(metric):
+    table = {"procedure": "kn", "indifference": 0.1} | ({"metric": metric} if metric else {})
+    with pytest.raises(ValidationError, match="allowed: procedure kn-bounded with it"):
+        Selection.model_validate(table)
+    assert Selection.model_validate(table | {"procedure": "kn-bounded"})
+    assert Selection.model_validate(table | {"metric": "reward"})

@@ -64,12 +64,12 @@ BAD = {
     "missions = 9\nprecision.targets.success.absolute = 0.1": [
         "missions: are decided by precision"
     ],
-    "missions = 9\nselection = {procedure = 'kn', indifference = 0.1}": [
+    "missions = 9\nselection = {procedure = 'kn-bounded', indifference = 0.1}": [
         "missions: are decided by selection"
     ],
-    "selection = {procedure = 'kn', indifference = 0.1}\n"
+    "selection = {procedure = 'kn-bounded', indifference = 0.1}\n"
     "precision.targets.success.absolute = 0.1": ["precision: selection is also given"],
-    "selection = {procedure = 'kn', indifference = 0.1, first = 9, budget = 8}": [
+    "selection = {procedure = 'kn-bounded', indifference = 0.1, first = 9, budget = 8}": [
         "selection.budget: 8",
         "9 or more",
     ],

@@ -38,7 +38,7 @@ STUDIES = {
     "a null character": 'scenario = "a\\u0000"',
     "a long name": f'scenario = "{LONG}"',
     "control characters": f'policies = ["{RAW}"]',
-    "selection": "selection = {procedure = 'kn', indifference = 1e-320}",
+    "selection": "selection = {procedure = 'kn-bounded', indifference = 1e-320}",
     "cheapest": "selection = {procedure = 'cheapest', requirements = {success = 0.5}, "
     "indifference = 1e-320}\ncosts.uav = 1",
     "tolerance": "selection = {procedure = 'cheapest', requirements = {success = 0.5}, "

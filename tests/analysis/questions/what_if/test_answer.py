@@ -10,7 +10,8 @@ from scipy import stats
 from analysis.names import METRICS, PRODUCT
 from analysis.questions.what_if import answer as what_if_answer
 from analysis.questions.what_if.question import BASELINE, VARIATION
-from analysis.stats.intervals import LEVEL
+from analysis.stats.intervals import LEVEL, by_replication
+from analysis.stats.paired import paired
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE
 from tests.analysis.small import asked
 
@@ -49,14 +50,13 @@ def test_answers_are_paired_comparisons(results):
     assert len(answers) == len(POLICIES) * (len(METRICS) + len(what_if_answer.MEASURES))
     for answer in answers.itertuples():
         rows = missions[missions["policy"] == answer.policy]
-        sides = rows.pivot(index="replication", columns="point", values=answer.metric).astype(float)
+        sides = by_replication(rows, answer.metric, "point")
         assert answer.before == pytest.approx(sides[BASELINE].mean())
         assert answer.after == pytest.approx(sides[VARIATION].mean())
         change = sides[VARIATION] - sides[BASELINE]
         assert (answer.difference, answer.n) == (pytest.approx(change.mean()), MISSIONS)
-        if answer.metric != "success" and change.std():
-            ends = stats.ttest_1samp(change, 0).confidence_interval(LEVEL)
-            assert (answer.low, answer.high) == pytest.approx(tuple(ends))
+        pair = paired(*(sides[n].to_numpy() for n in (VARIATION, BASELINE)), metric=answer.metric)
+        assert (answer.low, answer.high) == pytest.approx(pair[1:3])
 
 
 def test_means_are_of_the_papers_metrics(results):

@@ -55,7 +55,8 @@ def test_a_study_is_shown(dess, dess_json):
 def test_a_selection_is_shown_with_its_check(dess, tmp_path):
     with open("trial.toml") as file:
         text = file.read().replace("missions = 10\n", "")
-    rule = "procedure = 'kn'\nfirst = 8\nindifference = 0.05\nbudget = 900\ncheck = 9\n"
+    rule = "procedure = 'kn'\nmetric = 'collection_ratio'\n"
+    rule += "first = 8\nindifference = 0.05\nbudget = 900\ncheck = 9\n"
     design = "[design]\nkind = 'grid'\nvalues.quota = [20, 60]\n"
     (tmp_path / "best.toml").write_text(f"{text}\n{design}[selection]\n{rule}")
     code, out, _ = dess("study", "run", "best.toml")
