@@ -1,0 +1,93 @@
+"""The README and the docs say what their commands print, from an installed wheel in an empty home.
+
+A file has its name as the title of its block. The output of a command stands in a ``text`` block
+directly below it, where ``...`` is anything. All commands of the tutorial but the installation run,
+and of other pages those with an output.
+"""
+
+import doctest
+import os
+import re
+import subprocess
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from tests.installed import environment
+
+ROOT = Path(__file__).parents[1]
+TUTORIAL = "docs/tutorial.md"
+LIMIT = 600  # seconds of a command
+SAME = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+BLOCK = r'^```(\w+)(?: title="(.+?)")?\n(.*?)^```\n(?:\n^```text\n(.*?)^```$)?'
+
+pytestmark = pytest.mark.slow
+
+
+class Step(NamedTuple):
+    """A fenced block: its language, the name of its file, its text, and the output below it."""
+
+    language: str
+    title: str
+    text: str
+    output: str
+
+    @property
+    def prints(self) -> bool:
+        """Whether it is a command with an output."""
+        return self.language == "sh" and bool(self.output)
+
+
+def steps_of(path: Path) -> list[Step]:
+    """The blocks of a page, each with its output."""
+    return [Step(*found) for found in re.findall(BLOCK, path.read_text("utf-8"), re.M | re.S)]
+
+
+STEPS = {
+    path.relative_to(ROOT).as_posix(): steps_of(path)
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+}
+
+
+def output_of(step: Step, place: Path, variables: dict[str, str]) -> str:
+    """What the commands of a step print in a folder."""
+    done = subprocess.run(
+        ["bash", "-e", "-c", step.text],
+        cwd=place,
+        env=variables,
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+    )
+    assert done.returncode == 0, f"{step.text}{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+def test_the_tutorial_begins_with_an_installation_of_everything() -> None:
+    assert re.search(r"pip install .*\.\[all\]", STEPS[TUTORIAL][0].text)
+
+
+@pytest.mark.parametrize("page", [p for p, steps in STEPS.items() if any(s.prints for s in steps)])
+def test_commands_print_what_the_page_says(page: str, installed: Path, tmp_path: Path) -> None:
+    home, place = tmp_path / "home", tmp_path / "place"
+    home.mkdir(), place.mkdir()
+    path = os.pathsep.join([str(installed.parent), os.environ["PATH"]])
+    variables, wrong = environment(home) | {"PATH": path}, []
+    for step in STEPS[page][page == TUTORIAL :]:
+        if step.title:
+            (place / step.title).write_text(step.text, encoding="utf-8")
+        elif step.prints or (page == TUTORIAL and step.language == "sh"):
+            output = output_of(step, place, variables)
+            if not doctest.OutputChecker().check_output(step.output, output, SAME):
+                wrong.append(f"{step.text}{output}")
+            if output.lstrip().startswith("runs/sea  "):
+                check_training(output)
+    assert not wrong, "\n".join(wrong)
+
+
+def check_training(output: str) -> None:
+    """The policy that the tutorial trains is better than greedy: their intervals are apart."""
+    product = r"collection_ratio_and_communication +(\S+) +(\S+) +(\S+)"
+    (_, low, _), (_, _, high) = re.findall(product, output)
+    assert float(low) > float(high)
