@@ -160,6 +160,7 @@ def test_nox_sessions_exist() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.brief
 def test_the_moving_picture_is_of_the_command_beside_it(tmp_path: Path) -> None:
     (text,) = re.findall(r"`dess (simulate .*--animation .*?)`", README)
     *arguments, name = shlex.split(text)
