@@ -32,7 +32,8 @@ QUICK: dict[str, Any] = {"missions": 40, "requirements": {"success": 0.9}}
 # The width of the text on A4 [px], and the elements that reach beyond a width.
 A4 = 688
 BEYOND = """[...document.querySelectorAll("main *")].filter(
-    e => e.checkVisibility() && e.getBoundingClientRect().right > {} + 1).map(e => e.outerHTML.slice(0, 80))"""
+    e => e.checkVisibility() && e.getBoundingClientRect().right > {} + 1
+).map(e => e.outerHTML.slice(0, 80))"""
 # The drawings of every page of the small results.
 FIGURES = {
     "mission": 4,
