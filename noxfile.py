@@ -37,8 +37,11 @@ FORCED = {"pufferlib"}  # asks for libraries that it does not need; its pins are
 def install(session: nox.Session, extras: str = "") -> None:
     """Install the project and its pinned libraries; editable, so compiled code stays cached.
 
-    An environment in which this has been done with the same requirements is left as it is.
+    An environment in which this has been done with the same requirements is left as it is. With
+    ``nox --no-venv`` all sessions use the present one, which has to have all: see ``.ci/run``.
     """
+    if session.virtualenv.venv_backend == "none":
+        return
     wanted = "\n".join([extras, *(Path(f).read_text("utf-8") for f in REQUIREMENTS)])
     done = Path(session.virtualenv.location, "requirements-installed.txt")
     if done.exists() and done.read_text("utf-8") == wanted:
@@ -89,16 +92,27 @@ def docs(session: nox.Session) -> None:
 
 @nox.session
 def reports(session: nox.Session) -> None:
-    """Run the studies, then render the reports; ``-- --full`` simulates all policies of each."""
-    full = "--full" in session.posargs
-    if session.posargs not in ([], ["--full"]):
-        session.error(f"reports: {' '.join(session.posargs)} is unknown; allowed: --full")
+    """Run the studies, then render the reports; ``-- --full`` simulates all policies of each.
+
+    ``-- --dry-run`` only prints the plans of the studies.
+    """
+    full, dry = (session.posargs == [option] for option in ("--full", "--dry-run"))
+    if session.posargs and not full and not dry:
+        unknown = " ".join(session.posargs)
+        session.error(f"reports: {unknown} is unknown; allowed: --full, --dry-run")
     install(session, "[learning,reports]")
     results, reports = (folder / "full" if full else folder for folder in (RESULTS, REPORTS))
     for studies, less in STUDIES.items():
         out = results if " " in studies else results / studies
-        options = [*([] if full else less.split()), "--workers", "2"]
+        options = [
+            *([] if full else less.split()),
+            "--workers",
+            "2",
+            *(["--dry-run"] if dry else []),
+        ]
         session.run("dess", "study", "run", *studies.split(), "--out", str(out), *options)
+    if dry:
+        return
     session.run("dess", "report", "--results", str(results), "--out", str(reports))
     session.log(f"The reports are at {(reports / 'index.html').resolve().as_uri()}")
 
@@ -112,7 +126,14 @@ def bench(session: nox.Session) -> None:
 
 @nox.session(python=False)
 def integrations(session: nox.Session) -> None:
-    """Check the environments in other libraries; ``-- NAME`` checks one, and writes no matrix."""
+    """Check the environments in other libraries; ``-- NAME`` checks one, and writes no matrix.
+
+    ``-- --collect-only`` needs none of the libraries: it collects the tests.
+    """
+    if session.posargs == ["--collect-only"]:
+        # Without its library, a file of tests is skipped: then no test is found (5).
+        session.run("pytest", "-q", str(LIBRARIES), *session.posargs, success_codes=[0, 5])
+        return
     names = sorted(path.stem.removeprefix("test_") for path in LIBRARIES.glob("test_*.py"))
     if unknown := set(session.posargs) - set(names):
         session.error(f"integrations: {', '.join(unknown)} is unknown; allowed: {', '.join(names)}")

@@ -82,7 +82,7 @@ def test_physics(benchmark) -> None:
         agents = 0
         for _ in range(STEPS[1024]):
             outcome = missions.step(generator.integers(0, 5, shape))
-            agents += int(np.count_nonzero(outcome.acted))
+            agents += int(np.count_nonzero(outcome["acted"]))
             missions.launch(np.flatnonzero(env.state.missions["active"] == 0))
         return agents
 

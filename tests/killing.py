@@ -26,7 +26,7 @@ SECONDS = 300.0  # in which a command makes progress, ends, and is followed by i
 # What a command prints on stderr beside the line for an error.
 PROGRESS = re.compile(
     r"\s*|compiling the simulator .*|[\d,]+ missions(, [\d,]+ of them present)?|"
-    r"replay memory: .*|curves: .*|a live view of the curves .*|.*\[\d\d:\d\d.*"
+    r"replay memory: .*|on this machine: .*|curves: .*|a live view of the curves .*|.*\[\d\d:\d\d.*"
 )
 
 

@@ -3,12 +3,15 @@
 import ast
 import re
 import sys
+from importlib.metadata import distributions
 from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
 import yaml
+from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 from policies.registry import TRAINED, trained_names
 from tests.distributions import EXTRAS, PROJECT, ROOT, asked, closure, homes, requirements
@@ -81,6 +84,19 @@ def test_what_the_requirements_require_is_pinned_too() -> None:
     needed_by_all = closure(*ASKED)
     assert len(needed_by_all) > len(requirements(*ASKED))
     assert not needed_by_all - set(pins(CONSTRAINTS))
+
+
+def test_pins_run_on_the_oldest_python_that_is_promised() -> None:
+    """Here are the pinned versions, as far as they are installed, so their metadata says it."""
+    oldest = PROJECT["requires-python"].removeprefix(">=")
+    here = {canonicalize_name(d.metadata["Name"]): d for d in distributions()}
+    assert here.keys() >= requirements(*asked("test")).keys()
+    for name, pin in pins(CONSTRAINTS).items():
+        if name in here:
+            needed = SpecifierSet(here[name].metadata["Requires-Python"] or "")
+            assert (Version(here[name].version).public, needed.contains(oldest)) == (pin, True), (
+                name
+            )
 
 
 def test_all_and_the_tests_have_every_extra_that_adds_something() -> None:

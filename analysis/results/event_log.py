@@ -73,8 +73,7 @@ def age_falls(events: Events) -> pd.DataFrame:
     the node was emptied.
     """
     log = pd.DataFrame(events)
-    start = log[(log["event"] == "mission_start") & (log["node"] >= 0)]
-    if (start["packet"] >= 0).any():
+    if (log["packet"] >= 0).any():
         falls = log[log["event"] == "delivery"]
         newest = falls["generated"].groupby(falls["node"]).cummax()
         before = newest.groupby(falls["node"]).shift(fill_value=0.0)

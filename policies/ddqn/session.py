@@ -127,7 +127,8 @@ def train(
     """Train into a folder, or resume the training in it.
 
     Ctrl-C, SIGTERM and SIGHUP end the session after the present tick. The returned training is then
-    not ``done``, and the folder has everything to resume it exactly. The folder is locked until the
+    not ``done``, and the folder has everything to resume it exactly. A tick that takes longer than
+    a second is given up; the folder then has all ticks before it. The folder is locked until the
     end of the session.
 
     Args:
@@ -136,7 +137,8 @@ def train(
         resume: Whether to resume the training in the folder.
         device: ``auto``, ``cpu`` or ``cuda``.
         accept_size: Whether to train even if that takes more memory than is available.
-        start: The folder of a trained policy whose weights a new training begins with.
+        start: The folder of a trained policy whose weights a new training begins with; one that is
+            resumed goes on with its own.
         announce: Called before any large allocation with ``memory_of(config)``.
         progress: Called after each tick with the training and the ticks since the last call.
 
@@ -145,6 +147,7 @@ def train(
 
     Raises:
         DivergenceError: If the loss is no finite number any more; the best policy so far is kept.
+        KeyboardInterrupt: If a signal ends the session in the middle of a tick.
         InputError: If ``resume`` is not set and the folder has any files; if it is set and the
             folder has no training, or one of another config; if another process trains into the
             folder; if the folder cannot be written; if the machine's memory is too small.
@@ -181,19 +184,29 @@ def train(
 def _run(training: Training, out: Path, progress: Callable[[Training, int], None] | None) -> None:
     """Train until the end or a signal; save a checkpoint now and then, and every better policy."""
     with _tensorboard(out / EVENTS, training) as show, _stop_signal() as stopped:
-        saved = time.monotonic()
+        saved, took = time.monotonic(), [0.0, 0.0]  # the last ticks without and with an evaluation
         while not training.done and not stopped():
-            rows = len(training.curve)
+            rows, evaluates, began = len(training.curve), _evaluates(training), time.monotonic()
             training.run(1)
+            now = time.monotonic()
+            took[evaluates] = now - began
+            # A signal does not wait for the end of a tick that takes long.
+            is_due = now - saved > CHECKPOINT_EVERY or took[_evaluates(training)] > TICK_END
+            if is_due:
+                save_training(out / CHECKPOINT, training)
+                saved = now
             if len(training.curve) > rows:
                 show(training.curve[-1])
+            if is_due or len(training.curve) > rows:
                 _save_results(out, training)
-            if time.monotonic() - saved > CHECKPOINT_EVERY:
-                save_training(out / CHECKPOINT, training)
-                saved = time.monotonic()
             if progress:
                 progress(training, 1)
     save_training(out / CHECKPOINT, training)
+
+
+def _evaluates(training: Training) -> bool:
+    """Whether the next tick ends with an evaluation."""
+    return (training.tick + 1) % training.config.evaluate_every == 0
 
 
 def _check_folder(out: Path, resume: bool) -> None:

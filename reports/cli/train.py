@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from policies.ddqn.training import Training
 
 app = typer.Typer()
+MEASURED = 5.0  # seconds of training after which it is said how long it will take
 
 
 @command(app)
@@ -35,6 +36,8 @@ def train(
 ) -> None:
     """Train a policy into a folder; Ctrl-C saves it, --resume continues exactly.
 
+    After the first ticks it prints how long this machine will take.
+
     Args:
         name: The name of a shipped config, or a TOML file.
         out: Folder of the training.
@@ -42,7 +45,7 @@ def train(
         device: auto uses CUDA if a device is available.
         seed: Seed in place of the seed of the config.
         scenario: Scenario in place of that, or of the seas, of the config.
-        start: Trained policy whose weights the training begins with.
+        start: Trained policy whose weights the training begins with; with --resume, it has begun.
         yes: Train even if it takes more memory than is available.
     """
     from policies.ddqn.config import CHECKPOINT, load_config, resume_command
@@ -53,8 +56,6 @@ def train(
     if scenario is not None:
         changes |= {"scenario": scenario, "seas": (), "evaluation_seas": ()}
     config = load_config(name, fields, **changes)
-    if start and resume:
-        raise InputError("--from: the training has begun; allowed: --resume without it")
     if start and not folder_of(start):
         raise InputError(
             f"--from: {shown(start)} is no trained policy; allowed: one, or its folder"
@@ -104,10 +105,24 @@ def train(
 
 @contextmanager
 def _bar(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
-    """Progress of a training, with the metrics of its last evaluation."""
+    """Progress of a training, with the metrics of its last evaluation and how long it will take."""
+    from analysis import numbers
+
     with console.bar("tick", ticks) as bar:
+        first: tuple[int, float] | None = None  # without the first tick, which compiles
+        is_said = False
 
         def show(training: "Training", done: int) -> None:
+            nonlocal first, is_said
+            first = first or (training.tick, training.seconds)
+            ticks_done, seconds = training.tick - first[0], training.seconds - first[1]
+            if not is_said and ticks_done >= 2 and seconds > MEASURED:
+                each, is_said = seconds / ticks_done, True
+                rest = numbers.duration(each * (ticks - training.tick))
+                bar.write(
+                    f"on this machine: {numbers.seconds(each)} a tick, about {rest} to go",
+                    file=sys.stderr,
+                )
             if bar.n == 0:  # a resumed training begins at its tick
                 bar.initial = bar.n = bar.last_print_n = training.tick - done
             bar.update(training.tick - bar.n)

@@ -7,6 +7,7 @@ import ast
 import io
 from collections.abc import Sequence
 from contextlib import chdir, redirect_stderr
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -26,7 +27,9 @@ def run_here() -> None:
     html.svg = lambda drawing: b""
 
 
-def _run(reports: Sequence[Report], progress: Progress | None = None) -> None:
+def _run(
+    reports: Sequence[Report], progress: Progress | None = None, shared: Sequence[Path] = ()
+) -> None:
     for report in reports:
         try:
             # As another process, not among the files of the case, and without bars and drawings.

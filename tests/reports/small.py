@@ -65,6 +65,11 @@ STUDIES: dict[str, dict[str, Any]] = {
         },
     },
     "gap": {"policies": [*POLICIES, "planner"], "missions": 12, "logged": 2},
+    "seas": {
+        "policies": ["any", "greedy", "planner"],
+        "missions": 4,
+        "design": {"kind": "grid", "values": {"scenario": ["coast:2", "scattered:2", "large:2"]}},
+    },
     "sensitivity": {
         "policies": ["greedy"],
         "design": {

@@ -216,6 +216,14 @@ def _forgeries(file: Path) -> Iterator[tuple[str, dict[str, Any], dict[str, Any]
         yield f"{name} {place}", {name: tensor}, {}
 
 
+def test_a_checkpoint_has_no_bytes_of_undefined_memory(training: Training) -> None:
+    uavs = np.frombuffer(b"\xff" * UAV.itemsize * 2, UAV).copy()
+    for name in uavs.dtype.names:
+        uavs[name] = 0
+    assert uavs.tobytes().strip(b"\0")  # what lies between the fields
+    assert not files.bytes_of(uavs).any()
+
+
 def test_a_forged_checkpoint_is_refused(training: Training, file: Path) -> None:
     content, accepted = file.read_bytes(), []
     _forged(file, curve=[ROW])

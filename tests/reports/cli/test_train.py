@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,15 +11,28 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+import tomli_w
 import torch
 
 import policies
 from dess.code import memory
+from policies.ddqn import session
 from policies.ddqn.checkpoint import load_training
 from policies.ddqn.config import load_config
+from policies.ddqn.proximal import ProximalTraining
+from policies.ddqn.training import Training
 from reports import cli
+from reports.cli import train
 from tests.analysis.small import files_of
-from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, one_thread, write_config
+from tests.policies.ddqn.tiny import (
+    CPU,
+    ON_SEAS,
+    PHASES,
+    TINY,
+    assert_same,
+    one_thread,
+    write_config,
+)
 
 SHORT = {
     "phases": [phase | {"ticks": 10} for phase in PHASES],
@@ -147,6 +161,47 @@ def test_a_large_training_has_to_be_confirmed(dess, monkeypatch):
     assert err.endswith(" or --yes\n")
     assert not Path("out").exists()
     assert dess("train", "tiny.toml", "--out", "out", "--yes")[0] == 0
+
+
+KINDS = {"double DQN": (), "any sea": (), "any sea, begun with a policy": ("--from", "begun")}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_ctrl_c_in_a_long_tick_keeps_all_ticks_before_it(kind, dess, tmp_path, monkeypatch):
+    settings = TINY | SHORT if kind == "double DQN" else ON_SEAS
+    (tmp_path / "tiny.toml").write_text(tomli_w.dumps(settings), "utf-8")
+    arguments = ("train", "tiny.toml", "--device", "cpu", *KINDS[kind], "--out")
+    if "--from" in arguments:
+        assert dess("train", "tiny.toml", "--device", "cpu", "--seed", 7, "--out", "begun")[0] == 0
+    assert dess(*arguments, "undisturbed")[0] == 0
+    learn = Training._learn if kind == "double DQN" else ProximalTraining._learn
+
+    def interrupted(training, share):
+        learn(training, share)
+        if training.tick == 3:
+            signal.raise_signal(signal.SIGINT)
+            while True:  # until the tick is given up
+                pass
+
+    with monkeypatch.context() as patch:
+        patch.setattr(session, "TICK_END", 0.0)
+        patch.setattr(Training, "_learn", interrupted)
+        patch.setattr(ProximalTraining, "_learn", interrupted)
+        code, out, err = dess(*arguments, "out")
+    assert (code, out) == (130, "")
+    config = load_config("tiny.toml")
+    assert load_training(tmp_path / "out" / "checkpoint.safetensors", config, CPU).tick == 3
+    assert policies.load("out").name == "tiny"
+    assert "interrupted: the last checkpoint is kept; continue with dess train" in err
+    assert dess(*arguments, "out", "--resume")[0] == 0
+    paths = [tmp_path / name / "checkpoint.safetensors" for name in ("out", "undisturbed")]
+    assert_same(*(load_training(path, config, CPU) for path in paths))
+
+
+def test_a_training_says_how_long_it_will_take_here(dess, monkeypatch):
+    monkeypatch.setattr(train, "MEASURED", 0.0)
+    _, _, err = dess("train", "tiny.toml", "--out", "out")
+    assert re.search(r"on this machine: [\d.]+ m?s a tick, about \d+ seconds to go\n", err)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")

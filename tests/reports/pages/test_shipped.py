@@ -11,6 +11,7 @@ from typing import Any
 import nbformat
 import pytest
 from nbclient import NotebookClient
+from playwright.sync_api import expect
 
 import reports
 from analysis import load_results
@@ -31,7 +32,8 @@ QUICK: dict[str, Any] = {"missions": 40, "requirements": {"success": 0.9}}
 # The width of the text on A4 [px], and the elements that reach beyond a width.
 A4 = 688
 BEYOND = """[...document.querySelectorAll("main *")].filter(
-    e => e.getBoundingClientRect().right > {} + 1).map(e => e.outerHTML.slice(0, 80))"""
+    e => e.checkVisibility() && e.getBoundingClientRect().right > {} + 1
+).map(e => e.outerHTML.slice(0, 80))"""
 # The drawings of every page of the small results.
 FIGURES = {
     "mission": 4,
@@ -75,6 +77,7 @@ def pages(files: dict[str, str]) -> dict[str, str]:
     return {name: text for name, text in files.items() if name.endswith(".html")}
 
 
+@pytest.mark.brief
 def test_pages_load_nothing(pages: dict[str, str], files: dict[str, str]) -> None:
     for name, html in pages.items():
         links = Links(html)
@@ -85,10 +88,11 @@ def test_pages_load_nothing(pages: dict[str, str], files: dict[str, str]) -> Non
                 assert page in {"", *files}
                 assert not section or f'id="{section}"' in files[page or name]
         for drawing in map(b64decode, EMBEDDED.findall(html)):
-            assert set(re.findall(rb'href="(.)', drawing)) == {b"#"}
+            assert set(re.findall(rb'href="(.)', drawing)) <= {b"#"}  # some refer to nothing
         assert not re.search(r"//[a-z]|url\(|@import", links.outside_scripts)
 
 
+@pytest.mark.brief
 def test_pages_show_no_paths_and_no_times(files: dict[str, str], results: Path) -> None:
     for html in files.values():
         html = html.replace(library().data, "")
@@ -97,17 +101,18 @@ def test_pages_show_no_paths_and_no_times(files: dict[str, str], results: Path) 
         assert not re.search(r"\b\d\d:\d\d:\d\d\b|\b20\d\d-\d\d-\d\d\b", html)
 
 
+@pytest.mark.brief
 def test_pages_show_results_and_no_errors(pages: dict[str, str]) -> None:
-    assert pages["index.html"].count('<a class="card"') == len(NAMES) - 1
-    (scorecard,) = re.findall('<section id="scorecard">.*?</section>', pages["index.html"], re.S)
-    assert scorecard in pages["scorecard.html"]
-    assert scorecard.count('<tr class="claim">') >= 15
+    assert pages["index.html"].count('<a class="card"') == len(NAMES)
+    assert 'href="scorecard.html"' in pages["index.html"]
+    assert pages["scorecard.html"].count('<tr class="claim">') >= 15
     for name in NAMES:
         assert pages[f"{name}.html"].count("<img ") == FIGURES[name]
         text = words_of(pages[f"{name}.html"])
         assert not re.search(r"Traceback|Warning|stderr|<Figure|Figure\(|NaN|\bnan\b|None", text)
 
 
+@pytest.mark.brief
 def test_every_figure_has_a_caption_with_its_number(pages: dict[str, str]) -> None:
     for name in NAMES:
         html = pages[f"{name}.html"]
@@ -116,6 +121,7 @@ def test_every_figure_has_a_caption_with_its_number(pages: dict[str, str]) -> No
         assert all(re.search(r"\bn\b", caption) for caption in captions), name
 
 
+@pytest.mark.brief
 def test_every_page_carries_the_evidence_of_its_studies(
     pages: dict[str, str], results: Path
 ) -> None:
@@ -189,7 +195,9 @@ def test_pages_fit_the_paper(
 def test_a_mission_is_played_in_its_page(visit: Callable[[Path, int], Visit], out: Path) -> None:
     opened = visit(out / "mission.html", 1280)
     opened.page.locator("#player button").click()
-    opened.page.wait_for_function("document.querySelector('#player input').value >= 3")
+    # A function to wait for would be evaluated in the page, which forbids that.
+    slot = opened.page.locator("#player input").first
+    expect(slot).to_have_value(re.compile(r"^([3-9]|\d\d+)$"), timeout=30_000)
     opened.page.locator("#player-second canvas").press("End")
     opened.page.locator("#player-first canvas").press("ArrowLeft")
     first, second = (opened.page.locator(f"#player-{n} output") for n in ("first", "second"))

@@ -143,7 +143,8 @@ def test_the_same_results_give_the_same_bytes_and_the_notebook_shows_them(
     assert again["study-trial.html"].decode() == page
     assert again["index.html"] == files_of(out)["index.html"]
     notebook = nbformat.read(out / "study-trial.ipynb", as_version=4)
-    assert notebook.cells.pop(0).source == "# Study trial\n\nHow many UAVs & pads?"
+    question = "# Which number of UAVs and number of charging pads for small.toml?"
+    assert notebook.cells.pop(0).source == f"{question}\n\nHow many UAVs &#38; pads?"
     NotebookClient(notebook, resources={"metadata": {"path": str(out)}}).execute()
     assert body_of(notebook).html in page
 
