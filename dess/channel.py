@@ -251,12 +251,18 @@ def _draw(mission, substream, batch, width):
         mission.seed, mission.replication, streams.SHADOWING, substream, mission.slot,
         batch.node, words, width,
     )  # fmt: skip
+    _add_shadowing(mean, words, mission.shadowing_deviation, snr, width)
+    for word in range(GROUP):
+        batch.top[word] = _top(batch.node, snr, word, width)
+
+
+@kernel
+def _add_shadowing(mean, words, deviation, snr, width):
+    """The SNR [dB] of nodes. As a function that is optimized on its own, it becomes vector code."""
     for word in range(GROUP):
         for place in range(width):
             deviate = streams.normal_or_bound(words[word, place])
-            snr[word, place] = mean[word, place] + mission.shadowing_deviation * deviate
-    for word in range(GROUP):
-        batch.top[word] = _top(batch.node, snr, word, width)
+            snr[word, place] = mean[word, place] + deviation * deviate
 
 
 @inlined
