@@ -43,7 +43,8 @@ def needed_draws(
 
 @kernel
 def _count(
-    mission, uavs, residual, sensors, teeth, actions, nodes, mean_snr, order, means, batches, search
+    mission, uavs, residual, sensors, teeth, actions,
+    nodes, mean_snr, order, means, chart, batches, search,
 ):  # fmt: skip
     """Simulate one mission and count."""
     arrivals = np.empty(len(nodes), np.int64)
@@ -52,10 +53,10 @@ def _count(
     while mission.active > 0:
         for i in range(mission.uavs):
             uavs[i].action = actions[mission.slot, i]
-        rules.resolve(mission, uavs)
+        rules.resolve(mission, uavs, chart)
         rules.grant_pads(mission, uavs)
         rules.spend(mission, uavs)
-        channel.open_slot(mission, uavs, nodes, mean_snr, order, means, search)
+        channel.open_slot(mission, uavs, nodes, mean_snr, order, means, chart, search)
         needed = np.zeros((mission.uavs, len(nodes)), np.bool_)
         for n in range(1, mission.communication_slots + 1):
             before = residual.copy()
