@@ -1,4 +1,6 @@
-"""Speed of the engines on the paper's scenario, in UAV-slots per second."""
+"""Speed of the engines on the paper's scenario, in UAV-slots per second of CPU time."""
+
+import time
 
 import numpy as np
 import pytest
@@ -10,6 +12,8 @@ from benchmarks.recorded import Recorded
 from dess import simulate, simulate_batch
 
 FLOOR_MISSIONS = 300
+# What other processes do matters less for CPU time than for the clock.
+pytestmark = pytest.mark.benchmark(timer=time.process_time)
 
 
 def test_floor(benchmark, recorded: RecordedMissions) -> None:
@@ -39,6 +43,7 @@ def test_batch_engine_free_policy(benchmark, recorded: RecordedMissions) -> None
     _batch(benchmark, recorded, Recorded(recorded.actions))
 
 
+@pytest.mark.benchmark(timer=time.perf_counter)
 def test_batch_engine_free_policy_two_threads(benchmark, recorded: RecordedMissions) -> None:
     """The same on two cores."""
     _batch(benchmark, recorded, Recorded(recorded.actions), workers=2)

@@ -105,12 +105,13 @@ def world_of(scenario: ScenarioSpace) -> World:
 def _world_of(scenario: ScenarioSpace, thread: int) -> World:
     m, (columns, rows) = scenario.communication_slots, scenario.size
     places, longest = m * fleet.places_per_slot(scenario.fleet), max(columns, rows)
-    fine = np.arange(places * (longest - 1) + 1) / places
+    fine = np.arange(places * (longest - 1) + 1)
     diagonal = np.sqrt(2) * np.sqrt((columns**2 + rows**2) / 2) * scenario.cell_size
     edge = diagonal / 2
     mean_snr = np.empty((longest, len(fine)))
     for row in range(longest):  # each takes a moment, all of a large grid may take seconds
-        horizontal = scenario.cell_size * np.hypot(row, fine)
+        # From an integer: at equal distances, the SNR is equal to the bit.
+        horizontal = scenario.cell_size * (np.sqrt((places * row) ** 2 + fine**2) / places)
         distance = np.hypot(horizontal, scenario.altitude)
         loss = 10 * scenario.path_loss_exponent * log10(distance / edge)
         mean_snr[row] = scenario.edge_snr - loss
@@ -251,12 +252,18 @@ def _draw(mission, substream, batch, width):
         mission.seed, mission.replication, streams.SHADOWING, substream, mission.slot,
         batch.node, words, width,
     )  # fmt: skip
+    _add_shadowing(mean, words, mission.shadowing_deviation, snr, width)
+    for word in range(GROUP):
+        batch.top[word] = _top(batch.node, snr, word, width)
+
+
+@kernel
+def _add_shadowing(mean, words, deviation, snr, width):
+    """The SNR [dB] of nodes. As a function that is optimized on its own, it becomes vector code."""
     for word in range(GROUP):
         for place in range(width):
             deviate = streams.normal_or_bound(words[word, place])
-            snr[word, place] = mean[word, place] + mission.shadowing_deviation * deviate
-    for word in range(GROUP):
-        batch.top[word] = _top(batch.node, snr, word, width)
+            snr[word, place] = mean[word, place] + deviation * deviate
 
 
 @inlined

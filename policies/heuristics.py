@@ -28,6 +28,7 @@ _SHARED = 0.3
 _SLOTS_AT_NODE = 1.0
 # Weight of the nodes that a UAV can visit after the next one (age).
 _BEYOND = 0.1
+_FINE = 2.0**24  # parts of a slot of age per slot of distance
 # Cost [slots] of a step into a cell, by the result of the guard's contest for that cell.
 _CONTEST_COST = np.array([0.0, 0.5, 2.5, 50.0])
 
@@ -224,7 +225,7 @@ def _goal(
 @inlined
 def _staleness(mission, data, sensors, nodes, chart, k, slots):
     """The age per slot of distance of node ``k``, and a share of that of all nodes beyond it."""
-    here = beyond = 0.0
+    here, beyond = 0.0, 0  # an integer, since a sum of floats depends on the order of the nodes
     for other in range(len(nodes)):
         if data[other] > 0.0:
             age = mission.slot + 1 - sensors[other].newest  # at the end of this slot
@@ -233,8 +234,8 @@ def _staleness(mission, data, sensors, nodes, chart, k, slots):
             if other == k:
                 here = score
             else:
-                beyond += score
-    return here + _BEYOND * beyond
+                beyond += np.int64(score * _FINE)
+    return here + _BEYOND * (beyond / _FINE)
 
 
 @inlined

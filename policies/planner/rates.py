@@ -107,11 +107,15 @@ def _of_steps(
 
 
 def _mean_rate(snr: np.ndarray, length: float, deviation: float) -> np.ndarray:
-    """The mean of the rate (eq. 9) over the shadowing, for mean SNRs [dB]."""
+    """The mean of the rate (eq. 9) over the shadowing, for mean SNRs [dB].
+
+    It is computed once for each SNR, so that nodes at equal distances have equal rates.
+    """
     points, weights = np.polynomial.hermite_e.hermegauss(_POINTS)
     weights /= weights.sum()
-    rates = np.empty_like(snr)
-    for row, levels in enumerate(snr):  # all rows at once would take gigabytes on a large grid
-        levels = levels[:, None] + deviation * points
-        rates[row] = length * np.log2(1.0 + 10.0 ** (levels / 10.0)) @ weights
-    return rates
+    distinct, places = np.unique(snr, return_inverse=True)
+    rates = np.empty_like(distinct)
+    for part in np.array_split(np.arange(len(distinct)), len(snr)):  # all would take gigabytes
+        levels = distinct[part, None] + deviation * points
+        rates[part] = length * np.log2(1.0 + 10.0 ** (levels / 10.0)) @ weights
+    return rates[places].reshape(snr.shape)

@@ -1,0 +1,66 @@
+"""Nodes at equal distances tie exactly, whatever they are computed from: the lowest index wins."""
+
+import numpy as np
+import pytest
+
+import policies
+from dess import channel, simulate
+from dess.code.kernels import kernel
+from dess.scenario import ScenarioSpace
+from dess.state import state_of
+from policies import heuristics
+from policies.planner import rates
+
+CELLS = [[x, y] for x in range(13) for y in range(13)]
+SEA = {
+    **{"grid": 13, "zone": [5, 5, 3, 3], "shadowing_variance": 0.0},
+    **{"initial_data": 1000.0, "arrival_rate": 0.0, "max_slots": 60},
+}
+
+
+def _sea(slots: int, nodes: list[list[int]]) -> ScenarioSpace:
+    return ScenarioSpace.model_validate(SEA | {"communication_slots": slots, "nodes": nodes})
+
+
+@pytest.mark.parametrize("slots", [3, 5, 6])
+def test_of_nodes_at_the_same_distance_the_first_is_served(slots: int) -> None:
+    policy, ties = policies.load("random-unguarded"), 0
+    for seed in range(12):
+        space = _sea(slots, np.random.default_rng(seed).permutation(CELLS)[:12].tolist())
+        nodes = slots * np.array(space.nodes)
+        for event in simulate(space, policy, seed, events=True).events:
+            if event.event == "communication":
+                place = np.rint(slots * np.array([event.x, event.y])).astype(int)
+                squares = ((nodes - place) ** 2).sum(1)  # integers
+                ties += (squares == squares.min()).sum() > 1
+                assert event.node == squares.argmin(), (event.x, event.y)
+    assert ties > 100
+
+
+@pytest.mark.parametrize("slots", [3, 4, 5, 7])
+def test_the_planner_expects_the_same_rate_at_the_same_distance(slots: int) -> None:
+    space = ScenarioSpace.model_validate({"communication_slots": slots})
+    snr = channel.world_of(space).mean_snr
+    table = rates._mean_rate(snr, 1 / slots, 1.4)
+    coarse, fine = np.indices(snr.shape)
+    places = np.unique((slots * coarse) ** 2 + fine**2, return_inverse=True)[1].ravel()
+    for values in (snr.ravel(), table.ravel()):
+        first = np.zeros(places.max() + 1)
+        first[places] = values
+        assert (first[places] == values).all()
+
+
+def test_mirrored_nodes_are_as_stale_for_the_policy_age() -> None:
+    lattice = [[x, y] for x in range(0, 13, 3) for y in range(0, 13, 3)]
+    space = _sea(4, lattice)
+    state, data, nodes = state_of([space], 1), np.ones(25), np.array(lattice)
+    mirrored = ([0, 3], [3, 0], [9, 0], [0, 9], [12, 3], [3, 12], [12, 9], [9, 12])
+    assert (
+        len({_staleness(state, data, nodes, space.chart, lattice.index(c)) for c in mirrored}) == 1
+    )
+
+
+@kernel
+def _staleness(state, data, nodes, chart, k):
+    sensors = state.sensors[0]
+    return heuristics._staleness(state.missions[0], data, sensors, nodes, chart, k, 12)
