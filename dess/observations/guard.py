@@ -19,7 +19,7 @@ from dess.code.kernels import inlined, kernel
 from dess.constants import MOST_ZONES
 from dess.observations.reach import reach_of
 from dess.rules import data_left, flies
-from dess.sea.chart import distance, distance_home, in_zone, is_open, length_around
+from dess.sea.chart import FAR, distance, distance_home, in_zone, is_open, length_around
 from dess.sections.failures import working_pads
 from dess.sections.section import extension
 from dess.sections.wind import move_surcharge
@@ -81,6 +81,8 @@ def must_charge(mission, u, data):
     needed = slots_expected(mission, u, data)
     if mission.pad_rate > 0.0 and mission.pad_repair == 0.0 and _all_pads(mission) == 0:
         return False
+    # A UAV that lives until the mission is truncated is not lost.
+    needed = min(needed, mission.max_slots - mission.slot + 1)
     return u.battery < mission.flight_cost * (needed + _most_wind(mission, u, needed))
 
 
@@ -185,26 +187,21 @@ def parking_cell(mission, uavs, i, chart, memory, reach):
     memory.free[:] = 0
     for j in range(mission.uavs):
         o = uavs[j]
-        if j != i and o.active and o.zone >= 0:
+        if o.active and o.zone >= 0:
             taken[chart.nearest[o.y, o.x]] = True
-            if o.pad_request >= 0:
+            if j != i and o.pad_request >= 0:
                 _take_pad(mission, o, o.zone, 0, memory.free)
-    last_battery, last = -1, -1
+    done, last = -FAR, -1
     while True:
         # the next UAV to choose
-        chooser = -1
+        chooser, least = -1, FAR
         for j in range(mission.uavs):
             o = uavs[j]
-            if (
-                not o.active
-                or o.battery < last_battery
-                or (o.battery == last_battery and j <= last)
-            ):
-                continue
-            if chooser < 0 or o.battery < uavs[chooser].battery:
-                chooser = j
+            spare = _spare(mission, o, chart) if o.active else FAR
+            if (spare > done or (spare == done and j > last)) and spare < least:
+                chooser, least = j, spare
         o = uavs[chooser]
-        last_battery, last = o.battery, chooser
+        done, last = least, chooser
         if chooser != i and is_parked(o):
             continue
         cell, slots = _soonest_free(mission, uavs, chooser, chart, memory, reach)
@@ -227,6 +224,14 @@ def parking_cell(mission, uavs, i, chart, memory, reach):
 
 
 @inlined
+def _spare(mission, u, chart):
+    """What the UAV with the least of it chooses first: where pads are few, what its way leaves."""
+    if not mission.plans_waits or mission.uavs <= mission.pads:
+        return u.battery
+    return u.battery - distance_home(chart, u.x, u.y) * u.slots_per_cell
+
+
+@inlined
 def _soonest_free(mission, uavs, i, chart, memory, reach):
     """The number of the best parking cell that is not taken (-1 if none), and the way to it."""
     u = uavs[i]
@@ -239,7 +244,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     if reach is None and free:
         if path_length(mission, uavs, i, chart, u.x, u.y, x, y) == slots:
             return cell, slots
-    best, way, least = -1, -1, -1
+    best, way, least, fewest = -1, -1, -1, -1
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
@@ -248,13 +253,17 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
         if _is_given_up(mission, zone):
             continue
         slots = path_length(mission, uavs, i, chart, u.x, u.y, x, y)
-        until = waiting_time(mission, u, zone, slots, memory.free)
-        if reach is None:
-            until += slots
-        else:
-            until += _in_wind(mission, u, chart, u.x, u.y, x, y, slots, reach)
-        if best < 0 or until < least or (until == least and slots < way):
-            best, way, least = cell, slots, until
+        wait = waiting_time(mission, u, zone, slots, memory.free)
+        until = slots
+        if reach is not None:
+            until = _in_wind(mission, u, chart, u.x, u.y, x, y, slots, reach)
+        # the slots that lack if it begins to charge as soon as it may and a pad is free
+        spare = u.battery - mission.charge_start
+        lacks = max(max(until, spare) + wait + 1 - u.battery, 0) if wait > 0 else 0
+        until += wait
+        is_sooner = until < least or (until == least and slots < way)
+        if best < 0 or lacks < fewest or (lacks == fewest and is_sooner):
+            best, way, least, fewest = cell, slots, until, lacks
     return best, way
 
 
@@ -429,6 +438,8 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
         The safe actions, a bit for each.
     """
     u = uavs[i]
+    if charge and u.pad_request >= 0:
+        return 1 << HOVER  # it would lose its place in the queue
     spare = margin(mission, u)
     reserve = spare + wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
