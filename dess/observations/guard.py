@@ -224,11 +224,33 @@ def parking_cell(mission, uavs, i, chart, memory, reach):
 
 
 @inlined
+def _are_few(mission):
+    """Whether a zone has fewer pads than there are UAVs."""
+    few = False
+    for zone in range(mission.zones):
+        few = few or mission.uavs > mission.zone_pads[zone]
+    return few
+
+
+@inlined
 def _spare(mission, u, chart):
-    """What the UAV with the least of it chooses first: where pads are few, what its way leaves."""
-    if not mission.plans_waits or mission.uavs <= mission.pads:
+    """What the UAV that has the least of it chooses first: its battery.
+
+    Where pads are few, it is what is left of it at the second nearest zone: whoever flies to a zone
+    and can reach no other keeps its pad there.
+    """
+    if not mission.plans_waits or mission.zones == 1 or not _are_few(mission):
         return u.battery
-    return u.battery - distance_home(chart, u.x, u.y) * u.slots_per_cell
+    nearest = other = FAR
+    for zone in range(mission.zones):
+        way = FAR
+        for cell in range(len(chart.parking)):
+            x, y = chart.parking[cell, 0], chart.parking[cell, 1]
+            if chart.zones[y, x] == zone:
+                way = min(way, distance(chart, u.x, u.y, x, y))
+        other = min(other, max(nearest, way))
+        nearest = min(nearest, way)
+    return u.battery - other * u.slots_per_cell
 
 
 @inlined
