@@ -19,7 +19,7 @@ from dess.code.kernels import inlined, kernel
 from dess.constants import MOST_ZONES
 from dess.observations.reach import reach_of
 from dess.rules import data_left, flies
-from dess.sea.chart import FAR, distance, distance_home, in_zone, is_open, length_around
+from dess.sea.chart import distance, distance_home, in_zone, is_open, length_around
 from dess.sections.failures import working_pads
 from dess.sections.section import extension
 from dess.sections.wind import move_surcharge
@@ -191,17 +191,22 @@ def parking_cell(mission, uavs, i, chart, memory, reach):
             taken[chart.nearest[o.y, o.x]] = True
             if j != i and o.pad_request >= 0:
                 _take_pad(mission, o, o.zone, 0, memory.free)
-    done, last = -FAR, -1
+    last_battery, last = -1, -1
     while True:
         # the next UAV to choose
-        chooser, least = -1, FAR
+        chooser = -1
         for j in range(mission.uavs):
             o = uavs[j]
-            spare = _spare(mission, o, chart) if o.active else FAR
-            if (spare > done or (spare == done and j > last)) and spare < least:
-                chooser, least = j, spare
+            if (
+                not o.active
+                or o.battery < last_battery
+                or (o.battery == last_battery and j <= last)
+            ):
+                continue
+            if chooser < 0 or o.battery < uavs[chooser].battery:
+                chooser = j
         o = uavs[chooser]
-        done, last = least, chooser
+        last_battery, last = o.battery, chooser
         if chooser != i and is_parked(o):
             continue
         cell, slots = _soonest_free(mission, uavs, chooser, chart, memory, reach)
@@ -221,36 +226,6 @@ def parking_cell(mission, uavs, i, chart, memory, reach):
             latest = min(own_request, o.battery // max(mission.flight_cost, 1) - 1)
             asked = max(_until_asked(mission, o, slots), latest)
             _take_pad(mission, o, zone, asked, memory.free)
-
-
-@inlined
-def _are_few(mission):
-    """Whether a zone has fewer pads than there are UAVs."""
-    few = False
-    for zone in range(mission.zones):
-        few = few or mission.uavs > mission.zone_pads[zone]
-    return few
-
-
-@inlined
-def _spare(mission, u, chart):
-    """What the UAV that has the least of it chooses first: its battery.
-
-    Where pads are few, it is what is left of it at the second nearest zone: whoever flies to a zone
-    and can reach no other keeps its pad there.
-    """
-    if not mission.plans_waits or mission.zones == 1 or not _are_few(mission):
-        return u.battery
-    nearest = other = FAR
-    for zone in range(mission.zones):
-        way = FAR
-        for cell in range(len(chart.parking)):
-            x, y = chart.parking[cell, 0], chart.parking[cell, 1]
-            if chart.zones[y, x] == zone:
-                way = min(way, distance(chart, u.x, u.y, x, y))
-        other = min(other, max(nearest, way))
-        nearest = min(nearest, way)
-    return u.battery - other * u.slots_per_cell
 
 
 @inlined
@@ -281,7 +256,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
             until = _in_wind(mission, u, chart, u.x, u.y, x, y, slots, reach)
         # the slots that lack if it begins to charge as soon as it may and a pad is free
         spare = u.battery - mission.charge_start
-        lacks = max(max(until, spare) + wait + 1 - u.battery, 0) if wait > 0 else 0
+        lacks = max(max(until, spare) + wait + 1 - u.battery, 0)
         until += wait
         is_sooner = until < least or (until == least and slots < way)
         if best < 0 or lacks < fewest or (lacks == fewest and is_sooner):
