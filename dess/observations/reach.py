@@ -1,7 +1,7 @@
 """How much battery a UAV needs to reach a parking cell, where that is not one percent per cell.
 
     table = reach_of(view.state.missions, view.world.chart)
-    table[c, s - 1, y, x]       # [%] to parking cell c, for a UAV that takes s mission slots per cell
+    table[c, s - 1, y, x]       # [%] to parking cell c, for a UAV that takes s slots per cell
 
 The cost of a way depends on the wind and on the speed of the UAV. A table has the cheapest way from
 every cell (Bellman and Ford's algorithm). Without wind and slow UAVs there is no table.

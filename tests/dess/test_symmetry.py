@@ -133,8 +133,8 @@ def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
     """How far away the cell is where UAV ``i`` may charge, and whether the choice was clear.
 
     In plain Python: the UAVs choose one after the other, the lowest battery first, where they get a
-    pad with the least battery. Parked teammates are islands, where the way around them is not longer than to wait
-    for a charge.
+    pad with the least battery. Parked teammates are islands, where the way around them is not
+    longer than to wait for a charge.
     """
     team, space = [u for u in sea.state.uavs[0] if u["active"]], sea.space
     me, clear, mission = sea.state.uavs[0][i], True, sea.state.missions[0]
