@@ -238,9 +238,8 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     zone, slots = np.int64(chart.zones[y, x]), distance(chart, u.x, u.y, x, y)
     free = (slots == 0 or not memory.taken[cell]) and not _is_given_up(mission, zone)
     free = free and (mission.zones == 1 or not waiting_time(mission, u, zone, slots, memory.free))
-    if reach is None and free:
-        if path_length(mission, uavs, i, chart, u.x, u.y, x, y) == slots:
-            return cell, slots
+    if reach is None and free and path_length(mission, uavs, i, chart, u.x, u.y, x, y) == slots:
+        return cell, slots
     best, way, least, fewest = -1, -1, -1, -1
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
