@@ -329,7 +329,9 @@ def test_a_uav_that_waits_in_the_queue_keeps_its_place() -> None:
 
 def test_a_parked_uav_keeps_its_cell_whoever_chooses_first() -> None:
     """A teammate with less battery must not take the cell, and its only pad, from it."""
-    team = [{"x": 3, "y": 4, "battery": 9, "latch": True}, {"x": 1, "y": 4, "battery": 7}]
+    places = ((3, 4, 9), (3, 1, 11), (1, 4, 7), (1, 1, 8))
+    team: list[dict[str, Any]] = [{"x": x, "y": y, "battery": b} for x, y, b in places]
+    team[0]["latch"] = True
     sea: dict[str, Any] = {"grid": 6, "rows": 5, "zone": [3, 2, 2, 2], "pads": 1, "nodes": [[0, 0]]}
     sea |= {"zones": [{"cells": [3, 4, 1, 1]}], "charge_start": 30, "charge_complete": 80}
     state, chart = placed(team, **sea)
