@@ -17,14 +17,7 @@ from matplotlib.patches import Rectangle
 
 from analysis.figures import drawings, style
 from analysis.figures.style import Look
-from analysis.names import (
-    LESS_IS_BETTER,
-    METRICS,
-    PRODUCT,
-    metric_label,
-    parameter,
-    value_text,
-)
+from analysis.names import LESS_IS_BETTER, METRICS, PRODUCT, metric_label, parameter, value_text
 from analysis.questions import settings
 from analysis.results.tables import Results
 from analysis.study.design import NOISE

@@ -311,8 +311,9 @@ def _ends(results: Results, point: int) -> dict[str, str]:
     }
     return {
         field: end
-        for field, end in ends(results, point, DECISIONS).items()
-        if end == "least" or not of.get(field) or sum(spent.values()) - spent[field] > of[field]
+        for field, end in ends(results, point).items()
+        if field in DECISIONS
+        and (end == "least" or not of.get(field) or sum(spent.values()) - spent[field] > of[field])
     }
 
 

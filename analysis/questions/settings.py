@@ -16,15 +16,7 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from analysis import numbers
-from analysis.names import (
-    COST,
-    LESS_IS_BETTER,
-    METRICS,
-    PRODUCT,
-    metrics_in,
-    parameter,
-    value_text,
-)
+from analysis.names import COST, LESS_IS_BETTER, METRICS, PRODUCT, metrics_in, parameter, value_text
 from analysis.results.tables import Results
 from analysis.stats.correction import with_adjusted
 from analysis.stats.differences import column_tests
@@ -95,7 +87,7 @@ def dependence(results: Results, ranked: pd.DataFrame, metric: str) -> list[str]
     ]
 
 
-def ends(results: Results, point: int, fields: Iterable[str] | None = None) -> dict[str, str]:
+def ends(results: Results, point: int) -> dict[str, str]:
     """The fields that have the least or the largest of their values at a design point.
 
     Beyond such an end there may be a better setting. An end that is a limit of the scenario itself,
@@ -104,21 +96,18 @@ def ends(results: Results, point: int, fields: Iterable[str] | None = None) -> d
     Args:
         results: The study.
         point: The design point.
-        fields: The fields that are looked at; by default all that the design varies.
 
     Returns:
         For each of these fields ``least`` or ``largest``.
     """
-    table, space, found = points(results), results.scenario(point), {}
-    for field in table if fields is None else [name for name in table if name in fields]:
-        values = table[field]
+    space, found = results.scenario(point), {}
+    for field, values in points(results).items():
         if is_numeric_dtype(values) and field in space.numeric:
-            limits = space.limits(field)
-            for word, end, limit in zip(
-                ("least", "largest"), (values.min(), values.max()), limits, strict=True
-            ):
-                if values[point] == end != limit:
-                    found[str(field)] = word
+            low, high = space.limits(field)
+            if values[point] == values.min() != low:
+                found[str(field)] = "least"
+            elif values[point] == values.max() != high:
+                found[str(field)] = "largest"
     return found
 
 

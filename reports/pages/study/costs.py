@@ -98,14 +98,9 @@ def parts_table(results: Results) -> HTML:
     return html.table(shown, caption, data=rows)
 
 
-def cheapest(results: Results) -> list[str]:
-    """The cheapest settings that meet the requirements, with reasons, a sentence each."""
-    return questions.sentences(results)
-
-
 def reasons(results: Results) -> html.Marked:
-    """All of ``cheapest`` as a list, and the guarantee."""
-    lines = [f"- {text}" for text in cheapest(results)]
+    """The cheapest settings that meet the requirements, with reasons, and the guarantee."""
+    lines = [f"- {text}" for text in questions.sentences(results)]
     said = {choice.guarantee for p in results.policies if (choice := results.cheapest(p))}
     sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(said))
     return html.composed("\n".join(lines) + f"\n\n{sure}")

@@ -24,7 +24,7 @@ FRAMED = (
 
 def leading(results: Results, metric: str) -> Drawing:
     """The figure that shows the answer of a study: the metric over all that the design varies."""
-    count, kind = len(settings.varied(results)), _kind(results)
+    count, kind = len(settings.varied(results)), results.design
     if kind == "saltelli":
         return sensitivity(results, metric)[0]
     if not count:
@@ -107,7 +107,7 @@ def small_multiples(results: Results, metric: str = PRODUCT) -> list[Drawing]:
 
 def main_effects(results: Results, metrics: Iterable[str]) -> list[Drawing]:
     """Every metric against every varied field, averaged over the other fields."""
-    is_sample = (results.manifest["study"]["design"] or {}).get("kind") == "saltelli"
+    is_sample = results.design == "saltelli"
     drawings: list[Drawing] = []
     for metric in metrics:
         data = settings.main_effects(results, metric)
@@ -196,10 +196,6 @@ _MEANT = {
     "replication by replication",
     True: "the missions with the value, whatever the other fields are",
 }
-
-
-def _kind(results: Results) -> str:
-    return str((results.manifest["study"]["design"] or {}).get("kind", "grid"))
 
 
 def _of(table: pd.DataFrame, metric: str) -> pd.DataFrame:

@@ -59,8 +59,7 @@ def report_of(
 
 def _kind(results: Results) -> str:
     """The kind of the design; a design that varies one field at most is a grid."""
-    design = results.manifest["study"]["design"] or {}
-    kind = str(design.get("kind", "grid"))
+    kind = results.design
     return kind if kind in ("saltelli", "latin-hypercube") or len(varied(results)) > 1 else "grid"
 
 

@@ -120,10 +120,9 @@ def of_variance(results: Results, metric: str) -> str:
 
 def title(results: Results) -> str:
     """The question that a study answers."""
-    design = results.manifest["study"]["design"] or {}
     if isinstance(results.store.manifest.selection, Cheapest):
         question = "Which fleet is the cheapest for {}?"
-    elif design.get("kind") == "saltelli":
+    elif results.design == "saltelli":
         question = "Which parameters matter for {}?"
     elif fields := [parameter(field).within for field in settings.varied(results)]:
         question = f"Which {numbers.words(fields)} for {{}}?" if len(fields) < 4 else _BEST
@@ -157,10 +156,9 @@ def commands(results: Results, missions: pd.DataFrame) -> html.Marked:
 def _design(results: Results) -> Iterator[html.Marked]:
     """The fields that the design varies, as items of the list."""
     points = len(results.store.manifest.points)
-    kind = (results.manifest["study"]["design"] or {}).get("kind", "grid")
     if fields := settings.varied(results):
         line = "- **Design:** {kind}, {points:,} design points. It varies:"
-        yield html.marked(line, kind=html.code(kind), points=points)
+        yield html.marked(line, kind=html.code(results.design), points=points)
     for field, values in fields.items():
         unit = f" [{parameter(field).unit}]".removesuffix(" []")
         line = "    - {field}{unit}: {values}"
