@@ -164,8 +164,7 @@ def _counted(study: Study, store: Store) -> list[Planned]:
         plan.append(Planned(policy, needed, needed - missing, logs, max(most, needed)))
     if study.bounds:
         parts = bound_parts(manifest)
-        missing = missions_in(store.missing("bounds", parts))
-        needed = missions_in(parts)
+        needed, missing = missions_in(parts), missions_in(store.missing("bounds", parts))
         plan.append(Planned("upper bounds", needed, needed - missing, most=needed))
     return plan
 
@@ -185,10 +184,10 @@ def _most(study: Study) -> int:
 
 def _seconds(study: Study, planned: Planned) -> Range:
     """Estimated time on one core of the missing missions and event logs, or of the bounds."""
-    spaces, most = [point.scenario for point in study.points], planned.most - planned.present
+    spaces = [point.scenario for point in study.points]
     if planned.policy not in study.policies:
         made = planned.missing * sum(map(decisions, spaces)) / len(spaces)
         return Range(*(made * each for each in BOUND))
     logs = seconds_of(spaces, planned.policy, (planned.logs, planned.logs), "events")
-    missions = planned.missing, max(most, 0)
+    missions = planned.missing, planned.most - planned.present
     return seconds_of(spaces, planned.policy, missions, study.engine).plus(logs)

@@ -165,7 +165,8 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
         wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[cell]))
         ends = column_intervals(wide, name)
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
-    table["tied"] = _tied(wide, metric)  # by the ranking metric, which was computed last
+    # By the ranking metric, which was computed last.
+    table["tied"] = may_be_best(wide.to_numpy(float), metric)
     less = metric in LESS_IS_BETTER
     table = table.sort_values(metric, ascending=less, kind="stable", ignore_index=True)
     table.insert(0, "rank", np.arange(1, len(table) + 1))
@@ -309,7 +310,7 @@ def _averaged(
             at_points = by_replication(part, metric, "point")
             ends = _over_points(at_points.reindex(columns=range(len(cell_of))), cell_of, metric)
         table = pd.concat([cells, ends], axis=1)
-        table = table.assign(points=sizes, tied=_tied(wide, metric))
+        table = table.assign(points=sizes, tied=may_be_best(wide.to_numpy(float), metric))
         table.insert(0, "policy", name)
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
@@ -349,10 +350,6 @@ def _missions(results: Results, metric: str, policy: str | None) -> pd.DataFrame
         return results.missions
     results.check_policy(policy)
     return results.missions[results.missions["policy"] == policy]
-
-
-def _tied(values: pd.DataFrame, metric: str) -> np.ndarray:
-    return may_be_best(values.to_numpy(float), metric)
 
 
 def _ordered(values: pd.Series) -> list[Any]:

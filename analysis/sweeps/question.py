@@ -98,10 +98,9 @@ def question(
     if requirements:
         data["selection"] = _cheapest(requirements, missions, study_from(data, "sweep"))
     if policies is None:
-        points = study_from(data, "sweep").points
+        spaces = [point.scenario for point in study_from(data, "sweep").points]
         each = max(USUAL, missions) if requirements else missions
-        chosen = policies_for((point.scenario for point in points), each)
-        data["policies"] = chosen
+        data["policies"] = policies_for(spaces, each)
     study = study_from(data, "sweep")
     return study if name is not None else study.model_copy(update={"name": _name_of(study, swept)})
 

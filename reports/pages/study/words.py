@@ -9,11 +9,13 @@ from analysis import numbers
 from analysis.names import METRICS, PRODUCT, metric_name, parameter, value_text
 from analysis.questions import settings, summary
 from analysis.results.tables import Results
+from analysis.stats.intervals import LEVEL
 from analysis.study.cheapest import Cheapest
 from analysis.study.design import NOISE
 from dess import InputError
 from reports.pages import html
 
+INTERVALS = f"{numbers.level(LEVEL)} intervals"
 MOST_NAMES = 3  # the largest number of settings that are named because they may be as good
 MOST_ROWS = 25  # the largest number of rows of a table on the page; its data have all rows
 _BEST = "Which setting is the best for {}?"
