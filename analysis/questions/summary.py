@@ -197,10 +197,9 @@ def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) 
     cell = ["policy", "point"]
     values = missions[cell].assign(value=values_within(missions, PRODUCT, cell))
     at_points = values.groupby(cell, sort=False)["value"].mean()
-    means = (
-        at_points.groupby("policy", sort=False).mean().sort_values(ascending=False, kind="stable")
-    )
-    return [str(policy) for policy in means.index if policy in among]
+    means = at_points.groupby("policy", sort=False).mean()
+    ranked = means.sort_values(ascending=False, kind="stable").index
+    return [str(policy) for policy in ranked if policy in among]
 
 
 def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> str:

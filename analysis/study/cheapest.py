@@ -254,11 +254,8 @@ class _Search:
         """The feasible candidate with the lowest mean cost, and how much more it may cost."""
         n = self._seen
         costs = np.array(
-            [
-                np.mean([np.asarray(self.samples[p]["cost"][:n], float) for p in points], axis=0)
-                for points in candidates
-            ]
-        )
+            [[self.samples[p]["cost"][:n] for p in points] for points in candidates], float
+        ).mean(axis=1)
         leader = int(np.argmin(np.where(feasible, costs.mean(axis=1), np.inf)))
         excess = costs[leader] - costs
         loss = np.mean([self.settings[p].loss for p in candidates[leader]])

@@ -172,11 +172,8 @@ def _by_sea(results: Results, by: str, metric: str) -> list[tuple[object, pd.Dat
     table = missions(results)
     means = table.groupby([by, "policy", "sea"], sort=False)[metric].mean().reset_index()
     groups = [*means[by].unique()]
-    groups = sorted(groups, key=_first_number) if by in ("uavs", "nodes") else groups
+    if by in ("uavs", "nodes"):  # by the first number
+        groups.sort(key=lambda group: int(str(group).partition(" ")[0]))
     wide = [means[means[by] == group].pivot(index="sea", columns="policy", values=metric)
             for group in groups]  # fmt: skip
     return [(g, w[results.policies]) for g, w in zip(groups, wide, strict=True)]
-
-
-def _first_number(group: object) -> int:
-    return int(str(group).partition(" ")[0])
