@@ -15,7 +15,7 @@ _NAN = re.compile(r"\bnan\b")
 def why_nan(cells: Iterable[object]) -> str:
     """Why a table has nan, in words; empty if no cell has."""
     found = any(_NAN.search(str(cell)) for cell in cells)
-    return "nan: the missions are too few, or too much alike, to estimate it" if found else ""
+    return "nan: the missions are too few, or too similar, to estimate it" if found else ""
 
 
 def percent(value: float) -> str:
