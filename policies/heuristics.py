@@ -156,7 +156,7 @@ def _action(kind, mission, team, i, data, sensors, nodes, circuit, chart, reach,
     charge = guard.must_charge(mission, u, data_left(mission, data))
     home_x, home_y, wait = u.x, u.y, 0
     if charge:
-        home_x, home_y, _, wait = guard.parking_cell(mission, team, i, chart, memory)
+        home_x, home_y, _, wait = guard.parking_cell(mission, team, i, chart, memory, reach)
     safe = guard.safe_moves(mission, team, i, chart, charge, home_x, home_y, wait, reach)
     node = _goal(
         kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home_x, home_y,

@@ -64,15 +64,16 @@ def distances(chart, x, y, to):
 
 
 @kernel
-def parking_cell(mission, uavs, i, chart):
-    return guard.parking_cell(mission, uavs, i, chart, guard.parking_memory(chart, len(uavs)))
+def parking_cell(mission, uavs, i, chart, reach=None):
+    memory = guard.parking_memory(chart, len(uavs))
+    return guard.parking_cell(mission, uavs, i, chart, memory, reach)
 
 
 @kernel
 def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):
     """The node that a heuristic chooses, and the way there."""
     charge = guard.must_charge(mission, uavs[i], rules.data_left(mission, residual))
-    home_x, home_y, _, wait = parking_cell(mission, uavs, i, chart)
+    home_x, home_y, _, wait = parking_cell(mission, uavs, i, chart, reach)
     node = heuristics._goal(
         kind, mission, uavs, i, residual, sensors, nodes, np.zeros(0, np.int64), chart, charge,
         home_x, home_y, wait, reach,

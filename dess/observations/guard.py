@@ -10,6 +10,7 @@ mission; ``chart`` is a ``dess.sea.chart.Chart``, ``reach`` the table of
 ``dess.observations.reach``.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,9 @@ from dess.view import View
 
 # Margin [cells] on the way to the zone per active teammate, since each may cause a detour.
 MARGIN_PER_TEAMMATE = 2
+# Data [data units] that a UAV collects in a slot near an average node, and the communication slots
+# that each UAV can fill with a data unit that arrives at an empty sea.
+MEAN_RATE, SLOTS_PER_PACKET = 0.2, 1.0
 # Margin [slots] for the quota when little data is left, as some slots may find no data to collect.
 SCARCE_SLOTS = 6
 
@@ -36,6 +40,29 @@ def slots_needed(mission, u):
     """Flying slots until the quota of UAV ``u`` is filled, if it collects data in all of them."""
     m = mission.communication_slots
     return (u.quota - u.communications + m - 1) // m
+
+
+@inlined
+def slots_expected(mission, u, data):
+    """Flying slots until the quota of UAV ``u`` is filled, as far as data are there for it.
+
+    A UAV collects some ``MEAN_RATE`` data units in a slot. Once the residual data are collected,
+    it may count on ``SLOTS_PER_PACKET`` communication slots for each data unit that arrives.
+
+    Args:
+        mission: ``MISSION`` record.
+        u: ``UAV`` record.
+        data: Residual data of all nodes together [data units].
+    """
+    needed = slots_needed(mission, u)
+    if data >= MEAN_RATE * needed * mission.active:
+        return needed
+    served = data / (MEAN_RATE * mission.active)
+    arriving = SLOTS_PER_PACKET * mission.arrival_rate * mission.nodes
+    share = min(arriving / mission.communication_slots, 1.0)
+    if (needed - served) >= share * mission.max_slots:
+        return mission.max_slots
+    return int(math.ceil(served + (needed - served) / share)) + SCARCE_SLOTS
 
 
 @inlined
@@ -51,12 +78,11 @@ def must_charge(mission, u, data):
         u: ``UAV`` record.
         data: Residual data of all nodes together [data units].
     """
-    needed = slots_needed(mission, u)
-    # A UAV collects some 0.2 data units in a slot near an average node.
-    if data < 0.2 * needed * mission.active:
-        needed += SCARCE_SLOTS
+    needed = slots_expected(mission, u, data)
     if mission.pad_rate > 0.0 and mission.pad_repair == 0.0 and _all_pads(mission) == 0:
         return False
+    # A UAV that lives until the mission is truncated is not lost.
+    needed = min(needed, mission.max_slots - mission.slot + 1)
     return u.battery < mission.flight_cost * (needed + _most_wind(mission, u, needed))
 
 
@@ -136,7 +162,7 @@ def parking_memory(chart, uavs):
 
 
 @kernel
-def parking_cell(mission, uavs, i, chart, memory):
+def parking_cell(mission, uavs, i, chart, memory, reach):
     """The zone cell where UAV ``i`` will charge: of those that no teammate takes, the soonest.
 
     Teammates in a zone keep their cells, and their pads if they have asked for one. The other UAVs
@@ -149,6 +175,7 @@ def parking_cell(mission, uavs, i, chart, memory):
         i: Index of the UAV.
         chart: ``Chart``.
         memory: ``parking_memory``.
+        reach: The table of ``reach_of``.
 
     Returns:
         The x and y of the cell, how many cells away it is, and the slots for which the UAV must
@@ -160,9 +187,9 @@ def parking_cell(mission, uavs, i, chart, memory):
     memory.free[:] = 0
     for j in range(mission.uavs):
         o = uavs[j]
-        if j != i and o.active and o.zone >= 0:
+        if o.active and o.zone >= 0:
             taken[chart.nearest[o.y, o.x]] = True
-            if o.pad_request >= 0:
+            if j != i and o.pad_request >= 0:
                 _take_pad(mission, o, o.zone, 0, memory.free)
     last_battery, last = -1, -1
     while True:
@@ -182,7 +209,7 @@ def parking_cell(mission, uavs, i, chart, memory):
         last_battery, last = o.battery, chooser
         if chooser != i and is_parked(o):
             continue
-        cell, slots = _soonest_free(mission, uavs, chooser, chart, memory)
+        cell, slots = _soonest_free(mission, uavs, chooser, chart, memory, reach)
         if chooser == i and cell < 0:
             return u.x, u.y, 0, 0
         if cell < 0:
@@ -202,7 +229,7 @@ def parking_cell(mission, uavs, i, chart, memory):
 
 
 @inlined
-def _soonest_free(mission, uavs, i, chart, memory):
+def _soonest_free(mission, uavs, i, chart, memory, reach):
     """The number of the best parking cell that is not taken (-1 if none), and the way to it."""
     u = uavs[i]
     # The nearest cell of all is free most of the time, so this one is tried first.
@@ -211,9 +238,9 @@ def _soonest_free(mission, uavs, i, chart, memory):
     zone, slots = np.int64(chart.zones[y, x]), distance(chart, u.x, u.y, x, y)
     free = (slots == 0 or not memory.taken[cell]) and not _is_given_up(mission, zone)
     free = free and (mission.zones == 1 or not waiting_time(mission, u, zone, slots, memory.free))
-    if free and path_length(mission, uavs, i, chart, u.x, u.y, x, y) == slots:
+    if reach is None and free and path_length(mission, uavs, i, chart, u.x, u.y, x, y) == slots:
         return cell, slots
-    best, way, least = -1, -1, -1
+    best, way, least, fewest = -1, -1, -1, -1
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
@@ -222,9 +249,17 @@ def _soonest_free(mission, uavs, i, chart, memory):
         if _is_given_up(mission, zone):
             continue
         slots = path_length(mission, uavs, i, chart, u.x, u.y, x, y)
-        until = slots * u.slots_per_cell + waiting_time(mission, u, zone, slots, memory.free)
-        if best < 0 or until < least or (until == least and slots < way):
-            best, way, least = cell, slots, until
+        wait = waiting_time(mission, u, zone, slots, memory.free)
+        until = slots
+        if reach is not None:
+            until = _in_wind(mission, u, chart, u.x, u.y, x, y, slots, reach)
+        # the slots that lack if it begins to charge as soon as it may and a pad is free
+        spare = u.battery - mission.charge_start
+        lacks = max(max(until, spare) + wait + 1 - u.battery, 0)
+        until += wait
+        is_sooner = until < least or (until == least and slots < way)
+        if best < 0 or lacks < fewest or (lacks == fewest and is_sooner):
+            best, way, least, fewest = cell, slots, until, lacks
     return best, way
 
 
@@ -298,51 +333,34 @@ def margin(mission, u):
 
 
 @inlined
-def zone_near(chart, x, y):
-    """The number of the zone that is nearest to a cell."""
-    cell = chart.nearest[y, x]
-    return np.int64(chart.zones[chart.parking[cell, 1], chart.parking[cell, 0]])
-
-
-@inlined
-def battery_home(mission, u, chart, home_x, home_y, slots, reach):
-    """The battery [%] that UAV ``u`` needs to reach its parking cell.
+def battery_home(mission, uavs, i, chart, x, y, home_x, home_y, reach):
+    """The battery [%] that UAV ``i`` needs from a cell to its parking cell.
 
     Args:
         mission: ``MISSION`` record.
-        u: ``UAV`` record.
+        uavs: (I,) ``UAV`` records.
+        i: Index of the UAV.
         chart: ``Chart``.
-        home_x, home_y, slots: Its parking cell and the slots to it: the result of ``parking_cell``.
-        reach: The table of ``reach_of``. If it is used, the way to the nearest cell of the zone is
-            in it; if the parking cell is farther, each further cell may cost the most.
+        x, y: The cell.
+        home_x, home_y: The parking cell.
+        reach: The table of ``reach_of``. A detour around parked teammates is not in it; each of
+            its cells may cost the most.
     """
+    cells = path_length(mission, uavs, i, chart, x, y, home_x, home_y)
     if reach is None:
-        return slots
-    table = _table_home(mission, u, chart, home_x, home_y)
-    further = _further(mission, u, chart, table, slots)
-    return reach[table, u.slots_per_cell - 1, u.y, u.x] + further
+        return cells
+    return _in_wind(mission, uavs[i], chart, x, y, home_x, home_y, cells, reach)
 
 
 @inlined
-def _table_home(mission, u, chart, home_x, home_y):
-    """The number of the table of the way home: that of any zone, unless the nearest one is full."""
-    home = distance(chart, u.x, u.y, home_x, home_y)
-    if mission.zones == 1 or home == distance_home(chart, u.x, u.y):
-        return 0
-    return 1 + zone_near(chart, home_x, home_y)
-
-
-@inlined
-def _further(mission, u, chart, table, slots):
-    """The battery [%] for the cells by which the parking cell is farther than its zone."""
-    nearest = distance_home(chart, u.x, u.y)
-    if table > 0:
-        nearest = slots
-        for cell in range(len(chart.parking)):
-            x, y = chart.parking[cell, 0], chart.parking[cell, 1]
-            if chart.zones[y, x] == table - 1:
-                nearest = min(nearest, distance(chart, u.x, u.y, x, y))
-    return (slots - nearest) * (u.slots_per_cell + mission.wind_most)
+def _in_wind(mission, u, chart, x, y, home_x, home_y, cells, reach):
+    """The battery [%] for a way of so many cells, those of a detour included."""
+    dearest = u.slots_per_cell + mission.wind_most
+    if reach.size == 0:  # too many cells for a table
+        return cells * dearest
+    detour = cells - distance(chart, x, y, home_x, home_y)
+    home = chart.nearest[home_y, home_x]
+    return reach[home, u.slots_per_cell - 1, y, x] + detour * dearest
 
 
 @inlined
@@ -357,7 +375,13 @@ def round_trip(mission, u, chart, x, y, home_x, home_y, reach):
             return cells + min(distance(chart, x, y, home_x, home_y), distance_home(chart, x, y))
         return cells + distance(chart, x, y, home_x, home_y)
     against = max(mission.wind_x * (u.x - x), 0.0) + max(mission.wind_y * (u.y - y), 0.0)
-    return cells * u.slots_per_cell + int(against) + reach[0, u.slots_per_cell - 1, y, x]
+    back = distance(chart, x, y, home_x, home_y)
+    back = _in_wind(mission, u, chart, x, y, home_x, home_y, back, reach)
+    if mission.zones > 1:
+        near = chart.parking[chart.nearest[y, x]]
+        cells_near = distance(chart, x, y, near[0], near[1])
+        back = min(back, _in_wind(mission, u, chart, x, y, near[0], near[1], cells_near, reach))
+    return cells * u.slots_per_cell + int(against) + back
 
 
 @inlined
@@ -410,6 +434,8 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
         The safe actions, a bit for each.
     """
     u = uavs[i]
+    if charge and u.pad_request >= 0:
+        return 1 << HOVER  # it would lose its place in the queue
     spare = margin(mission, u)
     reserve = spare + wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
@@ -426,10 +452,8 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
             continue
         late = 0
         if charge:
-            if reach is None:
-                needed = 1 + path_length(mission, uavs, i, chart, x, y, home_x, home_y)
-            else:
-                needed = _needed(mission, uavs, i, chart, action, x, y, home_x, home_y, reach)
+            needed = battery_home(mission, uavs, i, chart, x, y, home_x, home_y, reach)
+            needed += 1 if reach is None else _cost(mission, u, chart, action, x, y)
             # One slot is the charging slot itself; the battery must not be depleted before it.
             late = max(needed + 1 + reserve - u.battery, 0)
         bit = 1 << action
@@ -446,21 +470,16 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
     if least > 0 and clear & in_time:
         # these slots are there to wait or step aside until the teammate has passed
         return clear & in_time
-    return nearest
+    # Two UAVs that both insist block each other: the one without the right of way waits a slot.
+    return 1 << HOVER if least > 0 and u.overruled and not nearest & clear else nearest
 
 
 @inlined
-def _needed(mission, uavs, i, chart, action, x, y, home_x, home_y, reach):
-    """The battery [%] for an action of UAV ``i`` and the way home from the cell it leads to."""
-    u = uavs[i]
+def _cost(mission, u, chart, action, x, y):
+    """The battery [%] for an action of a UAV that leads to a cell, in wind or at a low speed."""
     if action == HOVER:
-        cost = 0 if u.latch and in_zone(chart, x, y) else 1
-    else:
-        cost = u.slots_per_cell + move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
-    table = _table_home(mission, u, chart, home_x, home_y)
-    slots = path_length(mission, uavs, i, chart, u.x, u.y, home_x, home_y)
-    further = _further(mission, u, chart, table, slots)
-    return cost + reach[table, u.slots_per_cell - 1, y, x] + further
+        return 0 if u.latch and in_zone(chart, x, y) else 1
+    return u.slots_per_cell + move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
 
 
 @kernel
@@ -473,7 +492,7 @@ def _mask(missions, uavs, residual, rows_mission, rows_uav, chart, reach):
         charge = must_charge(mission, team[i], data_left(mission, residual[b]))
         home_x = home_y = wait = 0
         if charge:
-            home_x, home_y, _, wait = parking_cell(mission, team, i, chart, memory)
+            home_x, home_y, _, wait = parking_cell(mission, team, i, chart, memory, reach)
         safe = safe_moves(mission, team, i, chart, charge, home_x, home_y, wait, reach)
         for action in range(5):
             masks[row, action] = safe >> action & 1

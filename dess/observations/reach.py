@@ -1,32 +1,32 @@
-"""How much battery a UAV needs to reach the charging zone, where that is not one percent per cell.
+"""How much battery a UAV needs to reach a parking cell, where that is not one percent per cell.
 
     table = reach_of(view.state.missions, view.world.chart)
-    table[0, s - 1, y, x]       # [%] from a cell, for a UAV that takes s mission slots per cell
+    table[c, s - 1, y, x]       # [%] to parking cell c, for a UAV that takes s slots per cell
 
 The cost of a way depends on the wind and on the speed of the UAV. A table has the cheapest way from
 every cell (Bellman and Ford's algorithm). Without wind and slow UAVs there is no table.
 """
 
 from functools import lru_cache
-from itertools import product
 
 import numpy as np
 
+from dess.code.kernels import kernel
 from dess.sea.chart import NO_FLY, Chart
 from dess.sections.wind import surcharges
-from dess.state import STEP_X, STEP_Y
 
-_FAR = 2**62  # further than any cell
+FAR = 2**15 - 1  # [%]: further than any cell
+_MOST_ENTRIES = 2**26  # 128 MB
 
 # The fields of ``MISSION`` that a table depends on.
 _FIELDS = ("slowest", "wind_x", "wind_y", "wind_gusts", "wind_seed")
 
 
 def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
-    """(1 + Z, S, H, W) battery [%] to any zone and to each of Z zones, for 1 to S slots per cell.
+    """(C, S, H, W) battery [%] to each of C parking cells, for 1 to S slots per cell.
 
-    A single zone has only the first of these. None if every cell costs one percent; then the
-    compiler leaves out the code for the table.
+    None if every cell costs one percent; then the compiler leaves out the code for the table. A
+    table that would be larger than 128 MB is empty: then every cell may cost the most.
 
     Args:
         missions: (B,) ``MISSION`` records of one batch, which share wind and fleet.
@@ -35,25 +35,43 @@ def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
     mission = missions[0]
     if mission["wind_most"] == 0 and mission["slowest"] == 1:
         return None
-    zones = chart.zones
-    return _table(zones.shape, zones.tobytes(), *(mission[field].item() for field in _FIELDS))
+    sea = (chart.zones.shape, chart.zones.tobytes(), chart.parking.tobytes())
+    return _table(*sea, *(mission[field].item() for field in _FIELDS))
 
 
 @lru_cache(maxsize=16)
-def _table(shape: tuple[int, int], zones: bytes, slowest: int, *wind) -> np.ndarray:
+def _table(shape: tuple[int, int], zones: bytes, parking: bytes, slowest: int, *wind) -> np.ndarray:
     cells, (rows, columns) = np.frombuffer(zones, np.int8).reshape(shape), shape
-    count = int(cells.max()) + 1
-    table = np.full((1 + count if count > 1 else 1, slowest, *shape), _FAR)
-    for number, s in product(range(len(table)), range(1, slowest + 1)):
-        costs = table[number, s - 1]
-        costs[cells == number - 1 if number else cells >= 0] = 0
-        before = np.zeros(0)
-        while not np.array_equal(before, costs):
-            before = costs.copy()
-            extras = surcharges((columns, rows), *wind)
-            for extra, x, y in zip(extras, 1 + STEP_X, 1 + STEP_Y, strict=False):
-                onto = np.pad(np.minimum(costs + s + extra, _FAR), 1, constant_values=_FAR)
-                onto = onto[y : y + rows, x : x + columns]
-                costs[cells != NO_FLY] = np.minimum(costs, onto)[cells != NO_FLY]
+    homes = np.frombuffer(parking, np.int64).reshape(-1, 2)
+    if len(homes) * slowest * cells.size > _MOST_ENTRIES:
+        return np.zeros((0, 0, 0, 0), np.int16)
+    table = np.full((len(homes), slowest, *shape), FAR, np.int16)
+    extras = surcharges((columns, rows), *wind)
+    for c, (x, y) in enumerate(homes):
+        for s in range(slowest):
+            table[c, s, y, x] = 0
+            _relax(cells, extras, s + 1, table[c, s])
     table.flags.writeable = False
     return table
+
+
+@kernel
+def _relax(zones, extras, slots, costs):
+    """Lower the costs of all cells to those of the cheapest ways to the cell that costs nothing."""
+    rows, columns = zones.shape
+    changed, forth = True, True
+    while changed:
+        changed = False
+        for place in range(zones.size):
+            cell = place if forth else zones.size - 1 - place
+            y, x = cell // columns, cell % columns
+            if zones[y, x] == NO_FLY:
+                continue
+            for action, (step_x, step_y) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
+                a, b = x + step_x, y + step_y
+                if 0 <= a < columns and 0 <= b < rows and costs[b, a] < FAR:
+                    cost = min(costs[b, a] + slots + extras[action, b, a], FAR - 1)
+                    if cost < costs[y, x]:
+                        costs[y, x] = cost
+                        changed = True
+        forth = not forth

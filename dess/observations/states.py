@@ -133,8 +133,8 @@ def _fill(missions, uavs, residual, guarded, chart, reach, out):
             if not u.active:
                 continue
             row[MUST_CHARGE] = guard.must_charge(mission, u, data)
-            home_x, home_y, slots, wait = guard.parking_cell(mission, team, i, chart, memory)
-            home = guard.battery_home(mission, u, chart, home_x, home_y, slots, reach)
+            home_x, home_y, _, wait = guard.parking_cell(mission, team, i, chart, memory, reach)
+            home = guard.battery_home(mission, team, i, chart, u.x, u.y, home_x, home_y, reach)
             row[HOME] = min(home, _MOST)
             if may_act(u):
                 if guarded:

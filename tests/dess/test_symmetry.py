@@ -133,8 +133,8 @@ def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
     """How far away the cell is where UAV ``i`` may charge, and whether the choice was clear.
 
     In plain Python: the UAVs choose one after the other, the lowest battery first, where they get a
-    pad first. Parked teammates are islands, where the way around them is not longer than to wait
-    for a charge.
+    pad with the least battery. Parked teammates are islands, where the way around them is not
+    longer than to wait for a charge.
     """
     team, space = [u for u in sea.state.uavs[0] if u["active"]], sea.space
     me, clear, mission = sea.state.uavs[0][i], True, sea.state.missions[0]
@@ -148,11 +148,11 @@ def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
     free = [[0] * min(mission["zone_pads"][zone], len(team)) for zone in range(mission["zones"])]
     places = [(int(u["x"]), int(u["y"])) for u in team]
     parked = [p for p, u in zip(places, team, strict=True) if u["latch"] and u["zone"] >= 0]
-    taken = {p for p, u in zip(places, team, strict=True) if u["zone"] >= 0 and u is not me}
+    taken = {p for p, u in zip(places, team, strict=True) if u["zone"] >= 0}
     own = int(me["x"]), int(me["y"])
-    taken.discard(own)
     home = min(reached(own, *space.size, {*space.no_fly})[cell] for cell in zones)
     request = _until_asked(me, home, mission)
+    reach = reach_of(sea.state.missions, space.chart)
     for u in sorted(team, key=lambda u: u["battery"]):
         place, cost = (int(u["x"]), int(u["y"])), mission["flight_cost"]
         if place in parked and place != own:
@@ -177,13 +177,20 @@ def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
             asked = _until_asked(u, way, mission)
             wait = max(min(free[zone]) - asked, 0)
             wait *= mission["uavs"] > mission["zone_pads"][zone]
-            options.append((way * u["slots_per_cell"] + wait, way, zone, asked, cell))
+            battery = way
+            if reach is not None:
+                speed = u["slots_per_cell"]
+                battery = reach[[*zones].index(cell), speed - 1, place[1], place[0]]
+                battery += (way - through) * (speed + mission["wind_most"])
+            until_latched = u["battery"] - mission["charge_start"]
+            lacks = max(max(battery, until_latched) + wait + 1 - u["battery"], 0)
+            options.append((lacks, battery + wait, way, zone, asked, cell))
         options.sort()
-        clear &= len(options) < 2 or options[0][:2] < options[1][:2]
+        clear &= len(options) < 2 or options[0][:3] < options[1][:3]
         if place == own:
-            return [way for _, way, *_ in options[:1]], clear
+            return [way for _, _, way, *_ in options[:1]], clear
         if options:
-            _, _, zone, asked, cell = options[0]
+            *_, zone, asked, cell = options[0]
             taken.add(cell)
             needed = math.ceil((u["quota"] - u["communications"]) / mission["communication_slots"])
             if u["battery"] < cost * needed:
@@ -223,7 +230,9 @@ def test_a_sea_mirrored_or_turned_is_the_same(case: tuple) -> None:
     rows = plain.view.uav
     homes = [_homes(plain, i) for i in rows]
     for i, (way, clear) in zip(rows, homes, strict=True):
-        found = compiled.parking_cell(plain.state.missions[0], plain.state.uavs[0], i, space.chart)
+        found = compiled.parking_cell(
+            plain.state.missions[0], plain.state.uavs[0], i, space.chart, reach
+        )
         assert not clear or found[2] == (way[0] if way else 0)
     compiled.resolve(plain.state.missions[0], plain.state.uavs[0], space.chart)
     clear = all(clear for _, clear in homes)
@@ -233,9 +242,10 @@ def test_a_sea_mirrored_or_turned_is_the_same(case: tuple) -> None:
         chart = turned.space.chart
         if reach is not None:
             other = reach_of(turned.state.missions, chart)
+            homes = [chart.nearest[turn.cell(*home)[::-1]] for home in space.chart.parking]
             for y, x in np.ndindex(space.chart.zones.shape):
                 a, b = turn.cell(x, y)
-                assert (other[..., b, a] == reach[..., y, x]).all()
+                assert (other[homes, :, b, a] == reach[:, :, y, x]).all()
         if clear:
             assert (guard(turned.view)[:, turn.actions] == mask).all()
         compiled.resolve(turned.state.missions[0], turned.state.uavs[0], chart)

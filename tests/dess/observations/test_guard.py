@@ -280,3 +280,59 @@ def test_with_a_pad_for_two_uavs_the_second_comes_early_enough_to_wait(
     space = load_scenario("paper", uavs=uavs, pads=pads)
     missions = simulate_batch(space, policies.load("greedy"), 777301, 200).missions
     assert missions["success"].mean() >= 0.99
+
+
+# --- what killed UAVs that had a way to live ---
+
+WIND = {"wind": {"strength": 0.8, "direction": 37, "gusts": 0.4, "seed": 1}}
+
+
+@pytest.mark.parametrize(
+    ("sea", "changes", "policy", "replication"),
+    [
+        # The sea is empty: the arrivals that are left fill the quota too late.
+        ("clustered:900307", {"uavs": [3, 5], "pads": 3}, "any", 2),
+        # A third UAV would wait for longer than its battery lasts; another zone is in reach.
+        ("corridor:900002", {"uavs": [5, 6], "pads": 4}, "any", 9),
+        # The own cell is behind others of the zone, in wind.
+        ("clustered:900701", WIND, "any", 3),
+        # The zone that is nearest by cells is not the one that is nearest by battery.
+        ("coast:900701", WIND, "greedy", 2),
+        # Four UAVs insist on cells beside each other.
+        ("archipelago:700023", {"uavs": 6, "pads": 6}, "greedy", 4),
+    ],
+)
+def test_a_uav_that_has_a_way_to_live_lives(
+    sea: str, changes: dict[str, Any], policy: str, replication: int
+) -> None:
+    space = load_scenario(sea, **changes)
+    assert simulate_batch(space, policies.load(policy), 2600, [replication]).missions["success"][0]
+
+
+def test_a_uav_must_charge_if_no_data_are_left_for_its_quota_unless_it_lives_to_the_end() -> None:
+    state, _ = placed([{"battery": 60}], arrival_rate=0.0, quota=440)
+    mission, u = state.missions[0], state.uavs[0, 0]
+    u["communications"] = 400  # 10 slots are enough if there are data
+    assert not compiled.must_charge(mission, u, 1e6)
+    assert compiled.must_charge(mission, u, 0.0)
+    mission["slot"] = mission["max_slots"] - 60
+    assert compiled.must_charge(mission, u, 0.0)
+    mission["slot"] += 1
+    assert not compiled.must_charge(mission, u, 0.0)
+
+
+def test_a_uav_that_waits_in_the_queue_keeps_its_place() -> None:
+    state, chart = placed([{"x": 27, "y": 4, "battery": 20, "latch": True, "pad_request": 3}])
+    allowed = masks(compact_states(state, chart, True), np.array([0]), np.array([0]))[0]
+    assert np.nonzero(allowed)[0].tolist() == [HOVER]
+
+
+def test_a_parked_uav_keeps_its_cell_whoever_chooses_first() -> None:
+    """A teammate with less battery must not take the cell, and its only pad, from it."""
+    places = ((3, 4, 9), (3, 1, 11), (1, 4, 7), (1, 1, 8))
+    team: list[dict[str, Any]] = [{"x": x, "y": y, "battery": b} for x, y, b in places]
+    team[0]["latch"] = True
+    sea: dict[str, Any] = {"grid": 6, "rows": 5, "zone": [3, 2, 2, 2], "pads": 1, "nodes": [[0, 0]]}
+    sea |= {"zones": [{"cells": [3, 4, 1, 1]}], "charge_start": 30, "charge_complete": 80}
+    state, chart = placed(team, **sea)
+    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[:3] == (3, 4, 0)

@@ -67,20 +67,20 @@ def test_gusts_are_normal_and_a_tail_wind_saves_nothing() -> None:
 def test_the_way_home_costs_as_much_as_the_best_neighbour_and_the_move_there(
     space: ScenarioSpace, wind: Wind
 ) -> None:
-    """The table satisfies the equation of the shortest way, in every cell outside the zones."""
+    """The table satisfies the equation of the shortest way, to every parking cell."""
     fleet = [{"slots_per_cell": 2}]
     space = ScenarioSpace.of(space, wind=wind.model_dump(), fleet=fleet)
     reach, extra = reach_of(constants_of(space), space.chart), _table(wind, *space.size)
     water = reached(space.zone[:2], *space.size, {*space.no_fly})
-    zones = [space.rectangles, *([zone] for zone in space.rectangles)]
-    for (number, among), s, (x, y) in product(enumerate(zones[: len(reach)]), (1, 2), water):
+    homes = enumerate(parking_of(space.rectangles))
+    for (number, home), s, (x, y) in product(homes, (1, 2), water):
         steps = [(0, x, y - 1), (1, x + 1, y), (2, x, y + 1), (3, x - 1, y)]
         ways = [
             s + extra[action, b, a] + reach[number, s - 1, b, a]
             for action, a, b in steps
             if 0 <= a < space.size[0] and 0 <= b < space.size[1] and (a, b) not in space.no_fly
         ]
-        assert reach[number, s - 1, y, x] == (0 if (x, y) in parking_of(among) else min(ways))
+        assert reach[number, s - 1, y, x] == (0 if (x, y) == home else min(ways))
 
 
 @given(spaces(uavs=1, initial_data=1e6), winds, GUARDED, st.integers(1, 3), seeds, replications)
