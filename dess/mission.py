@@ -145,7 +145,7 @@ class MissionModel:
                 if packets is not None:
                     packets.deliver(slot + n / m)
             before = self._team() if self.log is not None else []
-            active = _close(missions, uavs, residual, self.arrivals)
+            active = _close(missions, uavs, residual, self.arrivals, *self.scratch)
             slot += 1
             self._log_close(slot, before)
             if has_failures:
@@ -297,8 +297,8 @@ def _communicate(
 
 
 @kernel
-def _close(missions, uavs, residual, arrivals):
+def _close(missions, uavs, residual, arrivals, batches, search):
     """Add the arrivals and settle the slot; return the number of UAVs that are still active."""
-    rules.arrive(missions[0], residual[0], arrivals)
+    rules.arrive(missions[0], residual[0], arrivals, batches, search)
     rules.settle(missions[0], uavs[0])
     return missions[0].active

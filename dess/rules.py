@@ -9,7 +9,7 @@ The batch engine runs a slot in the order of Section III-C (see ``advance``):
     spend(mission, uavs)                 # energy
     channel.open_slot(mission, uavs, ...)
     communicate(mission, uavs, ..., n)   # for each communication slot n = 1..m
-    arrive(mission, residual, arrivals)  # new data
+    arrive(mission, residual, ...)       # new data
     settle(mission, uavs)                # rewards, operational status
     strike(mission, uavs, ...)           # failures and repairs (dess.sections.failures)
 """
@@ -323,28 +323,42 @@ def communicate(
         mission.slot_collected += amount
 
 
-@inlined
-def arrive(mission, residual, arrivals):
+@kernel
+def _communicate_all(mission, uavs, residual, sensors, teeth, order, means, batches, search):
+    """Run all communication slots. Within ``advance``, registers would be short."""
+    for n in range(1, mission.communication_slots + 1):
+        communicate(mission, uavs, residual, sensors, teeth, order, means, batches, search, n)
+
+
+@kernel
+def arrive(mission, residual, arrivals, batches, search):
     """Add the new data of one slot (eq. 12): a Poisson number of data units per node.
 
     Args:
         mission: ``MISSION`` record.
         residual: (K,) residual data [data units], increased.
         arrivals: (K,) new data of the slot [data units], overwritten.
+        batches, search: As in ``Scratch``; memory for the draws.
     """
     if mission.continuous != 0:  # then they are events of their own (dess.sections.packets)
         return
     probability_of_none = math.exp(-mission.arrival_rate)
-    for k in range(0, mission.nodes, 4):
-        words = streams.block(
-            mission.seed, mission.replication, streams.ARRIVAL, 0, mission.slot, k // 4
-        )
-        for j in range(min(4, mission.nodes - k)):
-            arrivals[k + j] = 0
-            if streams.uniform(words[j]) > probability_of_none:
-                arrivals[k + j] = streams.poisson(words[j], mission.arrival_rate)
-                residual[k + j] += arrivals[k + j]
-                mission.arrived += arrivals[k + j]
+    batch = batches[0, 0]
+    for k in range(mission.nodes):
+        block = k // 4 % len(batch.node)
+        if k % 4 == 0 and block == 0:
+            for ahead in range(len(batch.node)):
+                batch.node[ahead] = k // 4 + ahead
+            streams.blocks(
+                mission.seed, mission.replication, streams.ARRIVAL, 0, mission.slot,
+                batch.node, batch.words, search[0, channel.WIDTH],
+            )  # fmt: skip
+        word = batch.words[k % 4, block]
+        arrivals[k] = 0
+        if streams.uniform(word) > probability_of_none:
+            arrivals[k] = streams.poisson(word, mission.arrival_rate)
+            residual[k] += arrivals[k]
+            mission.arrived += arrivals[k]
 
 
 @inlined
@@ -418,10 +432,7 @@ def advance(
     grant_pads(mission, uavs)
     spend(mission, uavs)
     channel.open_slot(mission, uavs, nodes, mean_snr, order, means, chart, search)
-    for n in range(1, mission.communication_slots + 1):
-        communicate(
-            mission, uavs, residual, sensors, teeth, order, means, batches, search, n,
-        )  # fmt: skip
-    arrive(mission, residual, arrivals)
+    _communicate_all(mission, uavs, residual, sensors, teeth, order, means, batches, search)
+    arrive(mission, residual, arrivals, batches, search)
     settle(mission, uavs)
     strike_if_on(mission, uavs, residual, sensors, LOST)

@@ -239,10 +239,13 @@ class Starts(NamedTuple):
 def starts_of(spaces: Sequence[ScenarioSpace], seed: int = 0) -> Starts:
     """What missions of these scenarios, which are all extended or all not, start from."""
     fleet = max(space.uavs[1] for space in spaces)
-    constants = np.concatenate([constants_of(space) for space in spaces])
+    # With the very dtypes of the state: a call of compiled code compares any others field by field.
+    kind = _constants_of(spaces[0]).dtype
+    constants = np.concatenate([constants_of(space) for space in spaces], dtype=kind)
     constants["seed"] = seed
     ranges = np.stack([ranges_of(space) for space in spaces])
-    return Starts(constants, ranges, np.stack([types_of(space, fleet) for space in spaces]))
+    types = np.stack([types_of(space, fleet) for space in spaces], dtype=UAV)
+    return Starts(constants, ranges, types)
 
 
 @kernel
