@@ -300,7 +300,7 @@ WIND = {"wind": {"strength": 0.8, "direction": 37, "gusts": 0.4, "seed": 1}}
         ("coast:900701", WIND, "greedy", 2),
         # Four UAVs insist on cells beside each other.
         ("archipelago:700023", {"uavs": 6, "pads": 6}, "greedy", 4),
-        # Of two UAVs with equal batteries, one takes the pad of the only zone that the other reaches.
+        # Of two UAVs with equal batteries, one takes the pad of the only zone that the other has.
         ("large:700014", {"uavs": 2, "pads": 1}, "any", 1),
     ],
 )
