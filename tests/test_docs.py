@@ -293,6 +293,19 @@ def test_the_readme_has_the_figures_of_the_table_of_policies() -> None:
 
 
 @pytest.mark.slow
+def test_the_readme_quotes_the_answer_of_its_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (line,) = re.findall(r"^dess (sweep --set .*)$", README, re.M)
+    (quoted,) = re.findall(r"\*(\w+: the cheapest .*?)\*", README, re.S)
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(shlex.split(line)) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    for part in " ".join(quoted.split()).split(" ... "):  # what is left out
+        assert part in printed
+
+
+@pytest.mark.slow
 def test_the_table_by_fleet_is_what_its_commands_print(capsys: pytest.CaptureFixture[str]) -> None:
     printed = table(POLICIES, "policy | I = 1")
     by_fleet = [a for a in command_lines("dess") if "tour" in a and a[2].startswith("uavs=")]
