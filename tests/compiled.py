@@ -3,6 +3,7 @@
 import numpy as np
 
 from dess import rules
+from dess.channel import empty_scratch
 from dess.code.kernels import kernel
 from dess.observations import guard
 from dess.sea.chart import FAR, distance, is_open
@@ -22,9 +23,13 @@ def move(mission, uavs, chart):
     rules.spend(mission, uavs)
 
 
-@kernel
 def arrive(mission, residual, arrivals):
-    rules.arrive(mission, residual, arrivals)
+    _arrive(mission, residual, arrivals, *empty_scratch(1, len(residual)))
+
+
+@kernel
+def _arrive(mission, residual, arrivals, batches, search):
+    rules.arrive(mission, residual, arrivals, batches, search)
 
 
 @kernel
