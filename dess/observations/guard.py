@@ -163,24 +163,24 @@ def parking_memory(chart, uavs):
 
 @kernel
 def parking_cell(mission, uavs, i, chart, memory, reach):
-    """The zone cell where UAV ``i`` will charge, as ``_plan`` finds it.
+    """The x and y of the zone cell where UAV ``i`` will charge, the way there and the wait.
 
-    Of several zones with few pads, a teammate that would run empty chooses before all others.
+    The UAVs choose one after another, as ``_plan`` says. If one of them would run empty and there
+    are several zones, this one chooses before all others, except those that would lack more then.
     """
     x, y, slots, wait, lacks = _plan(mission, uavs, i, -1, chart, memory, reach)
-    if not (mission.plans_waits and mission.zones > 1 and mission.uavs > 1):
+    if not mission.plans_waits or mission.zones == 1 or mission.uavs == 1:
         return x, y, slots, wait
     first = i if lacks > 0 else -1
     for j in range(mission.uavs):
         o = uavs[j]
-        if first >= 0 or not flies(o) or is_parked(o):
-            continue
-        if o.battery < mission.flight_cost * slots_needed(mission, o):
-            if _plan(mission, uavs, j, -1, chart, memory, reach)[4] > 0:
-                first = j
+        charges = o.battery < mission.flight_cost * slots_needed(mission, o)
+        if first < 0 and charges and flies(o) and not is_parked(o):
+            first = j if _plan(mission, uavs, j, -1, chart, memory, reach)[4] > 0 else -1
     if first >= 0:
         to_x, to_y, cells, time, lacking = _plan(mission, uavs, i, first, chart, memory, reach)
         if lacking <= lacks:
+            # who would run empty flies there at once, in case that the others do not give way
             return to_x, to_y, cells, mission.charge_start - 1 if first == i else time
     return x, y, slots, wait
 
@@ -257,7 +257,7 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
 
 @inlined
 def _soonest_free(mission, uavs, i, chart, memory, reach):
-    """The number of the best parking cell that is not taken (-1 if none), the way to it and what lacks."""
+    """The number of the best parking cell that is not taken (-1 if none), the way, what lacks."""
     u = uavs[i]
     # The nearest cell of all is free most of the time, so this one is tried first.
     cell = np.int64(chart.nearest[u.y, u.x])
