@@ -300,7 +300,7 @@ WIND = {"wind": {"strength": 0.8, "direction": 37, "gusts": 0.4, "seed": 1}}
         ("coast:900701", WIND, "greedy", 2),
         # Four UAVs insist on cells beside each other.
         ("archipelago:700023", {"uavs": 6, "pads": 6}, "greedy", 4),
-        # Of two UAVs with equal batteries, one takes the pad of the only zone that the other has.
+        # One of two UAVs takes the pad of the only zone that the other reaches.
         ("large:700014", {"uavs": 2, "pads": 1}, "any", 1),
     ],
 )
@@ -344,7 +344,8 @@ def test_a_uav_that_can_reach_two_zones_leaves_the_pad_to_one_that_can_reach_one
     """The batteries are equal, so the first UAV would choose first."""
     team: list[dict[str, Any]] = [{"x": x, "y": 1, "battery": 15} for x in (12, 15)]
     sea: dict[str, Any] = {"grid": 24, "rows": 3, "zone": [0, 0, 1, 3], "pads": 1}
-    sea |= {"zones": [{"cells": [22, 0, 2, 3]}], "charge_start": 20, "charge_complete": 80}
-    state, chart = placed(team, **sea, nodes=[[12, 0]])
+    sea |= {"zones": [{"cells": [22, 0, 2, 3], "pads": 1}]}
+    sea |= {"nodes": [[12, 0]], "charge_start": 20, "charge_complete": 80}
+    state, chart = placed(team, **sea)
     zones = [compiled.parking_cell(state.missions[0], state.uavs[0], i, chart)[0] for i in (0, 1)]
     assert zones == [0, 22]
