@@ -16,11 +16,7 @@ PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
 # The paper's metrics, in its order (Section VI-A). It calls them successful communication,
 # collection ratio, and collection ratio and communication; the last is here the product of each
 # mission.
-METRICS = {
-    SUCCESS: "Success",
-    RATIO: "Collection ratio",
-    PRODUCT: "Product",
-}
+METRICS = {SUCCESS: "Success", RATIO: "Collection ratio", PRODUCT: "Product"}
 # Their names for the terminal.
 SHORT_METRICS = {metric: name.lower() for metric, name in METRICS.items()}
 

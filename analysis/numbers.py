@@ -15,7 +15,7 @@ _NAN = re.compile(r"\bnan\b")
 def why_nan(cells: Iterable[object]) -> str:
     """Why a table has nan, in words; empty if no cell has."""
     found = any(_NAN.search(str(cell)) for cell in cells)
-    return "nan: the missions are too few, or too much alike, to estimate it" if found else ""
+    return "nan: the missions are too few, or too similar, to estimate it" if found else ""
 
 
 def percent(value: float) -> str:
@@ -26,6 +26,11 @@ def percent(value: float) -> str:
 def interval(mean: float, low: float, high: float) -> str:
     """A mean and its interval as ``97.3 % [96.1, 98.1]``."""
     return f"{percent(mean)} [{minus(f'{100 * low:.1f}')}, {minus(f'{100 * high:.1f}')}]"
+
+
+def with_ends(write: Callable[[float], str], mean: float, low: float, high: float) -> str:
+    """An estimate and its interval, each number as ``write`` has it: ``1 [0, 2]``."""
+    return f"{write(mean)} [{write(low)}, {write(high)}]"
 
 
 def estimate(row: pd.Series) -> str:
@@ -41,14 +46,12 @@ def difference(value: float, reference: float) -> str:
 
 def points(value: float, low: float, high: float) -> str:
     """A difference and its interval in percentage points, as ``+7.4 [6.9, 7.9]``."""
-    ends = [difference(end, 0) for end in (low, high)]
-    return f"{difference(value, 0)} [{ends[0]}, {ends[1]}]"
+    return with_ends(lambda points: difference(points, 0), value, low, high)
 
 
 def decimals(value: float, low: float, high: float, digits: int = 3) -> str:
     """An estimate and its interval as ``1.0123 [0.9868, 1.0378]``, with ``digits`` decimals."""
-    middle, *ends = [minus(f"{number:.{digits}f}") for number in (value, low, high)]
-    return f"{middle} [{ends[0]}, {ends[1]}]"
+    return with_ends(lambda number: minus(f"{number:.{digits}f}"), value, low, high)
 
 
 def quantity(value: float) -> str:
@@ -59,7 +62,7 @@ def quantity(value: float) -> str:
 
 def quantities(mean: float, low: float, high: float) -> str:
     """An estimate and its interval as ``1,042 [1,010, 1,074]``."""
-    return f"{quantity(mean)} [{quantity(low)}, {quantity(high)}]"
+    return with_ends(quantity, mean, low, high)
 
 
 def written(metric: str) -> Callable[[float, float, float], str]:
@@ -104,8 +107,7 @@ def money(amount: float, currency: str) -> str:
 def amounts(mean: float, low: float, high: float) -> str:
     """A cost and its interval as ``69,120 [68,400, 69,840]``; with two decimals below 100."""
     digits = 0 if abs(mean) >= 100 else 2
-    middle, *ends = [minus(f"{amount:,.{digits}f}") for amount in (mean, low, high)]
-    return f"{middle} [{ends[0]}, {ends[1]}]"
+    return with_ends(lambda amount: minus(f"{amount:,.{digits}f}"), mean, low, high)
 
 
 def seconds(time: float) -> str:
@@ -126,6 +128,11 @@ def span(values: Iterable[float], form: str = "{:,}") -> str:
     """The smallest and the largest of some numbers, as ``20 to 1,200``, or ``300`` if equal."""
     ordered = sorted(values)
     return " to ".join(dict.fromkeys(map(form.format, (ordered[0], ordered[-1]))))
+
+
+def counted(number: int, what: str) -> str:
+    """A number of things, as ``1 UAV`` or ``3 UAVs``."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def words(names: Sequence[str]) -> str:

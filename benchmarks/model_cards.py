@@ -31,6 +31,7 @@ EVALUATION_SEED = 20_261_121
 # The study whose heuristics a learned policy is compared with: those with the aim of the paper.
 STUDY = "table4"
 ROWS = 12  # of the learning curve
+BENCHMARKS = Path(__file__).parent
 
 
 def card(folder: Path, command: str, missions: int) -> str:
@@ -56,7 +57,7 @@ def card(folder: Path, command: str, missions: int) -> str:
         for n in paper.FIG_4
     }
     environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent), undefined=StrictUndefined, trim_blocks=True
+        loader=FileSystemLoader(BENCHMARKS), undefined=StrictUndefined, trim_blocks=True
     )
     environment.filters |= {"percent": numbers.percent, "whole": "{:,.0f}".format}
     evaluated = {"success": "evaluation_success", "product": f"evaluation_{PRODUCT}"}

@@ -273,13 +273,12 @@ def shown(interval: dict[str, float]) -> Any:
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_the_table_of_policies_is_what_its_command_prints(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     printed = table(POLICIES, "policy | success")
     assert printed.pop("paper") == [[pytest.approx(100 * paper.TABLE_IV[m])] for m in METRICS]
-    arguments = next(a for a in command_lines("dess") if "--missions" in a and "1000" in a)
+    (arguments,) = (a for a in command_lines("dess") if {"random-unguarded", "planner"} <= {*a})
     rows = evaluated(arguments, capsys)
     assert list(printed) == [row["policy"] for row in rows]
     for row in rows:
@@ -291,6 +290,19 @@ def test_the_readme_has_the_figures_of_the_table_of_policies() -> None:
     assert [a or b for a, b, _ in rows] == ["greedy", "ddqn", "planner", "paper"]
     for name, other, cells in rows:
         assert re.search(rf"^\| `?{name or other}`? \| {re.escape(cells)} \|$", POLICIES, re.M)
+
+
+@pytest.mark.slow
+def test_the_readme_quotes_the_answer_of_its_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (line,) = re.findall(r"^dess (sweep --set .*)$", README, re.M)
+    (quoted,) = re.findall(r"\*(\w+: the cheapest .*?)\*", README, re.S)
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(shlex.split(line)) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    for part in " ".join(quoted.split()).split(" ... "):  # what is left out
+        assert part in printed
 
 
 @pytest.mark.slow

@@ -99,26 +99,6 @@ def check_run(
 ) -> None:
     """Refuse a run that could not come to its end, before its first mission.
 
-    The arguments are those of ``check_effort``.
-
-    Raises:
-        InputError: As from ``check_effort``; or if a policy cannot act in a scenario of the study,
-            such as a learned policy on a layout that differs from that of its training.
-    """
-    if check_effort(study, out, workers, accept_code=accept_code, reuse=reuse, yes=yes):
-        _check_policies(study)
-
-
-def check_effort(
-    study: Study,
-    out: str | Path,
-    workers: int = 1,
-    accept_code: bool = False,
-    reuse: Sequence[Path] = (),
-    yes: bool = False,
-) -> int:
-    """Refuse a run that takes too much time or memory.
-
     Args:
         study: The study.
         out: The results folder, which need not exist.
@@ -127,13 +107,11 @@ def check_effort(
         reuse: As for ``run_study``.
         yes: Whether any time and memory is allowed.
 
-    Returns:
-        The number of missing missions; a lower bound if a rule decides it.
-
     Raises:
         InputError: If the run would take long or more memory than is available (the message has
             the number of missions and the estimate), the folder contains something else, or
-            ``workers`` is out of range.
+            ``workers`` is out of range; if a policy cannot act in a scenario of the study, such as
+            a learned policy on a layout that differs from that of its training.
     """
     plan, teams = plan_study(study, out, workers, accept_code), len(study.policies)
     if reuse and total(plan, workers).low > LONG_RUN:
@@ -143,13 +121,13 @@ def check_effort(
         f"study {study.name}: {'at least ' if study.rule else ''}{missing:,} missions to "
         f"simulate (policies: {teams}, design points: {study.size:,}, workers: {workers:,})"
     )
-    if yes or not any(planned.missing + planned.logs for planned in plan):
-        return missing
-    check_time(what, total(plan, workers))
-    held = study.size * (POINT_MEMORY + study.first * teams * MISSION_MEMORY)
-    ends = [study.points[number].scenario for number in (0, -1)]
-    check_workers_memory(what, workers, ends, held)
-    return missing
+    if not yes and any(planned.missing + planned.logs for planned in plan):
+        check_time(what, total(plan, workers))
+        held = study.size * (POINT_MEMORY + study.first * teams * MISSION_MEMORY)
+        ends = [study.points[number].scenario for number in (0, -1)]
+        check_workers_memory(what, workers, ends, held)
+    if missing:
+        _check_policies(study)
 
 
 def _check_policies(study: Study) -> None:
@@ -186,8 +164,7 @@ def _counted(study: Study, store: Store) -> list[Planned]:
         plan.append(Planned(policy, needed, needed - missing, logs, max(most, needed)))
     if study.bounds:
         parts = bound_parts(manifest)
-        missing = missions_in(store.missing("bounds", parts))
-        needed = missions_in(parts)
+        needed, missing = missions_in(parts), missions_in(store.missing("bounds", parts))
         plan.append(Planned("upper bounds", needed, needed - missing, most=needed))
     return plan
 
@@ -207,10 +184,10 @@ def _most(study: Study) -> int:
 
 def _seconds(study: Study, planned: Planned) -> Range:
     """Estimated time on one core of the missing missions and event logs, or of the bounds."""
-    spaces, most = [point.scenario for point in study.points], planned.most - planned.present
+    spaces = [point.scenario for point in study.points]
     if planned.policy not in study.policies:
         made = planned.missing * sum(map(decisions, spaces)) / len(spaces)
         return Range(*(made * each for each in BOUND))
     logs = seconds_of(spaces, planned.policy, (planned.logs, planned.logs), "events")
-    missions = planned.missing, max(most, 0)
+    missions = planned.missing, planned.most - planned.present
     return seconds_of(spaces, planned.policy, missions, study.engine).plus(logs)

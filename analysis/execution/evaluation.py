@@ -1,9 +1,9 @@
 """Evaluate single teams: many missions of one scenario, kept as records or as means alone."""
 
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import reduce
+from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -31,8 +31,6 @@ from dess.view import check_team
 from policies.registry import TypedByUser, load_team
 
 METRICS = (*SHARES, *MEANS)
-
-Clock = Callable[[], float]
 
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
 # sums depend on it.
@@ -114,7 +112,6 @@ def evaluate(
     engine: str = "batch",
     workers: int = 1,
     progress: Progress | None = None,
-    clock: Clock = time.perf_counter,
 ) -> Evaluation:
     """Simulate replications 0, 1, ... of a team, and measure the time.
 
@@ -128,7 +125,6 @@ def evaluate(
         engine: ``batch`` or ``events``.
         workers: Threads of the batch engine, processes of the event engine.
         progress: Called with the number of missions done since its last call.
-        clock: Returns the time [s].
 
     Raises:
         InputError: If a policy is unknown, a number is out of range, or the team has more policies
@@ -136,13 +132,11 @@ def evaluate(
     """
     asked = Asked(scenario, TypedByUser(team), missions, seed, engine, workers)
     asked.check()
-    (whole,) = _evaluations(asked, [range(missions)], progress, clock)
+    (whole,) = _evaluations(asked, [range(missions)], progress)
     return whole
 
 
-def means(
-    asked: Asked, progress: Progress | None = None, clock: Clock = time.perf_counter
-) -> Means:
+def means(asked: Asked, progress: Progress | None = None) -> Means:
     """The metrics of replications 0, 1, ... of a team, in a memory that does not grow with them.
 
     The number of workers does not change the result.
@@ -150,7 +144,6 @@ def means(
     Args:
         asked: The missions.
         progress: Called with the number of missions done since its last call.
-        clock: Returns the time [s].
 
     Raises:
         InputError: As for ``evaluate``.
@@ -159,7 +152,7 @@ def means(
     moments: dict[str, dict[int, Moments]] = {}
     uav_slots, seconds, size = 0, 0.0, _together(asked.scenario)
     pieces = (range(n, min(n + size, asked.missions)) for n in range(0, asked.missions, size))
-    for piece in _evaluations(asked, pieces, progress, clock):
+    for piece in _evaluations(asked, pieces, progress):
         for metric, values in _metrics(piece.records).items():
             fleets = piece.records.missions["uavs"]
             for fleet in np.unique(fleets[~np.isnan(values)]):
@@ -169,24 +162,17 @@ def means(
         uav_slots, seconds = uav_slots + piece.uav_slots, seconds + piece.seconds
     low, high = asked.scenario.uavs
     over_space = {
-        metric: _over_space(of, asked.missions, range(low, high + 1))
+        metric: Moments.of_space([of.get(n) for n in range(low, high + 1)], asked.missions)
         for metric, of in moments.items()
     }
     return Means(asked.team, over_space, uav_slots, seconds)
-
-
-def _over_space(fleets: dict[int, Moments], missions: int, drawn: range) -> Moments:
-    """The moments of a metric over a space; what some missions lack has a plain mean."""
-    whole = sum(of.n for of in fleets.values()) == missions
-    return Moments.of_space([fleets.get(n) for n in drawn], post_stratify=whole)
 
 
 def _metrics(records: Records) -> dict[str, np.ndarray]:
     """The values of every metric that some of the missions have measured."""
     values = {metric: records.missions[metric] for metric in METRICS}
     if len(records.operations):
-        measured = {name: records.operations[name] for name in OPERATIONS.names or ()}
-        values |= measured
+        values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
     return {metric: of.astype(float) for metric, of in values.items()}
 
 
@@ -225,7 +211,7 @@ def _together(scenario: ScenarioSpace) -> int:
 
 
 def _evaluations(
-    asked: Asked, pieces: Iterable[range], progress: Progress | None, clock: Clock
+    asked: Asked, pieces: Iterable[range], progress: Progress | None
 ) -> Iterator[Evaluation]:
     """An evaluation for each piece of the replications; only the simulation is timed."""
     policies, pool = load_team(asked.team), Here(asked.workers)
@@ -236,12 +222,12 @@ def _evaluations(
         first = _jobs(asked, range(1))
         _results(pool, first * (1 if asked.workers == 1 else 2 * asked.workers))  # starts processes
     for piece in pieces:
-        begin = clock()
+        begin = perf_counter()
         if asked.engine == "batch":
             records = simulate_batch(*about, piece, workers=asked.workers, progress=progress)
         else:
             records = _results(pool, _jobs(asked, piece), progress)
-        yield Evaluation(asked.team, records, clock() - begin)
+        yield Evaluation(asked.team, records, perf_counter() - begin)
 
 
 def _jobs(asked: Asked, replications: range) -> list[Job]:

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 
 from analysis.figures import drawings, style
 from analysis.names import BOUND, METRICS, PRODUCT, metric_label, parameter
+from analysis.numbers import counted
 from analysis.questions.head_to_head import Pair
-from analysis.questions.optimality.gap import ALL, fleet
+from analysis.questions.optimality.gap import ALL
 from analysis.questions.regions import AHEAD, BEHIND
 from analysis.questions.what_if.question import SIDES
 from analysis.stats.intervals import LEVEL
@@ -144,7 +145,7 @@ def differences(table: pd.DataFrame) -> Figure:
     Args:
         table: Rows of ``optimality.planner.differences``.
     """
-    names = table["uavs"].map(lambda uavs: uavs if uavs == ALL else fleet(uavs))
+    names = table["uavs"].map(lambda uavs: uavs if uavs == ALL else counted(uavs, "UAV"))
     return _differences(table, names, f"Difference from {table['baseline'].iloc[0]}")
 
 
@@ -180,7 +181,7 @@ def gaps(table: pd.DataFrame) -> Figure:
             ax.axvspan(low, high, color=style.MUTED, alpha=0.3, linewidth=0)
             ax.axvline(bound, color=style.INK, linewidth=1.3, label="upper bound")
             drawings.in_rows(rows, ax, PRODUCT, f"{PRODUCT}_low", f"{PRODUCT}_high")
-            ax.set(title=f"{fleet(uavs)}: bound {bound:.1%}", xlim=(-0.02, 1.02))
+            ax.set(title=f"{counted(uavs, 'UAV')}: bound {bound:.1%}", xlim=(-0.02, 1.02))
             style.in_units(ax.xaxis, "%")
         ax.set_xlabel(METRICS[PRODUCT])
     return figure

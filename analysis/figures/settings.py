@@ -16,15 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from analysis.figures import drawings, style
-from analysis.figures.style import Look
-from analysis.names import (
-    LESS_IS_BETTER,
-    METRICS,
-    PRODUCT,
-    metric_label,
-    parameter,
-    value_text,
-)
+from analysis.names import LESS_IS_BETTER, METRICS, PRODUCT, metric_label, parameter, value_text
 from analysis.questions import settings
 from analysis.results.tables import Results
 from analysis.study.design import NOISE
@@ -191,7 +183,7 @@ def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = N
         policy: The policy; by default all policies.
     """
     effects = settings.main_effects(results, metric, policy)
-    looks = _looks(results, effects)
+    looks = style.policy_colours(results.policies, effects["policy"])
 
     def draw(field: str, ax: Axes) -> None:
         rows = effects[effects["field"] == field]
@@ -209,7 +201,7 @@ def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) 
         policy: The policy; by default all policies.
     """
     table = settings.ranked(results, metric, policy)
-    looks = _looks(results, table)
+    looks = style.policy_colours(results.policies, table["policy"])
 
     def draw(field: str, ax: Axes) -> None:
         rows = drawings.placed(table, field)
@@ -254,8 +246,8 @@ def effect(
         changes: For each policy to draw, its ``main_effects.changes`` in the last of ``METRICS``.
         policies: All policies of the study, so that every policy has the same colour on all pages.
     """
-    rows, colours = table[table["field"] == field], style.policy_colours(policies)
-    looks, first = {policy: colours[policy] for policy in changes}, rows[rows["position"] == 0]
+    rows, looks = table[table["field"] == field], style.policy_colours(policies, changes)
+    first = rows[rows["position"] == 0]
     steps = pd.concat(
         [pairs[pairs["first"] == 0].assign(policy=name) for name, pairs in changes.items()]
     ).rename(columns={"difference": "mean", "second": "position"})
@@ -282,8 +274,7 @@ def one_by_one(table: pd.DataFrame, policies: list[str]) -> Figure:
         policies: All policies of the study, so that every policy has the same colour on all pages.
     """
     rows = table[table["metric"] == PRODUCT]
-    fields, colours = [*rows["field"].unique()], style.policy_colours(policies)
-    looks = {policy: colours[policy] for policy in rows["policy"].unique()}
+    fields, looks = [*rows["field"].unique()], style.policy_colours(policies, rows["policy"])
     with _grid(3.4, len(fields), len(fields)) as (figure, axes):
         for ax, field in zip(axes, fields, strict=True):
             drawings.along(rows[rows["field"] == field], looks, "%", ax)
@@ -351,12 +342,6 @@ def _panel_per_field(
             ax.set_xlabel(fill(parameter(field).label, 28), parse_math=True)
         figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
     return figure
-
-
-def _looks(results: Results, rows: pd.DataFrame) -> dict[str, Look]:
-    """The looks of the policies of some rows, which are the same whatever policies are drawn."""
-    looks = style.policy_colours(results.policies)
-    return {name: looks[name] for name in rows["policy"].unique()}
 
 
 def _short(value: float, metric: str) -> str:

@@ -138,13 +138,19 @@ def _readable(colour: tuple[float, ...]) -> tuple[float, ...]:
     return colour if 1.05 / (luminance + 0.05) >= 3 else _readable(darker)
 
 
-def policy_colours(policies: Iterable[str]) -> dict[str, Look]:
-    """Colour and marker of every policy; those of ``KNOWN_POLICIES`` always have the same."""
+def policy_colours(policies: Iterable[str], drawn: Iterable[str] | None = None) -> dict[str, Look]:
+    """Colour and marker of every policy; those of ``KNOWN_POLICIES`` always have the same.
+
+    Args:
+        policies: All policies of a study, so that each looks the same in all of its figures.
+        drawn: Those of them that a figure shows; by default all.
+    """
     names = list(dict.fromkeys(policies))
     numbers = {name: KNOWN_POLICIES.index(name) for name in names if name in KNOWN_POLICIES}
     free = [n for n in range(len(names)) if n not in numbers.values()]
     numbers |= dict(zip((name for name in names if name not in numbers), free, strict=False))
-    return {name: (palette()[numbers[name] % 10], MARKERS[numbers[name] % 7]) for name in names}
+    shown = names if drawn is None else dict.fromkeys(drawn)
+    return {name: (palette()[numbers[name] % 10], MARKERS[numbers[name] % 7]) for name in shown}
 
 
 def graded(values: Sequence[Any]) -> dict[str, Look]:

@@ -261,10 +261,8 @@ def _answer(rows: pd.DataFrame, wanted: Mapping[Any, float], currency: str, trus
     if len(best):
         found = _told(best.iloc[0], wanted, currency)
         cheaper = rows[rows[COST] < best[COST].iloc[0]].tail(1)
-        text, which = (
-            f"the cheapest setting that meets the requirements is {found}.",
-            "next cheaper",
-        )
+        text = f"the cheapest setting that meets the requirements is {found}."
+        which = "next cheaper"
     else:
         leads = pd.DataFrame({metric: rows[metric] - least for metric, least in wanted.items()})
         cheaper = rows.loc[leads.min(axis=1).nlargest(1).index]
@@ -311,8 +309,9 @@ def _ends(results: Results, point: int) -> dict[str, str]:
     }
     return {
         field: end
-        for field, end in ends(results, point, DECISIONS).items()
-        if end == "least" or not of.get(field) or sum(spent.values()) - spent[field] > of[field]
+        for field, end in ends(results, point).items()
+        if field in DECISIONS
+        and (end == "least" or not of.get(field) or sum(spent.values()) - spent[field] > of[field])
     }
 
 

@@ -8,7 +8,7 @@ stays the same::
 """
 
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated
@@ -23,6 +23,7 @@ from analysis.questions.head_to_head import Pair
 from analysis.questions.missions import FOLDER
 from analysis.results.provenance import Count, Finite
 from analysis.results.tables import Results
+from analysis.stats.front import on_front
 from analysis.study.stopping import Text
 from dess import InputError, simulate, simulate_batch
 from dess.files.documents import Document
@@ -183,6 +184,22 @@ def _processor() -> str:
         lines = []
     models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return next(filter(None, [*models, platform.processor(), platform.machine()]), "unknown")
+
+
+def front(means: pd.DataFrame, seconds: Mapping[str, float | None]) -> pd.DataFrame:
+    """The policies that were timed, the fastest first, with their times and the Pareto front.
+
+    Args:
+        means: A row per policy, with the ``mean`` of what it reaches.
+        seconds: The time of a decision of policies [s].
+
+    Returns:
+        The rows of these policies, with ``seconds`` and ``on_front``: whether no other policy is at
+        least as fast and as good, and better in one of the two.
+    """
+    table = means.assign(seconds=means["policy"].map(seconds)).dropna()
+    table = table.sort_values("seconds", ignore_index=True)
+    return table.assign(on_front=on_front(table["seconds"].to_numpy(), table["mean"].to_numpy()))
 
 
 def listed(times: Times) -> pd.DataFrame:

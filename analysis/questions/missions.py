@@ -52,7 +52,7 @@ class LoggedMission:
     @property
     def fleet(self) -> str:
         """The fleet of the mission, as ``3 UAVs``."""
-        return f"{self.scenario.uavs} UAV{'s' * (self.scenario.uavs > 1)}"
+        return numbers.counted(self.scenario.uavs, "UAV")
 
     @property
     def causes(self) -> str:

@@ -57,7 +57,7 @@ def along(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
     Returns:
         A row per parameter and bin; a parameter has at most ``BINS`` bins of about equally many
         missions. The columns are ``field``, ``position``, ``value`` in words, and those of a
-        comparison: ``mean``, ``low``, ``high`` (Student's t, 95 % each), ``p``, ``p_adjusted``
+        comparison: ``mean``, ``low``, ``high`` (by ``paired``, 95 %), ``p``, ``p_adjusted``
         (Holm over all rows, Bonferroni for the choice of the pair), ``verdict``, ``n``, and
         ``behind``, the share of missions in which the policy is worse, with ``behind_low`` and
         ``behind_high``.

@@ -16,15 +16,7 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from analysis import numbers
-from analysis.names import (
-    COST,
-    LESS_IS_BETTER,
-    METRICS,
-    PRODUCT,
-    metrics_in,
-    parameter,
-    value_text,
-)
+from analysis.names import COST, LESS_IS_BETTER, METRICS, PRODUCT, metrics_in, parameter, value_text
 from analysis.results.tables import Results
 from analysis.stats.correction import with_adjusted
 from analysis.stats.differences import column_tests
@@ -95,7 +87,7 @@ def dependence(results: Results, ranked: pd.DataFrame, metric: str) -> list[str]
     ]
 
 
-def ends(results: Results, point: int, fields: Iterable[str] | None = None) -> dict[str, str]:
+def ends(results: Results, point: int) -> dict[str, str]:
     """The fields that have the least or the largest of their values at a design point.
 
     Beyond such an end there may be a better setting. An end that is a limit of the scenario itself,
@@ -104,21 +96,18 @@ def ends(results: Results, point: int, fields: Iterable[str] | None = None) -> d
     Args:
         results: The study.
         point: The design point.
-        fields: The fields that are looked at; by default all that the design varies.
 
     Returns:
         For each of these fields ``least`` or ``largest``.
     """
-    table, space, found = points(results), results.scenario(point), {}
-    for field in table if fields is None else [name for name in table if name in fields]:
-        values = table[field]
+    space, found = results.scenario(point), {}
+    for field, values in points(results).items():
         if is_numeric_dtype(values) and field in space.numeric:
-            limits = space.limits(field)
-            for word, end, limit in zip(
-                ("least", "largest"), (values.min(), values.max()), limits, strict=True
-            ):
-                if values[point] == end != limit:
-                    found[str(field)] = word
+            low, high = space.limits(field)
+            if values[point] == values.min() != low:
+                found[str(field)] = "least"
+            elif values[point] == values.max() != high:
+                found[str(field)] = "largest"
     return found
 
 
@@ -176,7 +165,8 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
         wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[cell]))
         ends = column_intervals(wide, name)
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
-    table["tied"] = _tied(wide, metric)  # by the ranking metric, which was computed last
+    # By the ranking metric, which was computed last.
+    table["tied"] = may_be_best(wide.to_numpy(float), metric)
     less = metric in LESS_IS_BETTER
     table = table.sort_values(metric, ascending=less, kind="stable", ignore_index=True)
     table.insert(0, "rank", np.arange(1, len(table) + 1))
@@ -320,7 +310,7 @@ def _averaged(
             at_points = by_replication(part, metric, "point")
             ends = _over_points(at_points.reindex(columns=range(len(cell_of))), cell_of, metric)
         table = pd.concat([cells, ends], axis=1)
-        table = table.assign(points=sizes, tied=_tied(wide, metric))
+        table = table.assign(points=sizes, tied=may_be_best(wide.to_numpy(float), metric))
         table.insert(0, "policy", name)
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
@@ -360,10 +350,6 @@ def _missions(results: Results, metric: str, policy: str | None) -> pd.DataFrame
         return results.missions
     results.check_policy(policy)
     return results.missions[results.missions["policy"] == policy]
-
-
-def _tied(values: pd.DataFrame, metric: str) -> np.ndarray:
-    return may_be_best(values.to_numpy(float), metric)
 
 
 def _ordered(values: pd.Series) -> list[Any]:

@@ -7,7 +7,6 @@
 Every function takes results, or the missions of results.
 """
 
-import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -29,6 +28,7 @@ from analysis.names import (
 from analysis.questions import costs
 from analysis.questions.sensitivity import sensitivity
 from analysis.results.chunks import parts_of
+from analysis.results.provenance import study_of
 from analysis.results.tables import Results
 from analysis.stats.correction import for_choice
 from analysis.stats.distribution import distribution
@@ -39,7 +39,6 @@ from analysis.stats.screening import may_be_best
 from analysis.stats.verdict import MARKS, position
 from analysis.study.cheapest import Cheapest
 from analysis.study.design import Saltelli
-from analysis.study.stopping import Precision
 
 BEST, TIED, WORSE, ONLY = "best", "tied", "worse", "only"  # verdicts on a policy at a design point
 
@@ -198,10 +197,9 @@ def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) 
     cell = ["policy", "point"]
     values = missions[cell].assign(value=values_within(missions, PRODUCT, cell))
     at_points = values.groupby(cell, sort=False)["value"].mean()
-    means = (
-        at_points.groupby("policy", sort=False).mean().sort_values(ascending=False, kind="stable")
-    )
-    return [str(policy) for policy in means.index if policy in among]
+    means = at_points.groupby("policy", sort=False).mean()
+    ranked = means.sort_values(ascending=False, kind="stable").index
+    return [str(policy) for policy in ranked if policy in among]
 
 
 def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> str:
@@ -324,15 +322,14 @@ def precisions(results: Results) -> pd.DataFrame:
         A row per policy, design point and metric: ``policy``, and the fields of
         ``analysis.study.stopping.Reached``. Empty if the study has no targets.
     """
-    data, manifest = results.manifest["study"]["precision"], results.store.manifest
-    if data is None:
+    manifest = results.store.manifest
+    if (rule := study_of(manifest.study).precision) is None:
         return pd.DataFrame()
-    rule = Precision.model_validate_json(json.dumps(data))
     tables = {
         policy: pd.DataFrame(rule.reached(results.store.samples(parts_of(manifest, team))))
         for team, policy in enumerate(results.policies)
     }
-    return pd.concat(tables, names=["policy"]).reset_index("policy").reset_index(drop=True)
+    return _by_policy(tables)
 
 
 def sensitivities(results: Results) -> pd.DataFrame:
@@ -342,12 +339,15 @@ def sensitivities(results: Results) -> pd.DataFrame:
         A row per policy, metric and parameter: ``policy``, and the columns of
         ``questions.sensitivity``. Empty if the design is not of the kind ``saltelli``.
     """
-    design = results.manifest["study"]["design"]
-    if not design or design["kind"] != "saltelli":
+    design = study_of(results.manifest["study"]).design
+    if not isinstance(design, Saltelli):
         return pd.DataFrame()
-    saltelli = Saltelli.model_validate_json(json.dumps(design))
     missions = results.missions.groupby("policy", sort=False)
-    tables = {policy: sensitivity(saltelli, rows, [*METRICS]) for policy, rows in missions}
+    return _by_policy({name: sensitivity(design, rows, [*METRICS]) for name, rows in missions})
+
+
+def _by_policy(tables: Mapping[Any, pd.DataFrame]) -> pd.DataFrame:
+    """The rows of all policies, with the column ``policy``."""
     return pd.concat(tables, names=["policy"]).reset_index("policy").reset_index(drop=True)
 
 

@@ -5,11 +5,7 @@ from analysis.stats.intervals import Interval, wilson
 
 # Table IV: means over TABLE_IV_MISSIONS random missions of the scenario space of Table II.
 TABLE_IV_MISSIONS = 1000
-TABLE_IV = {
-    SUCCESS: 0.901,
-    RATIO: 0.798,
-    PRODUCT: 0.719,
-}
+TABLE_IV = {SUCCESS: 0.901, RATIO: 0.798, PRODUCT: 0.719}
 
 # Fig. 4 (a), (b), (c) by number of UAVs: C_S 30, C_C 80, 12.5 data units per node, flying time 80.
 # The paper does not say over how many missions, and does not print the product.
@@ -21,11 +17,7 @@ FIG_4 = {
 
 # Section V-D: means over SWEET_SPOT_MISSIONS missions with every parameter at its best value.
 SWEET_SPOT_MISSIONS = 300
-SWEET_SPOT = {
-    SUCCESS: 0.99,
-    RATIO: 0.936,
-    PRODUCT: 0.93,
-}
+SWEET_SPOT = {SUCCESS: 0.99, RATIO: 0.936, PRODUCT: 0.93}
 
 # The printed means, by the name of the shipped study that does the same.
 PRINTED = {"table4": TABLE_IV, "sweet-spot": SWEET_SPOT}

@@ -46,14 +46,14 @@ def _cause(log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int,
     zones, parking, *_ = scenario.chart
     home = spread(zones, parking)[0].reshape(zones.shape)
     away = home[last["y"], last["x"]]
-    where = f"{_count(away, 'cell')} from the nearest zone" if away else "in a zone"
+    where = f"{numbers.counted(away, 'cell')} from the nearest zone" if away else "in a zone"
     facts = [f"{name} ran empty {cell}, {where}, {to_go}"]
     if flown["charging"].any():
         flown = flown[flown["slot"] > flown["slot"][flown["charging"]].max()]
     cells = home[flown["from_y"], flown["from_x"]]
     covers = flown["before"] > cells * kind.slots_per_cell * scenario.flight_cost
     if away and covers.any():
-        row, way = flown[covers].iloc[-1], _count(cells[covers][-1], "cell")
+        row, way = flown[covers].iloc[-1], numbers.counted(cells[covers][-1], "cell")
         facts.append(
             f"its battery last covered the way to a zone after {row['slot']} slots, with "
             f"{row['before']} % for {way}"
@@ -67,19 +67,15 @@ def _cause(log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int,
         busy = f", while {_names(charging['uav'][there], first)} charged there"
         x, y, *_ = scenario.rectangles[zone]
         facts.append(
-            f"it waited {_count(len(rows), 'slot')} for a pad of the zone at ({x}, {y}), which "
-            f"has {scenario.zone_pads[zone]}{busy if there.any() else ''}"
+            f"it waited {numbers.counted(len(rows), 'slot')} for a pad of the zone at ({x}, {y}), "
+            f"which has {scenario.zone_pads[zone]}{busy if there.any() else ''}"
         )
     overruled = own[(own["event"] == "collision") & (own["other"] >= 0)]
     overruled = overruled["other"][overruled["time"] >= flown["slot"].min()]
     if len(overruled):
-        times = _count(len(overruled), "time")
+        times = numbers.counted(len(overruled), "time")
         facts.append(f"it was overruled {times}, by {_names(overruled, first)}")
     return "; ".join(facts)
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _names(uavs: pd.Series, first: int) -> str:

@@ -160,13 +160,10 @@ def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
     frame = pa.concat_tables(tables, promote_options="default").to_pandas().astype({"cell": str})
     one = [name for name in ("cell", "replication", "uav") if name in frame]
     if frame.duplicated(one).any():  # such as after files of two folders were merged
-        frame = frame[~frame.map(_hashable).duplicated()]
+        hashable = frame.map(lambda v: v.tobytes() if isinstance(v, np.ndarray) else v)
+        frame = frame[~hashable.duplicated()]
         if frame.duplicated(one).any():
             raise InputError(
                 "results: two files have different records of a mission; allowed: one of them"
             )
     return frame
-
-
-def _hashable(value: Any) -> Any:
-    return value.tobytes() if isinstance(value, np.ndarray) else value

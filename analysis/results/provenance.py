@@ -151,7 +151,7 @@ class Origin(Document):
         """
         if SEA in values:
             return scenario_at(self.study["scenario"], values, **self.study["set"])
-        return scenario_of(merged(self.scenario, values))
+        return _scenario_of(json.dumps(merged(self.scenario, values)))
 
     def changes_here(self, named: Collection[str] = ()) -> list[str]:
         """How the code and libraries of this process differ from those that made the results.
@@ -186,17 +186,13 @@ class Origin(Document):
         return changes
 
 
-def scenario_of(fields: dict[str, Any]) -> ScenarioSpace:
-    """The scenario with the fields that a document has; manifests have the same ones many times.
+@lru_cache(maxsize=2**15)
+def _scenario_of(fields: str) -> ScenarioSpace:
+    """The scenario with these fields, as JSON; manifests have the same ones many times.
 
     Raises:
         InputError: If they are not valid.
     """
-    return _scenario_of(json.dumps(fields))
-
-
-@lru_cache(maxsize=2**15)
-def _scenario_of(fields: str) -> ScenarioSpace:
     try:
         return ScenarioSpace.model_validate(json.loads(fields))
     except ValidationError as error:

@@ -59,6 +59,11 @@ class Results:
         """The teams, as the study names them."""
         return [team.policy for team in self.store.manifest.policies]
 
+    @property
+    def design(self) -> str:
+        """The kind of the design; the scenario alone is a grid."""
+        return str((self.manifest["study"]["design"] or {}).get("kind", "grid"))
+
     def scenario(self, point: int = 0) -> ScenarioSpace:
         """The scenario of a design point."""
         return self.store.manifest.scenarios[point]

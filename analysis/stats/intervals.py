@@ -8,6 +8,7 @@ of a replication: compare them by ``analysis.compare``. Intervals are two-sided.
 """
 
 from collections.abc import Iterator, Sequence
+from functools import reduce
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -82,21 +83,19 @@ class Moments(NamedTuple):
         )
 
     @classmethod
-    def of_space(cls, fleets: Sequence[Self | None], post_stratify: bool = True) -> Self:
+    def of_space(cls, fleets: Sequence[Self | None], missions: int) -> Self:
         """The moments of the linearised values of ``post_stratified``.
 
         Args:
             fleets: For every number of UAVs that may be drawn the moments of its missions; None
                 where it has none.
-            post_stratify: Whether they are all missions, and not those that have measured it.
+            missions: Number of missions; what some of them have not measured has a plain mean.
         """
         drawn = [of for of in fleets if of]
-        whole = drawn[0]
-        for of in drawn[1:]:
-            whole = whole.with_others(of)
+        whole = reduce(cls.with_others, drawn)
         counts = np.array([of.n if of else 0 for of in fleets])
         weights = weights_of_fleets(counts)
-        if weights is None or not post_stratify:
+        if weights is None or whole.n < missions:
             return whole
         mean = float(np.mean([of.mean for of in drawn]))
         spread = weights**2 * counts / (counts - 1) * (1 - 1 / whole.n)

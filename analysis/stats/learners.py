@@ -15,13 +15,7 @@ from scipy import optimize, stats
 from analysis.names import MEANS, REWARD, SHARES
 from analysis.stats.bounded import rare_differences
 from analysis.stats.correction import Correction, with_adjusted
-from analysis.stats.differences import (
-    difference_test,
-    differences_of,
-    sign_test,
-    smoothed,
-    t_test,
-)
+from analysis.stats.differences import difference_test, differences_of, sign_test, smoothed, t_test
 from analysis.stats.intervals import LEVEL, check_share
 from analysis.stats.matching import check_same_missions, matched, metrics_by_treatment, select
 from dess import InputError
@@ -178,15 +172,9 @@ def _compared(
     if rare is None or (metric == REWARD and b.size == 1):
         return result, differences
     smooth = crossed(smoothed(differences, rare), level)
-    smooth = smooth if metric == REWARD else _within(smooth)
-    ends = {name: getattr(smooth, name) for name in _ENDS}
+    limit = np.inf if metric == REWARD else 1.0
+    ends = {name: float(np.clip(getattr(smooth, name), -limit, limit)) for name in _ENDS}
     return result._replace(**ends, p=smooth.p), differences
-
-
-def _within(result: Crossed) -> Crossed:
-    """The result with its intervals cut off at -1 and 1, the limits of differences of shares."""
-    ends = {name: float(np.clip(getattr(result, name), -1, 1)) for name in _ENDS}
-    return result._replace(**ends)
 
 
 def _alpha_of(half: Callable[[float], float], distance: float) -> float:

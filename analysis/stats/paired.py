@@ -51,7 +51,8 @@ def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str = "")
         a: (n,) values of A.
         b: (n,) values of B; entry r forms a pair with entry r of A.
         level: Confidence level.
-        metric: The metric of the values; by default one without bounds.
+        metric: The metric of the values; by default one without bounds. Post-stratified values of
+            shares may lie outside [0, 1].
 
     Returns:
         The interval and the p-value of ``differences.difference_test``: of Student's t, with
@@ -64,18 +65,11 @@ def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str = "")
         - If A or B is constant, their correlation is 0. If both are, the variance reduction is 0.
 
     Raises:
-        ValueError: If the samples are empty, differ in length, or should be shares and are not.
+        ValueError: If the samples are empty or differ in length.
     """
     a, b = np.asarray(a, float), np.asarray(b, float)
     if a.shape != b.shape or not a.size:
         raise ValueError(f"paired: {a.size} and {b.size} values; allowed: as many, at least one")
-    if metric in SHARES and (min(a.min(), b.min()) < 0 or max(a.max(), b.max()) > 1):
-        raise ValueError("paired: no shares; allowed: values from 0 to 1")
-    return _paired(a, b, level, metric)
-
-
-def _paired(a: np.ndarray, b: np.ndarray, level: float, metric: str) -> Paired:
-    """The comparison; linearised values of shares may lie outside [0, 1]."""
     mean, p = difference_test(a, b, metric, level)
     differences = differences_of(a, b)
     of_a, of_b, of_differences = map(_variance, (a, b, differences))
@@ -152,7 +146,7 @@ def compare(
             for metric in metrics:
                 measured = ~np.isnan(a[metric]) & ~np.isnan(b[metric])
                 if measured.any():
-                    result = _paired(a[metric][measured], b[metric][measured], level, metric)
+                    result = paired(a[metric][measured], b[metric][measured], level, metric)
                     rows.append((name, baseline, *group, metric, *result))
     columns = [of, "baseline", *by, "metric", *Paired._fields]
     return with_adjusted(pd.DataFrame(rows, columns=columns), correction)

@@ -43,20 +43,17 @@ def may_be_best(values: np.ndarray, metric: str = "", level: float = LEVEL) -> n
     centre = np.nanmean(np.where(present.any(1, keepdims=True), values, 0.0), axis=1, keepdims=True)
     centred, mask = np.where(present, values - centre, 0.0), present.astype(float)
     alpha = (1 - level) / max(values.shape[1] - 1, 1)
-    blocks = range(0, values.shape[1], _BLOCK)
-    parts = []
-    for b in blocks:
-        block = slice(b, b + _BLOCK)
-        rare = rare_differences(metric, means, means[block, None])
-        parts.append(_unbeaten(block, centred, mask, rare, alpha))
+    blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
+    rare = [rare_differences(metric, means, means[block, None]) for block in blocks]
+    parts = [_unbeaten(*of, centred, mask, alpha) for of in zip(blocks, rare, strict=True)]
     return np.concatenate(parts) if parts else np.zeros(0, bool)
 
 
 def _unbeaten(
     block: slice,
+    rare: tuple[np.ndarray, np.ndarray] | None,
     values: np.ndarray,
     mask: np.ndarray,
-    rare: tuple[np.ndarray, np.ndarray] | None,
     alpha: float,
 ) -> np.ndarray:
     """Which settings of a block are not ruled out by any other setting.

@@ -46,7 +46,7 @@ from scipy.special import stdtrit
 from analysis.study.candidates import Answer, questions_about
 from analysis.study.costs import Costs
 from analysis.study.feasibility import MeanTest, Verdict
-from analysis.study.selection import Selection, based_on, check_begun, needed
+from analysis.study.selection import Chosen, Selection, based_on, check_begun, needed
 from analysis.study.stopping import MOST, Samples, StrictTable, of_its_kind
 from dess.scenario import Integer, Number, ScenarioSpace
 
@@ -74,14 +74,10 @@ class Setting(NamedTuple):
 
 
 @dataclass(frozen=True)
-class CheapestChoice:
+class CheapestChoice(Chosen):
     """The result of the search for the cheapest setting.
 
     Attributes:
-        counts: Number of missions per design point that the selection is based on.
-        rounds: Number of rounds of simulation.
-        done: Whether the procedure needs no more missions.
-        guarantee: What is guaranteed about the selection, in words.
         answers: One answer for every condition, in the order of the design and, if there are
             several conditions, one for all of them together.
         verdicts: For each design point, ``met``, ``missed`` or ``open``.
@@ -89,18 +85,9 @@ class CheapestChoice:
             and it is no more than ``FURTHER`` times the budget; otherwise None.
     """
 
-    counts: tuple[int, ...]
-    rounds: int
-    done: bool
-    guarantee: str
     answers: tuple[Answer, ...]
     verdicts: tuple[Verdict, ...]
     enough: int | None
-
-    @property
-    def missions(self) -> int:
-        """Number of all missions."""
-        return sum(self.counts)
 
     @property
     def selected(self) -> list[int]:
@@ -267,11 +254,8 @@ class _Search:
         """The feasible candidate with the lowest mean cost, and how much more it may cost."""
         n = self._seen
         costs = np.array(
-            [
-                np.mean([np.asarray(self.samples[p]["cost"][:n], float) for p in points], axis=0)
-                for points in candidates
-            ]
-        )
+            [[self.samples[p]["cost"][:n] for p in points] for points in candidates], float
+        ).mean(axis=1)
         leader = int(np.argmin(np.where(feasible, costs.mean(axis=1), np.inf)))
         excess = costs[leader] - costs
         loss = np.mean([self.settings[p].loss for p in candidates[leader]])

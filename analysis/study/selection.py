@@ -51,33 +51,42 @@ _BLOCK = 128
 
 
 @dataclass(frozen=True)
-class Choice:
-    """The result of a selection.
+class Chosen:
+    """What the results of all rules of selection have.
 
     Attributes:
-        counts: Number of missions per point that the selection is based on.
+        counts: Number of missions per design point that the selection is based on.
         rounds: Number of rounds of simulation.
         done: Whether the procedure needs no more missions.
         guarantee: What is guaranteed about the selection, in words.
-        best: Number of the selected design point.
-        survivors: The points that were not ruled out, the selected one included.
-        guaranteed: Whether the guarantee is a probability (and not that the budget has ended).
-        stage: Number of missions of the selected point when the selection ended.
     """
 
     counts: tuple[int, ...]
     rounds: int
     done: bool
     guarantee: str
-    best: int
-    survivors: tuple[int, ...]
-    guaranteed: bool
-    stage: int
 
     @property
     def missions(self) -> int:
         """Number of all missions."""
         return sum(self.counts)
+
+
+@dataclass(frozen=True)
+class Choice(Chosen):
+    """The result of a selection.
+
+    Attributes:
+        best: Number of the selected design point.
+        survivors: The points that were not ruled out, the selected one included.
+        guaranteed: Whether the guarantee is a probability (and not that the budget has ended).
+        stage: Number of missions of the selected point when the selection ended.
+    """
+
+    best: int
+    survivors: tuple[int, ...]
+    guaranteed: bool
+    stage: int
 
     @property
     def selected(self) -> int:

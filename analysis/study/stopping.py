@@ -285,17 +285,14 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
         low, high = bounded_ends(sample[:1] + means, squares / counts, counts)
         return sample[:1] + means, (high - low) / 2
     freedom = np.maximum(counts - 1, 1)
-    widths = _student(len(sample)) * np.sqrt(squares / freedom / counts)
+    quantiles = _student(1 << len(sample).bit_length())[: len(sample)]
+    widths = quantiles * np.sqrt(squares / freedom / counts)
     widths[:1] = np.inf
     return sample[:1] + means, widths
 
 
+@cache
 def _student(n: int) -> np.ndarray:
     """The (n,) quantiles of Student's t for samples of 1..n values."""
-    return _student_table(1 << n.bit_length())[:n]
-
-
-@cache
-def _student_table(n: int) -> np.ndarray:
     freedom = np.maximum(np.arange(n), 1)
     return stdtrit(freedom, (1 + LEVEL) / 2)

@@ -307,6 +307,18 @@ class Study(StudyData):
             raise InputError(f"at {_shown(values)}: {error}" if values else str(error)) from None
 
 
+def study_from(data: Mapping[str, Any], what: str) -> Study:
+    """The study with these fields.
+
+    Raises:
+        InputError: If they are not valid; ``what`` is named before the reason.
+    """
+    try:
+        return Study.model_validate(data)
+    except ValidationError as error:
+        raise InputError(validation_line(error, what, Study)) from None
+
+
 def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
     """A shipped study by name, or one from a TOML file.
 

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import tomli_w
-from pydantic import ValidationError
 
 import dess
 from analysis.execution.dry_run import check_run
@@ -32,8 +31,8 @@ from analysis.study.best import BASELINE, policies_for
 from analysis.study.cheapest import Cheapest
 from analysis.study.costs import Costs
 from analysis.study.design import Grid
-from analysis.study.study import Study
-from dess.errors import InputError, one_of, validation_line
+from analysis.study.study import Study, study_from
+from dess.errors import InputError, one_of
 from dess.files.reading import paths_in
 from dess.files.writing import write_file
 from dess.scenario import is_scenario_name, load_scenario
@@ -97,13 +96,12 @@ def question(
         **({} if requirements else {"missions": missions}),
     }
     if requirements:
-        data["selection"] = _cheapest(requirements, missions, _study(data))
+        data["selection"] = _cheapest(requirements, missions, study_from(data, "sweep"))
     if policies is None:
-        points = _study(data).points
+        spaces = [point.scenario for point in study_from(data, "sweep").points]
         each = max(USUAL, missions) if requirements else missions
-        chosen = policies_for((point.scenario for point in points), each)
-        data["policies"] = chosen
-    study = _study(data)
+        data["policies"] = policies_for(spaces, each)
+    study = study_from(data, "sweep")
     return study if name is not None else study.model_copy(update={"name": _name_of(study, swept)})
 
 
@@ -186,13 +184,6 @@ def write(study: Study, folder: str | Path) -> Path:
         data["scenario"] = Path(os.path.relpath(study.scenario, path.parent)).as_posix()
     write_file(path, tomli_w.dumps(data))
     return path
-
-
-def _study(data: dict[str, Any]) -> Study:
-    try:
-        return Study.model_validate(data)
-    except ValidationError as error:
-        raise InputError(validation_line(error, "sweep", Study)) from None
 
 
 def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) -> dict[str, Any]:

@@ -59,10 +59,7 @@ def communication_checks(logs: Sequence[Log], seed: int) -> list[Check]:
     off = float((same["value"] / same["known"] - 1).abs().max()) if len(same) else 0.0
     emptied = int((same["known"] == same["residual"]).sum())
     seen = f"off by {off:.1e} of it at most; {emptied:,} times the node was emptied"
-    test, known = (
-        "Node served in a communication slot",
-        "the best SNR among nodes with data",
-    )
+    test, known = "Node served in a communication slot", "the best SNR among nodes with data"
     choice = Check.counted(CHANNEL, test, known, len(table) - len(same), len(table))
     test, known = "Data of a communication", "min(R, D) with the shadowing that was drawn"
     bound = _ROUNDINGS * np.finfo(float).eps

@@ -163,6 +163,30 @@ def parking_memory(chart, uavs):
 
 @kernel
 def parking_cell(mission, uavs, i, chart, memory, reach):
+    """The x and y of the zone cell where UAV ``i`` will charge, the way there and the wait.
+
+    The UAVs choose one after another, as ``_plan`` says. If one of them would run empty and there
+    are several zones, this one chooses before all others, except those that would lack more then.
+    """
+    x, y, slots, wait, lacks = _plan(mission, uavs, i, -1, chart, memory, reach)
+    if not mission.plans_waits or mission.zones == 1 or mission.uavs == 1:
+        return x, y, slots, wait
+    first = i if lacks > 0 else -1
+    for j in range(mission.uavs):
+        o = uavs[j]
+        charges = o.battery < mission.flight_cost * slots_needed(mission, o)
+        if first < 0 and charges and flies(o) and not is_parked(o):
+            first = j if _plan(mission, uavs, j, -1, chart, memory, reach)[4] > 0 else -1
+    if first >= 0:
+        to_x, to_y, cells, time, lacking = _plan(mission, uavs, i, first, chart, memory, reach)
+        if lacking <= lacks:
+            # who would run empty flies there at once, in case that the others do not give way
+            return to_x, to_y, cells, mission.charge_start - 1 if first == i else time
+    return x, y, slots, wait
+
+
+@kernel
+def _plan(mission, uavs, i, first, chart, memory, reach):
     """The zone cell where UAV ``i`` will charge: of those that no teammate takes, the soonest.
 
     Teammates in a zone keep their cells, and their pads if they have asked for one. The other UAVs
@@ -173,13 +197,14 @@ def parking_cell(mission, uavs, i, chart, memory, reach):
         mission: ``MISSION`` record.
         uavs: (I,) ``UAV`` records.
         i: Index of the UAV.
+        first: Index of a UAV that chooses before all others, -1 for none.
         chart: ``Chart``.
         memory: ``parking_memory``.
         reach: The table of ``reach_of``.
 
     Returns:
-        The x and y of the cell, how many cells away it is, and the slots for which the UAV must
-        expect to wait there for a pad; the UAV's own cell if all are taken.
+        The x and y of the cell, how many cells away it is, the slots for which the UAV must expect
+        to wait there for a pad, and the slots that it lacks; the UAV's own cell if all are taken.
     """
     u, taken = uavs[i], memory.taken
     own_request = _until_asked(mission, u, distance_home(chart, u.x, u.y))
@@ -191,35 +216,37 @@ def parking_cell(mission, uavs, i, chart, memory, reach):
             taken[chart.nearest[o.y, o.x]] = True
             if j != i and o.pad_request >= 0:
                 _take_pad(mission, o, o.zone, 0, memory.free)
-    last_battery, last = -1, -1
+    last_battery, last, chooser = -1, -1, first
     while True:
         # the next UAV to choose
-        chooser = -1
         for j in range(mission.uavs):
             o = uavs[j]
             if (
                 not o.active
+                or j == first
                 or o.battery < last_battery
                 or (o.battery == last_battery and j <= last)
             ):
                 continue
-            if chooser < 0 or o.battery < uavs[chooser].battery:
+            if chooser < 0 or chooser != first and o.battery < uavs[chooser].battery:
                 chooser = j
         o = uavs[chooser]
-        last_battery, last = o.battery, chooser
-        if chooser != i and is_parked(o):
+        if chooser != first:
+            last_battery, last = o.battery, chooser
+        number, chooser = chooser, -1
+        if number != i and is_parked(o):
             continue
-        cell, slots = _soonest_free(mission, uavs, chooser, chart, memory, reach)
-        if chooser == i and cell < 0:
-            return u.x, u.y, 0, 0
+        cell, slots, lacks = _soonest_free(mission, uavs, number, chart, memory, reach)
+        if number == i and cell < 0:
+            return u.x, u.y, 0, 0, 0
         if cell < 0:
             continue
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
-        if chooser == i:
+        if number == i:
             # To wait for more than C_S is of no use, as a UAV may ask only at or below C_S.
             wait = waiting_time(mission, u, zone, slots, memory.free)
-            return x, y, slots, min(wait, mission.charge_start - 1)
+            return x, y, slots, min(wait, mission.charge_start - 1), lacks
         taken[cell] = True
         if flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o):
             # It may stay away for some time and come just before this UAV.
@@ -230,7 +257,7 @@ def parking_cell(mission, uavs, i, chart, memory, reach):
 
 @inlined
 def _soonest_free(mission, uavs, i, chart, memory, reach):
-    """The number of the best parking cell that is not taken (-1 if none), and the way to it."""
+    """The number of the best parking cell that is not taken (-1 if none), the way, what lacks."""
     u = uavs[i]
     # The nearest cell of all is free most of the time, so this one is tried first.
     cell = np.int64(chart.nearest[u.y, u.x])
@@ -239,7 +266,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     free = (slots == 0 or not memory.taken[cell]) and not _is_given_up(mission, zone)
     free = free and (mission.zones == 1 or not waiting_time(mission, u, zone, slots, memory.free))
     if reach is None and free and path_length(mission, uavs, i, chart, u.x, u.y, x, y) == slots:
-        return cell, slots
+        return cell, slots, max(slots + 1 - u.battery, 0)
     best, way, least, fewest = -1, -1, -1, -1
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
@@ -260,7 +287,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
         is_sooner = until < least or (until == least and slots < way)
         if best < 0 or lacks < fewest or (lacks == fewest and is_sooner):
             best, way, least, fewest = cell, slots, until, lacks
-    return best, way
+    return best, way, fewest
 
 
 @extension

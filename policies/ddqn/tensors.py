@@ -103,7 +103,7 @@ def bytes_of(array: np.ndarray) -> torch.Tensor:
     """The bytes of an array, which may be structured; those between its fields are 0."""
     if array.dtype.names:
         whole, array = array, np.zeros(array.shape, array.dtype)
-        for name in array.dtype.names:
+        for name in whole.dtype.names or ():
             array[name] = whole[name]
     return torch.from_numpy(np.frombuffer(array.tobytes(), np.uint8).copy())
 

@@ -154,9 +154,7 @@ def _print(answer: "Sweep", metric: str) -> None:
     cells["policy"] = top["policy"]
     cells[fields] = top[fields].map(value_text)
     required = getattr(answer.study.selection, "requirements", {})
-    for name in dict.fromkeys([metric, SUCCESS, *required, PRODUCT]):
-        if name == COST:
-            continue
+    for name in [m for m in dict.fromkeys([metric, SUCCESS, *required, PRODUCT]) if m != COST]:
         head = SHORT_METRICS.get(name) or metric_label(name)
         cells[head] = numbers.estimates(top, name, numbers.written(name))
     if prices:

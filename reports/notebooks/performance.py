@@ -79,10 +79,7 @@ html.gallery(
 # %%
 html.gallery(
     [
-        (
-            figures.by_fleet(fleets, metric),
-            f"{name} against the number of UAVs",
-        )
+        (figures.by_fleet(fleets, metric), f"{name} against the number of UAVs")
         for metric, name in METRICS.items()
     ],
     f"n = {numbers.span(fleets['n'])} missions per dot; bars are 95 % intervals.",

@@ -254,7 +254,7 @@ def lead(
     return HTML(_figure(drawing, alt, caption, data, source))
 
 
-def gallery(drawings: Sequence[Drawing], note: str = "") -> HTML:
+def gallery(drawings: Iterable[Drawing], note: str = "") -> HTML:
     """Several figures side by side where there is room.
 
     Args:

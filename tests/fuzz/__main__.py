@@ -19,6 +19,7 @@ from tests.fuzz.forks import Forks, Outcome
 from tests.fuzz.judge import CODES, findings
 
 FOLDER = Path("build/fuzz")
+LEAST = 20  # cases that are tried however long they take
 MEMORY = 6 * 2**30  # bytes that the session itself may take; cases have a limit of their own
 
 
@@ -92,8 +93,8 @@ class Session:
 
 
 def _until(end: float, cases: Iterator[tuple[int, Case]]) -> Iterator[tuple[int, Case]]:
-    for case in cases:
-        if time.monotonic() > end:
+    for tried, case in enumerate(cases):
+        if tried >= LEAST and time.monotonic() > end:
             return
         yield case
 

@@ -37,7 +37,6 @@ def box(folder: Path) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.brief
 def test_planted_faults_are_found(folder: Path) -> None:
     steps = (write("in/a.toml", b""), node("out/device", "fifo"))
     cases = [Case("planted", (fault,), steps, seconds=2) for fault in FAULTS]

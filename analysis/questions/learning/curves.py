@@ -168,8 +168,7 @@ def transfer_table(
 
 
 def _rewards(*ends: float) -> str:
-    mean, low, high = (numbers.minus(f"{value:+.0f}") for value in ends)
-    return f"{mean} [{low}, {high}]"
+    return numbers.with_ends(lambda value: numbers.minus(f"{value:+.0f}"), *ends)
 
 
 def _average(values: pd.Series) -> pd.Series:

@@ -87,21 +87,16 @@ def in_words(results: Results, policy: str | None = None) -> str:
     found = useful(table)
     rows = found[found["policy"] == policy]
     parts = [
-        f"{100 * row[f'{GAP}_high']:.1f} points with {fleet(row['uavs'])} (mean gap "
-        f"{_points(*row[[GAP, f'{GAP}_low', f'{GAP}_high']])})"
+        f"{100 * row[f'{GAP}_high']:.1f} points with {numbers.counted(row['uavs'], 'UAV')} "
+        f"(mean gap {_points(*row[[GAP, f'{GAP}_low', f'{GAP}_high']])})"
         for _, row in rows.iterrows()
     ]
     others = sorted({*table["uavs"]} - {*found["uavs"], ALL})
     text = f"`{policy}` is at most {numbers.words(parts)} from the best possible. " if parts else ""
     if others:
-        fleets = numbers.words([fleet(int(uavs)) for uavs in others])
+        fleets = numbers.words([numbers.counted(int(uavs), "UAV") for uavs in others])
         text += f"The upper bound is 100 % for {fleets}, so there is no useful bound."
     return text.strip()
-
-
-def fleet(uavs: int) -> str:
-    """A number of UAVs as ``1 UAV`` or ``3 UAVs``."""
-    return f"{uavs} UAV{'s' * (uavs != 1)}"
 
 
 def _points(mean: float, low: float, high: float) -> str:

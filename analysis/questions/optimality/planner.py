@@ -12,13 +12,13 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.names import PRODUCT, SUCCESS
+from analysis.questions import decision_times
 from analysis.questions.decision_times import Times
 from analysis.questions.missions import LoggedMission, logged_mission
 from analysis.questions.node_shares import collected, held
 from analysis.questions.optimality.gap import ALL
 from analysis.results.event_log import uav_slots
 from analysis.results.tables import Results
-from analysis.stats.front import on_front
 from analysis.stats.intervals import summary as means_of
 from analysis.stats.paired import compare
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
@@ -87,9 +87,7 @@ def front(results: Results, times: Times) -> pd.DataFrame:
     """
     means = means_of(results.missions, by=["policy"]).query("metric == @PRODUCT")
     seconds = {cost.policy: cost.median for cost in times.costs}
-    table = means[["policy", "mean", "low", "high"]].assign(seconds=means["policy"].map(seconds))
-    table = table.dropna().sort_values("seconds", ignore_index=True)
-    return table.assign(on_front=on_front(table["seconds"].to_numpy(), table["mean"].to_numpy()))
+    return decision_times.front(means[["policy", "mean", "low", "high"]], seconds)
 
 
 def coverage(results: Results, policy: str) -> np.ndarray:

@@ -13,10 +13,10 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.names import BOUND, PRODUCT, SUCCESS
+from analysis.questions import decision_times
 from analysis.questions.decision_times import Times
 from analysis.results.tables import Results
 from analysis.stats.differences import column_tests
-from analysis.stats.front import on_front
 from analysis.stats.intervals import column_intervals
 from analysis.stats.paired import relative_change
 from dess.errors import InputError
@@ -24,6 +24,7 @@ from dess.scenario import SEA
 
 # Groups of seas by their number of nodes: the largest number of each but the last.
 _NODES = (15, 30, 60)
+_NODES_IN_WORDS = ("1 to 15", "16 to 30", "31 to 60", "61 and more")
 ALL = "all"
 REFERENCES = ("planner", "planner-long")  # the slow policies that others are compared with
 GROUPS = {"family": "Family", "nodes": "Nodes", "uavs": "UAVs"}
@@ -44,7 +45,7 @@ def missions(results: Results) -> pd.DataFrame:
     group = np.searchsorted(_NODES, counts)[point]
     return results.missions.assign(
         sea=sea, family=[name.partition(":")[0] for name in sea], all=ALL,
-        nodes=np.array(_in_words())[group],
+        nodes=np.array(_NODES_IN_WORDS)[group],
     )  # fmt: skip
 
 
@@ -107,10 +108,7 @@ def front(results: Results, times: Times) -> pd.DataFrame:
         ``seconds`` (of a decision for a UAV, in batches), and ``on_front``.
     """
     seconds = {cost.policy: cost.batch for cost in times.costs}
-    table = quality(results)
-    table = table.assign(seconds=table["policy"].map(seconds)).dropna()
-    table = table.sort_values("seconds", ignore_index=True)
-    return table.assign(on_front=on_front(table["seconds"].to_numpy(), table["mean"].to_numpy()))
+    return decision_times.front(quality(results), seconds)
 
 
 def summary(results: Results, times: Times) -> pd.DataFrame:
@@ -174,20 +172,8 @@ def _by_sea(results: Results, by: str, metric: str) -> list[tuple[object, pd.Dat
     table = missions(results)
     means = table.groupby([by, "policy", "sea"], sort=False)[metric].mean().reset_index()
     groups = [*means[by].unique()]
-    groups = sorted(groups, key=_first_number) if by in ("uavs", "nodes") else groups
+    if by in ("uavs", "nodes"):  # by the first number
+        groups.sort(key=lambda group: int(str(group).partition(" ")[0]))
     wide = [means[means[by] == group].pivot(index="sea", columns="policy", values=metric)
             for group in groups]  # fmt: skip
     return [(g, w[results.policies]) for g, w in zip(groups, wide, strict=True)]
-
-
-def _first_number(group: object) -> int:
-    return int(str(group).partition(" ")[0])
-
-
-def _in_words() -> list[str]:
-    """The groups of seas by their number of nodes: ``1 to 15``, ``16 to 30``, ..."""
-    least = [1, *(most + 1 for most in _NODES)]
-    return [
-        *(f"{n} to {most}" for n, most in zip(least, _NODES, strict=False)),
-        f"{least[-1]} and more",
-    ]

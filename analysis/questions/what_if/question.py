@@ -17,7 +17,6 @@ from typing import Any
 
 import pandas as pd
 import tomli_w
-from pydantic import ValidationError
 
 from analysis import numbers
 from analysis.execution.dry_run import check_run
@@ -28,8 +27,8 @@ from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
 from analysis.results.tables import Results
 from analysis.study.best import policies_for
-from analysis.study.study import Study
-from dess.errors import InputError, one_of, validation_line
+from analysis.study.study import Study, study_from
+from dess.errors import InputError, one_of
 from dess.files.reading import paths_in
 from dess.scenario import SAMPLED, ScenarioSpace, dotted, fields_of, load_scenario
 from policies.registry import typed
@@ -90,10 +89,7 @@ def question(
         "missions": missions,
         "seed": seed,
     }
-    try:
-        return Study.model_validate(data)
-    except ValidationError as error:
-        raise InputError(validation_line(error, "question", Study)) from None
+    return study_from(data, "question")
 
 
 def key_of(study: Study) -> str:

@@ -204,7 +204,9 @@ def _print_distributions(table: pd.DataFrame) -> None:
 def _print_comparisons(table: pd.DataFrame) -> None:
     """Differences of the other policies from the best one."""
     cells, product = differences(table, "policy")
-    cells["pairing saves"] = product["variance_reduction"].map(_gain)
+    # How many times as many missions the comparison needs without common random numbers.
+    gains = product["variance_reduction"].map(lambda v: f"{1 / (1 - v):.1f} x" if v < 1 else "")
+    cells["pairing saves"] = gains
     print_frame(f"against {table['baseline'].iloc[0]} [points]", cells)
 
 
@@ -219,11 +221,6 @@ def differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFra
     """``tables.compared`` by what is compared, and the rows of the product."""
     cells = tables.compared(table, who).set_index(who.capitalize())
     return cells, table[table["metric"] == PRODUCT].set_index(who)
-
-
-def _gain(reduction: float) -> str:
-    """How many times as many missions the comparison needs without common random numbers."""
-    return f"{1 / (1 - reduction):.1f} x" if reduction < 1 else ""
 
 
 def _print_worst(table: pd.DataFrame) -> None:

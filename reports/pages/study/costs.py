@@ -4,7 +4,7 @@ fronts = costs.fronts_of(study)
 html.gallery(costs.drawn(study, fronts))
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import inf
 
 import pandas as pd
@@ -15,12 +15,11 @@ from analysis.figures import fronts as figures
 from analysis.names import COST, METRICS, PRODUCT, SUCCESS, metric_name
 from analysis.questions import costs as questions
 from analysis.results.tables import Results
-from analysis.stats.intervals import LEVEL
 from analysis.study.cheapest import Cheapest
 from reports import tables
 from reports.pages import html
 from reports.pages.html import Drawing
-from reports.pages.study.words import MOST_ROWS
+from reports.pages.study.words import INTERVALS, MOST_ROWS
 
 MOST_CONDITIONS = 9  # the largest number of conditions with a figure; the table has all
 CERTAIN = 0.01  # settings with a lower probability of being on a front are not in the table
@@ -43,17 +42,15 @@ def required(results: Results) -> Mapping[str, float]:
     return {str(metric): least for metric, least in given.items()}
 
 
-def drawn(results: Results, fronts: Fronts, marks: str = MARKS) -> list[Drawing]:
+def drawn(results: Results, fronts: Fronts, marks: str = MARKS) -> Iterator[Drawing]:
     """Figures of the cost against the metrics of the fronts, for every condition."""
-    drawings: list[Drawing] = []
     for metric, front in fronts.items():
         for condition, rows in [*front.groupby("condition", sort=False)][:MOST_CONDITIONS]:
             least = required(results).get(metric)
             drawing = figures.costs(rows, metric, _currency(results), least)
             title = f"Cost against {metric_name(metric).lower()}{', ' * bool(condition)}{condition}"
-            counted = f"{_LEVEL} intervals; n = {numbers.span(rows['n'])} missions per setting."
-            drawings.append((drawing, title, f"{title}. {marks} Bars are {counted}", rows))
-    return drawings
+            counted = f"{INTERVALS}; n = {numbers.span(rows['n'])} missions per setting."
+            yield drawing, title, f"{title}. {marks} Bars are {counted}", rows
 
 
 def deciding(results: Results) -> Drawing:
@@ -66,7 +63,7 @@ def deciding(results: Results) -> Drawing:
     metric, part = parts[cheapest.index(max(cheapest))]
     wanted = numbers.words([f"{metric_name(m).lower()} {100 * q:g} %" for m, q in least.items()])
     marks = f"Large, dark marks are shown to meet all requirements ({wanted}); faint ones are not."
-    return drawn(results, {metric: part}, marks)[0]
+    return next(drawn(results, {metric: part}, marks))
 
 
 def front_table(results: Results, fronts: Fronts) -> HTML:
@@ -80,7 +77,7 @@ def front_table(results: Results, fronts: Fronts) -> HTML:
         shown[head] = shares.loc[top.index, metric].map(numbers.percent)
     caption = (
         f"Settings that may be on a front: mean cost [{_currency(results)}] and metrics with "
-        f"{_LEVEL} intervals, and the probability that they are on it"
+        f"{INTERVALS}, and the probability that they are on it"
     )
     data = first.drop(columns=["on_front", "probability"])
     return html.table(shown, caption, data=data.join(shares.add_prefix("on_front_of_")))
@@ -98,14 +95,9 @@ def parts_table(results: Results) -> HTML:
     return html.table(shown, caption, data=rows)
 
 
-def cheapest(results: Results) -> list[str]:
-    """The cheapest settings that meet the requirements, with reasons, a sentence each."""
-    return questions.sentences(results)
-
-
 def reasons(results: Results) -> html.Marked:
-    """All of ``cheapest`` as a list, and the guarantee."""
-    lines = [f"- {text}" for text in cheapest(results)]
+    """The cheapest settings that meet the requirements, with reasons, and the guarantee."""
+    lines = [f"- {text}" for text in questions.sentences(results)]
     said = {choice.guarantee for p in results.policies if (choice := results.cheapest(p))}
     sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(said))
     return html.composed("\n".join(lines) + f"\n\n{sure}")
@@ -119,7 +111,7 @@ def judged_table(results: Results) -> HTML:
     shown["Requirements"] = top["verdict"].map(questions.VERDICTS)
     shown["Selected"] = top["selected"].map({True: "yes", False: ""})
     shown["Missions"] = top["n"].map("{:,}".format)
-    caption = f"The settings, the cheapest first; means with {_LEVEL} intervals"
+    caption = f"The settings, the cheapest first; means with {INTERVALS}"
     return html.table(shown, caption, data=table)
 
 
@@ -130,12 +122,9 @@ def checked_table(results: Results) -> HTML:
     rows = questions.checks(results)
     shown = tables.priced(rows, [*METRICS])
     shown["Missions"] = rows["n"].map("{:,}".format)
-    caption = f"The check of the selected settings: means with {_LEVEL} intervals"
+    caption = f"The check of the selected settings: means with {INTERVALS}"
     return html.table(shown, caption, data=rows)
 
 
 def _currency(results: Results) -> str:
     return results.manifest["study"]["costs"]["currency"]
-
-
-_LEVEL = numbers.level(LEVEL)

@@ -59,13 +59,8 @@ def report_of(
 
 def _kind(results: Results) -> str:
     """The kind of the design; a design that varies one field at most is a grid."""
-    design = results.manifest["study"]["design"] or {}
-    kind = str(design.get("kind", "grid"))
+    kind = results.design
     return kind if kind in ("saltelli", "latin-hypercube") or len(varied(results)) > 1 else "grid"
-
-
-def _has_settings(results: Results) -> bool:
-    return len(results.store.manifest.points) > 1 and _kind(results) != "saltelli"
 
 
 def _is_scan(results: Results, fields: Callable[[int], bool]) -> bool:
@@ -81,7 +76,9 @@ def _has(section: str) -> Callable[[Results], bool]:
 # For each tag, a function that tells whether the page of a study has the cells with this tag.
 TAGS: dict[str, Callable[[Results], bool]] = {
     # Several design points whose missions share their replications: settings to rank.
-    "if-settings": _has_settings,
+    "if-settings": lambda results: (
+        len(results.store.manifest.points) > 1 and _kind(results) != "saltelli"
+    ),
     # Settings, one or several, with missions enough to rank them.
     "if-ranked": lambda results: _kind(results) != "saltelli",
     # The answer is the best setting.

@@ -11,12 +11,9 @@ from analysis.names import METRICS, metric_name, parameter, value_text
 from analysis.questions import sensitivity as indices
 from analysis.questions import settings, summary
 from analysis.results.tables import Results
-from analysis.stats.intervals import LEVEL
 from reports import tables
 from reports.pages import html
-from reports.pages.study.words import MOST_ROWS, metrics_of
-
-_LEVEL = numbers.level(LEVEL)
+from reports.pages.study.words import INTERVALS, MOST_ROWS, metrics_of
 
 
 def ranked(results: Results, rows: pd.DataFrame, metric: str) -> HTML:
@@ -29,7 +26,7 @@ def ranked(results: Results, rows: pd.DataFrame, metric: str) -> HTML:
     """
     caption = (
         f"The first {min(len(rows), MOST_ROWS)} of {len(rows):,} settings by "
-        f"{metric_name(metric).lower()}: means with {_LEVEL} intervals"
+        f"{metric_name(metric).lower()}: means with {INTERVALS}"
     )
     top = rows.head(MOST_ROWS)
     shown = _settings(results, top, metric)
@@ -67,7 +64,7 @@ def main_effects(results: Results, metric: str) -> HTML:
 def sensitivity(results: Results) -> HTML:
     """Sobol indices."""
     data = summary.sensitivities(results)
-    caption = f"Sobol indices as shares of the variance, with {_LEVEL} intervals"
+    caption = f"Sobol indices as shares of the variance, with {INTERVALS}"
     return html.table(indices.index_table(data), caption, data=data)
 
 
@@ -87,19 +84,19 @@ def selected(results: Results) -> HTML:
 
 def checked(results: Results) -> HTML:
     """The check of the selected settings on independent missions."""
-    caption = f"The check of the selected settings: means with {_LEVEL} intervals"
+    caption = f"The check of the selected settings: means with {INTERVALS}"
     return _means(summary.checks(results), caption)
 
 
 def means(results: Results) -> HTML:
     """The means of every policy at the only design point."""
-    return _means(summary.means(results), f"Means with {_LEVEL} intervals")
+    return _means(summary.means(results), f"Means with {INTERVALS}")
 
 
 def precisions(results: Results) -> HTML:
     """The precision that a study had to reach, and whether it did."""
     data = summary.precisions(results)
-    caption = f"Half-widths of {_LEVEL} intervals, and their targets"
+    caption = f"Half-widths of {INTERVALS}, and their targets"
     return html.table(tables.precisions(data.head(MOST_ROWS)), caption, data=data)
 
 
@@ -117,7 +114,7 @@ def against(results: Results, baseline: int, metric: str) -> HTML:
     unit = " in percentage points" if metric in METRICS else ""
     caption = (
         f"{metric_name(metric)}: paired difference from the baseline{unit} with "
-        f"{_LEVEL} intervals; the {len(top):,} largest of {len(rows):,} differences"
+        f"{INTERVALS}; the {len(top):,} largest of {len(rows):,} differences"
     )
     return html.table(pd.DataFrame(columns), caption, data=data)
 
@@ -161,7 +158,7 @@ def spread(distributions: pd.DataFrame, metric: str) -> HTML:
         distributions: Rows of ``analysis.distribution``.
         metric: The metric.
     """
-    caption = f"Quantiles of {metric_name(metric).lower()} over missions, with {_LEVEL} intervals"
+    caption = f"Quantiles of {metric_name(metric).lower()} over missions, with {INTERVALS}"
     return html.table(tables.spread(distributions, metric), caption, data=distributions)
 
 
@@ -183,7 +180,7 @@ def _means(rows: pd.DataFrame, caption: str) -> HTML:
 
 
 def _compared(rows: pd.DataFrame, of: str, caption: str) -> HTML:
-    units = f"[percentage points], with {_LEVEL} intervals (▲ better, ▼ worse, ≈ inconclusive);"
+    units = f"[percentage points], with {INTERVALS} (▲ better, ▼ worse, ≈ inconclusive);"
     caption = (
         f"{caption} {units} p corrected for the number of comparisons and the choice of the best "
         "by these data"

@@ -9,11 +9,13 @@ from analysis import numbers
 from analysis.names import METRICS, PRODUCT, metric_name, parameter, value_text
 from analysis.questions import settings, summary
 from analysis.results.tables import Results
+from analysis.stats.intervals import LEVEL
 from analysis.study.cheapest import Cheapest
 from analysis.study.design import NOISE
 from dess import InputError
 from reports.pages import html
 
+INTERVALS = f"{numbers.level(LEVEL)} intervals"
 MOST_NAMES = 3  # the largest number of settings that are named because they may be as good
 MOST_ROWS = 25  # the largest number of rows of a table on the page; its data have all rows
 _BEST = "Which setting is the best for {}?"
@@ -120,10 +122,9 @@ def of_variance(results: Results, metric: str) -> str:
 
 def title(results: Results) -> str:
     """The question that a study answers."""
-    design = results.manifest["study"]["design"] or {}
     if isinstance(results.store.manifest.selection, Cheapest):
         question = "Which fleet is the cheapest for {}?"
-    elif design.get("kind") == "saltelli":
+    elif results.design == "saltelli":
         question = "Which parameters matter for {}?"
     elif fields := [parameter(field).within for field in settings.varied(results)]:
         question = f"Which {numbers.words(fields)} for {{}}?" if len(fields) < 4 else _BEST
@@ -157,10 +158,9 @@ def commands(results: Results, missions: pd.DataFrame) -> html.Marked:
 def _design(results: Results) -> Iterator[html.Marked]:
     """The fields that the design varies, as items of the list."""
     points = len(results.store.manifest.points)
-    kind = (results.manifest["study"]["design"] or {}).get("kind", "grid")
     if fields := settings.varied(results):
         line = "- **Design:** {kind}, {points:,} design points. It varies:"
-        yield html.marked(line, kind=html.code(kind), points=points)
+        yield html.marked(line, kind=html.code(results.design), points=points)
     for field, values in fields.items():
         unit = f" [{parameter(field).unit}]".removesuffix(" []")
         line = "    - {field}{unit}: {values}"

@@ -2,7 +2,7 @@ import pytest
 
 from analysis import run_study
 from analysis.execution import effort
-from analysis.execution.dry_run import budget, check_effort, plan_study, total
+from analysis.execution.dry_run import budget, check_run, plan_study, total
 from analysis.execution.effort import BOUND, SPREAD, START, Range
 from dess import InputError
 from dess.code import memory
@@ -93,7 +93,7 @@ def test_a_run_that_is_surely_long_has_to_be_confirmed(tmp_path, monkeypatch):
     study, out = small_study(tmp_path), tmp_path / "out"
     ends = total(plan_study(study, out, workers=2), 2)
     monkeypatch.setattr(effort, "LONG_RUN", ends.low * 1.01)
-    check_effort(study, out, workers=2)
+    check_run(study, out, workers=2)
     monkeypatch.setattr(effort, "LONG_RUN", ends.low * 0.99)
     before = files_of(tmp_path)
     line = (
@@ -101,11 +101,11 @@ def test_a_run_that_is_surely_long_has_to_be_confirmed(tmp_path, monkeypatch):
         r"about up to 15 seconds; allowed: --yes, or less"
     )
     with pytest.raises(InputError, match=line):
-        check_effort(study, out, workers=2)
-    check_effort(study, out, yes=True)
+        check_run(study, out, workers=2)
+    check_run(study, out, yes=True)
     assert files_of(tmp_path) == before
     run_study(study, out)
-    check_effort(study, out)  # all of it is there
+    check_run(study, out)  # all of it is there
 
 
 def test_missions_are_counted_and_not_listed(tmp_path, monkeypatch):
@@ -114,7 +114,7 @@ def test_missions_are_counted_and_not_listed(tmp_path, monkeypatch):
     monkeypatch.setattr(effort, "LONG_RUN", 1e9)
     line = r"2,000,000,000 missions .*: about 2,23\d\.\d GiB of memory, of which 1,024.0 are avail"
     with pytest.raises(InputError, match=line):
-        check_effort(study, tmp_path / "out")
+        check_run(study, tmp_path / "out")
     assert [p.missions for p in plan_study(study, tmp_path / "out")] == [10**9] * 2
 
 

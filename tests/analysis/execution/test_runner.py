@@ -27,7 +27,8 @@ def assert_same(ours, other):
 
 
 def test_results_are_tidy(tmp_path):
-    study = small_study(tmp_path, design=grid(quota=[20, 60], uavs=[1, 2]))
+    design, policies = grid(quota=[20, 600], uavs=[1, 2]), ["random-unguarded", "greedy"]
+    study = small_study(tmp_path, design=design, policies=policies)
     results = run_study(study, tmp_path / "out")
     missions, uavs = results.missions, results.uavs
     assert list(missions.columns) == ["policy", "point", "quota", *MISSION_RECORD.names]

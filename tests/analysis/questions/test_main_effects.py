@@ -1,11 +1,13 @@
 """Main effects compare values of a parameter on the same missions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from analysis import run_study
-from analysis.names import PRODUCT
+from analysis.names import PRODUCT, SUCCESS
 from analysis.questions import main_effects
 from analysis.questions.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
 from analysis.stats.correction import adjust
@@ -56,6 +58,14 @@ def test_effects_are_the_means_by_value(results, table):
     ends = row.set_index("metric").loc["reward", ["mean", "low", "high"]]
     values = post_stratified(missions["reward"].to_numpy(), missions["uavs"].to_numpy())
     assert tuple(ends) == interval_of("reward", values)
+
+
+def test_success_is_compared_where_the_number_of_uavs_is_drawn(results, table):
+    """Its post-stratified values lie outside [0, 1]."""
+    missions = results.missions.assign(success=results.missions["replication"] % 2)
+    found = replace(results, missions=missions)
+    pairs = main_effects.changes(found, table, "random", "initial_data", SUCCESS)
+    assert (pairs["difference"] == 0).all() and (pairs["low"] < 0).all()
 
 
 def test_a_design_of_several_fields_is_refused(tmp_path):

@@ -65,14 +65,14 @@ def test_a_mission_is_simulated_again_with_what_it_measured(results):
 
 def test_missions_without_a_value_are_left_out_of_means_and_comparisons(results):
     missions = results.missions.copy()
-    missions.loc[missions["replication"] == 2, "waiting"] = np.nan
+    missions.loc[missions["replication"] == 2, "queue"] = np.nan
     rows = summary(missions, by=["policy", "point"]).set_index(["policy", "point", "metric"])
-    mine = missions.query("policy == 'random' and point == 1")["waiting"].dropna()
-    row = rows.loc["random", 1, "waiting"]
+    mine = missions.query("policy == 'random' and point == 1")["queue"].dropna()
+    row = rows.loc["random", 1, "queue"]
     assert row["n"] == len(mine) == 9
-    assert tuple(row[["mean", "low", "high"]]) == tuple(interval_of("waiting", mine))
+    assert tuple(row[["mean", "low", "high"]]) == tuple(interval_of("queue", mine))
     assert ("greedy", 0, "failures") not in rows.index  # nothing can fail there
-    table = compare(missions[missions["point"] == 1], "greedy", ["waiting"])
+    table = compare(missions[missions["point"] == 1], "greedy", ["queue"])
     assert table["n"].tolist() == [9]
 
 

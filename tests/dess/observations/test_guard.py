@@ -300,6 +300,8 @@ WIND = {"wind": {"strength": 0.8, "direction": 37, "gusts": 0.4, "seed": 1}}
         ("coast:900701", WIND, "greedy", 2),
         # Four UAVs insist on cells beside each other.
         ("archipelago:700023", {"uavs": 6, "pads": 6}, "greedy", 4),
+        # One of two UAVs takes the pad of the only zone that the other reaches.
+        ("large:700014", {"uavs": 2, "pads": 1}, "any", 1),
     ],
 )
 def test_a_uav_that_has_a_way_to_live_lives(
@@ -336,3 +338,14 @@ def test_a_parked_uav_keeps_its_cell_whoever_chooses_first() -> None:
     sea |= {"zones": [{"cells": [3, 4, 1, 1]}], "charge_start": 30, "charge_complete": 80}
     state, chart = placed(team, **sea)
     assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[:3] == (3, 4, 0)
+
+
+def test_a_uav_that_can_reach_two_zones_leaves_the_pad_to_one_that_can_reach_one() -> None:
+    """The batteries are equal, so the first UAV would choose first."""
+    team: list[dict[str, Any]] = [{"x": x, "y": 1, "battery": 15} for x in (12, 15)]
+    sea: dict[str, Any] = {"grid": 24, "rows": 3, "zone": [0, 0, 1, 3], "pads": 1}
+    sea |= {"zones": [{"cells": [22, 0, 2, 3], "pads": 1}]}
+    sea |= {"nodes": [[12, 0]], "charge_start": 20, "charge_complete": 80}
+    state, chart = placed(team, **sea)
+    zones = [compiled.parking_cell(state.missions[0], state.uavs[0], i, chart)[0] for i in (0, 1)]
+    assert zones == [0, 22]

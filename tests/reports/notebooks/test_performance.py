@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.stats.intervals import interval_of, post_stratified
 from tests.by_hand import Z, bounded
 from tests.reports.small import POLICIES, run_small_studies, said_by
 
@@ -46,8 +47,10 @@ def test_the_table_beside_the_paper_s(results: Path, text: str) -> None:
     for policy in POLICIES:
         cells = []
         for metric, printed in PRINTED.items():
-            values = missions.loc[missions["policy"] == policy, metric].to_numpy(float)
-            mean, low, high = by_hand(values, metric == "success")
+            of_policy = missions[missions["policy"] == policy]
+            values = of_policy[metric].to_numpy(float)
+            values = post_stratified(values, of_policy["uavs"].to_numpy())
+            mean, low, high = interval_of(metric, values)
             mark = "▲" if low > printed else "▼" if high < printed else "≈"
             gap = f"{100 * (mean - printed):+.1f}".replace("-", "−")
             cells.append(f"{in_percent(mean, low, high)} {gap} {mark}")
