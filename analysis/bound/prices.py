@@ -20,7 +20,7 @@ from analysis.bound.paths import blocks_of, bound_paths
 from analysis.bound.service import POINTS, rates_of, spread, step_values
 from analysis.bound.slopes import add_slopes
 from dess import rules
-from dess.channel import world_of
+from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.errors import InputError
 from dess.scenario import ScenarioSpace
@@ -146,7 +146,8 @@ def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
     rules.launch(state, 0, starts_of([scenario], seed), 0, replication)
     record = state.missions[0]
     starts = np.stack([state.uavs[0][axis][: sampled.uavs] for axis in "xy"], axis=1)
-    data = _data_by(record, state.residual[0], phases.slots)
+    residual = state.residual[0]
+    data = _data_by(record, residual, phases.slots, *empty_scratch(1, len(residual)))
     world = world_of(scenario)
     points = POINTS if scenario.shadowing_variance > 0 else np.zeros(1)
     below = spread(points) if scenario.shadowing_variance > 0 else np.array([0.0, 1.0])
@@ -158,7 +159,7 @@ def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
 
 
 @kernel
-def _data_by(mission, residual, slots):
+def _data_by(mission, residual, slots, batches, search):
     """(T + 1, K) the data that each node has had by the start of slot t = 0..T."""
     data = np.empty((slots + 1, len(residual)))
     arrivals = np.empty(len(residual), np.int64)
@@ -166,7 +167,7 @@ def _data_by(mission, residual, slots):
     for t in range(slots):
         data[t] = had
         mission.slot = t
-        rules.arrive(mission, had, arrivals)
+        rules.arrive(mission, had, arrivals, batches, search)
     data[slots] = had
     return data
 
