@@ -11,6 +11,8 @@ from scipy import stats
 from analysis import load_results, load_study, numbers, run_study
 from analysis.questions import decision_times, head_to_head, regions, summary
 from analysis.questions.missions import FOLDER
+from analysis.stats.intervals import by_replication
+from analysis.stats.paired import paired
 from dess import InputError
 from reports.pages.running import missions as missions_of_pages
 from tests.reports.small import said_by, shown_by
@@ -43,15 +45,16 @@ def with_studies_of(folder: Path, **changes: Any) -> Path:
 
 
 def test_the_difference_is_computed_anew_from_the_files(text: str, results: Path) -> None:
-    """Its mean with Student's interval, and the share of lost missions with Wilson's."""
+    """Its post-stratified mean with its interval, and the share of lost missions with Wilson's."""
     product = "collection_ratio_and_communication"
     missions = pd.read_parquet(results / NAME / "missions").astype({"policy": str})
     table = missions.pivot(index="replication", columns="policy", values=product)
-    baseline = table.drop(columns="ddqn").mean().idxmax()
+    values = by_replication(missions, product, "policy")
+    baseline = values.drop(columns="ddqn").mean().idxmax()
     assert f"The product of ddqn minus that of {baseline} is" in text
     assert f"on average over {len(table)} missions" in text
-    test = stats.ttest_rel(table["ddqn"], table[baseline])
-    points = [(table["ddqn"] - table[baseline]).mean(), *test.confidence_interval(0.95)]
+    pair = paired(values["ddqn"].to_numpy(), values[baseline].to_numpy(), metric=product)
+    points = [pair.difference, pair.low, pair.high]
     mean, low, high = (f"{100 * value:+.1f}".replace("-", "−") for value in points)
     assert f"{mean} [{low}, {high}]" in text
     lost = int((table["ddqn"] < table[baseline]).sum())
