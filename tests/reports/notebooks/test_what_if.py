@@ -9,13 +9,13 @@ import nbformat
 import pandas as pd
 import pytest
 from nbclient import NotebookClient
-from scipy import stats
 
 from analysis import load_results, numbers
 from analysis import what_if as ask
-from analysis.names import METRICS
+from analysis.names import METRICS, PRODUCT
 from analysis.questions.what_if import answer as what_if_answer
 from analysis.questions.what_if import question as what_if
+from analysis.stats.paired import paired
 from reports.pages.notebook import read
 from tests.analysis.small import write_scenario
 from tests.reports.small import said_by
@@ -49,16 +49,16 @@ def results(folder: Path, text: str) -> Any:
 
 
 def test_the_difference_is_computed_anew_from_the_files(text: str, results: Any) -> None:
-    """The mean paired difference of a policy, with Student's interval."""
+    """The mean paired difference of a policy, with its interval."""
     missions = pd.read_parquet(results.store.folder / "missions").astype({"policy": str})
     sides = {cell.key: cell.point for cell in results.store.manifest.cells[1]}  # of greedy
     greedy = missions[missions["policy"] == "greedy"]
     table = greedy.assign(point=greedy["cell"].map(sides)).pivot(
         index="replication", columns="point", values="collection_ratio_and_communication"
     )
-    change = table[1] - table[0]
-    ends = stats.ttest_1samp(change, 0).confidence_interval(0.95)
-    mean, low, high = (f"{100 * v:+.1f}".replace("-", "−") for v in (change.mean(), *ends))
+    pair = paired(table[1].to_numpy(), table[0].to_numpy(), metric=PRODUCT)
+    values = pair.difference, pair.low, pair.high
+    mean, low, high = (f"{100 * v:+.1f}".replace("-", "−") for v in values)
     assert f"by {mean} [{low}, {high}] points: from {100 * table[0].mean():.1f} %" in text
 
 
