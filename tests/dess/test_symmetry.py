@@ -132,6 +132,17 @@ def _turned(turn: Turn, team: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
     """How far away the cell is where UAV ``i`` may charge, and whether the choice was clear.
 
+    Where there are several zones and a UAV would run empty, another order is tried: not clear.
+    """
+    ways, clear, _lacking = _plan(sea, i)
+    several = sea.state.missions[0]["zones"] > 1
+    active = np.nonzero(sea.state.uavs[0]["active"])[0] if clear and several else ()
+    return ways, clear and not any(_plan(sea, j)[2] for j in active)
+
+
+def _plan(sea: Sea, i: int) -> tuple[list[int], bool, float]:
+    """As ``_homes`` in the plain order, and the battery that UAV ``i`` lacks.
+
     In plain Python: the UAVs choose one after the other, the lowest battery first, where they get a
     pad with the least battery. Parked teammates are islands, where the way around them is not
     longer than to wait for a charge.
@@ -188,7 +199,8 @@ def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
         options.sort()
         clear &= len(options) < 2 or options[0][:3] < options[1][:3]
         if place == own:
-            return [way for _, _, way, *_ in options[:1]], clear
+            lacking = options[0][0] if options else 0
+            return [way for _, _, way, *_ in options[:1]], clear, lacking
         if options:
             *_, zone, asked, cell = options[0]
             taken.add(cell)
