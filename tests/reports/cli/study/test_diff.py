@@ -44,7 +44,7 @@ def test_the_missions_that_differ_are_named_with_their_commands(dess, dess_json,
     code, out, err = dess("study", "diff", "a", "b")
     assert (code, err) == (0, "")
     assert out.startswith("2 of 20 missions differ\n")
-    assert re.search(r"random +2 of 10 +0.0 \[.*\] . +\+1.2 \[−[\d.]+, \+[\d.]+\]", out)
+    assert re.search(r"random +2 of 10 +0.0 \[.*\] . +\+1.2 \[−22.5, \+24.8\]", out)
     assert " 1 more without any difference\n" in out
     assert " A, a: made by the code, weights and libraries that are here\n" in out
     data = dess_json("study", "diff", "a", "b")
