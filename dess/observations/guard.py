@@ -118,7 +118,7 @@ def path_length(mission, uavs, i, chart, x, y, to_x, to_y):
             parked += before + distance(chart, o.x, o.y, to_x, to_y) == length
     if parked == 0:
         return length
-    if parked == 1 and chart.ways.size == 0:
+    if parked == 1 and chart.ways is None:
         # without no-fly cells, a way that does not follow a line has others of the same length
         return length + 2 if x == to_x or y == to_y else length
     return _length_around(mission, uavs, i, chart, x, y, to_x, to_y)

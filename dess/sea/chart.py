@@ -29,13 +29,13 @@ class Chart(NamedTuple):
         parking: (C, 2) the cells of the zones, zone by zone and row by row.
         nearest: (H, W) the number of the parking cell that is nearest to a cell.
         ways: (W * H, W * H) cells on the shortest way between two cells, numbered row by row, or
-            ``FAR``; (0, 0) where there are no no-fly cells.
+            ``FAR``; None without no-fly cells, so that the compiler leaves out the table.
     """
 
     zones: np.ndarray
     parking: np.ndarray
     nearest: np.ndarray
-    ways: np.ndarray
+    ways: np.ndarray | None
 
 
 def zones_of(
@@ -67,7 +67,7 @@ def chart_at(
     cells = zones_of(width, height, zones, no_fly)
     parking = np.array(parking_of(zones), np.int64)
     nearest = spread(cells, parking)[1].reshape(cells.shape)
-    ways = np.zeros((0, 0), np.int16)
+    ways = None
     if no_fly:
         ways = np.empty((cells.size, cells.size), np.int16)
         for number, (y, x) in enumerate(np.ndindex(cells.shape)):
@@ -175,10 +175,14 @@ def in_zone(chart, x, y):
 @inlined
 def distance(chart, x, y, to_x, to_y):
     """The cells on the shortest way between two cells of the grid."""
-    if chart.ways.size == 0:
+    return _distance(chart.ways, chart.zones.shape[1], x, y, to_x, to_y)
+
+
+@inlined
+def _distance(ways, width, x, y, to_x, to_y):
+    if ways is None:
         return abs(x - to_x) + abs(y - to_y)
-    width = chart.zones.shape[1]
-    return np.int64(chart.ways[to_y * width + to_x, y * width + x])
+    return np.int64(ways[to_y * width + to_x, y * width + x])
 
 
 @inlined

@@ -22,7 +22,7 @@ def test_ways_lead_around_no_fly_cells_and_home_to_the_nearest_zone(space: Scena
         if min(lengths) < FAR:
             assert chart.nearest[y, x] == np.argmin(lengths)
     again = ScenarioSpace.of(space, **geometry(chart)).chart
-    assert all((one == other).all() for one, other in zip(again, chart, strict=True))
+    assert all(map(np.array_equal, again, chart))
 
 
 def test_a_zone_may_have_more_cells_than_a_short_integer_counts() -> None:
