@@ -207,14 +207,13 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
         to wait there for a pad, and the slots that it lacks; the UAV's own cell if all are taken.
     """
     u, taken = uavs[i], memory.taken
-    own_request = _until_asked(mission, u, distance_home(chart, u.x, u.y))
     taken[:] = False
     memory.free[:] = 0
     for j in range(mission.uavs):
         o = uavs[j]
         if o.active and o.zone >= 0:
             taken[chart.nearest[o.y, o.x]] = True
-            if j != i and o.pad_request >= 0:
+            if j != i and o.pad_request >= 0 and _plans_wait(mission, o.zone):
                 _take_pad(mission, o, o.zone, 0, memory.free)
     last_battery, last, chooser = -1, -1, first
     while True:
@@ -248,8 +247,10 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
             wait = waiting_time(mission, u, zone, slots, memory.free)
             return x, y, slots, min(wait, mission.charge_start - 1), lacks
         taken[cell] = True
-        if flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o):
+        needed = slots_needed(mission, o)
+        if _plans_wait(mission, zone) and flies(o) and o.battery < mission.flight_cost * needed:
             # It may stay away for some time and come just before this UAV.
+            own_request = _until_asked(mission, u, distance_home(chart, u.x, u.y))
             latest = min(own_request, o.battery // max(mission.flight_cost, 1) - 1)
             asked = max(_until_asked(mission, o, slots), latest)
             _take_pad(mission, o, zone, asked, memory.free)
@@ -298,6 +299,13 @@ def _is_given_up(mission, zone):
 
 
 @inlined
+def _plans_wait(mission, zone):
+    """Whether the guard allows for the wait for a pad of a zone."""
+    few = mission.plans_waits and mission.uavs > mission.zone_pads[zone]
+    return few or mission.pad_rate > 0.0
+
+
+@inlined
 def waiting_time(mission, u, zone, cells, free):
     """The slots for which a UAV must expect to wait for a pad of a zone so many cells away.
 
@@ -310,8 +318,7 @@ def waiting_time(mission, u, zone, cells, free):
         cells: Cells on the way to it.
         free: As in ``Parking``.
     """
-    few = mission.plans_waits and mission.uavs > mission.zone_pads[zone]
-    if u.pad_request >= 0 or not (mission.pad_rate > 0.0 or few):
+    if u.pad_request >= 0 or not _plans_wait(mission, zone):
         return 0
     pad = _first_pad(mission, zone, free)
     until = free[zone, pad] if pad >= 0 else mission.max_slots
