@@ -140,20 +140,23 @@ def _decide(
 ):  # fmt: skip
     actions = np.empty(len(rows_mission), np.int64)
     memory = guard.parking_memory(chart, uavs.shape[1])
+    last, left = -1, 0.0
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
+        if b != last:
+            last, left = b, data_left(missions[b], residual[b])
         actions[row] = _action(
-            kind, missions[b], uavs[b], i, residual[b], sensors[b], nodes, circuit, chart, reach,
-            memory,
+            kind, missions[b], uavs[b], i, residual[b], left, sensors[b], nodes, circuit, chart,
+            reach, memory,
         )  # fmt: skip
     return actions
 
 
 @inlined
-def _action(kind, mission, team, i, data, sensors, nodes, circuit, chart, reach, memory):
-    """The action of UAV ``i``; ``memory`` is that of its parking cell."""
+def _action(kind, mission, team, i, data, left, sensors, nodes, circuit, chart, reach, memory):
+    """The action of UAV ``i``; ``left`` are all data, ``memory`` is that of its parking cell."""
     u = team[i]
-    charge = guard.must_charge(mission, u, data_left(mission, data))
+    charge = guard.must_charge(mission, u, left)
     home_x, home_y, wait = u.x, u.y, 0
     if charge:
         home_x, home_y, _, wait = guard.parking_cell(mission, team, i, chart, memory, reach)
@@ -213,6 +216,8 @@ def _goal(
             score = _staleness(mission, data, sensors, nodes, chart, k, slots)
         else:
             score = 1.0 / (1.0 + _circuit_position(mission, i, circuit[k]))
+        if score <= best:  # the weights below are at most 1
+            continue
         if kind in (_GREEDY, _AGE) and _teammate_is_nearer(mission, team, i, chart, x, y, slots):
             score *= _SHARED
         if kind != _AGE and data[k] < worth:
