@@ -161,7 +161,7 @@ def parking_memory(chart, uavs):
     return Parking(np.empty(len(chart.parking), np.bool_), np.empty((MOST_ZONES, uavs), np.int64))
 
 
-@kernel
+@inlined
 def parking_cell(mission, uavs, i, chart, memory, reach):
     """The x and y of the zone cell where UAV ``i`` will charge, the way there and the wait.
 
@@ -185,7 +185,7 @@ def parking_cell(mission, uavs, i, chart, memory, reach):
     return x, y, slots, wait
 
 
-@kernel
+@inlined
 def _plan(mission, uavs, i, first, chart, memory, reach):
     """The zone cell where UAV ``i`` will charge: of those that no teammate takes, the soonest.
 
@@ -208,7 +208,7 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
     """
     u, taken = uavs[i], memory.taken
     taken[:] = False
-    memory.free[:] = 0
+    memory.free[: mission.zones] = 0
     for j in range(mission.uavs):
         o = uavs[j]
         if o.active and o.zone >= 0:
@@ -247,8 +247,9 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
             wait = waiting_time(mission, u, zone, slots, memory.free)
             return x, y, slots, min(wait, mission.charge_start - 1), lacks
         taken[cell] = True
-        needed = slots_needed(mission, o)
-        if _plans_wait(mission, zone) and flies(o) and o.battery < mission.flight_cost * needed:
+        if not _plans_wait(mission, zone):
+            continue
+        if flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o):
             # It may stay away for some time and come just before this UAV.
             own_request = _until_asked(mission, u, distance_home(chart, u.x, u.y))
             latest = min(own_request, o.battery // max(mission.flight_cost, 1) - 1)
