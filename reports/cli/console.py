@@ -86,7 +86,13 @@ def _give_up(stream: TextIO) -> None:
 
 
 def _line(message: str) -> str:
-    return cut(printable(" ".join(message.split())), MESSAGE)
+    """The message in one line; one that is too long still says what is allowed."""
+    line = printable(" ".join(message.split()))
+    what, allowed, values = line.rpartition("; allowed: ")
+    if not allowed or len(line) <= MESSAGE:
+        return cut(line, MESSAGE)
+    end = allowed + cut(values, MESSAGE // 2)
+    return cut(what, MESSAGE - len(end)) + end
 
 
 def say(text: object, stream: TextIO | None = None) -> None:
