@@ -64,8 +64,9 @@ def refused(error: OSError | SystemExit) -> int:
         return 1
     place = error.filename or " and ".join(broken)
     reason = error.strerror or str(error)
-    code = 2 if error.errno == errno.ENAMETOOLONG else 1  # such a name is bad input
-    return fail(f"dess: error: {place}: {reason}" if place else f"dess: error: {reason}", code)
+    line = f"dess: error: {place}: {reason}" if place else f"dess: error: {reason}"
+    is_long = error.errno == errno.ENAMETOOLONG  # such a name is bad input
+    return fail(f"{line}; allowed: another path" if is_long else line, 2 if is_long else 1)
 
 
 def fail(message: str, code: int) -> int:

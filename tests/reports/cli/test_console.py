@@ -71,7 +71,7 @@ def test_a_long_error_says_what_is_allowed(values, capsys):
     console.fail(f"config.json: phases: {'x' * 290} is wrong; allowed: {values}", 2)
     line = capsys.readouterr().err
     assert len(line) <= console.MESSAGE + 1
-    assert line.startswith("config.json: phases: x") and f"; allowed: {values[:10]}"[:14] in line
+    assert line.startswith("config.json: phases: x") and "; allowed: a" in line
 
 
 def test_a_long_error_keeps_its_beginning_and_its_end(capsys):
