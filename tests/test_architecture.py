@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from importlib import import_module
 from pathlib import Path
@@ -173,22 +174,28 @@ def users_of_name(module: str, name: str) -> set[str]:
     return {user for user in LIBRARY if user != module and _takes(LIBRARY[user], module, name)}
 
 
+@cache
+def imports_and_attributes(tree: ast.Module) -> tuple[list[ast.Import | ast.ImportFrom], set[str]]:
+    """The imports in a source, and the attributes that it takes, in its words."""
+    nodes = [*ast.walk(tree)]
+    attributes = {ast.unparse(node) for node in nodes if isinstance(node, ast.Attribute)}
+    return [n for n in nodes if isinstance(n, ast.Import | ast.ImportFrom)], attributes
+
+
 def _takes(tree: ast.Module, module: str, name: str) -> bool:
     """Whether a source imports a name of a module, or takes it as an attribute of the module."""
+    imports, attributes = imports_and_attributes(tree)
     of_module = {module}
-    for node in ast.walk(tree):
+    for node in imports:
         if isinstance(node, ast.ImportFrom):
             imported = {f"{node.module}.{alias.name}": alias for alias in node.names}
             if {f"{module}.{name}", f"{module}.*"} & imported.keys():
                 return True
-        elif isinstance(node, ast.Import):
-            imported = {alias.name: alias for alias in node.names if alias.asname}
         else:
-            continue
+            imported = {alias.name: alias for alias in node.names if alias.asname}
         if module in imported:
             of_module.add(imported[module].asname or imported[module].name)
-    taken = (node for node in ast.walk(tree) if isinstance(node, ast.Attribute))
-    return any(node.attr == name and ast.unparse(node.value) in of_module for node in taken)
+    return any(f"{of}.{name}" in attributes for of in of_module)
 
 
 @pytest.mark.parametrize("door", MAY_RUN_FILES)

@@ -56,8 +56,8 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
 
 # The caption of ``trainings``.
 TRAININGS = (
-    "A line is the exponential moving average of a training (weight of the newest evaluation "
-    f"{ALPHA:g}); dotted: phase I."
+    "A line is the exponential moving average of a training, n = 1 (weight of the newest "
+    f"evaluation {ALPHA:g}); dotted: phase I."
 )
 
 

@@ -154,7 +154,13 @@ def leading_policies(
         results: The study.
         learned: The learned policy to take instead of the best one.
         heuristic: The heuristic to take instead of the best one.
+
+    Raises:
+        InputError: If the study lacks a policy that is named.
     """
+    for name in (learned, heuristic):
+        if name is not None:
+            results.check_policy(name)
     trained = {policy for names in summary.learners(results).values() for policy in names}
     ranked = summary.ranked_policies(results.missions)
     learned = learned or next((policy for policy in ranked if policy in trained), None)

@@ -16,7 +16,7 @@ from analysis.questions import settings
 from analysis.results.event_log import duration
 from analysis.results.tables import Results
 from analysis.stats.differences import column_tests
-from analysis.stats.intervals import by_replication
+from analysis.stats.intervals import by_replication, check_share
 from analysis.stats.paired import relative_change
 from dess.errors import InputError
 
@@ -106,8 +106,9 @@ def enough_pads(results: Results, margin: float) -> pd.DataFrame:
         ``too_few`` (the most that are too few, 0 if none is), and ``open``, those in between.
 
     Raises:
-        InputError: If the study does not vary these fields.
+        InputError: If the study does not vary these fields, or the margin is no share.
     """
+    check_share("margin", margin)
     pads = settings.varied(results).get("pads", [0])
     lost = changes(results, "pads", max(pads), PRODUCT)
     rows = []

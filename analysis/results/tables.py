@@ -75,9 +75,9 @@ class Results:
             InputError: If it has not been stored.
         """
         cell = self.cell(policy, point)
-        log = self.store.load_log(cell, replication)
+        logged = self.store.manifest.study["logged"]
+        log = self.store.load_log(cell, replication) if replication in range(logged) else None
         if log is None:
-            logged = self.store.manifest.study["logged"]
             raise InputError(
                 f"{self.store.folder}: no event log of {policy}, point {point}, replication "
                 f"{replication}; allowed: 0..logged - 1, logged = {logged}"

@@ -283,8 +283,8 @@ def check_columns(missions: pd.DataFrame, needed: Sequence[str]) -> None:
 
 def check_share(name: str, share: float) -> None:
     """Raise ``InputError`` unless a share, such as a confidence level, is between 0 and 1."""
-    if not 0 < share < 1:
-        raise InputError(f"{name}: {share}; allowed: between 0 and 1")
+    if not (isinstance(share, int | float) and 0 < share < 1):
+        raise InputError(f"{name}: {share!r}; allowed: between 0 and 1")
 
 
 def groups(missions: pd.DataFrame, by: Sequence[str]) -> Iterator[tuple[tuple, pd.DataFrame]]:

@@ -25,6 +25,8 @@ from analysis.verification.queues import suite as queues
 from dess import InputError
 from dess.scenario import ScenarioSpace
 
+_LARGEST_BLOCK = 1_000_000  # missions
+
 
 @dataclass(frozen=True)
 class Suite:
@@ -119,7 +121,12 @@ class Suite:
 
         Args:
             block: Number of missions in a block, for the checks of coverage.
+
+        Raises:
+            InputError: If the block has no such number.
         """
+        if block not in range(2, _LARGEST_BLOCK + 1):
+            raise InputError(f"block: {block!r}; allowed: 2..{_LARGEST_BLOCK:,}")
         space, seed, logs = self.space, self.study.store.manifest.seed, self.logs
         initial = np.array([log.initial for log in self.realisations])
         start_cells = np.array([log.first_cell for log in self.realisations])

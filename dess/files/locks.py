@@ -36,15 +36,16 @@ def locked(path: Path, busy: str, patience: float = 0.0) -> Iterator[None]:
     check_lock(path)
     make_folder(path.parent)
     lock = FileLock(path)
-    with writable(path):
-        try:
-            lock.acquire(timeout=patience)
-        except Timeout:
-            raise InputError(f"{path.parent}: {busy}") from None
     try:
+        with writable(path):
+            try:
+                lock.acquire(timeout=patience)
+            except Timeout:
+                raise InputError(f"{path.parent}: {busy}") from None
         yield
     finally:
-        _unlink(path)
+        if lock.is_locked:
+            _unlink(path)
         lock.release()
 
 

@@ -92,12 +92,11 @@ def _temporary(path: Path) -> Iterator[Path]:
         _check_place(path)
         temporary = path.with_name(f".dess-{os.getpid()}-{secrets.token_hex(4)}.tmp")
         _sweep(path.parent.absolute())
-        temporary.touch(exist_ok=False)
-    try:
-        with writable(path):
+        try:
+            temporary.touch(exist_ok=False)  # an interrupt may come as soon as the file is there
             yield temporary
-    finally:
-        temporary.unlink(missing_ok=True)
+        finally:
+            temporary.unlink(missing_ok=True)
 
 
 def check_target(path: Path) -> None:

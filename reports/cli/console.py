@@ -64,8 +64,9 @@ def refused(error: OSError | SystemExit) -> int:
         return 1
     place = error.filename or " and ".join(broken)
     reason = error.strerror or str(error)
-    code = 2 if error.errno == errno.ENAMETOOLONG else 1  # such a name is bad input
-    return fail(f"dess: error: {place}: {reason}" if place else f"dess: error: {reason}", code)
+    line = f"dess: error: {place}: {reason}" if place else f"dess: error: {reason}"
+    is_long = error.errno == errno.ENAMETOOLONG  # such a name is bad input
+    return fail(f"{line}; allowed: another path" if is_long else line, 2 if is_long else 1)
 
 
 def fail(message: str, code: int) -> int:
@@ -86,7 +87,13 @@ def _give_up(stream: TextIO) -> None:
 
 
 def _line(message: str) -> str:
-    return cut(printable(" ".join(message.split())), MESSAGE)
+    """The message in one line; one that is too long still says what is allowed."""
+    line = printable(" ".join(message.split()))
+    what, allowed, values = line.rpartition("; allowed: ")
+    if not allowed or len(line) <= MESSAGE:
+        return cut(line, MESSAGE)
+    end = allowed + cut(values, MESSAGE // 2)
+    return cut(what, MESSAGE - len(end)) + end
 
 
 def say(text: object, stream: TextIO | None = None) -> None:

@@ -33,7 +33,7 @@ from policies.registry import TRAINED
 from reports.pages import html
 
 # %%
-folder = Path(trained or TRAINED)
+folder = Path(str(trained or TRAINED))
 trainings = read_curves(folder / "curves.parquet")
 last, final = ablation.finals(trainings), f"final_{PRODUCT}"
 baseline, pairs = ablation.BASELINE, learning.pairs_in(trainings)

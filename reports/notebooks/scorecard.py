@@ -35,7 +35,7 @@ from reports.pages import html
 from reports.pages import scorecard as page
 
 # %%
-folder = Path(trained or str(files("policies") / "trained"))
+folder = Path(str(trained or files("policies") / "trained"))
 smaller = paths_in(Path(results), f"*{scorecard.SMALLER}/{MANIFEST}")
 names = ("table4", "fig4", "fig5", "sweet-spot", *(path.parent.name for path in smaller))
 studies = {name: load_results(Path(results) / name) for name in names}

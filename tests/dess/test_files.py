@@ -116,6 +116,27 @@ def test_after_an_error_the_old_content_stays(tmp_path, error):
     assert files_of(tmp_path) == {"file": b"old"}
 
 
+@pytest.mark.parametrize(
+    ("of", "name", "use"),
+    [
+        (Path, "touch", lambda path: write_file(path, "new")),
+        (FileLock, "acquire", lambda path: locked(path, "in use").__enter__()),
+    ],
+)
+def test_an_interrupt_as_soon_as_a_file_is_there_leaves_none(of, name, use, tmp_path, monkeypatch):
+    done = getattr(of, name)
+
+    def interrupted(*arguments, **options):
+        done(*arguments, **options)
+        assert [*tmp_path.iterdir()]
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(of, name, interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        use(tmp_path / "file")
+    assert not [*tmp_path.iterdir()]
+
+
 def test_files_of_one_command_come_together(tmp_path, monkeypatch):
     paths = [tmp_path / "old", tmp_path / "new", tmp_path / "other"]
     paths[0].write_text("before")

@@ -6,7 +6,7 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from hypothesis import assume, event, given
+from hypothesis import assume, event, given, settings
 from hypothesis import strategies as st
 
 import policies
@@ -294,6 +294,7 @@ def _decisions(sea: Sea, name: str) -> list[tuple[int, int, int, int]]:
     return found
 
 
+@settings(max_examples=settings().max_examples // 3)  # an example is all turns of a sea
 @given(_cases(), st.sampled_from([*HEURISTICS]))
 def test_heuristics_decide_the_same_on_a_sea_mirrored_turned_or_with_other_numbers_of_nodes(
     case: tuple, name: str

@@ -36,7 +36,7 @@ from reports.pages import html
 # %%
 study = load_results(Path(results) / "gap")
 times = decision_times.read(results, study)
-planners = [name for name in (planner, longer) if name in study.policies]
+planners = [planner, *(name for name in [longer] if name in study.policies)]
 differences = questions.differences(study, planners, learner)
 pair = head_to_head.pair_of(study, planner, learner)
 missions = head_to_head.duels(study, pair)

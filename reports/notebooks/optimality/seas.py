@@ -17,7 +17,7 @@
 results = "../../results"  # folder that holds the results folder seas
 policy = "any"  # the learned policy for any sea
 reference = "planner"  # a slow policy that is hard to beat
-baseline = "greedy"  # a fast policy without learning
+heuristic = "greedy"  # a fast policy without learning
 
 # %%
 from pathlib import Path
@@ -33,12 +33,14 @@ from reports.pages import html
 
 # %%
 study = load_results(Path(results) / "seas")
+for name in (policy, reference, heuristic):
+    study.check_policy(name)
 times = decision_times.read(results, study)
 shares = {by: seas.shares(study, reference, by) for by in seas.GROUPS}
-gains = {by: seas.gains(study, baseline, by) for by in seas.GROUPS}
+gains = {by: seas.gains(study, heuristic, by) for by in seas.GROUPS}
 
 # %%
-html.answer(seas.answer(study, times, policy, reference, baseline))
+html.answer(seas.answer(study, times, policy, reference, heuristic))
 
 # %%
 points = seas.front(study, times)
@@ -108,7 +110,7 @@ html.table(
 differences = gains["family"].assign(mean=gains["family"]["difference"])
 html.table(
     tables.estimates(differences, ["family"], "policy", tables.numbers.points),
-    f"Points of the product more than {baseline}, paired, with 95 % intervals",
+    f"Points of the product more than {heuristic}, paired, with 95 % intervals",
     data=differences,
 )
 

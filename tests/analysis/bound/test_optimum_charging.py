@@ -1,6 +1,6 @@
 """The bound against the exact optimum of missions with charges, which end by quota or are cut."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import product
 
 import numpy as np
@@ -62,6 +62,11 @@ FULL_TRIPS = [
 ]
 
 
+def some_slow(names: Iterable[str], *slow: str) -> list:
+    """Names for parameters, some of which are left to the longer proofs."""
+    return [pytest.param(n, marks=pytest.mark.slow) if n in slow else n for n in names]
+
+
 def shadings(space: dict) -> Iterator[tuple[ScenarioSpace, int]]:
     """Without and with shadowing; the values that it has."""
     for variance, count in ((0.0, 1), (9.0, 2)):
@@ -77,7 +82,7 @@ def test_both_ways_to_the_optimum_agree_where_uavs_charge(name: str) -> None:
         assert TinySea(space, 2, contraction(1)).optimum == pytest.approx(optimum(space, 2), 1e-12)
 
 
-@pytest.mark.parametrize("sea", SEAS)
+@pytest.mark.parametrize("sea", some_slow(SEAS, "two nodes beside the zone"))
 def test_the_bound_is_above_the_optimum_where_uavs_charge(sea: str) -> None:
     gaps = {}
     for name, seed in product(CASES, (4, 5)):
@@ -91,7 +96,11 @@ def test_the_bound_is_above_the_optimum_where_uavs_charge(sea: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["no battery decrease", "no flight before the charge", "up to the next percent"]
+    "name",
+    some_slow(
+        ("no flight before the charge", "no battery decrease", "up to the next percent"),
+        *("no battery decrease", "up to the next percent"),
+    ),
 )
 def test_the_bound_is_above_the_optimum_whenever_the_mission_is_cut(name: str) -> None:
     values, ends = BATTERIES[name]

@@ -58,7 +58,7 @@ def check(space: ScenarioSpace, seed: int, deviates: int) -> float:
 
 
 @pytest.mark.parametrize(
-    "seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))]
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))]
 )
 def test_the_bound_is_above_the_optimum_on_drawn_seas(seed: int) -> None:
     seas = islice(drawn_seas(seed), 12)
@@ -72,7 +72,7 @@ def test_the_bound_is_above_the_optimum_where_a_uav_may_charge_under_way() -> No
     trip = battery(11, 10, 11, 1, quota=12, max_slots=20)
     plenty = {"initial_data": 300.0, "shadowing_variance": 0.0}
     small = (sea for sea in drawn_seas(7) if sea["zones"] and sea["grid"] * sea["rows"] == 6)
-    for sea in islice(small, 8):
+    for sea in islice(small, 3):
         check(shadowed(**sea | trip | plenty), 3, 1)
 
 

@@ -69,7 +69,7 @@ def test_workers_need_the_memory_that_is_available(monkeypatch):
         check_workers_memory("an evaluation", 4, [wide], 0.0, are_processes=False)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.fixed_dictionaries({}, optional={n: st.sampled_from(v) for n, v in EXTREME.items()}))
 def test_every_mission_ends_or_is_refused(fields):
     """A mission that takes too much is refused by the scenario or by the estimate."""

@@ -188,7 +188,7 @@ def test_an_answer_says_what_is_guaranteed_names_all_that_is_paid_and_its_ends(t
     assert "1 pad and 3 pads in zone 2" in "".join(costs.priced(found)["fleet"])
 
 
-@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("first", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_the_answer_is_the_cheapest_fleet_of_any_policy(first, tmp_path):
     """The other policy meets the requirement, but with a dearer fleet."""
     policies, values = ["greedy", "nearest"], {"uavs": [1, 3], "pads": [1], "quota": [30]}

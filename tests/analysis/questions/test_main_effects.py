@@ -95,8 +95,10 @@ def test_shapes(steps, words, peaks):
 def test_the_best_policies_are_shown_unless_others_are_asked_for(results):
     means = results.missions.groupby("policy")[PRODUCT].mean()
     assert main_effects.leading_policies(results) == [means.idxmax()]
-    named = main_effects.leading_policies(results, "learned", means.idxmin())
-    assert named == ["learned", means.idxmin()]
+    named = main_effects.leading_policies(results, means.idxmax(), means.idxmin())
+    assert named == [means.idxmax(), means.idxmin()]
+    with pytest.raises(InputError, match="policy: 'learned' is not in the study"):
+        main_effects.leading_policies(results, "learned", means.idxmin())
 
 
 def test_changes_are_paired_by_replication(results, table):

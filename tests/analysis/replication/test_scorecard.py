@@ -123,7 +123,7 @@ def test_every_claim_is_judged_by_the_learned_policy_alone(rows: list[Row]) -> N
         assert [null.policy for null in nulls] == ([""] * 3 if row.section is FIG_3 else [*NULLS])
 
 
-@pytest.mark.parametrize("null", NULLS[:2])
+@pytest.mark.parametrize("null", [NULLS[0], pytest.param(NULLS[1], marks=pytest.mark.slow)])
 def test_in_the_place_of_the_learned_policy_a_null_passes_no_diagnostic_claim(
     null: str, studies: dict[str, Results]
 ) -> None:

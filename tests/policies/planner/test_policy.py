@@ -42,7 +42,7 @@ def _same(one: Any, records: Any, job: int) -> None:
     st.lists(replications, min_size=1, max_size=4),
     st.integers(1, 4),
 )
-@settings(max_examples=25)
+@settings(max_examples=12)
 def test_the_planner_does_the_same_in_any_engine_and_batch(
     space: ScenarioSpace, team: list[Any], seed: int, numbers: list[int], batch_size: int
 ) -> None:

@@ -51,6 +51,7 @@ BAD = {
     "report what-if --parameter speed": ["--parameter: 'speed' is not KEY=VALUE"],
     "report what-if --parameter results='x'": ["parameter: 'results' is unknown"],
     "verify nope": ["nope: no such file"],
+    f"verify {'x' * 300}": ["File name too long; allowed: another path"],
     "verify small.toml": ["small.toml: is not a page of dess"],
     "verify .": [".: contains no results and is not a page"],
 }

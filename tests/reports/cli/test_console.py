@@ -66,6 +66,14 @@ def test_a_warning_is_a_line_of_printable_characters(monkeypatch, capsys):
     assert "uses other settings" in err
 
 
+@pytest.mark.parametrize("values", ["a list of " + "names, " * 30, "a, b"])
+def test_a_long_error_says_what_is_allowed(values, capsys):
+    console.fail(f"config.json: phases: {'x' * 290} is wrong; allowed: {values}", 2)
+    line = capsys.readouterr().err
+    assert len(line) <= console.MESSAGE + 1
+    assert line.startswith("config.json: phases: x") and "; allowed: a" in line
+
+
 def test_a_long_error_keeps_its_beginning_and_its_end(capsys):
     assert console.fail(f"dess: error: {'x' * 10**6}; allowed: less", 2) == 2
     (line,) = capsys.readouterr().err.splitlines()

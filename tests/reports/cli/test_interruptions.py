@@ -21,7 +21,7 @@ from tests.policies.ddqn.tiny import PHASES, write_config
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends signals")
 
 SIGNALS = [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP]
-KILLS = 30  # by each signal
+KILLS = 12  # by each signal
 
 
 def seeded(*words):
@@ -83,7 +83,7 @@ def test_studies_that_are_killed_equal_an_undisturbed_one(number, workers, tmp_p
 def test_studies_that_are_killed_in_their_bounds_equal_an_undisturbed_one(
     number, workers, tmp_path
 ):
-    check_studies(tmp_path, workers, number, KILLS // 6, 60, bounds)
+    check_studies(tmp_path, workers, number, KILLS // 4, 60, bounds)
 
 
 # --- trainings ---

@@ -163,10 +163,12 @@ def test_a_large_training_has_to_be_confirmed(dess, monkeypatch):
     assert dess("train", "tiny.toml", "--out", "out", "--yes")[0] == 0
 
 
-KINDS = {"double DQN": (), "any sea": (), "any sea, begun with a policy": ("--from", "begun")}
+BEGUN = "any sea, begun with a policy"
+KINDS = {"double DQN": (), "any sea": (), BEGUN: ("--from", "begun")}
+MARKED = [pytest.param(k, marks=pytest.mark.slow) if k == BEGUN else k for k in KINDS]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", MARKED)
 def test_ctrl_c_in_a_long_tick_keeps_all_ticks_before_it(kind, dess, tmp_path, monkeypatch):
     settings = TINY | SHORT if kind == "double DQN" else ON_SEAS
     (tmp_path / "tiny.toml").write_text(tomli_w.dumps(settings), "utf-8")

@@ -75,6 +75,7 @@ def test_the_page_says_what_the_missions_say(text: str, results: Any) -> None:
     assert what_if.command(results) in text
 
 
+@pytest.mark.slow  # test_render.py runs a smaller notebook in Jupyter
 def test_the_notebook_asks_what_its_edited_cell_says(tmp_path: Path) -> None:
     """In Jupyter, from top to bottom."""
     values = {"scenario": str(write_scenario(tmp_path)), **ASKED}

@@ -16,13 +16,14 @@ from playwright.sync_api import expect
 import reports
 from analysis import load_results
 from analysis.questions.missions import FOLDER
+from dess import InputError
 from reports.pages.html import STUDY, embedded
 from reports.pages.notebook import NAMES, read
 from reports.pages.render import body_of, render
 from reports.player import library
 from tests.reports.browser import Visit
 from tests.reports.pages.test_render import another_environment
-from tests.reports.small import EMBEDDED, Links, run_small_studies, words_of
+from tests.reports.small import EMBEDDED, Links, run_small_studies, said_by, words_of
 
 pytestmark = pytest.mark.slow
 
@@ -33,6 +34,7 @@ A4 = 688
 BEYOND = """[...document.querySelectorAll("main *")].filter(
     e => e.checkVisibility() && e.getBoundingClientRect().right > {} + 1
 ).map(e => e.outerHTML.slice(0, 80))"""
+GALLERY = r'<div class="gallery">(.*?)</div>(?:<p class="note">(.*?)</p>)?'
 # The drawings of every page of the small results.
 FIGURES = {
     "mission": 4,
@@ -119,6 +121,10 @@ def test_every_figure_has_a_caption_with_its_number(pages: dict[str, str]) -> No
         html = pages[f"{name}.html"]
         captions = re.findall(r"<figcaption>(.*?)</figcaption>", html, re.S)
         assert len(captions) == len(re.findall("<figure", html))
+        # What holds for all figures of a gallery is said once, in its note.
+        for drawn, note in re.findall(GALLERY, html, re.S):
+            html = html.replace(drawn, drawn.replace("</figcaption>", f" {note}</figcaption>"))
+        captions = re.findall(r"<figcaption>(.*?)</figcaption>", html, re.S)
         assert all(re.search(r"\bn\b", caption) for caption in captions), name
 
 
@@ -138,6 +144,18 @@ def test_every_page_carries_the_evidence_of_its_studies(
                 assert evidence[field] == manifest.data[field]
             assert evidence["policies"] == manifest.data["policies"]
             assert manifest.key in words_of(pages[f"{name}.html"])
+
+
+@pytest.mark.brief
+@pytest.mark.parametrize("odd", ["none", {"uavs": 1}])
+@pytest.mark.usefixtures("pages")  # missions that the pages read are beside the results
+def test_a_page_refuses_parameters_of_another_kind(odd: object, results: Path) -> None:
+    """Such as a policy that the study lacks, or a table in place of a number."""
+    without_missions = (name for name in NAMES if "missions" not in read(name).parameters)
+    for name in without_missions:
+        for parameter in read(name).parameters.keys() - {"results", "longer"}:
+            with pytest.raises(InputError):
+                said_by(name, results=str(results), **{parameter: odd})
 
 
 def test_all_pages_are_the_same_bytes_elsewhere(
