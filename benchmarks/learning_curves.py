@@ -66,7 +66,6 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "1-step returns": {"n_step": 1},
     "discount 0.99": {"discount": 0.99},
     "64 environments": {"num_envs": 64, "replay": 8000},
-    "nodes": {"observation": "nodes", "hidden": (64, 256, 256)},
     "maps": {"observation": "maps"},
 }
 

@@ -51,7 +51,7 @@ class Adapter:
             name: The name under which results are stored.
             act: Chooses the (R,) actions for the observations of R UAVs, with R rows, and their
                 masks (R, 5) of booleans, for any R. The same row must always give the same action.
-            observation: ``vector``, ``nodes``, ``maps`` or ``state``, as in the training.
+            observation: ``vector``, ``maps`` or ``state``, as in the training.
             guarded: Whether the masks leave out what the return guard does not allow.
             weights: The file with the weights of ``act``, so that a study notices if they change.
 

@@ -74,7 +74,7 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
             scenario: The scenario, or the space from which each episode draws its parameters.
             seed: Seed of the episodes, until ``reset`` is called with another seed.
             render_mode: None, ``"rgb_array"``, or ``"human"`` for a window (needs matplotlib).
-            observation: ``vector``, ``nodes`` or ``maps``, the observations of the shipped learner,
+            observation: ``vector`` or ``maps``, the observations of the shipped learner,
                 or ``state``, the components of ``dess.observations.components.component_names``.
             mask: Where the mask of the allowed actions is: in the ``observation``, a dictionary of
                 ``observation`` and ``action_mask``, or in the ``info``.

@@ -72,7 +72,7 @@ class HarvestVectorEnv(VectorEnv):
             scenario: The scenario, or the space from which each mission draws its parameters.
             num_envs: Number of missions in progress (N).
             seed: Seed of the missions, until ``reset`` is called with another seed.
-            observation: ``vector``, ``nodes`` or ``maps``, the observations of the shipped learner,
+            observation: ``vector`` or ``maps``, the observations of the shipped learner,
                 or ``state``, the components of ``dess.observations.components.component_names``.
             guarded: Whether the masks leave out what the return guard does not allow, as for the
                 shipped learner.

@@ -13,7 +13,6 @@ from dess.channel import world_of
 from dess.errors import InputError, one_of, shown
 from dess.observations.components import Components, component_bounds
 from dess.observations.maps import Maps
-from dess.observations.nodes import Nodes
 from dess.observations.sets import Sets, sea_of
 from dess.observations.states import compact_states, layout_of, masks
 from dess.observations.vector import Vector
@@ -22,9 +21,8 @@ from dess.state import State, constants_of
 from dess.view import legal_actions
 
 # The encoders that learners use, by the kind of observation, and the names of their arrays.
-ENCODERS: dict[str, Any] = {"vector": Vector, "nodes": Nodes, "maps": Maps, "sets": Sets}
+ENCODERS: dict[str, Any] = {"vector": Vector, "maps": Maps, "sets": Sets}
 _PARTS = {
-    "nodes": ("vector", "nodes"),
     "maps": ("local", "global", "battery"),
     "sets": (
         *("own", "actions", "nodes", "node_moves"),
@@ -52,7 +50,7 @@ class Observer:
     """Encodes what UAVs observe, and the mask of their allowed actions.
 
     Attributes:
-        kind: ``vector``, ``nodes``, ``maps`` or ``sets``, the observations of the shipped
+        kind: ``vector``, ``maps`` or ``sets``, the observations of the shipped
             learner, or ``state``, the components that ``components.component_names`` lists.
         guarded: Whether the masks are those of the return guard; if not, they have all legal
             actions.

@@ -130,9 +130,9 @@ class TrainingConfig(_Settings):
         1, description="of the training: weights, exploration, missions"
     )
 
-    observation: Literal["vector", "nodes", "maps", "sets"] = Field(
+    observation: Literal["vector", "maps", "sets"] = Field(
         "vector",
-        description="vector: (b); nodes: (b) and a row per node; maps: the paper's (a); sets: for "
+        description="vector: (b); maps: the paper's (a); sets: for "
         "any sea, learned by proximal policy optimization and not by double DQN",
     )
     hidden: tuple[Width, ...] = Field(
@@ -204,8 +204,6 @@ class TrainingConfig(_Settings):
 
     @model_validator(mode="after")
     def _is_consistent(self) -> "TrainingConfig":
-        if self.observation == "nodes" and len(self.hidden) < 2:
-            raise ValueError(f"hidden: {list(self.hidden)} are too few; allowed: two or more")
         if self.ticks // self.evaluate_every > MOST_EVALUATIONS:
             raise ValueError(
                 f"evaluate_every: {self.evaluate_every} makes more than {MOST_EVALUATIONS:,} "

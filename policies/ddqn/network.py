@@ -110,44 +110,6 @@ class DuelingNetwork(_Dueling):
         return self._values(hidden)
 
 
-class NodeNetwork(_Dueling):
-    """A dueling network that applies the same layers to every node and pools the outputs."""
-
-    def __init__(
-        self,
-        shapes: Sequence[Sequence[int]],
-        hidden: Sequence[int],
-        precision: torch.dtype = torch.float32,
-    ) -> None:
-        """Make the layers.
-
-        Args:
-            shapes: Shapes of one row of the vector and of the nodes (``Nodes.shapes``).
-            hidden: Widths of the layers on a node, of the layer on the vector, then of the joint
-                layers.
-            precision: Of the hidden layers, float32 or bfloat16.
-        """
-        super().__init__()
-        (inputs,), (_, features) = shapes
-        per_node, own, *joint = hidden
-        self.precision = precision
-        self.context = nn.Linear(inputs, per_node)
-        self.node = nn.Linear(features, per_node)
-        self.nodes = _dense([per_node, per_node])
-        self.own = _dense([inputs, own])
-        sizes = [own + 2 * per_node, *joint]
-        self.hidden = _dense(sizes)
-        self._make_end(sizes[-1])
-
-    def forward(self, vector: Tensor, nodes: Tensor) -> Tensor:
-        """The values (R, 5) of the actions, from vectors (R, F) and nodes (R, K, features)."""
-        with _hidden_precision(self, self.precision, vector):
-            per_node = self.nodes(torch.relu(self.node(nodes) + self.context(vector)[:, None]))
-            pooled = [self.own(vector), per_node.amax(1), per_node.mean(1)]
-            hidden = self.hidden(torch.cat([part.to(pooled[0].dtype) for part in pooled], 1))
-        return self._values(hidden)
-
-
 class SetNetwork(nn.Module):
     """A dueling network for the sets of any sea: it takes the best of what is in them.
 

@@ -27,7 +27,7 @@ from dess.sea.chart import FAR, spread
 from dess.state import HOVER, STEP_X, STEP_Y
 from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
 from policies.ddqn.learner import Learner
-from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperNetwork, SetNetwork
+from policies.ddqn.network import NARROWEST, DuelingNetwork, PaperNetwork, SetNetwork
 from policies.ddqn.policy import DDQN
 from policies.ddqn.replay import ReplayMemory
 from policies.ddqn.tensors import require_forms
@@ -50,13 +50,11 @@ def build(config: TrainingConfig, layout: Layout | None) -> tuple[Any, nn.Module
         return Sets, SetNetwork(Sets.shapes, config.hidden, precision)
     if config.observation == "maps" and (2 * layout.grid - 1) // POOL < NARROWEST:
         raise InputError(
-            f"observation: a grid of {layout.grid} is too small for maps; allowed: vector, nodes"
+            f"observation: a grid of {layout.grid} is too small for maps; allowed: vector, sets"
         )
     observation = ENCODERS[config.observation](layout)
     if config.observation == "maps":
         return observation, PaperNetwork(observation.shapes, precision)
-    if config.observation == "nodes":
-        return observation, NodeNetwork(observation.shapes, config.hidden, precision)
     return observation, DuelingNetwork(observation.shapes[0][0], config.hidden, precision)
 
 

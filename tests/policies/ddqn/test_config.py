@@ -26,7 +26,6 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"guard": "perhaps"}, "guard: "),
     ({"hidden": [16, 0]}, "hidden.1: "),
     ({"observation": "radar"}, "observation: "),
-    ({"observation": "nodes", "hidden": [8]}, "hidden: [8] "),
     ({"precision": "float16"}, "precision: "),
     ({"discount": 1.5}, "discount: "),
     ({"phases": []}, "phases: "),

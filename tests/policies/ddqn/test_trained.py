@@ -70,10 +70,9 @@ def _forged(folder: Path, tensors: dict[str, torch.Tensor]) -> None:
         {},
         {"guard": False},
         {"precision": "bfloat16"},
-        {"observation": "nodes"},
         {"observation": "maps"},
     ],
-    ids=["vector", "free", "bfloat16", "nodes", "maps"],
+    ids=["vector", "free", "bfloat16", "maps"],
 )
 def test_a_policy_comes_back_as_it_was(changes: dict[str, Any], tmp_path: Path) -> None:
     training = Training(tiny(**changes), CPU)

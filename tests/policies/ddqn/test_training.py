@@ -64,7 +64,7 @@ def test_a_stopped_training_goes_on_as_if_nothing_had_been(
     "changes",
     [
         {"average_rate": 1.0, "updates": 2, "precision": "bfloat16"},
-        {"guard": False, "early_returns": 0.5, "observation": "nodes", "hidden": [8, 16, 16]},
+        {"guard": False, "early_returns": 0.5, "hidden": [8, 16, 16]},
     ],
 )
 def test_so_do_others(changes: dict[str, Any], tmp_path: Path) -> None:
