@@ -157,17 +157,15 @@ def _action(kind, mission, team, i, data, left, sensors, nodes, circuit, chart, 
     """The action of UAV ``i``; ``left`` are all data, ``memory`` is that of its parking cell."""
     u = team[i]
     charge = guard.must_charge(mission, u, left)
-    home_x, home_y, wait = u.x, u.y, 0
+    home = guard.stays(u)
     if charge:
-        home_x, home_y, _, wait = guard.parking_cell(mission, team, i, chart, memory, reach)
-    safe = guard.safe_moves(mission, team, i, chart, charge, home_x, home_y, wait, reach)
-    node = _goal(
-        kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home_x, home_y,
-        wait, reach,
-    )  # fmt: skip
+        home = guard.parking_cell(mission, team, i, chart, memory, reach)
+    safe = guard.safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
+    goal_x, goal_y = home.x, home.y
+    node = _goal(kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach)
     if node >= 0:
-        home_x, home_y = nodes[node, 0], nodes[node, 1]
-    return step_towards(mission, team, i, chart, safe, home_x, home_y)
+        goal_x, goal_y = np.int64(nodes[node, 0]), np.int64(nodes[node, 1])
+    return step_towards(mission, team, i, chart, safe, goal_x, goal_y)
 
 
 @inlined
@@ -179,7 +177,7 @@ def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
         if not safe >> action & 1:
             continue
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-        cost = guard.path_length(mission, team, i, chart, x, y, goal_x, goal_y)
+        cost = guard.path_length(mission, team, i, chart, None, x, y, goal_x, goal_y)
         cost += _CONTEST_COST[guard.contest(mission, team, i, x, y)]
         if cost < least:
             best, least = action, cost
@@ -188,14 +186,13 @@ def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
 
 @inlined
 def _goal(
-    kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home_x, home_y, wait,
-    reach,
+    kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach
 ):  # fmt: skip
     """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
     u = team[i]
     spare = guard.slots_needed(mission, u)
     if charge:
-        spare = u.battery - 1 - guard.margin(mission, u) - wait
+        spare = u.battery - 1 - guard.margin(mission, u) - home.wait
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best, node = 0.0, -1
     for k in range(mission.nodes):
@@ -205,7 +202,7 @@ def _goal(
         slots = _slots(u, chart, x, y)
         spent = slots
         if charge:
-            spent = guard.round_trip(mission, u, chart, x, y, home_x, home_y, reach)
+            spent = guard.round_trip(mission, u, chart, x, y, home, reach)
         if spent > spare:
             continue
         if kind == _NEAREST:

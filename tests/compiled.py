@@ -55,7 +55,7 @@ def must_charge(mission, u, data):
 
 @kernel
 def path(mission, uavs, i, chart, x, y):
-    return guard.path_length(mission, uavs, i, chart, uavs[i].x, uavs[i].y, x, y)
+    return guard.path_length(mission, uavs, i, chart, None, uavs[i].x, uavs[i].y, x, y)
 
 
 @kernel
@@ -78,10 +78,10 @@ def parking_cell(mission, uavs, i, chart, reach=None):
 def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):
     """The node that a heuristic chooses, and the way there."""
     charge = guard.must_charge(mission, uavs[i], rules.data_left(mission, residual))
-    home_x, home_y, _, wait = parking_cell(mission, uavs, i, chart, reach)
+    home = parking_cell(mission, uavs, i, chart, reach)
     node = heuristics._goal(
         kind, mission, uavs, i, residual, sensors, nodes, np.zeros(0, np.int64), chart, charge,
-        home_x, home_y, wait, reach,
+        home, reach,
     )  # fmt: skip
     return node
 
@@ -91,5 +91,5 @@ def step_cost(mission, uavs, i, chart, action, x, y):
     """What a heuristic counts for an action of a UAV that flies to a cell."""
     u = uavs[i]
     after = u.x + STEP_X[action], u.y + STEP_Y[action]
-    way = guard.path_length(mission, uavs, i, chart, after[0], after[1], x, y)
+    way = guard.path_length(mission, uavs, i, chart, None, after[0], after[1], x, y)
     return way, guard.contest(mission, uavs, i, after[0], after[1])

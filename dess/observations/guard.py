@@ -33,6 +33,8 @@ MARGIN_PER_TEAMMATE = 2
 MEAN_RATE, SLOTS_PER_PACKET = 0.2, 1.0
 # Margin [slots] for the quota when little data is left, as some slots may find no data to collect.
 SCARCE_SLOTS = 6
+# Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
+CELLS_PER_UAV = 4
 
 
 @inlined
@@ -108,34 +110,54 @@ def is_parked(u):
 
 
 @inlined
-def path_length(mission, uavs, i, chart, x, y, to_x, to_y):
-    """Cells that UAV ``i`` flies from one to another, with a detour around parked teammates."""
-    length, parked = distance(chart, x, y, to_x, to_y), 0
+def is_crowded(mission, chart):
+    """Whether the zones are so small that UAVs in them close the way to other zone cells."""
+    return len(chart.parking) < CELLS_PER_UAV * mission.uavs * mission.zones
+
+
+@inlined
+def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
+    """Cells that UAV ``i`` flies from one to another, with a detour around teammates.
+
+    Those are parked ones, and if ``planned`` is given, as in ``Parking``, those who will be.
+    """
+    length, between = distance(chart, x, y, to_x, to_y), 0
     for j in range(mission.uavs):
-        o = uavs[j]
-        if j != i and is_parked(o):
-            before = distance(chart, x, y, o.x, o.y)
-            parked += before + distance(chart, o.x, o.y, to_x, to_y) == length
-    if parked == 0:
+        closed_x, closed_y = _closed(uavs, i, j, chart, planned)
+        if closed_x >= 0:
+            before = distance(chart, x, y, closed_x, closed_y)
+            between += before + distance(chart, closed_x, closed_y, to_x, to_y) == length
+    if between == 0:
         return length
-    if parked == 1 and chart.ways is None:
+    if between == 1 and chart.ways is None:
         # without no-fly cells, a way that does not follow a line has others of the same length
         return length + 2 if x == to_x or y == to_y else length
-    return _length_around(mission, uavs, i, chart, x, y, to_x, to_y)
+    return _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y)
+
+
+@inlined
+def _closed(uavs, i, j, chart, planned):
+    """The cell that UAV ``j`` closes to UAV ``i``, or -1."""
+    o = uavs[j]
+    if j != i and is_parked(o):
+        return o.x, o.y
+    if planned is not None and planned[j] >= 0:
+        return np.int64(chart.parking[planned[j], 0]), np.int64(chart.parking[planned[j], 1])
+    return -1, -1
 
 
 @kernel
-def _length_around(mission, uavs, i, chart, x, y, to_x, to_y):
-    """The way around all parked teammates.
+def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
+    """The way around all cells that teammates close.
 
     Or, if that is shorter, the way through and the time that a teammate charges in it.
     """
     width = chart.zones.shape[1]
     closed, count = np.empty(mission.uavs, np.int64), 0
     for j in range(mission.uavs):
-        o = uavs[j]
-        if j != i and is_parked(o) and not (o.x == to_x and o.y == to_y):
-            closed[count] = o.y * width + o.x
+        closed_x, closed_y = _closed(uavs, i, j, chart, planned)
+        if closed_x >= 0 and not (closed_x == to_x and closed_y == to_y):
+            closed[count] = closed_y * width + closed_x
             count += 1
     around = length_around(chart.zones, closed[:count], x, y, to_x, to_y)
     lacking = mission.charge_complete - mission.charge_start
@@ -148,50 +170,134 @@ class Parking(NamedTuple):
 
     Attributes:
         taken: (zone cells,) whether a teammate takes the cell.
+        planned: (I,) the zone cell of each teammate that chooses before the UAV, or -1.
+        order: (I,) the UAVs in the order in which they choose.
         free: (Z, I) in how many slots each pad of a zone will be free, at most I pads.
+        free_after: The same if the UAV asks for a pad now.
     """
 
     taken: np.ndarray
+    planned: np.ndarray
+    order: np.ndarray
     free: np.ndarray
+    free_after: np.ndarray
+
+
+class Home(NamedTuple):
+    """Where a UAV will charge.
+
+    Attributes:
+        x, y: The zone cell.
+        cells: The way there [cells].
+        wait: The slots that the UAV must keep there for a pad.
+        lacks: The slots that it lacks.
+        gives_way: 1 if it must not ask for a pad yet, since a teammate would run empty; else 0.
+    """
+
+    x: int
+    y: int
+    cells: int
+    wait: int
+    lacks: int
+    gives_way: int
 
 
 @kernel
 def parking_memory(chart, uavs):
     """Working memory for missions with so many UAVs."""
-    return Parking(np.empty(len(chart.parking), np.bool_), np.empty((MOST_ZONES, uavs), np.int64))
+    return Parking(
+        np.empty(len(chart.parking), np.bool_),
+        np.empty(uavs, np.int64),
+        np.empty(uavs, np.int64),
+        np.empty((MOST_ZONES, uavs), np.int64),
+        np.empty((MOST_ZONES, uavs), np.int64),
+    )
 
 
 @inlined
+def stays(u):
+    """The ``Home`` of a UAV that need not charge."""
+    return Home(np.int64(u.x), np.int64(u.y), np.int64(0), np.int64(0), np.int64(0), np.int64(0))
+
+
+@kernel
 def parking_cell(mission, uavs, i, chart, memory, reach):
-    """The x and y of the zone cell where UAV ``i`` will charge, the way there and the wait.
+    """The ``Home`` of UAV ``i``, the zone cell where it will charge.
 
     The UAVs choose one after another, as ``_plan`` says. If one of them would run empty and there
     are several zones, this one chooses before all others, except those that would lack more then.
     """
-    x, y, slots, wait, lacks = _plan(mission, uavs, i, -1, chart, memory, reach)
-    if not mission.plans_waits or mission.zones == 1 or mission.uavs == 1:
-        return x, y, slots, wait
-    first = i if lacks > 0 else -1
-    for j in range(mission.uavs):
-        o = uavs[j]
-        charges = o.battery < mission.flight_cost * slots_needed(mission, o)
-        if first < 0 and charges and flies(o) and not is_parked(o):
-            first = j if _plan(mission, uavs, j, -1, chart, memory, reach)[4] > 0 else -1
-    if first >= 0:
-        to_x, to_y, cells, time, lacking = _plan(mission, uavs, i, first, chart, memory, reach)
-        if lacking <= lacks:
-            # who would run empty flies there at once, in case that the others do not give way
-            return to_x, to_y, cells, mission.charge_start - 1 if first == i else time
-    return x, y, slots, wait
+    if mission.active == 1 and reach is None and mission.zones == 1 and mission.pad_rate == 0.0:
+        return _nearest(mission, uavs[i], chart, memory)
+    first = -1
+    if mission.plans_waits and mission.zones > 1 and mission.uavs > 1:
+        first = _chooses_first(mission, uavs, i, chart, memory, reach)
+    home = _plan(mission, uavs, i, first, chart, memory, reach)
+    if first != i:
+        return home
+    # who would run empty flies there at once, in case that the others do not give way
+    soon = np.int64(mission.charge_start - 1)
+    return Home(home.x, home.y, home.cells, soon, home.lacks, home.gives_way)
 
 
 @inlined
-def _plan(mission, uavs, i, first, chart, memory, reach):
-    """The zone cell where UAV ``i`` will charge: of those that no teammate takes, the soonest.
+def _nearest(mission, u, chart, memory):
+    """The ``Home`` of a UAV without teammates."""
+    memory.planned[:] = -1
+    cell = chart.nearest[u.y, u.x]
+    x, y = np.int64(chart.parking[cell, 0]), np.int64(chart.parking[cell, 1])
+    cells = np.int64(distance(chart, u.x, u.y, x, y))
+    return Home(x, y, cells, np.int64(0), np.int64(max(cells + 1 - u.battery, 0)), np.int64(0))
 
-    Teammates in a zone keep their cells, and their pads if they have asked for one. The other UAVs
+
+@inlined
+def _chooses_first(mission, uavs, i, chart, memory, reach):
+    """Who of the UAVs that would run empty chooses its zone before all others, or -1 for none."""
+    lacks = _plan(mission, uavs, i, -1, chart, memory, reach).lacks
+    first = i if lacks > 0 else -1
+    for j in range(mission.uavs):
+        if first < 0 and _will_charge(mission, uavs[j]) and not is_parked(uavs[j]):
+            first = j if _plan(mission, uavs, j, -1, chart, memory, reach).lacks > 0 else -1
+    if first >= 0 and _plan(mission, uavs, i, first, chart, memory, reach).lacks > lacks:
+        return -1
+    return first
+
+
+@inlined
+def _will_charge(mission, u):
+    """Whether a UAV in the air cannot fill its quota with its battery."""
+    return flies(u) and u.battery < mission.flight_cost * slots_needed(mission, u)
+
+
+@inlined
+def _sort(mission, uavs, first, order):
+    """Sort the active UAVs: ``first``, then by battery, ties by index. How many there are."""
+    count = 0
+    for j in range(mission.uavs):
+        if not uavs[j].active:
+            continue
+        place = count
+        while place > 0 and (j == first or uavs[j].battery < uavs[order[place - 1]].battery):
+            if order[place - 1] == first:
+                break
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = j
+        count += 1
+    return count
+
+
+@kernel
+def _plan(mission, uavs, i, first, chart, memory, reach):
+    """Where UAV ``i`` will charge: of the zone cells that no teammate takes, the soonest.
+
+    Parked teammates keep their cells, and their pads if they have asked for one. The other UAVs
     choose one after another, the lowest battery first (ties in index order), so that no two UAVs
     fly to the same cell. Each chooses the cell where it gets a pad first, the nearest on a tie.
+
+    The UAV expects to wait for the pads of those who choose before it. It comes so early that those
+    who choose after it get a pad in time, too, and does not ask for a free pad if a teammate would
+    run empty then and this UAV would not run empty later.
 
     Args:
         mission: ``MISSION`` record.
@@ -203,58 +309,84 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
         reach: The table of ``reach_of``.
 
     Returns:
-        The x and y of the cell, how many cells away it is, the slots for which the UAV must expect
-        to wait there for a pad, and the slots that it lacks; the UAV's own cell if all are taken.
+        The ``Home``; the UAV's own cell if all are taken.
     """
-    u, taken = uavs[i], memory.taken
+    u, taken, free = uavs[i], memory.taken, memory.free
     taken[:] = False
-    memory.free[: mission.zones] = 0
+    for zone in range(mission.zones):
+        if _plans_wait(mission, zone):
+            free[zone, :] = 0
     for j in range(mission.uavs):
         o = uavs[j]
-        if o.active and o.zone >= 0:
+        memory.planned[j] = -1
+        if o.active and o.zone >= 0 and (j == i or is_parked(o) or not is_crowded(mission, chart)):
             taken[chart.nearest[o.y, o.x]] = True
             if j != i and o.pad_request >= 0 and _plans_wait(mission, o.zone):
-                _take_pad(mission, o, o.zone, 0, memory.free)
-    last_battery, last, chooser = -1, -1, first
-    while True:
-        # the next UAV to choose
-        for j in range(mission.uavs):
-            o = uavs[j]
-            if (
-                not o.active
-                or j == first
-                or o.battery < last_battery
-                or (o.battery == last_battery and j <= last)
-            ):
+                _take_pad(mission, o, o.zone, 0, free)
+    may_ask = u.zone >= 0 and u.latch and u.pad_request < 0 and _plans_wait(mission, u.zone)
+    if may_ask:
+        for pad in range(mission.uavs):
+            memory.free_after[u.zone, pad] = free[u.zone, pad]
+        _take_pad(mission, u, u.zone, 0, memory.free_after)
+    home, home_zone, followers, starves = stays(u), -1, 0, False
+    cell, slots, lacks, zone = -1, 0, 0, np.int64(0)
+    for place in range(_sort(mission, uavs, first, memory.order)):
+        j = memory.order[place]
+        o = uavs[j]
+        will_charge = _will_charge(mission, o)
+        if j != i and (is_parked(o) or (home_zone >= 0 and not will_charge)):
+            continue
+        if home_zone < 0 or mission.zones > 1:
+            cell, slots, lacks = _soonest_free(mission, uavs, j, chart, memory, reach)
+            if cell < 0 and j == i:
+                break
+            if cell < 0:
                 continue
-            if chooser < 0 or chooser != first and o.battery < uavs[chooser].battery:
-                chooser = j
-        o = uavs[chooser]
-        if chooser != first:
-            last_battery, last = o.battery, chooser
-        number, chooser = chooser, -1
-        if number != i and is_parked(o):
-            continue
-        cell, slots, lacks = _soonest_free(mission, uavs, number, chart, memory, reach)
-        if number == i and cell < 0:
-            return u.x, u.y, 0, 0, 0
-        if cell < 0:
-            continue
-        x, y = chart.parking[cell, 0], chart.parking[cell, 1]
-        zone = np.int64(chart.zones[y, x])
-        if number == i:
-            # To wait for more than C_S is of no use, as a UAV may ask only at or below C_S.
-            wait = waiting_time(mission, u, zone, slots, memory.free)
-            return x, y, slots, min(wait, mission.charge_start - 1), lacks
-        taken[cell] = True
-        if not _plans_wait(mission, zone):
-            continue
-        if flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o):
+            taken[cell] = True
+            zone = np.int64(chart.zones[chart.parking[cell, 1], chart.parking[cell, 0]])
+        if home_zone >= 0:
+            if zone == home_zone:
+                followers += 1
+                wait = max(home.wait, _kept(mission, u, o, zone, followers))
+                home = Home(home.x, home.y, home.cells, wait, home.lacks, home.gives_way)
+        elif j == i:
+            wait, home_zone = np.int64(waiting_time(mission, u, zone, slots, free)), zone
+            gives_way = np.int64(may_ask and starves and lacks == 0)
+            x, y = np.int64(chart.parking[cell, 0]), np.int64(chart.parking[cell, 1])
+            home = Home(x, y, np.int64(slots), wait, np.int64(lacks), gives_way)
+            if u.pad_request >= 0 or not mission.plans_waits or not _plans_wait(mission, zone):
+                break
+        else:
+            memory.planned[j] = cell
+            if not will_charge or not _plans_wait(mission, zone):
+                continue
+            asked = _until_asked(mission, o, slots)
+            if may_ask and zone == u.zone:
+                begin = max(asked, _until_free(mission, zone, free))
+                later = max(asked, _until_free(mission, zone, memory.free_after))
+                starves = starves or begin < o.battery <= later
+                _take_pad(mission, o, zone, asked, memory.free_after)
             # It may stay away for some time and come just before this UAV.
             own_request = _until_asked(mission, u, distance_home(chart, u.x, u.y))
             latest = min(own_request, o.battery // max(mission.flight_cost, 1) - 1)
-            asked = max(_until_asked(mission, o, slots), latest)
-            _take_pad(mission, o, zone, asked, memory.free)
+            _take_pad(mission, o, zone, max(asked, latest), free)
+    # To wait for more than C_S is of no use, as a UAV may ask only at or below C_S.
+    wait = np.int64(min(home.wait, mission.charge_start - 1))
+    return Home(home.x, home.y, home.cells, wait, home.lacks, home.gives_way)
+
+
+@inlined
+def _kept(mission, u, o, zone, followers):
+    """The slots that UAV ``u`` keeps so that the UAV so many places after it is charged in time.
+
+    A pad charges one UAV after another. So of those who come to the same zone, every one after as
+    many as there are pads waits until this UAV is charged, and its battery must last for so long.
+    """
+    pads = working_pads(mission, zone)
+    if pads == 0 or followers % pads != 0:
+        return 0
+    charge = (mission.charge_complete + mission.charge_rate - 1) // mission.charge_rate
+    return followers // pads * charge - (o.battery - u.battery) // max(mission.flight_cost, 1)
 
 
 @inlined
@@ -267,7 +399,11 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     zone, slots = np.int64(chart.zones[y, x]), distance(chart, u.x, u.y, x, y)
     free = (slots == 0 or not memory.taken[cell]) and not _is_given_up(mission, zone)
     free = free and (mission.zones == 1 or not waiting_time(mission, u, zone, slots, memory.free))
-    if reach is None and free and path_length(mission, uavs, i, chart, u.x, u.y, x, y) == slots:
+    if (
+        reach is None
+        and free
+        and path_length(mission, uavs, i, chart, None, u.x, u.y, x, y) == slots
+    ):
         return cell, slots, max(slots + 1 - u.battery, 0)
     best, way, least, fewest = -1, -1, -1, -1
     for cell in range(len(chart.parking)):
@@ -277,7 +413,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
             continue
         if _is_given_up(mission, zone):
             continue
-        slots = path_length(mission, uavs, i, chart, u.x, u.y, x, y)
+        slots = path_length(mission, uavs, i, chart, None, u.x, u.y, x, y)
         wait = waiting_time(mission, u, zone, slots, memory.free)
         until = slots
         if reach is not None:
@@ -321,9 +457,14 @@ def waiting_time(mission, u, zone, cells, free):
     """
     if u.pad_request >= 0 or not _plans_wait(mission, zone):
         return 0
+    return max(_until_free(mission, zone, free) - _until_asked(mission, u, cells), 0)
+
+
+@inlined
+def _until_free(mission, zone, free):
+    """In how many slots a pad of a zone will be free; the whole mission if none works."""
     pad = _first_pad(mission, zone, free)
-    until = free[zone, pad] if pad >= 0 else mission.max_slots
-    return max(until - _until_asked(mission, u, cells), 0)
+    return free[zone, pad] if pad >= 0 else mission.max_slots
 
 
 @inlined
@@ -368,7 +509,7 @@ def margin(mission, u):
 
 
 @inlined
-def battery_home(mission, uavs, i, chart, x, y, home_x, home_y, reach):
+def battery_home(mission, uavs, i, chart, planned, x, y, home, reach):
     """The battery [%] that UAV ``i`` needs from a cell to its parking cell.
 
     Args:
@@ -377,14 +518,16 @@ def battery_home(mission, uavs, i, chart, x, y, home_x, home_y, reach):
         i: Index of the UAV.
         chart: ``Chart``.
         x, y: The cell.
-        home_x, home_y: The parking cell.
+        home: ``Home``.
         reach: The table of ``reach_of``. A detour around parked teammates is not in it; each of
             its cells may cost the most.
     """
-    cells = path_length(mission, uavs, i, chart, x, y, home_x, home_y)
+    if reach is None and is_crowded(mission, chart):
+        return path_length(mission, uavs, i, chart, planned, x, y, home.x, home.y)
+    cells = path_length(mission, uavs, i, chart, None, x, y, home.x, home.y)
     if reach is None:
         return cells
-    return _in_wind(mission, uavs[i], chart, x, y, home_x, home_y, cells, reach)
+    return _in_wind(mission, uavs[i], chart, x, y, home.x, home.y, cells, reach)
 
 
 @inlined
@@ -399,7 +542,7 @@ def _in_wind(mission, u, chart, x, y, home_x, home_y, cells, reach):
 
 
 @inlined
-def round_trip(mission, u, chart, x, y, home_x, home_y, reach):
+def round_trip(mission, u, chart, x, y, home, reach):
     """The battery [%] that UAV ``u`` needs to fly to a cell and from there to the zone.
 
     Gusts on the way out are not considered; the safe moves are what keeps the zone in reach.
@@ -407,11 +550,11 @@ def round_trip(mission, u, chart, x, y, home_x, home_y, reach):
     cells = distance(chart, u.x, u.y, x, y)
     if reach is None:
         if mission.zones > 1:  # once there, another zone may be nearer
-            return cells + min(distance(chart, x, y, home_x, home_y), distance_home(chart, x, y))
-        return cells + distance(chart, x, y, home_x, home_y)
+            return cells + min(distance(chart, x, y, home.x, home.y), distance_home(chart, x, y))
+        return cells + distance(chart, x, y, home.x, home.y)
     against = max(mission.wind_x * (u.x - x), 0.0) + max(mission.wind_y * (u.y - y), 0.0)
-    back = distance(chart, x, y, home_x, home_y)
-    back = _in_wind(mission, u, chart, x, y, home_x, home_y, back, reach)
+    back = distance(chart, x, y, home.x, home.y)
+    back = _in_wind(mission, u, chart, x, y, home.x, home.y, back, reach)
     if mission.zones > 1:
         near = chart.parking[chart.nearest[y, x]]
         cells_near = distance(chart, x, y, near[0], near[1])
@@ -446,7 +589,18 @@ def contest(mission, uavs, i, x, y):
 
 
 @inlined
-def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
+def _is_in_the_way(mission, uavs, i):
+    """Whether UAV ``i`` has just overruled a teammate that must charge and has less battery."""
+    for j in range(mission.uavs):
+        o = uavs[j]
+        blocked = o.overruled and o.overruled_by == i and o.battery < uavs[i].battery
+        if blocked and _will_charge(mission, o):
+            return True
+    return False
+
+
+@inlined
+def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     """Find the safe actions: those after which UAV ``i`` can still reach its parking cell in time.
 
     If there is no such action, the actions that lead nearest to the parking cell are safe, except
@@ -454,7 +608,7 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
     to let this teammate pass. Moves off the grid, into a no-fly cell and into the cell of a parked
     teammate are never safe. A UAV that has just been overruled also avoids cells that a teammate
     may occupy: otherwise two UAVs could block each other until the battery of one of them is
-    depleted.
+    depleted. A UAV leaves its cell if a teammate that must charge has just been overruled by it.
 
     Args:
         mission: ``MISSION`` record.
@@ -462,7 +616,8 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
         i: Index of the UAV.
         chart: ``Chart``.
         charge: Whether the UAV must charge; if not, every legal action is safe.
-        home_x, home_y, wait: The result of ``parking_cell``, without the way.
+        home: The result of ``parking_cell``.
+        planned: As in ``Parking``, as ``parking_cell`` leaves it.
         reach: The table of ``reach_of``.
 
     Returns:
@@ -472,7 +627,7 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
     if charge and u.pad_request >= 0:
         return 1 << HOVER  # it would lose its place in the queue
     spare = margin(mission, u)
-    reserve = spare + wait if charge else 0
+    reserve = spare + home.wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
     # that lead nearest to the parking cell, and those after which it is reached if the margin and
     # the slots for a pad are spent.
@@ -483,11 +638,11 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
         # Teammates fly around a parked UAV, so it need not leave its cell for any.
         stays = action == HOVER and is_parked(u)
         contested = 0 if stays else contest(mission, uavs, i, x, y)
-        if not is_open(chart, x, y) or contested == 3:
+        if not is_open(chart, x, y) or contested == 3 or (home.gives_way == 1 and action == HOVER):
             continue
         late = 0
         if charge:
-            needed = battery_home(mission, uavs, i, chart, x, y, home_x, home_y, reach)
+            needed = battery_home(mission, uavs, i, chart, planned, x, y, home, reach)
             needed += 1 if reach is None else _cost(mission, u, chart, action, x, y)
             # One slot is the charging slot itself; the battery must not be depleted before it.
             late = max(needed + 1 + reserve - u.battery, 0)
@@ -502,11 +657,16 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
             nearest |= bit
     if nearest & clear and (least > 0 or u.overruled):
         return nearest & clear
+    elsewhere = nearest & clear & ~(1 << HOVER)
+    if elsewhere and not is_parked(u) and _is_in_the_way(mission, uavs, i):
+        return elsewhere
     if least > 0 and clear & in_time:
         # these slots are there to wait or step aside until the teammate has passed
         return clear & in_time
     # Two UAVs that both insist block each other: the one without the right of way waits a slot.
-    return 1 << HOVER if least > 0 and u.overruled and not nearest & clear else nearest
+    if u.overruled and not nearest & clear and (least > 0 or nearest >> HOVER & 1):
+        return 1 << HOVER
+    return nearest
 
 
 @inlined
@@ -525,10 +685,10 @@ def _mask(missions, uavs, residual, rows_mission, rows_uav, chart, reach):
         b, i = rows_mission[row], rows_uav[row]
         mission, team = missions[b], uavs[b]
         charge = must_charge(mission, team[i], data_left(mission, residual[b]))
-        home_x = home_y = wait = 0
+        home = stays(team[i])
         if charge:
-            home_x, home_y, _, wait = parking_cell(mission, team, i, chart, memory, reach)
-        safe = safe_moves(mission, team, i, chart, charge, home_x, home_y, wait, reach)
+            home = parking_cell(mission, team, i, chart, memory, reach)
+        safe = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
         for action in range(5):
             masks[row, action] = safe >> action & 1
     return masks

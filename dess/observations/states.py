@@ -86,7 +86,7 @@ def layout_of(space: ScenarioSpace) -> Layout:
     for field, is_wrong, allowed in misfits:
         if is_wrong:
             raise InputError(
-                f"{field}: the observations vector, nodes and maps need {allowed}; "
+                f"{field}: the observations vector and maps need {allowed}; "
                 "allowed: the observation state"
             )
     return Layout(space.grid, np.array(space.zone), np.array(space.nodes))
@@ -133,14 +133,14 @@ def _fill(missions, uavs, residual, guarded, chart, reach, out):
             if not u.active:
                 continue
             row[MUST_CHARGE] = guard.must_charge(mission, u, data)
-            home_x, home_y, _, wait = guard.parking_cell(mission, team, i, chart, memory, reach)
-            home = guard.battery_home(mission, team, i, chart, u.x, u.y, home_x, home_y, reach)
-            row[HOME] = min(home, _MOST)
+            home = guard.parking_cell(mission, team, i, chart, memory, reach)
+            battery = guard.battery_home(mission, team, i, chart, None, u.x, u.y, home, reach)
+            row[HOME] = min(battery, _MOST)
             if may_act(u):
                 if guarded:
                     charge = row[MUST_CHARGE] != 0
                     row[MASK] = guard.safe_moves(
-                        mission, team, i, chart, charge, home_x, home_y, wait, reach
+                        mission, team, i, chart, charge, home, memory.planned, reach
                     )
                 else:
                     row[MASK] = legal_moves(chart, u)

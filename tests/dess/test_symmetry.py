@@ -159,8 +159,10 @@ def _plan(sea: Sea, i: int) -> tuple[list[int], bool, float]:
     free = [[0] * min(mission["zone_pads"][zone], len(team)) for zone in range(mission["zones"])]
     places = [(int(u["x"]), int(u["y"])) for u in team]
     parked = [p for p, u in zip(places, team, strict=True) if u["latch"] and u["zone"] >= 0]
-    taken = {p for p, u in zip(places, team, strict=True) if u["zone"] >= 0}
     own = int(me["x"]), int(me["y"])
+    taken = {p for p, u in zip(places, team, strict=True) if u["zone"] >= 0}
+    if len(zones) < 4 * len(sea.state.uavs[0]) * mission["zones"]:  # the zones are crowded
+        taken &= {*parked, own}
     home = min(reached(own, *space.size, {*space.no_fly})[cell] for cell in zones)
     request = _until_asked(me, home, mission)
     reach = reach_of(sea.state.missions, space.chart)

@@ -220,20 +220,24 @@ OFF: dict[str, Any] = {"charging": {"plan_waits": False}}
     [
         ([32, 30, 32], [1], OFF, 0),
         ([32, 30, 32], [1], OFF | {"failures": {"pad_rate": 0.1}}, 3),
-        ([32, 30, 32], [1], {"charging": {"measured": True}}, 3),
-        ([32, 30, 32], [1], {}, 3),  # 50 % in 5 slots
-        ([50, 30, 50], [1], {}, 0),  # it may ask in 20 slots
+        ([32, 30, 40], [1], {"charging": {"measured": True}}, 3),
+        ([32, 30, 40], [1], {}, 3),  # 50 % in 5 slots
+        ([50, 30, 60], [1], {}, 0),  # it may ask in 20 slots
         ([32, 70, 70], [], {}, 0),  # it comes first
         # 60 % in 6 slots, then another 6 as 31 - 6 % are left; its own cell is 3 slots away
         ([32, 20, 31], [1], {}, 9),
-        ([32, 20, 32], [1], {}, 4),  # on a tie the lower index, its own, comes first
+        # On a tie the lower index, its own, comes first; the other must be charged after it.
+        ([32, 20, 32], [1], {}, 8),
+        ([32, 36, 50], [], {}, 4),  # 8 slots to charge, and the next battery lasts for 4 more
+        ([32, 32, 32], [], {}, 16),
+        ([32, 32, 32], [], {"pads": 2}, 8),  # only the third waits for it
         ([32, 20, 10], [1, 2], {"pads": 2}, 4),
         ([32, 20, 20], [1], {"pads": 3}, 0),
         ([32, 20, 20], [1, 2], {"charging": {"power": 5}}, 25),  # 12 slots, and 15 for 72 %
         ([32, 20, 20], [1, 2], {"charging": {"power": 1}}, 29),  # C_S - 1 at most
         ([20, 20, 20], [0, 1], {}, 0),  # it has asked
         ([32, 31, 31], [], {"quota": 40}, 0),  # they need not charge
-        ([32, 30, 32], [1], {"zones": [{"cells": [0, 0, 9, 9]}]}, 3),  # too far off
+        ([32, 30, 40], [1], {"zones": [{"cells": [0, 0, 9, 9]}]}, 3),  # too far off
         ([32, 30, 32], [1], {"zones": [{"cells": [24, 8, 1, 1]}]}, 0),  # 4 slots, not 2 + 3
     ],
 )
