@@ -66,8 +66,8 @@ def test_a_quota_beyond_all_bounds_is_just_far_away() -> None:
     assert states.uavs[0, 0, column.NEEDED] == np.iinfo(np.int16).max
 
 
-# Of the encoders with which the shipped weights were trained, and of the guard's masks. The encoders
-# have a version, which changes with their part of these.
+# Of the encoders with which the shipped weights were trained, and of the guard's masks. The
+# encoders have a version, which changes with their part of these.
 SEEN = {
     "vector": "e02739c87034e98ce492cbff0c7a9690a60f4d6748fafcf5761cd731e606a70e",
     "maps": "d84f92a83d6972fc22190b64ac38d96a0b84879625587c5463c29505e9c3985a",
