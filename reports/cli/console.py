@@ -92,7 +92,7 @@ def _line(message: str) -> str:
     what, allowed, values = line.rpartition("; allowed: ")
     if not allowed or len(line) <= MESSAGE:
         return cut(line, MESSAGE)
-    end = allowed + cut(values, MESSAGE // 2)
+    end = allowed + cut(values, max(MESSAGE // 2, MESSAGE - len(what + allowed)))
     return cut(what, MESSAGE - len(end)) + end
 
 

@@ -73,7 +73,8 @@ def test_workers_need_the_memory_that_is_available(monkeypatch):
 @given(st.fixed_dictionaries({}, optional={n: st.sampled_from(v) for n, v in EXTREME.items()}))
 def test_every_mission_ends_or_is_refused(fields):
     """A mission that takes too much is refused by the scenario or by the estimate."""
-    faulthandler.dump_traceback_later(120, exit=True)  # nothing else stops compiled code
+    # Nothing else stops compiled code. The first example may compile for a minute.
+    faulthandler.dump_traceback_later(300, exit=True)
     try:
         space = load_scenario("paper", **fields)
         check_missions("a mission", [space], effort.LONG_RUN - 20_000 * EVENT)
