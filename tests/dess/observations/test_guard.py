@@ -289,6 +289,8 @@ def test_with_a_pad_for_two_uavs_the_second_comes_early_enough_to_wait(
 # --- what killed UAVs that had a way to live ---
 
 WIND = {"wind": {"strength": 0.8, "direction": 37, "gusts": 0.4, "seed": 1}}
+SHARED: dict[str, Any] = {"uavs": 2, "pads": 1}
+SHARED |= {"wind": {"strength": 0.3, "direction": 1, "gusts": 0.2, "seed": 32}}
 
 
 @pytest.mark.parametrize(
@@ -304,6 +306,10 @@ WIND = {"wind": {"strength": 0.8, "direction": 37, "gusts": 0.4, "seed": 1}}
         ("coast:900701", WIND, "greedy", 2),
         # Four UAVs insist on cells beside each other.
         ("archipelago:700023", {"uavs": 6, "pads": 6}, "greedy", 4),
+        # Two UAVs share a pad: the one with more battery comes first, and takes it too late.
+        ("archipelago:910032", SHARED, "greedy", 5),
+        # Three UAVs come to a zone of six cells at once, and two of them close its side.
+        ("clustered:910027", {"uavs": 3, "pads": 2}, "greedy", 6),
         # One of two UAVs takes the pad of the only zone that the other reaches.
         ("large:700014", {"uavs": 2, "pads": 1}, "any", 1),
     ],
