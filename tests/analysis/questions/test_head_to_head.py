@@ -143,18 +143,25 @@ def test_the_worst_missions_and_the_most_lost():
 
 
 def test_the_outcome_of_a_mission_is_that_of_its_uavs(tmp_path):
-    study = small_study(tmp_path, policies=["random", "greedy"], missions=8, set={"quota": 120})
+    study = small_study(
+        tmp_path, policies=["random-unguarded", "greedy"], missions=8, set={"quota": 120}
+    )
     results = run_study(study, tmp_path / "out")
-    pair = Pair("random", "greedy", 1)
+    pair = Pair("random-unguarded", "greedy", 1)
     missions = head_to_head.duels(results, pair)
     table, depleted, quotas = head_to_head.listed(missions, results, pair), 0, set()
     assert table["", "Mission"].tolist() == [str(n) for n in range(8)]
     for replication in range(8):
-        record = simulate(results.scenario(), load_team("random"), 7, replication)
+        record = simulate(results.scenario(), load_team("random-unguarded"), 7, replication)
         ends = [row["end"] for row in record.uav_rows()]
         depleted += ends.count("battery")
         quotas.add(f"{ends.count('quota')} of {len(ends)}")
-        assert table["random", "Quotas"][replication] == f"{ends.count('quota')} of {len(ends)}"
-        assert table["random", "Success"][replication] == ("yes" if record.success else "no")
+        assert (
+            table["random-unguarded", "Quotas"][replication]
+            == f"{ends.count('quota')} of {len(ends)}"
+        )
+        assert table["random-unguarded", "Success"][replication] == (
+            "yes" if record.success else "no"
+        )
     assert len(quotas) > 1
-    assert depleted == head_to_head.depleted(results, "random", range(8)) > 0
+    assert depleted == head_to_head.depleted(results, "random-unguarded", range(8)) > 0
