@@ -366,10 +366,7 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
                 later = max(asked, _until_free(mission, zone, memory.free_after))
                 starves = starves or begin < o.battery <= later
                 _take_pad(mission, o, zone, asked, memory.free_after)
-            # It may stay away for some time and come just before this UAV.
-            own_request = _until_asked(mission, u, distance_home(chart, u.x, u.y))
-            latest = min(own_request, o.battery // max(mission.flight_cost, 1) - 1)
-            _take_pad(mission, o, zone, max(asked, latest), free)
+            _take_pad(mission, o, zone, asked, free)
     # To wait for more than C_S is of no use, as a UAV may ask only at or below C_S.
     wait = np.int64(min(home.wait, mission.charge_start - 1))
     return Home(home.x, home.y, home.cells, wait, home.lacks, home.gives_way)
