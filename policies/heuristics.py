@@ -29,7 +29,7 @@ _SLOTS_AT_NODE = 1.0
 # Weight of the nodes that a UAV can visit after the next one (age).
 _BEYOND = 0.1
 _FINE = 2.0**24  # parts of a slot of age per slot of distance
-# Cost [slots] of a step into a cell, by the result of the guard's contest for that cell.
+# Cost [slots] of a step into a cell, by the guard's contest for that cell.
 _CONTEST_COST = np.array([0.0, 0.5, 2.5, 50.0])
 
 
@@ -115,10 +115,10 @@ def _choose(missions, uavs, allowed, rows_mission, rows_uav):
     actions = np.empty(len(rows_mission), np.int64)
     for row in range(len(rows_mission)):
         i, mission, team = rows_uav[row], missions[rows_mission[row]], uavs[rows_mission[row]]
+        levels = guard.contests(mission, team, i)
         moves = count = 0
         for action in range(4):
-            x, y = team[i].x + STEP_X[action], team[i].y + STEP_Y[action]
-            if allowed[row, action] and guard.contest(mission, team, i, x, y) == 0:
+            if allowed[row, action] and guard.contest(levels, action) == 0:
                 moves |= 1 << action
                 count += 1
         actions[row] = HOVER
@@ -172,13 +172,14 @@ def _action(kind, mission, team, i, data, left, sensors, nodes, circuit, chart, 
 def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
     """The safe action that brings UAV ``i`` nearest to its goal; contested cells cost more."""
     u = team[i]
+    levels = guard.contests(mission, team, i)
     best, least = HOVER, 1e18
     for action in range(5):
         if not safe >> action & 1:
             continue
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
         cost = guard.path_length(mission, team, i, chart, None, x, y, goal_x, goal_y)
-        cost += _CONTEST_COST[guard.contest(mission, team, i, x, y)]
+        cost += _CONTEST_COST[guard.contest(levels, action)]
         if cost < least:
             best, least = action, cost
     return best

@@ -92,4 +92,4 @@ def step_cost(mission, uavs, i, chart, action, x, y):
     u = uavs[i]
     after = u.x + STEP_X[action], u.y + STEP_Y[action]
     way = guard.path_length(mission, uavs, i, chart, None, after[0], after[1], x, y)
-    return way, guard.contest(mission, uavs, i, after[0], after[1])
+    return way, guard.contest(guard.contests(mission, uavs, i), action)

@@ -30,7 +30,7 @@ from dess.view import View
 MARGIN_PER_TEAMMATE = 2
 # Data [data units] that a UAV collects in a slot near an average node, and the communication slots
 # that each UAV can fill with a data unit that arrives at an empty sea.
-MEAN_RATE, SLOTS_PER_PACKET = 0.2, 1.0
+MEAN_RATE, SLOTS_PER_PACKET = 0.3, 1.0
 # Margin [slots] for the quota when little data is left, as some slots may find no data to collect.
 SCARCE_SLOTS = 6
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
@@ -402,13 +402,17 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
         and path_length(mission, uavs, i, chart, None, u.x, u.y, x, y) == slots
     ):
         return cell, slots, max(slots + 1 - u.battery, 0)
-    best, way, least, fewest = -1, -1, -1, -1
+    best, best_zone, way, least, fewest = -1, -1, -1, -1, -1
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
         if memory.taken[cell] and not (u.x == x and u.y == y):
             continue
         if _is_given_up(mission, zone):
+            continue
+        # no detour and no wait makes a cell better than a nearer one of the same zone
+        is_nearer = distance(chart, u.x, u.y, x, y) < way
+        if reach is None and best >= 0 and zone == best_zone and not is_nearer:
             continue
         slots = path_length(mission, uavs, i, chart, None, u.x, u.y, x, y)
         wait = waiting_time(mission, u, zone, slots, memory.free)
@@ -421,7 +425,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
         until += wait
         is_sooner = until < least or (until == least and slots < way)
         if best < 0 or lacks < fewest or (lacks == fewest and is_sooner):
-            best, way, least, fewest = cell, slots, until, lacks
+            best, best_zone, way, least, fewest = cell, zone, slots, until, lacks
     return best, way, fewest
 
 
@@ -560,29 +564,38 @@ def round_trip(mission, u, chart, x, y, home, reach):
 
 
 @inlined
-def contest(mission, uavs, i, x, y):
-    """Whether teammates of UAV ``i`` may occupy a cell in the next slot.
+def contests(mission, uavs, i):
+    """Whether teammates of UAV ``i`` may occupy the cells that its actions lead to in the next slot.
 
     Returns:
-        0 if the cell is free; 1 if a teammate that gives way is on it; 2 if a teammate with the
-        right of way (less battery; on a tie, lower index) may come or stay there; 3 if a parked
-        teammate is on it.
+        Two bits for each action, as ``contest`` reads them: 0 if the cell is free; 1 if a teammate
+        that gives way is on it; 2 if a teammate with the right of way (less battery; on a tie,
+        lower index) may come or stay there; 3 if a parked teammate is on it.
     """
     u = uavs[i]
-    level = 0
+    levels = 0
     for j in range(mission.uavs):
         o = uavs[j]
-        if j == i or not o.active:
+        east, south = o.x - u.x, o.y - u.y
+        if j == i or not o.active or abs(east) + abs(south) > 2:
             continue
-        slots = abs(o.x - x) + abs(o.y - y)
-        if is_parked(o):
+        parked = is_parked(o)
+        goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
+        for action in range(5):
+            slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
+            level = 0
             if slots == 0:
-                return 3
-        elif slots <= 1 and (o.battery < u.battery or (o.battery == u.battery and j < i)):
-            level = 2
-        elif slots == 0:
-            level = max(level, 1)
-    return level
+                level = 3 if parked else 2 if goes_first else 1
+            elif slots == 1 and goes_first and not parked:
+                level = 2
+            levels += max(level - contest(levels, action), 0) << 2 * action
+    return levels
+
+
+@inlined
+def contest(levels, action):
+    """The two bits of ``contests`` for an action."""
+    return levels >> 2 * action & 3
 
 
 @inlined
@@ -630,11 +643,12 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     # the slots for a pad are spent.
     clear = nearest = in_time = 0
     least = 1_000_000  # battery [%] that lacks on the way to the parking cell
+    levels = contests(mission, uavs, i)
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
         # Teammates fly around a parked UAV, so it need not leave its cell for any.
         stays = action == HOVER and is_parked(u)
-        contested = 0 if stays else contest(mission, uavs, i, x, y)
+        contested = 0 if stays else contest(levels, action)
         if not is_open(chart, x, y) or contested == 3 or (home.gives_way == 1 and action == HOVER):
             continue
         late = 0
