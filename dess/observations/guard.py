@@ -19,7 +19,7 @@ from dess.code.kernels import inlined, kernel
 from dess.constants import MOST_ZONES
 from dess.observations.reach import reach_of
 from dess.rules import data_left, flies
-from dess.sea.chart import distance, distance_home, in_zone, is_open, length_around
+from dess.sea.chart import distance, in_zone, is_open, length_around
 from dess.sections.failures import working_pads
 from dess.sections.section import extension
 from dess.sections.wind import move_surcharge
@@ -110,9 +110,9 @@ def is_parked(u):
 
 
 @inlined
-def is_crowded(mission, chart):
-    """Whether the zones are so small that UAVs in them close the way to other zone cells."""
-    return len(chart.parking) < CELLS_PER_UAV * mission.uavs * mission.zones
+def is_crowded(mission, chart, zone):
+    """Whether a zone is so small that UAVs in it close the way to its other cells."""
+    return chart.sizes[zone] < CELLS_PER_UAV * mission.uavs
 
 
 @inlined
@@ -319,7 +319,8 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
     for j in range(mission.uavs):
         o = uavs[j]
         memory.planned[j] = -1
-        if o.active and o.zone >= 0 and (j == i or is_parked(o) or not is_crowded(mission, chart)):
+        stays_there = j == i or is_parked(o) or not is_crowded(mission, chart, o.zone)
+        if o.active and o.zone >= 0 and stays_there:
             taken[chart.nearest[o.y, o.x]] = True
             if j != i and o.pad_request >= 0 and _plans_wait(mission, o.zone):
                 _take_pad(mission, o, o.zone, 0, free)
@@ -334,9 +335,11 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
         j = memory.order[place]
         o = uavs[j]
         will_charge = _will_charge(mission, o)
-        if j != i and (is_parked(o) or (home_zone >= 0 and not will_charge)):
+        if j != i and (o.grounded or o.pad_request >= 0 or (home_zone >= 0 and not will_charge)):
             continue
-        if home_zone < 0 or mission.zones > 1:
+        if j != i and is_parked(o):  # it asks for a pad in this slot
+            cell, slots, zone = np.int64(chart.nearest[o.y, o.x]), 0, np.int64(o.zone)
+        elif home_zone < 0 or mission.zones > 1:
             cell, slots, lacks = _soonest_free(mission, uavs, j, chart, memory, reach)
             if cell < 0 and j == i:
                 break
@@ -416,9 +419,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
             continue
         slots = path_length(mission, uavs, i, chart, None, u.x, u.y, x, y)
         wait = waiting_time(mission, u, zone, slots, memory.free)
-        until = slots
-        if reach is not None:
-            until = _in_wind(mission, u, chart, u.x, u.y, x, y, slots, reach)
+        until = _battery(mission, u, chart, u.x, u.y, x, y, slots, reach)
         # the slots that lack if it begins to charge as soon as it may and a pad is free
         spare = u.battery - mission.charge_start
         lacks = max(max(until, spare) + wait + 1 - u.battery, 0)
@@ -523,17 +524,17 @@ def battery_home(mission, uavs, i, chart, planned, x, y, home, reach):
         reach: The table of ``reach_of``. A detour around parked teammates is not in it; each of
             its cells may cost the most.
     """
-    if reach is None and is_crowded(mission, chart):
+    if reach is None and is_crowded(mission, chart, chart.zones[home.y, home.x]):
         return path_length(mission, uavs, i, chart, planned, x, y, home.x, home.y)
     cells = path_length(mission, uavs, i, chart, None, x, y, home.x, home.y)
-    if reach is None:
-        return cells
-    return _in_wind(mission, uavs[i], chart, x, y, home.x, home.y, cells, reach)
+    return _battery(mission, uavs[i], chart, x, y, home.x, home.y, cells, reach)
 
 
 @inlined
-def _in_wind(mission, u, chart, x, y, home_x, home_y, cells, reach):
-    """The battery [%] for a way of so many cells, those of a detour included."""
+def _battery(mission, u, chart, x, y, home_x, home_y, cells, reach):
+    """The battery [%] for a way home of so many cells, those of a detour included."""
+    if reach is None:
+        return cells
     dearest = u.slots_per_cell + mission.wind_most
     if reach.size == 0:  # too many cells for a table
         return cells * dearest
@@ -548,24 +549,22 @@ def round_trip(mission, u, chart, x, y, home, reach):
 
     Gusts on the way out are not considered; the safe moves are what keeps the zone in reach.
     """
+    cells = distance(chart, x, y, home.x, home.y)
+    back = _battery(mission, u, chart, x, y, home.x, home.y, cells, reach)
+    if mission.zones > 1:  # once there, another zone may be nearer
+        near = chart.parking[chart.nearest[y, x]]
+        cells = distance(chart, x, y, near[0], near[1])
+        back = min(back, _battery(mission, u, chart, x, y, near[0], near[1], cells, reach))
     cells = distance(chart, u.x, u.y, x, y)
     if reach is None:
-        if mission.zones > 1:  # once there, another zone may be nearer
-            return cells + min(distance(chart, x, y, home.x, home.y), distance_home(chart, x, y))
-        return cells + distance(chart, x, y, home.x, home.y)
+        return cells + back
     against = max(mission.wind_x * (u.x - x), 0.0) + max(mission.wind_y * (u.y - y), 0.0)
-    back = distance(chart, x, y, home.x, home.y)
-    back = _in_wind(mission, u, chart, x, y, home.x, home.y, back, reach)
-    if mission.zones > 1:
-        near = chart.parking[chart.nearest[y, x]]
-        cells_near = distance(chart, x, y, near[0], near[1])
-        back = min(back, _in_wind(mission, u, chart, x, y, near[0], near[1], cells_near, reach))
     return cells * u.slots_per_cell + int(against) + back
 
 
 @inlined
 def contests(mission, uavs, i):
-    """Whether teammates of UAV ``i`` may occupy the cells that its actions lead to in the next slot.
+    """Whether teammates of UAV ``i`` may occupy the cells that its actions lead to.
 
     Returns:
         Two bits for each action, as ``contest`` reads them: 0 if the cell is free; 1 if a teammate

@@ -27,6 +27,7 @@ class Chart(NamedTuple):
     Attributes:
         zones: (H, W) the number of the charging zone of a cell, ``OPEN`` or ``NO_FLY``.
         parking: (C, 2) the cells of the zones, zone by zone and row by row.
+        sizes: (Z,) how many cells each zone has.
         nearest: (H, W) the number of the parking cell that is nearest to a cell.
         ways: (W * H, W * H) cells on the shortest way between two cells, numbered row by row, or
             ``FAR``; None without no-fly cells, so that the compiler leaves out the table.
@@ -34,6 +35,7 @@ class Chart(NamedTuple):
 
     zones: np.ndarray
     parking: np.ndarray
+    sizes: np.ndarray
     nearest: np.ndarray
     ways: np.ndarray | None
 
@@ -66,13 +68,14 @@ def chart_at(
     """The chart of a grid with these zones and no-fly cells."""
     cells = zones_of(width, height, zones, no_fly)
     parking = np.array(parking_of(zones), np.int64)
+    sizes = np.array([columns * rows for _, _, columns, rows in zones], np.int64)
     nearest = spread(cells, parking)[1].reshape(cells.shape)
     ways = None
     if no_fly:
         ways = np.empty((cells.size, cells.size), np.int16)
         for number, (y, x) in enumerate(np.ndindex(cells.shape)):
             ways[number] = spread(cells, np.array([[x, y]]))[0]
-    return Chart(cells, parking, nearest, ways)
+    return Chart(cells, parking, sizes, nearest, ways)
 
 
 def geometry(chart: Chart) -> dict[str, Any]:
@@ -183,10 +186,3 @@ def _distance(ways, width, x, y, to_x, to_y):
     if ways is None:
         return abs(x - to_x) + abs(y - to_y)
     return np.int64(ways[to_y * width + to_x, y * width + x])
-
-
-@inlined
-def distance_home(chart, x, y):
-    """The cells on the shortest way from a cell to the nearest charging zone."""
-    number = chart.nearest[y, x]
-    return distance(chart, x, y, chart.parking[number, 0], chart.parking[number, 1])

@@ -18,7 +18,7 @@ from dess.scenario import (
     scenario_description,
     scenario_names,
 )
-from dess.sea.chart import distance_home
+from dess.sea.chart import spread
 from dess.sections.age import MOST_TEETH
 from dess.state import check_seed, sample_scenario, spaces_of
 from tests.drawn import continuous_spaces, extended_spaces, replications, seeds, spaces
@@ -39,7 +39,8 @@ def test_bays_have_land_and_invented_nodes_within_reach(name: str) -> None:
     assert 24 <= min(bay.size) <= max(bay.size) <= 64 and bay.rows
     assert 2 <= bay.uavs[0] <= bay.uavs[1] <= 5
     assert 100 < len(bay.no_fly) < 0.8 * bay.size[0] * bay.size[1]
-    assert all(distance_home(bay.chart, x, y) <= 27 for x, y in bay.nodes)
+    home = spread(bay.chart.zones, bay.chart.parking)[0].reshape(bay.chart.zones.shape)
+    assert all(home[y, x] <= 27 for x, y in bay.nodes)
     assert "coarse" in scenario_description(name) and "invented" in scenario_description(name)
 
 

@@ -312,6 +312,10 @@ SHARED |= {"wind": {"strength": 0.2, "direction": 268, "gusts": 0.1, "seed": 79}
         ("clustered:910027", {"uavs": 3, "pads": 2}, "greedy", 6),
         # One of two UAVs takes the pad of the only zone that the other reaches.
         ("large:700014", {"uavs": 2, "pads": 1}, "any", 1),
+        # Two UAVs come to a pad in the same slot, and the one with less battery cannot wait.
+        ("large:1230002", {"uavs": 2, "pads": 1}, "greedy", 0),
+        # Six UAVs collect the last data faster than they did on the whole.
+        ("clustered:970026", {"uavs": 6, "pads": 3}, "planner-short", 2),
     ],
 )
 def test_a_uav_that_has_a_way_to_live_lives(

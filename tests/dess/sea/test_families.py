@@ -14,7 +14,7 @@ from analysis import load_study
 from dess import InputError, load_scenario
 from dess.scenario import ScenarioSpace, scenario_description, scenario_names
 from dess.sea import families
-from dess.sea.chart import distance_home, parking_of, spread
+from dess.sea.chart import parking_of, spread
 from dess.sea.families import FAMILIES, MOST_SEED, SETS, sea_of, seas_of
 
 # What never changes: a sea of each family, as TOML.
@@ -37,7 +37,8 @@ def check(name: str) -> ScenarioSpace:
     assert 16 <= min(columns, rows) <= max(columns, rows) <= 64
     assert 6 <= len(space.nodes) <= (100 if name.startswith("dense") else 60)
     assert all(chart.zones[y, x] == -1 for x, y in space.nodes)  # in no zone
-    assert all(5 * distance_home(chart, x, y) <= 2 * least for x, y in space.nodes)
+    home = spread(chart.zones, chart.parking)[0].reshape(chart.zones.shape)
+    assert all(5 * home[y, x] <= 2 * least for x, y in space.nodes)
     assert 1 <= len(space.rectangles) <= 3
     for (*_, width, height), pads in zip(space.rectangles, space.zone_pads, strict=True):
         assert 2 <= min(width, height) <= max(width, height) <= 4 and 1 <= pads <= width * height
