@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from dess.code.libraries import needs
+from dess.code.sources import path_of
 from dess.errors import InputError, one_of, shown
 from dess.files.reading import paths_in
 from policies.base import Policy
@@ -188,6 +189,7 @@ def _importable(path: Path) -> str:
     if (folder := str(path.resolve().parent)) not in sys.path:
         sys.path.append(folder)
     invalidate_caches()
+    path_of.cache_clear()
     spec = find_spec(path.stem)
     if not spec or not spec.origin or Path(spec.origin).resolve() != path.resolve():
         raise InputError(f"policy: {path}: another module has its name; allowed: another file name")

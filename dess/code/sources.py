@@ -13,7 +13,7 @@ not found this way and does not count.
 import ast
 import re
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from importlib.machinery import PathFinder
 from pathlib import Path
@@ -31,12 +31,12 @@ def code_of(*modules: str) -> dict[str, str]:
     the modules have no source file.
     """
     packages = OURS | {module.partition(".")[0] for module in modules}
-    folders = {path.parent for path in map(_path_of, modules) if path}
+    folders = {path.parent for path in map(path_of, modules) if path}
     hashes: dict[str, str] = {}
     waiting = [*modules]
     while waiting:
         module = waiting.pop()
-        path = _path_of(module)
+        path = path_of(module)
         within = module.partition(".")[0] in packages or (path and path.parent in folders)
         if path and within and module not in hashes:
             hashes[module], imports = read(path, module)
@@ -72,8 +72,8 @@ def _imports(tree: ast.Module, package: str) -> Iterator[str]:
             above = parents[: len(parents) - node.level + 1] if node.level else []
             base = ".".join([*above, *([node.module] if node.module else [])])
             members = [f"{base}.{alias.name}" for alias in node.names]
-            yield from (name for name in members if _path_of(name))
-            if not all(map(_path_of, members)):
+            yield from (name for name in members if path_of(name))
+            if not all(map(path_of, members)):
                 yield base
 
 
@@ -93,8 +93,9 @@ def _outline(tree: ast.Module) -> str:
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
-def _path_of(module: str) -> Path | None:
-    """The source file of a module, or None without one; its packages are not imported."""
+@cache
+def path_of(module: str) -> Path | None:
+    """The source file of a module, looked for once, or None; its packages are not imported."""
     found, places, names = None, None, module.split(".")
     for end in range(len(names)):
         found = PathFinder.find_spec(".".join(names[: end + 1]), places)

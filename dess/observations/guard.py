@@ -277,8 +277,8 @@ def _sort(mission, uavs, first, order):
         if not uavs[j].active:
             continue
         place = count
-        while place > 0 and (j == first or uavs[j].battery < uavs[order[place - 1]].battery):
-            if order[place - 1] == first:
+        while place > 0 and order[place - 1] != first:
+            if j != first and uavs[j].battery >= uavs[order[place - 1]].battery:
                 break
             order[place] = order[place - 1]
             place -= 1
@@ -330,7 +330,7 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
             memory.free_after[u.zone, pad] = free[u.zone, pad]
         _take_pad(mission, u, u.zone, 0, memory.free_after)
     home, home_zone, followers, starves = stays(u), -1, 0, False
-    cell, slots, lacks, zone = -1, 0, 0, np.int64(0)
+    cell, slots, lacks, wait, zone = -1, 0, 0, 0, np.int64(0)
     for place in range(_sort(mission, uavs, first, memory.order)):
         j = memory.order[place]
         o = uavs[j]
@@ -350,13 +350,12 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
         if home_zone >= 0:
             if zone == home_zone:
                 followers += 1
-                wait = max(home.wait, _kept(mission, u, o, zone, followers))
-                home = Home(home.x, home.y, home.cells, wait, home.lacks, home.gives_way)
+                wait = max(wait, _kept(mission, u, o, zone, followers))
         elif j == i:
-            wait, home_zone = np.int64(waiting_time(mission, u, zone, slots, free)), zone
+            wait, home_zone = waiting_time(mission, u, zone, slots, free), zone
             gives_way = np.int64(may_ask and starves and lacks == 0)
             x, y = np.int64(chart.parking[cell, 0]), np.int64(chart.parking[cell, 1])
-            home = Home(x, y, np.int64(slots), wait, np.int64(lacks), gives_way)
+            home = Home(x, y, np.int64(slots), np.int64(0), np.int64(lacks), gives_way)
             if u.pad_request >= 0 or not mission.plans_waits or not _plans_wait(mission, zone):
                 break
         else:
@@ -371,7 +370,7 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
                 _take_pad(mission, o, zone, asked, memory.free_after)
             _take_pad(mission, o, zone, asked, free)
     # To wait for more than C_S is of no use, as a UAV may ask only at or below C_S.
-    wait = np.int64(min(home.wait, mission.charge_start - 1))
+    wait = np.int64(min(wait, mission.charge_start - 1))
     return Home(home.x, home.y, home.cells, wait, home.lacks, home.gives_way)
 
 
@@ -399,23 +398,17 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     zone, slots = np.int64(chart.zones[y, x]), distance(chart, u.x, u.y, x, y)
     free = (slots == 0 or not memory.taken[cell]) and not _is_given_up(mission, zone)
     free = free and (mission.zones == 1 or not waiting_time(mission, u, zone, slots, memory.free))
-    if (
-        reach is None
-        and free
-        and path_length(mission, uavs, i, chart, None, u.x, u.y, x, y) == slots
-    ):
+    free = free and reach is None
+    if free and path_length(mission, uavs, i, chart, None, u.x, u.y, x, y) == slots:
         return cell, slots, max(slots + 1 - u.battery, 0)
     best, best_zone, way, least, fewest = -1, -1, -1, -1, -1
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
-        if memory.taken[cell] and not (u.x == x and u.y == y):
-            continue
-        if _is_given_up(mission, zone):
+        if (memory.taken[cell] and not (u.x == x and u.y == y)) or _is_given_up(mission, zone):
             continue
         # no detour and no wait makes a cell better than a nearer one of the same zone
-        is_nearer = distance(chart, u.x, u.y, x, y) < way
-        if reach is None and best >= 0 and zone == best_zone and not is_nearer:
+        if reach is None and zone == best_zone and distance(chart, u.x, u.y, x, y) >= way:
             continue
         slots = path_length(mission, uavs, i, chart, None, u.x, u.y, x, y)
         wait = waiting_time(mission, u, zone, slots, memory.free)
@@ -635,8 +628,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     u = uavs[i]
     if charge and u.pad_request >= 0:
         return 1 << HOVER  # it would lose its place in the queue
-    spare = margin(mission, u)
-    reserve = spare + home.wait if charge else 0
+    reserve = margin(mission, u) + home.wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
     # that lead nearest to the parking cell, and those after which it is reached if the margin and
     # the slots for a pad are spent.
