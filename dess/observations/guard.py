@@ -640,7 +640,8 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         # Teammates fly around a parked UAV, so it need not leave its cell for any.
         stays = action == HOVER and is_parked(u)
         contested = 0 if stays else contest(levels, action)
-        if not is_open(chart, x, y) or contested == 3 or (home.gives_way == 1 and action == HOVER):
+        gives_way = charge and home.gives_way == 1 and action == HOVER
+        if not is_open(chart, x, y) or contested == 3 or gives_way:
             continue
         late = 0
         if charge:

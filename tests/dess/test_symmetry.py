@@ -160,19 +160,15 @@ def _plan(sea: Sea, i: int) -> tuple[list[int], bool, float]:
     places = [(int(u["x"]), int(u["y"])) for u in team]
     parked = [p for p, u in zip(places, team, strict=True) if u["latch"] and u["zone"] >= 0]
     own = int(me["x"]), int(me["y"])
-    taken = {p for p, u in zip(places, team, strict=True) if u["zone"] >= 0}
-    if len(zones) < 4 * len(sea.state.uavs[0]) * mission["zones"]:  # the zones are crowded
-        taken &= {*parked, own}
-    home = min(reached(own, *space.size, {*space.no_fly})[cell] for cell in zones)
-    request = _until_asked(me, home, mission)
+    cells = [width * height for _, _, width, height in space.rectangles]
+    crowded = [number < 4 * len(sea.state.uavs[0]) for number in cells]
+    taken = {p for p in places if p in zones and (not crowded[zones[p]] or p in (*parked, own))}
     reach = reach_of(sea.state.missions, space.chart)
     for u in sorted(team, key=lambda u: u["battery"]):
         place, cost = (int(u["x"]), int(u["y"])), mission["flight_cost"]
-        if place in parked and place != own:
-            continue
-        options = []
+        options, is_parked = [], place in parked and place != own
         for cell, zone in zones.items():
-            if cell in taken and cell != place:
+            if cell != place and (cell in taken or is_parked):
                 continue
             mates = {p for p in parked if p not in (place, cell)}
             islands = {*space.no_fly}
@@ -208,7 +204,6 @@ def _plan(sea: Sea, i: int) -> tuple[list[int], bool, float]:
             taken.add(cell)
             needed = math.ceil((u["quota"] - u["communications"]) / mission["communication_slots"])
             if u["battery"] < cost * needed:
-                asked = max(asked, min(request, u["battery"] // cost - 1))
                 pad = int(np.argmin(free[zone]))
                 begin = max(free[zone][pad], asked)
                 lacking = complete - max(u["battery"] - begin * cost, 0)
