@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import textwrap
 from base64 import b64decode
 from collections.abc import Callable
 from pathlib import Path
@@ -21,6 +22,7 @@ from reports.pages.html import STUDY, embedded
 from reports.pages.notebook import NAMES, read
 from reports.pages.render import body_of, render
 from reports.player import library
+from tests.pins.pinned import pinned
 from tests.reports.browser import Visit
 from tests.reports.pages.test_render import another_environment
 from tests.reports.small import EMBEDDED, Links, run_small_studies, said_by, words_of
@@ -114,6 +116,13 @@ def test_pages_show_results_and_no_errors(pages: dict[str, str]) -> None:
         if "nan: the missions are too few" in text:  # what cannot be estimated, with its reason
             text = re.sub(r"\bnan\b", "", text)
         assert not re.search(r"Traceback|Warning|stderr|<Figure|Figure\(|NaN|\bnan\b|None", text)
+
+
+@pytest.mark.brief
+@pytest.mark.parametrize("name", ["performance", "parameters", "pads", "seas", "what-if"])
+def test_a_page_says_what_the_kept_one_says(pages: dict[str, str], name: str) -> None:
+    text = textwrap.fill(words_of(pages[f"{name}.html"]), 100, break_long_words=False)
+    pinned(f"pages/{name}.txt", text + "\n")
 
 
 def test_every_figure_has_a_caption_with_its_number(pages: dict[str, str]) -> None:
