@@ -1,0 +1,65 @@
+"""The words of the command line, the keys of its JSON, and the columns of files."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import typer
+from click.testing import CliRunner
+
+from analysis.results import parquet
+from dess.record import EVENT_COLUMNS
+from reports.cli.commands import app
+from tests.pins.pinned import pinned
+from tests.reports.cli.conftest import dess, dess_json
+
+__all__ = ["dess", "dess_json"]  # fixtures
+
+SWEEP = ["sweep", "--scenario", "small.toml", "--set", "uavs=1,2", "--policy", "greedy,random"]
+COMMANDS = {
+    "simulate": ["simulate", "--scenario", "small.toml", "--policy", "greedy"],
+    "evaluate": ["evaluate", "--scenario", "small.toml", "--policy", "greedy", "--missions", "5"],
+    "sweep": [*SWEEP, "--price", "uav=2", "--require", "success=0.5", "--name", "asked"],
+    "study show": ["study", "show", "trial"],
+    "study diff": ["study", "diff", "trial", "again"],
+    "verify": ["verify", "trial", "--missions", "2", "--seed", "1"],
+    "policies show": ["policies", "show", "any"],
+    "scenarios show": ["scenarios", "show", "paper"],
+    "studies show": ["studies", "show", "pads"],
+}
+
+
+def _commands(command: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    yield path
+    for name, further in sorted(getattr(command, "commands", {}).items()):
+        yield from _commands(further, (*path, name))
+
+
+def _shape(value: Any) -> Any:
+    """A JSON value without its content: the keys of objects, and what kind the rest is."""
+    if isinstance(value, dict):
+        return {key: _shape(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        shapes = [_shape(entry) for entry in value]
+        return [shape for n, shape in enumerate(shapes) if shape not in shapes[:n]]
+    return "number" if type(value) in (int, float) else type(value).__name__
+
+
+def test_every_help_is_the_kept_one() -> None:
+    command, run = typer.main.get_command(app), CliRunner(env={"COLUMNS": "80"}).invoke
+    texts = [run(command, [*path, "--help"]).output for path in _commands(command)]
+    pinned("help.txt", "\n".join(texts))
+
+
+def test_the_keys_of_every_json_document_are_the_kept_ones(dess: Any, dess_json: Any) -> None:
+    for folder in ("trial", "again"):
+        assert dess("study", "run", "trial.toml", "--out", folder)[0] == 0
+    shapes = {name: _shape(dess_json(*command)) for name, command in COMMANDS.items()}
+    pinned("json.txt", json.dumps(shapes, indent=1) + "\n")
+
+
+def test_the_columns_of_every_file_are_the_kept_ones() -> None:
+    lines = [f"log: {name} {kind}" for name, kind in EVENT_COLUMNS.items()]
+    for kind, schemas in parquet.SCHEMAS.items():
+        lines += [f"{kind}: {field}" for schema in schemas for field in schema]
+    pinned("columns.txt", "\n".join(lines) + "\n")

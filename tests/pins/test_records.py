@@ -1,0 +1,33 @@
+"""Records of missions stay the same to the bit, whatever is moved."""
+
+from hashlib import sha256
+from typing import Any
+
+import pytest
+
+import policies
+from dess.batch import simulate_batch
+from dess.scenario import load_scenario
+from tests.pins.pinned import pinned
+
+# Everything that a scenario may have beyond the paper.
+EXTENDED: dict[str, Any] = {
+    "pads": 2,
+    "wind": {"strength": 0.6, "direction": 40, "gusts": 0.4, "seed": 5},
+    "failures": {"uav_rate": 0.005, "uav_repair": 20.0, "pad_rate": 0.01, "pad_repair": 30.0},
+    "age": {"measured": True, "reward": 0.5},
+}
+SEAS: dict[str, dict[str, Any]] = {"paper": {}, "archipelago:7": {}, "bay": EXTENDED}
+TEAMS = ["greedy", "age", "planner-short", "ddqn", "any"]
+
+
+@pytest.mark.parametrize("team", TEAMS)
+def test_the_records_of_a_policy_are_the_kept_ones(team: str) -> None:
+    hashes = []
+    for sea, changes in SEAS.items():
+        if team == "ddqn" and sea != "paper":
+            continue  # it acts on the paper's sea only
+        records = simulate_batch(load_scenario(sea, **changes), policies.load(team), 2030, 8)
+        content = sha256(b"".join(table.tobytes() for table in records)).hexdigest()
+        hashes.append(f"{sea} {content}\n")
+    pinned(f"records/{team}.txt", "".join(hashes))
