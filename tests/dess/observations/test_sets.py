@@ -1,4 +1,4 @@
-"""Sets: values by hand, and what a mirrored, rotated or renamed sea changes in them."""
+"""Sets: the plain ones, values by hand, and what a mirrored, rotated or renamed sea changes."""
 
 from typing import Any
 
@@ -12,13 +12,22 @@ from dess.observations import states as column
 from dess.observations.sets import ACTION, MATE, MOVES, NODE, OWN, ZONE, Sets, sea_kinds, sea_of
 from dess.observations.states import CompactStates, empty_states
 from dess.scenario import ScenarioSpace
+from dess.sea.chart import NO_FLY
 from dess.state import constants_of, starts_of, state_of
+from tests.dess.observations.any_teams import any_teams
+from tests.dess.observations.plain_sets import arrays_of
 from tests.drawn import PLAIN_SEA, seas, spaces
 
 OWN_PART, ACTIONS, NODES, NODE_MOVES, MATES, MATE_MOVES, ZONES, ZONE_MOVES = range(8)
 NORTH, EAST, SOUTH, WEST, HOVER = range(5)
 # What becomes of the four moves on a sea that is mirrored along x, and on one that is transposed.
 MIRRORED, TRANSPOSED = [NORTH, WEST, SOUTH, EAST], [WEST, SOUTH, EAST, NORTH]
+# Walls with a gap in the north or south, so that some ways are longer than the longest that counts.
+MAZE: dict[str, Any] = {
+    **{"grid": 81, "rows": 12, "nodes": ((0, 11), (40, 5), (78, 3), (80, 0)), "zone": (0, 4, 1, 2)},
+    "zones": [{"cells": (x, 2, 1, height)} for x, height in ((2, 1), (4, 1), (6, 1), (78, 10))],
+    "no_fly": [(x, y) for x in range(1, 80, 2) for y in range(12) if y != x % 4 // 2 * 11],
+}
 
 
 def _sets(space: ScenarioSpace) -> Sets:
@@ -33,25 +42,20 @@ def _encode(space: ScenarioSpace, states: CompactStates, uav: int) -> tuple[np.n
 def _cases(draw: st.DrawFn, **fixed: Any) -> tuple[dict[str, Any], CompactStates, int]:
     """The geometry of a sea, a team in any state on it, and a UAV that is active."""
     sea = draw(seas(**fixed))
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    uavs, size = draw(st.integers(1, 6)), (sea["grid"], sea["rows"] or sea["grid"])
-    open_cells = [c for c in np.ndindex(size) if c not in sea.get("no_fly", ())]
-    states = empty_states(1, uavs, len(sea["nodes"]))
-    states.missions[0] = rng.integers((10, 60), (51, 101))
-    team = states.uavs[0]
-    team[:, [column.X, column.Y]] = rng.choice(open_cells, uavs)
-    team[:, column.BATTERY] = rng.integers(0, 101, uavs)
-    team[:, column.NEEDED] = rng.integers(0, 111, uavs)
-    flags = [column.ACTIVE, column.LATCH, column.CHARGING, column.MUST_CHARGE]
-    team[:, flags] = rng.integers(0, 2, (uavs, 4))
-    team[:, column.HOME] = rng.integers(0, 20, uavs)
-    team[:, column.MASK] = rng.integers(1, 32, uavs)
-    states.residual[0] = rng.choice([0.0, 1.0], len(sea["nodes"])) * rng.uniform(
-        0, 20, len(sea["nodes"])
-    )
-    uav = draw(st.integers(0, uavs - 1))
-    team[uav, column.ACTIVE] = 1
-    return sea, states, uav
+    return sea, *draw(_teams(_space(sea)))
+
+
+@st.composite
+def _worlds(draw: st.DrawFn, **sea: Any) -> tuple[ScenarioSpace, CompactStates, int]:
+    """A space, some missions with teams in any state on it, and a UAV that is active in each."""
+    data = draw(st.sampled_from([(0.0, 0.0), (0.0, 40.0), (8.0, 12.0)]))
+    space = draw(spaces(**sea, initial_data=data))
+    return space, *draw(_teams(space, 10))
+
+
+def _teams(space: ScenarioSpace, count: int = 1) -> st.SearchStrategy[tuple[CompactStates, int]]:
+    open_cells = np.argwhere(space.chart.zones.T != NO_FLY).tolist()
+    return any_teams(open_cells, len(space.nodes), count)
 
 
 def _space(sea: dict[str, Any]) -> ScenarioSpace:
@@ -83,6 +87,18 @@ def _turned_states(states: CompactStates, grid: int, transposes: bool) -> Compac
     bits = states.uavs[..., column.MASK, None] >> np.array([*moves, HOVER]) & 1
     team[..., column.MASK] = (bits << np.arange(5)).sum(-1)
     return states._replace(uavs=team)
+
+
+@pytest.mark.parametrize("sea", [{}, MAZE], ids=["drawn", "maze"])
+@given(st.data())
+def test_its_numbers_are_the_plain_ones(sea: dict[str, Any], data: st.DataObject) -> None:
+    """Without a tolerance: both round at the same places."""
+    space, states, uav = data.draw(_worlds(**sea))
+    missions = np.arange(len(states.missions))
+    parts = _sets(space).encode(states, missions, np.full_like(missions, uav))
+    for b in missions:
+        for part, plain in zip(parts, arrays_of(space, states, b, uav), strict=True):
+            np.testing.assert_array_equal(part[b], plain)
 
 
 @given(_cases(), st.booleans())

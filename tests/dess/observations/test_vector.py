@@ -6,26 +6,14 @@ from hypothesis import strategies as st
 
 from dess.env.vector import vector_env
 from dess.observations.states import (
-    ACTIVE,
-    BATTERY,
-    CHARGE_COMPLETE,
-    CHARGE_START,
-    CHARGING,
-    HOME,
-    LATCH,
-    MASK,
-    MUST_CHARGE,
-    NEEDED,
     CompactStates,
     Layout,
-    X,
-    Y,
     compact_states,
-    empty_states,
     layout_of,
 )
 from dess.observations.vector import Vector
 from dess.scenario import load_scenario
+from tests.dess.observations.any_teams import any_teams
 from tests.dess.observations.plain_vector import line_of
 
 GRID = 32
@@ -41,23 +29,11 @@ NEAR, MIDDLE, FAR = 1.2, 4.0, 12.0  # scales of nearness [slots]
 
 @st.composite
 def _worlds(draw: st.DrawFn) -> tuple[Vector, CompactStates, int]:
-    """A layout, a mission of a team of up to six in any state, and one that is active."""
+    """A layout, a mission of a team in any state, and a UAV of it that is active."""
     grid = draw(st.integers(2, 12))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     nodes = rng.integers(0, grid, (draw(st.integers(1, 5)), 2))
-    uavs = draw(st.integers(1, 6))
-    states = empty_states(1, uavs, len(nodes))
-    states.missions[0, [CHARGE_START, CHARGE_COMPLETE]] = rng.integers((10, 60), (51, 101))
-    team = states.uavs[0]
-    team[:, [X, Y]] = rng.integers(0, grid, (uavs, 2))
-    team[:, BATTERY] = rng.integers(0, 101, uavs)
-    team[:, NEEDED] = rng.integers(0, 111, uavs)
-    team[:, [ACTIVE, LATCH, CHARGING, MUST_CHARGE]] = rng.integers(0, 2, (uavs, 4))
-    team[:, HOME] = rng.integers(0, 2 * grid, uavs)
-    team[:, MASK] = rng.integers(1, 32, uavs)
-    states.residual[0] = rng.uniform(0, 20, len(nodes))
-    uav = draw(st.integers(0, uavs - 1))
-    team[uav, ACTIVE] = 1
+    states, uav = draw(any_teams([*np.ndindex(grid, grid)], len(nodes)))
     return Vector(Layout(grid, np.array([0, 0, 1, 1]), nodes)), states, uav
 
 
