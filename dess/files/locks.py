@@ -9,7 +9,7 @@ with temporary_folder(Path(gettempdir()), "dess-kernel-") as folder:
 import secrets
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -75,13 +75,12 @@ def temporary_folder(parent: Path, prefix: str) -> Iterator[Path]:
         with suppress(Timeout, OSError), FileLock(left, timeout=0):  # its process is dead
             _remove(left)
     lock = parent / f"{prefix}{secrets.token_hex(4)}{SUFFIX}"
-    with FileLock(lock):
-        try:
-            folder = lock.with_suffix("")
-            folder.mkdir(mode=0o700)
-            yield folder
-        finally:
-            _remove(lock)
+    with FileLock(lock), ExitStack() as cleaning:
+        for _ in range(2):  # an interrupt may end the first time in the middle
+            cleaning.callback(_remove, lock)
+        folder = lock.with_suffix("")
+        folder.mkdir(mode=0o700)
+        yield folder
 
 
 def _remove(lock: Path) -> None:

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -209,6 +210,20 @@ def test_temporary_folders_are_removed_and_those_of_killed_processes(tmp_path):
     assert {name for name in files_of(tmp_path) if not name.endswith(".lock")} == {
         *("other/deep/file", "t-living/deep/file")
     }
+
+
+def test_an_interrupt_while_a_temporary_folder_is_removed_leaves_none(tmp_path, monkeypatch):
+    remove, interrupts = shutil.rmtree, [KeyboardInterrupt]
+
+    def interrupted(folder, **options):
+        if interrupts:
+            raise interrupts.pop()
+        remove(folder, **options)
+
+    monkeypatch.setattr("dess.files.locks.shutil.rmtree", interrupted)
+    with pytest.raises(KeyboardInterrupt), temporary_folder(tmp_path, "t-") as folder:
+        (folder / "file").write_text("half")
+    assert not [*tmp_path.iterdir()]
 
 
 def test_processes_wait_for_each_other_but_not_for_ever(tmp_path):
