@@ -53,7 +53,7 @@ def assert_agree(record: Any, log: pd.DataFrame) -> None:
 @pytest.mark.parametrize("fields", CASES)
 @pytest.mark.parametrize("policy", ["greedy", "random"])
 def test_tables_agree_with_the_record(policy: str, fields: dict[str, Any]) -> None:
-    record, log = logged(policy, **fields)
+    record, log = logged(policy, 3, **fields)
     assert_agree(record, log)
     if fields:
         assert record.uavs["slots_waiting"].sum() > 0  # the case is the one it is meant to be
