@@ -669,7 +669,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     # Two UAVs that both insist block each other: the one without the right of way waits a slot.
     if u.overruled and not nearest & clear and (least > 0 or nearest >> HOVER & 1):
         return 1 << HOVER
-    return nearest
+    return nearest or 1 << HOVER  # who gives way may have nowhere to go
 
 
 @inlined
