@@ -19,7 +19,6 @@ from tests.fuzz.forks import Outcome
 CODES = {0: "done", 1: "failed", 2: "bad input", 130: "interrupted"}
 LINE = 300  # characters
 ENDING = 2  # seconds of CPU time after a signal
-COMPILING = 15  # the same if it compiles, since LLVM does not end in the middle of a function
 # Words of Python or of a library in a line for a user.
 _INNER = re.compile(
     r"\b(?!InputError)[A-Z]\w*(Error|Exception|Warning)\b|Input should be|validation error"
@@ -55,7 +54,7 @@ def _ending(outcome: Outcome) -> Iterator[str]:
         yield f"exit code {outcome.code} in place of {outcome.case.code}"
     if outcome.waited and outcome.code == 130:
         yield "it waited for something until it was interrupted"
-    if outcome.ending > (COMPILING if "compiling" in outcome.text(STDERR) else ENDING):
+    if outcome.ending > ENDING:
         yield f"it took {outcome.ending:.1f} seconds of CPU time to end after a signal"
     for name in outcome.left:
         yield f"left a process: {name}"

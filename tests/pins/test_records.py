@@ -10,7 +10,7 @@ from dess.batch import simulate_batch
 from dess.scenario import load_scenario
 from tests.pins.pinned import pinned
 
-# Everything that a scenario may have beyond the paper.
+# Few pads, wind, failures and the age of the data.
 EXTENDED: dict[str, Any] = {
     "pads": 2,
     "wind": {"strength": 0.6, "direction": 40, "gusts": 0.4, "seed": 5},

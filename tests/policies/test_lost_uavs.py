@@ -14,7 +14,7 @@ from dess.batch import simulate_batch
 from dess.mission import simulate
 from dess.scenario import Scenario, ScenarioSpace
 from dess.sea.families import FAMILIES
-from dess.state import BATTERY
+from dess.state import BATTERY, END_NAMES
 from policies.registry import load
 from tests.dess.flights import flown
 from tests.drawn import Script
@@ -49,9 +49,10 @@ def drawn_spaces(seed: int) -> Iterator[list[ScenarioSpace]]:
 
 
 def failures(seed: int) -> tuple[int, list[str]]:
-    """The number of drawn missions, and what was the matter in those in which a UAV was lost.
+    """The number of drawn missions, and what was the matter in those that failed.
 
-    Where the data of a sea do not suffice for all quotas, missions are truncated; nobody is lost.
+    A mission in which no UAV is lost and all but 1 % of the data are collected does not count as
+    failed: the data of its sea do not suffice for all quotas until it is truncated.
     """
     missions, failed = 0, []
     for number, spaces in enumerate(drawn_spaces(seed)):
@@ -59,16 +60,19 @@ def failures(seed: int) -> tuple[int, list[str]]:
             policy, numbers = load(name), first * MISSIONS + np.arange(MISSIONS)
             records = simulate_batch(spaces, policy, seed + number, numbers)
             missions += len(numbers)
-            for n in np.nonzero((records.uavs["end"] == BATTERY).any(axis=1))[0]:
+            lost = (records.uavs["end"] == BATTERY).any(axis=1)
+            lacks_data = ~lost & (records.missions["collection_ratio"] >= 0.99)
+            for n in np.nonzero((records.missions["success"] == 0) & ~lacks_data)[0]:
                 space, which = spaces[n], (seed + number, int(numbers[n]))
-                found = "; ".join(map(str, judged(space, policy, *which)))
+                ends = [END_NAMES[end] for end in records.uavs[n]["end"][: space.uavs[1]]]
+                found = "; ".join(map(str, judged(space, policy, *which))) or f"ends: {ends}"
                 what = f"{space.uavs[1]} UAVs, {space.zone_pads} pads, {space.wind.strength} wind"
                 failed.append(f"{name}, sea {number}, {which}, {what}: {found}")
     return missions, failed
 
 
 @pytest.mark.slow
-def test_in_at_most_one_of_a_thousand_drawn_missions_is_a_uav_lost() -> None:
+def test_at_most_one_of_a_thousand_drawn_missions_fails() -> None:
     missions, failed = failures(SEED)
     assert len(failed) <= missions / 1000, "\n".join(failed)
 
