@@ -22,7 +22,7 @@ from dess.sea.chart import distance, in_zone, is_open
 from dess.sections.failures import working_pads
 from dess.sections.fleet import leg
 from dess.state import HOVER, STEP_X, STEP_Y, fields
-from policies.planner.plan import CHARGE, NEVER
+from policies.planner.plan import CHARGE, NEVER, last_charge
 
 # The data of a flight are records: the compiled code passes them on without counting references,
 # which would take longer than the model itself.
@@ -200,15 +200,13 @@ def fly(mission, rates, plan, source, first, flight, slots, lag=math.inf):
 @inlined
 def _take(plan, i, v, first):
     """Let a UAV follow a plan from a snapshot on."""
-    v.waypoints, v.last_charge = plan.lengths[i], -1
+    v.waypoints, v.last_charge = plan.lengths[i], last_charge(plan, i)
     for number in range(v.waypoints + 1):
         w = plan.waypoints[i, number]
         if number > v.next:
             w.begun = NEVER
         elif first == 0:
             w.begun = 0
-        if number < v.waypoints and w.stay == CHARGE:
-            v.last_charge = number
 
 
 @inlined

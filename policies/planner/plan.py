@@ -50,6 +50,15 @@ def copy_plan(mission, source, target):
             target.waypoints[i, number] = source.waypoints[i, number]
 
 
+@inlined
+def last_charge(plan, i):
+    """The last waypoint at which UAV ``i`` charges, or -1."""
+    number = plan.lengths[i] - 1
+    while number >= 0 and plan.waypoints[i, number].stay != CHARGE:
+        number -= 1
+    return number
+
+
 @kernel
 def insert(plan, i, place, x, y, stay, turned):
     """Insert a waypoint of UAV ``i`` before one of its."""

@@ -109,6 +109,8 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         slot = _edit(mission, uavs, nodes, rates.chart, flight, trial, words)
         if slot == _NO_EDIT:
             continue
+        if slot != plans.NEVER:
+            slot = min(slot, _first_unplanned(mission, present, trial))
         if slot >= flight.last[1]:
             plans.copy_plan(mission, present, trial)
             continue
@@ -120,7 +122,8 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
             value = new
             _keep(mission, ahead, flight, slot // fluid.STRIDE)
             for i in range(mission.uavs):  # waypoints that are not reached are of no use
-                trial.lengths[i] = min(trial.lengths[i], flight.team[flight.last[0], i].next + 1)
+                v = flight.team[flight.last[0], i]  # but for charges, which count as planned
+                trial.lengths[i] = min(trial.lengths[i], max(v.next, v.last_charge) + 1)
             plans.copy_plan(mission, trial, present)
             if value > best:
                 best = value
@@ -130,6 +133,17 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
     course[TRIED] = last if last < steps else 0
     course[VALUE], course[BEST], course[HEAT] = value, best, heat
     return last - first
+
+
+@kernel
+def _first_unplanned(mission, present, trial):
+    """The first slot after the last charge of a UAV in one plan, if it is another in the other."""
+    slot = plans.NEVER
+    for i in range(mission.uavs):
+        one, other = plans.last_charge(present, i), plans.last_charge(trial, i)
+        if one != other:
+            slot = min(slot, present.waypoints[i, min(one, other) + 1].begun)
+    return slot
 
 
 @kernel
