@@ -114,7 +114,7 @@ def tables() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     uav = {**dict.fromkeys(UAV_RECORD.names or (), 0), "end": "quota"}
     lists = {"missions": [mission], "rates": [0.5], "slots": [0.5, 0.5]}
     of_uav = {"policy": "greedy", "replication": 0, "uav": 0, **uav}
-    yield CrossCheck, {"study": "0" * 16, "queues": {"batches": [0.5]}, "uavs": [of_uav]} | lists
+    yield CrossCheck, {"study": "0" * 16, "uavs": [of_uav]} | lists
 
 
 FLOORS = ("dess", "policies", "analysis", "reports")

@@ -20,7 +20,7 @@ from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 
 ARRIVALS, CHANNEL, DRAWS, COVERAGE = "Arrivals", "Channel", "Draws", "Intervals"
-QUEUES, CONSERVATION, ENERGY, RECORDS = "Queues", "Conservation", "Energy", "Records"
+CONSERVATION, ENERGY, RECORDS = "Conservation", "Energy", "Records"
 REALISATIONS, ENGINES = "Realisations", "Engines"
 BOOKKEEPING = (CONSERVATION, ENERGY, RECORDS, REALISATIONS, ENGINES)
 

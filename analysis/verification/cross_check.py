@@ -1,8 +1,7 @@
 """Missions that only the page on verification needs: simulated before the page, kept in a file.
 
-``dess report`` simulates missions of the study ``verification`` again with the SimPy engine,
-missions of a single UAV with both engines, and queues that theory knows. The page reads them and
-simulates nothing::
+``dess report`` simulates missions of the study ``verification`` again with the SimPy engine, and
+missions of a single UAV with both engines. The page reads them and simulates nothing::
 
     make("results", results)
     missions = read("results", results)
@@ -21,7 +20,6 @@ from analysis.results.provenance import Key
 from analysis.results.tables import Results
 from analysis.study.stopping import Text
 from analysis.verification import lone_uav
-from analysis.verification.queues import suite as queues
 from dess import InputError, simulate
 from dess.files.documents import Document, Outdated
 from dess.files.reading import Missing
@@ -67,7 +65,6 @@ class CrossCheck(Document):
         uavs: The records of their UAVs, each with ``policy``, ``replication`` and ``uav``.
         rates: The result of ``lone_uav.simulate_rates``.
         slots: The result of ``lone_uav.simulate_slots``.
-        queues: The result of ``queues.suite.simulate``.
     """
 
     study: Key
@@ -75,7 +72,6 @@ class CrossCheck(Document):
     uavs: list[Uav]
     rates: list[Data]
     slots: list[Data] = Field(min_length=2)
-    queues: queues.Measured
 
 
 def simulate_missions(
@@ -85,8 +81,7 @@ def simulate_missions(
 
     Args:
         results: The results of the study.
-        count: Missions of every policy to simulate again, all of them if there are fewer; and
-            batches of each queue, at least 2.
+        count: Missions of every policy to simulate again, all of them if there are fewer.
         progress: Called after every mission.
     """
     space, seed = results.scenario(), results.store.manifest.seed
@@ -105,7 +100,6 @@ def simulate_missions(
         uavs=uavs,
         rates=lone_uav.simulate_rates(space, seed),
         slots=lone_uav.simulate_slots(space, seed),
-        queues=queues.simulate(space, seed, max(count, 2)),
     )
 
 
@@ -171,8 +165,6 @@ def read(folder: str | Path, results: Results) -> CrossCheck:
     """
     path, space, key = Path(folder) / FILE, results.scenario(), results.store.manifest.key
     missions = CrossCheck.load(path, _ALLOWED, fixed={"study": key})
-    fits = {"rates": len(missions.rates) == len(lone_uav.offsets(space))}
-    fits["queues"] = queues.fits(missions.queues, space)
-    for key in (key for key, is_fit in fits.items() if not is_fit):
-        raise InputError(f"{path}: {key}: are not those of the study; allowed: {_ALLOWED}")
+    if len(missions.rates) != len(lone_uav.offsets(space)):
+        raise InputError(f"{path}: rates: are not those of the study; allowed: {_ALLOWED}")
     return missions

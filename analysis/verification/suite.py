@@ -21,7 +21,6 @@ from analysis.verification import logs as event_logs
 from analysis.verification.checks import Check
 from analysis.verification.cross_check import STUDY, CrossCheck
 from analysis.verification.logs import Log
-from analysis.verification.queues import suite as queues
 from dess import InputError
 from dess.scenario import ScenarioSpace
 
@@ -136,7 +135,6 @@ class Suite:
             channel.rate_check(self.rates),
             *channel.shadowing_checks(lone_uav.deviates(space, self.again.slots)),
             *channel.communication_checks(logs, seed),
-            *queues.checks(self.again.queues, space),
             budgets.conservation_check(self.studies),
             budgets.balance_check(logs),
             budgets.battery_check(logs),

@@ -90,15 +90,6 @@ n = sum((log.events["event"] == "communication").sum() for log in suite.logs)
 html.say("{verdicts} The logs have {n:,} communications.", verdicts=verdicts, n=n)
 
 # %% [markdown]
-# ## Queues and the age of information
-#
-# Pads and buffers are driven as M/M/c, M/D/1, M/M/1 and M/M/1/K queues. The age is known for M/M/1
-# and for visits at fixed or exponential gaps. Thinned arrivals must fit the integrated rate.
-
-# %%
-html.say("{verdicts}", verdicts=html.composed(checks.on_topics(judged, checks.QUEUES)))
-
-# %% [markdown]
 # ## Conservation, batteries and engines
 #
 # Data are neither created nor lost, batteries follow their rules, logs add up to the records, and

@@ -63,9 +63,6 @@ FORGED: dict[str, Callable[[dict[str, Any]], object]] = {
     "uavs.0.odd": lambda d: d["uavs"][0].update(odd=1),
     "rates": lambda d: d["rates"].pop(),
     "slots": lambda d: d.update(slots=[]),
-    "queues": lambda d: d["queues"].pop("Node visited at fixed gaps"),
-    "queues:": lambda d: d["queues"]["Node visited at fixed gaps"].pop(),
-    "queues: ": lambda d: d["queues"]["Thinned arrivals"].reverse(),
 }
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import kstest, poisson
 
-from analysis.verification.queues.sources import arrivals_of, integrated
+from tests.dess.queues.model import arrivals_of, integrated
 from dess.scenario import ScenarioSpace, load_scenario
 
 

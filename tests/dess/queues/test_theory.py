@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.verification.closed_forms import Moments
-from analysis.verification.queues import theory
+from tests.dess.queues import theory
 
 
 @pytest.mark.parametrize(("servers", "load"), [(1, 0.9), (2, 1.5), (7, 5.0), (30, 28.0)])

@@ -1,14 +1,33 @@
-"""Buffers with a server, and missions as queues: by hand, and with Little's law."""
+"""The zone, the buffers and missions as queues: by hand, and with Little's law."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.verification.queues.server import Server, ages_of, mission_above, visited
 from dess.scenario import load_scenario
+from tests.dess.queues.model import Server, Station, ages_of, mission_above, visited
 
 times = st.integers(1, 40).map(lambda eighths: eighths / 8)
+
+
+def test_three_uavs_and_a_pad_by_hand() -> None:
+    """They come at 1, 2 and 3 and charge for 4, 1 and 1: the pad is free at 5, 6 and 7."""
+    station = Station(1, np.array([1.0, 1.0, 1.0]), np.array([4.0, 1.0, 1.0]))
+    assert station.waits.tolist() == [0.0, 3.0, 3.0]
+    assert station.queues.tolist() == [0.0, 0.0, 1.0 + 5.0]  # one from 2 to 3, two to 5, one to 6
+
+
+def test_two_pads_by_hand() -> None:
+    station = Station(2, np.array([1.0, 1.0, 1.0]), np.array([4.0, 1.5, 1.0]))
+    assert station.waits.tolist() == [0.0, 0.0, 0.5]
+
+
+@given(st.integers(1, 3), st.lists(st.tuples(times, times), min_size=1, max_size=60))
+def test_littles_law_of_the_zone(pads: int, uavs: list[tuple[float, float]]) -> None:
+    gaps, charging = np.array(uavs).T
+    station = Station(pads, gaps, charging)
+    assert station.queues.sum() == pytest.approx(station.waits.sum())
 
 
 def test_three_packets_by_hand() -> None:
@@ -26,7 +45,7 @@ def test_a_packet_in_service_takes_a_place_of_the_buffer() -> None:
 
 
 @given(st.integers(0, 3), st.lists(st.tuples(times, times), min_size=1, max_size=60))
-def test_littles_law(limit: int, packets: list[tuple[float, float]]) -> None:
+def test_littles_law_of_a_buffer(limit: int, packets: list[tuple[float, float]]) -> None:
     gaps, work = np.array(packets).T
     server = Server(gaps.cumsum(), work, limit)
     stays = server.buffers.packets["left"] - server.buffers.packets["generated"]

@@ -1,1 +1,0 @@
-"""The queues of the simulator, and the ages of its data, compared with queueing theory."""

@@ -1,0 +1,1 @@
+"""The queues of the simulator beside those that theory knows."""
