@@ -17,7 +17,7 @@ from analysis.questions.decision_times import Times
 from analysis.results.evidence import Evidence
 from analysis.results.manifest import Manifest
 from analysis.study.study import Study
-from analysis.verification.cross_check import CrossCheck
+from analysis.verification.measurements import CrossCheck
 from dess import InputError
 from dess.files.documents import Document
 from dess.record import MISSION_RECORD, UAV_RECORD

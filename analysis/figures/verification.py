@@ -12,7 +12,7 @@ from scipy import stats
 from analysis.figures import style
 from analysis.stats.intervals import LEVEL
 from analysis.verification import closed_forms
-from analysis.verification.fits import Fit
+from analysis.verification.checks import Fit
 from dess.scenario import ScenarioSpace
 
 SEEN, MISS, KNOWN = "#0072b2", "#d55e00", "#c9d3da"

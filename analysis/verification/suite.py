@@ -16,11 +16,9 @@ from analysis.names import METRICS, SUCCESS
 from analysis.numbers import words
 from analysis.questions.summary import best_policy
 from analysis.results.tables import Results, load_results
-from analysis.verification import budgets, channel, coverage, cross_check, draws, lone_uav, records
-from analysis.verification import logs as event_logs
+from analysis.verification import balances, draws, measurements
 from analysis.verification.checks import Check
-from analysis.verification.cross_check import STUDY, CrossCheck
-from analysis.verification.logs import Log
+from analysis.verification.measurements import STUDY, CrossCheck, Log
 from dess import InputError
 from dess.scenario import ScenarioSpace
 
@@ -58,8 +56,8 @@ class Suite:
                     f"{Path(folder) / STUDY}: its scenario has {section}, which this page cannot "
                     "check; allowed: a study without them"
                 )
-        again = cross_check.read(folder, study)
-        return cls(study, *budgets.studies_in(Path(folder), but=STUDY), again)
+        again = measurements.read(folder, study)
+        return cls(study, *balances.studies_in(Path(folder), but=STUDY), again)
 
     @property
     def studies(self) -> dict[str, Results]:
@@ -80,12 +78,12 @@ class Suite:
     @cached_property
     def logs(self) -> list[Log]:
         """All missions with an event log."""
-        return event_logs.logs_of(self.study)
+        return measurements.logs_of(self.study)
 
     @cached_property
     def realisations(self) -> list[Log]:
         """One mission with an event log per replication, since policies share the draws."""
-        return event_logs.longest(self.logs)
+        return measurements.longest(self.logs)
 
     @cached_property
     def missions(self) -> pd.DataFrame:
@@ -100,12 +98,12 @@ class Suite:
     @cached_property
     def arrivals(self) -> np.ndarray:
         """(T, K) data units that arrived in all realisations, by mission slot and node."""
-        return event_logs.arrivals(self.realisations, self.space)
+        return measurements.arrivals(self.realisations, self.space)
 
     @cached_property
     def rates(self) -> pd.DataFrame:
-        """The rates of a single UAV, as ``lone_uav.rates`` returns them."""
-        return lone_uav.rates(self.space, self.again.rates)
+        """The rates of a single UAV, as ``missions.rates`` returns them."""
+        return measurements.rates(self.space, self.again.rates)
 
     def values(self, metric: str) -> np.ndarray:
         """(n,) a metric of the missions of the best policy."""
@@ -132,20 +130,20 @@ class Suite:
         return [
             *draws.arrival_checks(self.arrivals, space.arrival_rate),
             draws.arrived_check(self.missions, space),
-            channel.rate_check(self.rates),
-            *channel.shadowing_checks(lone_uav.deviates(space, self.again.slots)),
-            *channel.communication_checks(logs, seed),
-            budgets.conservation_check(self.studies),
-            budgets.balance_check(logs),
-            budgets.battery_check(logs),
-            records.record_check(logs),
-            *records.realisation_checks(self.study, logs),
-            records.engine_check(self.study, self.again),
+            draws.rate_check(self.rates),
+            *draws.shadowing_checks(measurements.deviates(space, self.again.slots)),
+            *draws.communication_checks(logs, seed),
+            balances.conservation_check(self.studies),
+            balances.balance_check(logs),
+            balances.battery_check(logs),
+            balances.record_check(logs),
+            *balances.realisation_checks(self.study, logs),
+            balances.engine_check(self.study, self.again),
             *draws.parameter_checks(self.missions, space),
             *draws.initial_checks(initial, self.missions["initial"].to_numpy(), space),
             draws.start_check(start_cells, space),
             *(
-                coverage.coverage_check(name, self.values(metric), block, metric == SUCCESS)
+                draws.coverage_check(name, self.values(metric), block, metric == SUCCESS)
                 for metric, name in METRICS.items()
             ),
         ]

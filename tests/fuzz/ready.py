@@ -6,7 +6,7 @@ from pathlib import Path
 
 from analysis import load_study, run_study
 from analysis.questions.missions import FOLDER
-from analysis.verification import cross_check
+from analysis.verification import measurements
 from policies import registry
 from reports.pages.notebook import NAMES
 from reports.pages.running import missions
@@ -68,8 +68,8 @@ def _make_reports(folder: Path) -> None:
         for name, changes in STUDIES.items():
             fewer = {key: min(value, 8) for key, value in changes.items() if key == "missions"}
             study = run_study(load_study(name, **changes | fewer), folder / name)
-            if name == cross_check.STUDY:
-                cross_check.write(cross_check.simulate_missions(study, 2), folder)
+            if name == measurements.STUDY:
+                measurements.write(measurements.simulate_missions(study, 2), folder)
         missions.make(NAMES, folder, {})
 
 

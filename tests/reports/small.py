@@ -16,7 +16,7 @@ import pytest
 from analysis import load_study, run_study
 from analysis.bound import Bound
 from analysis.execution import jobs
-from analysis.verification import cross_check
+from analysis.verification import measurements
 from dess.scenario import ScenarioSpace
 from policies.planner import Budget, Planner
 from reports.pages import html
@@ -105,8 +105,8 @@ def run_small_studies(folder: Path, *names: str) -> Path:
     for name in names or STUDIES:
         with quick():
             study = run_study(load_study(name, **STUDIES[name]), folder / name)
-        if name == cross_check.STUDY:
-            cross_check.write(cross_check.simulate_missions(study, 2), folder)
+        if name == measurements.STUDY:
+            measurements.write(measurements.simulate_missions(study, 2), folder)
     return folder
 
 

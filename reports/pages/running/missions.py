@@ -14,7 +14,7 @@ from typing import Any
 from analysis.questions import decision_times, head_to_head
 from analysis.questions.missions import keep_logs
 from analysis.results.tables import load_results
-from analysis.verification import cross_check
+from analysis.verification import measurements
 from reports.pages.running.kernels import Progress
 
 COMPARISON, VERIFICATION = "comparison", "verification"  # names of the pages and of their studies
@@ -52,4 +52,4 @@ def make(
     for page in TIMED.keys() & {*pages}:
         decision_times.make(results, load_results(results / TIMED[page]), show)
     if VERIFICATION in pages:
-        cross_check.make(results, load_results(results / VERIFICATION), show)
+        measurements.make(results, load_results(results / VERIFICATION), show)

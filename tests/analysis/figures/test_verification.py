@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from analysis.figures import verification as drawings
 from analysis.figures.verification import MISS, SEEN
-from analysis.verification import closed_forms, lone_uav
-from analysis.verification.fits import Fit
+from analysis.verification import closed_forms, measurements
+from analysis.verification.checks import Fit
 from dess import load_scenario
 
 SPACE = load_scenario("paper")
@@ -52,7 +52,7 @@ def test_classes_that_are_far_off_are_marked() -> None:
 
 
 def test_rates_stand_beside_their_curve() -> None:
-    table = lone_uav.rates(SPACE, lone_uav.simulate_rates(SPACE, 3))
+    table = measurements.rates(SPACE, measurements.simulate_rates(SPACE, 3))
     figure = drawings.rates(table, SPACE)
     assert dots(figure, 0) == pytest.approx(table[["distance", "mean"]].to_numpy())
     (curve,) = figure.axes[0].lines

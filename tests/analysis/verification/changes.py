@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from analysis.results.tables import Results
-from analysis.verification.logs import Log
+from analysis.verification.measurements import Log
 
 
 def altered(logs: list[Log], event: str, which: int = 0, **columns: Any) -> list[Log]:

@@ -6,10 +6,8 @@ import pytest
 
 from analysis import run_study
 from analysis.results.tables import Results
-from analysis.verification import cross_check
-from analysis.verification import logs as event_logs
-from analysis.verification.cross_check import CrossCheck
-from analysis.verification.logs import Log
+from analysis.verification import measurements
+from analysis.verification.measurements import CrossCheck, Log
 from tests.analysis.small import small_study
 
 # Two groups of communication slots, a queue for one pad, all nodes emptied now and then.
@@ -24,9 +22,9 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
 
 @pytest.fixture(scope="session")
 def logs(results: Results) -> list[Log]:
-    return event_logs.logs_of(results)
+    return measurements.logs_of(results)
 
 
 @pytest.fixture(scope="session")
 def again(results: Results) -> CrossCheck:
-    return cross_check.simulate_missions(results, 3)
+    return measurements.simulate_missions(results, 3)

@@ -3,24 +3,24 @@
 import numpy as np
 
 from analysis.stats.intervals import mean_interval, wilson
-from analysis.verification import coverage
+from analysis.verification import draws
 from tests.analysis.verification.verdicts import failing
 
 
 def test_blocks_have_the_intervals_of_their_missions() -> None:
     values = np.random.default_rng(12).uniform(size=45)
-    table = coverage.blocks(values, 10, share=False)
+    table = draws.blocks(values, 10, share=False)
     assert len(table) == 4
     assert tuple(table.loc[1, ["mean", "low", "high"]]) == mean_interval(values[10:20])
     held = [low <= values[:40].mean() <= high for low, high in table[["low", "high"]].to_numpy()]
     assert table["holds"].tolist() == held
     successes = (values > 0.3).astype(int)
-    ends = tuple(coverage.blocks(successes, 10, share=True).loc[0, ["mean", "low", "high"]])
+    ends = tuple(draws.blocks(successes, 10, share=True).loc[0, ["mean", "low", "high"]])
     assert ends == wilson(successes[:10].sum(), 10)
 
 
 def covered(values: np.ndarray, share: bool) -> set[str]:
-    return failing([coverage.coverage_check("metric", values, 100, share)])
+    return failing([draws.coverage_check("metric", values, 100, share)])
 
 
 def test_intervals_of_independent_missions_cover_as_often_as_they_promise() -> None:
@@ -39,5 +39,5 @@ def test_missions_that_depend_on_each_other_are_covered_too_rarely() -> None:
 
 def test_nothing_to_cover_tells_nothing() -> None:
     for values in (np.ones(20_000), np.random.default_rng(17).uniform(size=150)):
-        check = coverage.coverage_check("metric", values, 100, share=False)
+        check = draws.coverage_check("metric", values, 100, share=False)
         assert check.p is None and check.error is None

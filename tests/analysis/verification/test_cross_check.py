@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from analysis.results.tables import Results
-from analysis.verification import cross_check
-from analysis.verification.cross_check import FILE, CrossCheck
+from analysis.verification import measurements
+from analysis.verification.measurements import FILE, CrossCheck
 from dess import InputError
 
 ANOTHER = "f" * 16  # the key of another study
@@ -27,26 +27,26 @@ def test_missions_that_are_missing_damaged_or_of_other_results_are_refused(
     results: Results, again: CrossCheck, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match="no such file.*dess report verification"):
-        cross_check.read(tmp_path, results)
+        measurements.read(tmp_path, results)
     (tmp_path / FILE).parent.mkdir()
     (tmp_path / FILE).write_text("{")
     with pytest.raises(InputError, match="not valid JSON"):
-        cross_check.read(tmp_path, results)
-    cross_check.write(again.model_copy(update={"study": ANOTHER}), tmp_path)
+        measurements.read(tmp_path, results)
+    measurements.write(again.model_copy(update={"study": ANOTHER}), tmp_path)
     with pytest.raises(InputError, match="has study 'f+', not '.*'; allowed: what is made"):
-        cross_check.read(tmp_path, results)
+        measurements.read(tmp_path, results)
 
 
 def test_missions_are_simulated_only_if_they_are_missing_or_of_other_results(
     results: Results, again: CrossCheck, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    cross_check.write(again, tmp_path)
-    cross_check.make(tmp_path, results)
-    assert cross_check.read(tmp_path, results) == again
-    cross_check.write(again.model_copy(update={"study": ANOTHER}), tmp_path)
-    monkeypatch.setattr(cross_check, "simulate_missions", lambda results, progress: again)
-    cross_check.make(tmp_path, results)
-    assert cross_check.read(tmp_path, results) == again
+    measurements.write(again, tmp_path)
+    measurements.make(tmp_path, results)
+    assert measurements.read(tmp_path, results) == again
+    measurements.write(again.model_copy(update={"study": ANOTHER}), tmp_path)
+    monkeypatch.setattr(measurements, "simulate_missions", lambda results, progress: again)
+    measurements.make(tmp_path, results)
+    assert measurements.read(tmp_path, results) == again
 
 
 def _without(key: str) -> Callable[[dict[str, Any]], object]:
@@ -75,7 +75,7 @@ def test_forged_missions_of_the_study_are_a_line_that_names_the_key(
     path = tmp_path / FILE
     path.parent.mkdir()
     path.write_text(json.dumps(document))
-    for use in (cross_check.read, cross_check.make):
+    for use in (measurements.read, measurements.make):
         with pytest.raises(InputError, match=f"^{path}: {key}.*; allowed: ") as error:
             use(tmp_path, results)
         assert "\n" not in str(error.value)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.verification.fits import poisson_fit, uniform_fit
+from analysis.verification.checks import poisson_fit, uniform_fit
 
 
 @pytest.mark.parametrize("mean", [0.02, 1.0, 40.0])

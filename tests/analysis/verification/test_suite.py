@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from analysis import run_study
-from analysis.verification.cross_check import STUDY
+from analysis.verification.measurements import STUDY
 from analysis.verification.suite import Suite
 from dess import InputError
 from tests.analysis.small import small_study

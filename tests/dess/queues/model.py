@@ -1,8 +1,8 @@
 """The charging zone and the buffers of nodes as queues: arrivals, customers and a server.
 
-The zone (``dess.sections.zone``), the buffers (``dess.sections.buffers``) and the arrivals are those
-of the SimPy model. Only the UAVs are other ones: they come to the zone, charge for a given time and
-leave. A UAV collects data at fixed times, so a SimPy process takes its place where theory asks for
+Zone (``dess.sections.zone``), buffers (``dess.sections.buffers``) and arrivals are those of the
+SimPy model. Only the UAVs are other ones: they come to the zone, charge for a given time and leave.
+A UAV collects data at fixed times, so a SimPy process takes its place where theory asks for
 exponential service. With a UAV above a node, a whole mission of the model is the queue.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 import simpy
 
 from analysis.verification import closed_forms
-from analysis.verification.lone_uav import Hovering
+from analysis.verification.measurements import Hovering
 from dess import simulate
 from dess.record import OPERATIONS, MissionRecord
 from dess.scenario import ScenarioSpace

@@ -17,8 +17,15 @@ from scipy import stats
 from analysis.verification.closed_forms import Moments
 from dess.scenario import ScenarioSpace, load_scenario
 from tests.dess.queues import theory
-from tests.dess.queues.model import Server, Station, ages_of, arrivals_of, integrated
-from tests.dess.queues.model import mission_above, visited
+from tests.dess.queues.model import (
+    Server,
+    Station,
+    ages_of,
+    arrivals_of,
+    integrated,
+    mission_above,
+    visited,
+)
 
 BATCHES, CUSTOMERS = 10, 1000  # customers in a batch
 SLOTS = 400  # of a mission; each mission is a batch

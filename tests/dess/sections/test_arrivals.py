@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import kstest, poisson
 
-from tests.dess.queues.model import arrivals_of, integrated
 from dess.scenario import ScenarioSpace, load_scenario
+from tests.dess.queues.model import arrivals_of, integrated
 
 
 def _space(**arrivals: Any) -> ScenarioSpace:

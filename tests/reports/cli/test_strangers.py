@@ -14,8 +14,8 @@ from analysis.results.chunks import parts_of, split
 from analysis.results.evidence import Evidence
 from analysis.results.resimulate import resimulate
 from analysis.results.tables import Results, load_results
-from analysis.verification import cross_check
-from analysis.verification.records import engine_check
+from analysis.verification import measurements
+from analysis.verification.balances import engine_check
 from dess import InputError
 from reports.cli import main
 from reports.pages import html
@@ -120,8 +120,8 @@ def test_no_mission_of_a_python_file_that_only_results_name_is_simulated() -> No
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fewer missions of the cross-check than a page has."""
-    simulated = partial(cross_check.simulate_missions, count=2)
-    monkeypatch.setattr(cross_check, "simulate_missions", simulated)
+    simulated = partial(measurements.simulate_missions, count=2)
+    monkeypatch.setattr(measurements, "simulate_missions", simulated)
 
 
 @pytest.mark.slow
@@ -147,8 +147,8 @@ def test_the_page_of_the_verification_leaves_out_a_python_file_that_only_results
 @pytest.mark.usefixtures("stranger", "few")
 def test_a_study_of_python_files_alone_has_no_missions_to_simulate_again() -> None:
     results = load_results("results")
-    cross_check.make(".", results)
-    again = cross_check.read(".", results)
+    measurements.make(".", results)
+    again = measurements.read(".", results)
     check = engine_check(results, again)
     assert (check.n, check.error, again.uavs) == (0, None, [])
     assert "not simulated again: evil_policy.py:Evil0 and evil_policy.py:Evil1" in check.test

@@ -13,8 +13,8 @@ from scipy import stats
 from analysis import load_study, run_study
 from analysis.execution import engines, jobs
 from analysis.stats.verdict import HOLDS, REFUTED
-from analysis.verification import cross_check
-from analysis.verification.cross_check import simulate_missions, write
+from analysis.verification import measurements
+from analysis.verification.measurements import simulate_missions, write
 from dess import simulate, simulate_batch
 from dess.scenario import ScenarioSpace
 from reports.pages.running import missions
@@ -39,7 +39,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("results")
     run_study(load_study(NAME, **SMALL), folder / NAME)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cross_check, "simulate_missions", partial(simulate_missions, count=10))
+        patch.setattr(measurements, "simulate_missions", partial(simulate_missions, count=10))
         missions.make([NAME], folder, {})
     run_study(load_study("fig4", policies=["random"], missions=2, logged=1), folder / "fig4")
     return folder

@@ -1,0 +1,381 @@
+"""The missions that the page on verification compares: event logs, and missions simulated for it.
+
+``dess report`` simulates missions of the study ``verification`` again with the SimPy engine, and
+missions of a single UAV near a single node with both engines. The page reads them and simulates
+nothing::
+
+    make("results", results)
+    missions = read("results", results)
+    records.engine_check(results, missions)
+
+In a mission, UAVs serve the node with the highest SNR, so the data that they collect are not a
+random sample of the channel. With one node there is no choice, and the data of every communication
+slot are one random draw of the rate.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+from pydantic import Field, create_model
+
+from analysis.questions.missions import FOLDER
+from analysis.results import event_log
+from analysis.results.provenance import Key
+from analysis.results.tables import Results
+from analysis.study.stopping import Text
+from analysis.verification import closed_forms
+from dess import InputError, simulate, simulate_batch
+from dess.files.documents import Document, Outdated
+from dess.files.reading import Missing
+from dess.files.writing import check_target, write_file
+from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
+from dess.scenario import SAMPLED, Scenario, ScenarioSpace
+from dess.state import END_NAMES, HOVER
+from dess.view import View
+from policies.registry import files_of, load_team
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """A mission whose event log is stored.
+
+    Attributes:
+        policy: The team.
+        scenario: The scenario with the parameters that the mission drew.
+        mission: The record of the mission.
+        uavs: The records of its UAVs.
+        events: The event log.
+    """
+
+    policy: str
+    scenario: Scenario
+    mission: pd.Series
+    uavs: pd.DataFrame
+    events: pd.DataFrame
+
+    @property
+    def replication(self) -> int:
+        """The replication of the mission."""
+        return int(self.mission["replication"])
+
+    @cached_property
+    def uav_slots(self) -> pd.DataFrame:
+        """The action of every UAV in every slot, as ``analysis.results.event_log.uav_slots``."""
+        return event_log.uav_slots(self.events)
+
+    @cached_property
+    def initial(self) -> np.ndarray:
+        """(K,) data of every node at the start [data units]."""
+        return self._of_nodes("mission_start")
+
+    @cached_property
+    def left(self) -> np.ndarray:
+        """(K,) data of every node at the end [data units]."""
+        return self._of_nodes("mission_end")
+
+    @cached_property
+    def first_cell(self) -> np.ndarray:
+        """(2,) the cell in which the first UAV starts."""
+        rows = self.events[(self.events["event"] == "mission_start") & (self.events["uav"] == 0)]
+        return rows[["x", "y"]].to_numpy(int)[0]
+
+    @cached_property
+    def arrivals(self) -> np.ndarray:
+        """(T, K) data units that arrived, by mission slot and node."""
+        rows = self.events[self.events["event"] == "arrival"]
+        counts = np.zeros((event_log.duration(self.events), len(self.scenario.nodes)), int)
+        slot = rows["time"].astype(int) - 1
+        np.add.at(counts, (slot, rows["node"]), rows["value"].astype(int))
+        return counts
+
+    @cached_property
+    def residuals(self) -> np.ndarray:
+        """(E, K) residual data before every event, summed in the order of the log."""
+        flows = np.zeros((len(self.events) + 1, len(self.scenario.nodes)))
+        flows[0] = self.initial
+        sign = self.events["event"].map({"arrival": 1.0, "communication": -1.0}).fillna(0.0)
+        flowing = np.flatnonzero(sign)
+        nodes = self.events["node"].to_numpy()[flowing]
+        flows[flowing + 1, nodes] = (sign * self.events["value"]).to_numpy()[flowing]
+        return flows.cumsum(0)[:-1]
+
+    def _of_nodes(self, event: str) -> np.ndarray:
+        rows = self.events[(self.events["event"] == event) & (self.events["node"] >= 0)]
+        return rows.sort_values("node")["value"].to_numpy()
+
+
+def logs_of(results: Results) -> list[Log]:
+    """The missions of the first design point whose logs a study has stored."""
+    logs = []
+    space, replications = results.scenario(), range(results.manifest["study"]["logged"])
+    missions, uavs = (
+        table[(table["point"] == 0) & table["replication"].isin(replications)]
+        for table in (results.missions, results.uavs)
+    )
+    for policy in results.policies:
+        records = missions[missions["policy"] == policy].set_index("replication", drop=False)
+        fleets = uavs[uavs["policy"] == policy]
+        for replication in replications:
+            record = records.loc[replication]
+            scenario = space.scenario_at(**{name: int(record[name]) for name in SAMPLED})
+            fleet = fleets[fleets["replication"] == replication]
+            events = results.events(policy, 0, replication)
+            logs.append(Log(policy, scenario, record, fleet, events))
+    return logs
+
+
+def longest(logs: Sequence[Log]) -> list[Log]:
+    """The longest log of every replication; all policies meet the same arrivals in it."""
+    by_replication: dict[int, Log] = {}
+    for log in logs:
+        other = by_replication.setdefault(log.replication, log)
+        if log.mission["slots"] > other.mission["slots"]:
+            by_replication[log.replication] = log
+    return [by_replication[replication] for replication in sorted(by_replication)]
+
+
+def arrivals(logs: Sequence[Log], space: ScenarioSpace) -> np.ndarray:
+    """(T, K) data units that arrived, by slot and node; missions follow one after another."""
+    none = np.zeros((0, len(space.nodes)), int)
+    return np.concatenate([none, *(log.arrivals for log in logs)])
+
+
+PER_DISTANCE, SLOTS = (
+    200,
+    100,
+)  # missions per distance and slots per mission, with the batch engine
+LONG = 5000  # mission slots of the mission with the SimPy engine
+
+_PLENTY = 1e9  # data units at the node, more than the UAV can collect
+
+
+class Hovering:
+    """A policy that hovers in every slot."""
+
+    name = "hovering"
+
+    def act(self, view: View) -> np.ndarray:
+        """Choose Hover for all R rows."""
+        return np.full(len(view.uav), HOVER)
+
+
+def alone(space: ScenarioSpace, dx: int, dy: int, slots: int) -> ScenarioSpace:
+    """A scenario with the same channel, one UAV and one node ``dx, dy`` cells away.
+
+    The mission lasts ``slots`` slots. The battery does not decrease, and the node is never empty.
+    """
+    still: dict[str, Any] = {"uavs": 1, "flying_time": 100, "flight_cost": 0, "pads": None}
+    place: dict[str, Any] = {"zone": (0, 0, 1, 1), "nodes": ((dx, dy),)}
+    data: dict[str, Any] = {"initial_data": _PLENTY, "arrival_rate": 0.0}
+    quota = slots * space.communication_slots
+    return ScenarioSpace.of(space, **still, **place, **data, quota=quota, max_slots=slots)
+
+
+def offsets(space: ScenarioSpace) -> list[tuple[int, int]]:
+    """Offsets of the node from the UAV [cells], from none up to the whole grid."""
+    along = [0, *(2**k for k in range(8) if 2**k < space.grid)]
+    return [*((d, 0) for d in along), (space.grid - 1, space.grid - 1)]
+
+
+def simulate_rates(space: ScenarioSpace, seed: int) -> list[float]:
+    """Mean rates at all offsets with the batch engine [data units per communication slot].
+
+    Every offset has its own replications, because the same replications have the same shadowing.
+    """
+    means = []
+    for number, (dx, dy) in enumerate(offsets(space)):
+        replications = range(number * PER_DISTANCE, (number + 1) * PER_DISTANCE)
+        scenario = alone(space, dx, dy, SLOTS)
+        missions = simulate_batch(scenario, Hovering(), seed, replications).missions
+        means.append(float(missions["collected"].sum() / _draws(space)))
+    return means
+
+
+def simulate_slots(space: ScenarioSpace, seed: int, slots: int = LONG) -> list[float]:
+    """Data of every communication slot of a mission with the SimPy engine [data units]."""
+    scenario = alone(space, space.grid // 2, 0, slots)
+    log = simulate(
+        scenario, Hovering(), seed, len(offsets(space)) * PER_DISTANCE, events=True
+    ).events
+    assert log is not None
+    columns = log.columns()
+    return columns["value"][columns["event"] == "communication"].tolist()
+
+
+def rates(space: ScenarioSpace, means: Sequence[float]) -> pd.DataFrame:
+    """The rates of ``simulate_rates`` together with those of the closed form.
+
+    Returns:
+        A row per distance: ``distance`` [m], ``n`` communication slots, ``mean`` [data units per
+        communication slot], ``known`` and ``error``, the closed form's mean and the standard error
+        of a mean of n draws.
+    """
+    rows, n = [], _draws(space)
+    for (dx, dy), mean in zip(offsets(space), means, strict=True):
+        distance = float(closed_forms.distance(space, dx, dy))
+        known, deviation = closed_forms.rate_moments(space, distance)
+        rows.append((distance, n, mean, known, deviation / np.sqrt(n)))
+    return pd.DataFrame(rows, columns=["distance", "n", "mean", "known", "error"])
+
+
+def deviates(space: ScenarioSpace, collected: Sequence[float]) -> np.ndarray:
+    """The shadowing in the data of ``simulate_slots``, in standard deviations.
+
+    The SNR follows from the data of a communication slot (eq. 9), the shadowing from the SNR
+    (eq. 10).
+    """
+    distance = closed_forms.distance(space, space.grid // 2, 0)
+    snr = closed_forms.snr_of(space, np.array(collected))
+    return (snr - closed_forms.mean_snr(space, distance)) / np.sqrt(space.shadowing_variance)
+
+
+def _draws(space: ScenarioSpace) -> int:
+    """The number of communication slots per distance."""
+    return PER_DISTANCE * SLOTS * space.communication_slots
+
+
+STUDY = "verification"
+FILE = Path(FOLDER, "missions.json")  # in the folder of all results
+MISSIONS = 50  # missions of every policy to simulate again, spread over its replications
+
+# Called with the number of steps done and of all steps.
+Progress = Callable[[int, int], None]
+
+_ALLOWED = "what is made by: dess report verification"
+
+
+def _fields(record: np.dtype) -> dict[str, Any]:
+    """The fields of a record, as those of a model."""
+    assert record.fields is not None
+    kinds = {name: kind for name, (kind, *_) in record.fields.items()}
+    return {name: (float if kind.kind == "f" else Whole, ...) for name, kind in kinds.items()}
+
+
+Whole = Annotated[int, Field(ge=-(2**63), lt=2**64)]
+Data = Annotated[float, Field(ge=0, le=1e9)]
+Mission: Any = create_model(
+    "Mission", __base__=Document, policy=(Text, ...), **_fields(MISSION_RECORD)
+)
+_OF_UAV = {"policy": (Text, ...), "replication": (Whole, ...), "uav": (Whole, ...)}
+Uav: Any = create_model(
+    "Uav", __base__=Document, **_OF_UAV | _fields(UAV_RECORD) | {"end": (Text, ...)}
+)
+
+
+class CrossCheck(Document):
+    """Missions simulated in addition to those of a study.
+
+    Attributes:
+        study: The key of the study, a hash of all that its records depend on.
+        missions: Records by the SimPy engine, each with its ``policy``.
+        uavs: The records of their UAVs, each with ``policy``, ``replication`` and ``uav``.
+        rates: The result of ``lone_uav.simulate_rates``.
+        slots: The result of ``lone_uav.simulate_slots``.
+    """
+
+    study: Key
+    missions: list[Mission]
+    uavs: list[Uav]
+    rates: list[Data]
+    slots: list[Data] = Field(min_length=2)
+
+
+def simulate_missions(
+    results: Results, count: int = MISSIONS, progress: Progress | None = None
+) -> CrossCheck:
+    """Simulate the missions; those of policies that are classes of Python files are left out.
+
+    Args:
+        results: The results of the study.
+        count: Missions of every policy to simulate again, all of them if there are fewer.
+        progress: Called after every mission.
+    """
+    space, seed = results.scenario(), results.store.manifest.seed
+    teams = {name: load_team(name) for name in results.policies if not files_of(name)}
+    missions, uavs, chosen = [], [], [*_chosen(results, teams, count)]
+    for done, (policy, replication) in enumerate(chosen, 1):
+        record = simulate(space, teams[policy], seed, replication)
+        fields = {name: record.metrics[name].item() for name in MISSION_RECORD.names or ()}
+        missions.append({"policy": policy, **fields})
+        uavs += [{"policy": policy, "replication": replication, **uav} for uav in _uavs(record)]
+        if progress:
+            progress(done, len(chosen))
+    return CrossCheck(
+        study=results.store.manifest.key,
+        missions=missions,
+        uavs=uavs,
+        rates=simulate_rates(space, seed),
+        slots=simulate_slots(space, seed),
+    )
+
+
+def _chosen(results: Results, policies: Iterable[str], count: int) -> Iterator[tuple[str, int]]:
+    """The policies and replications of the missions to simulate again, at the first point."""
+    missions = results.missions[results.missions["point"] == 0]
+    for policy in policies:
+        replications = missions.loc[missions["policy"] == policy, "replication"].to_numpy()
+        rows = np.unique(np.linspace(0, len(replications) - 1, count).astype(int))
+        yield from ((policy, int(replication)) for replication in replications[rows])
+
+
+def _uavs(record: MissionRecord) -> Iterator[dict[str, Any]]:
+    for number, uav in enumerate(record.uavs):
+        fields = {name: uav[name].item() for name in UAV_RECORD.names or ()}
+        yield {"uav": number, **fields, "end": END_NAMES[uav["end"]]}
+
+
+def make(folder: str | Path, results: Results, progress: Progress | None = None) -> None:
+    """Simulate the missions and write them, unless the folder has those of these results.
+
+    Args:
+        folder: A folder that contains a results folder per study.
+        results: The results of the study.
+        progress: Called after every mission.
+
+    Raises:
+        InputError: If those of the folder are damaged, or new ones cannot be written.
+    """
+    try:
+        read(folder, results)
+    except (Missing, Outdated):
+        check_target(Path(folder) / FILE)
+        write(simulate_missions(results, progress=progress), folder)
+
+
+def write(missions: CrossCheck, folder: str | Path) -> Path:
+    """Write missions, in place of earlier ones, and return the file.
+
+    Args:
+        missions: The missions.
+        folder: A folder that contains a results folder per study.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    path = Path(folder) / FILE
+    write_file(path, missions.model_dump_json(indent=1))
+    return path
+
+
+def read(folder: str | Path, results: Results) -> CrossCheck:
+    """Read missions.
+
+    Args:
+        folder: A folder that contains a results folder per study.
+        results: The results of the study to which the missions must belong.
+
+    Raises:
+        Missing: If there are none.
+        Outdated: If they belong to other results.
+        InputError: If they are damaged.
+    """
+    path, space, key = Path(folder) / FILE, results.scenario(), results.store.manifest.key
+    missions = CrossCheck.load(path, _ALLOWED, fixed={"study": key})
+    if len(missions.rates) != len(offsets(space)):
+        raise InputError(f"{path}: rates: are not those of the study; allowed: {_ALLOWED}")
+    return missions
