@@ -7,23 +7,23 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
+    from analysis.answers.learning import marl_eval_data as marl_eval_data
+    from analysis.answers.learning import rliable_scores as rliable_scores
+    from analysis.ask.sweep import sweep as sweep
+    from analysis.ask.what_if import what_if as what_if
     from analysis.execution.evaluation import evaluate as evaluate
     from analysis.execution.runner import run_study as run_study
-    from analysis.questions.learning.runs import marl_eval_data as marl_eval_data
-    from analysis.questions.learning.runs import rliable_scores as rliable_scores
     from analysis.results.resimulate import resimulate as resimulate
     from analysis.results.tables import Results as Results
     from analysis.results.tables import load_results as load_results
-    from analysis.stats.bootstrap import bootstrap_interval as bootstrap_interval
+    from analysis.stats.differences import compare as compare
     from analysis.stats.distribution import distribution as distribution
+    from analysis.stats.intervals import bootstrap_interval as bootstrap_interval
     from analysis.stats.intervals import summary as summary
     from analysis.stats.learners import compare_learners as compare_learners
-    from analysis.stats.paired import compare as compare
     from analysis.study.study import Study as Study
     from analysis.study.study import load_study as load_study
     from analysis.study.study import study_names as study_names
-    from analysis.sweeps.sweep import sweep as sweep
-    from analysis.sweeps.what_if import what_if as what_if
 
 _HOME = {
     "Study": "study.study",
@@ -34,15 +34,15 @@ _HOME = {
     "Results": "results.tables",
     "load_results": "results.tables",
     "resimulate": "results.resimulate",
-    "rliable_scores": "questions.learning.runs",
-    "marl_eval_data": "questions.learning.runs",
+    "rliable_scores": "answers.learning",
+    "marl_eval_data": "answers.learning",
     "summary": "stats.intervals",
     "distribution": "stats.distribution",
-    "bootstrap_interval": "stats.bootstrap",
-    "compare": "stats.paired",
+    "bootstrap_interval": "stats.intervals",
+    "compare": "stats.differences",
     "compare_learners": "stats.learners",
-    "sweep": "sweeps.sweep",
-    "what_if": "sweeps.what_if",
+    "sweep": "ask.sweep",
+    "what_if": "ask.what_if",
 }
 
 __all__ = [*_HOME]

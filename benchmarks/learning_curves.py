@@ -20,10 +20,8 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
+from analysis.answers.learning import SHIPPED, read_curves, trained_policies
 from analysis.names import METRICS, PRODUCT
-from analysis.questions.learning.ablation import SHIPPED
-from analysis.questions.learning.files import read_curves
-from analysis.questions.learning.trained import trained_policies
 from dess import simulate_batch
 from dess.files.reading import paths_in
 from dess.files.tables import read_table, write_table

@@ -13,11 +13,11 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from analysis import load_study, numbers
+from analysis.answers.learning import read_curve
 from analysis.names import METRICS, PRODUCT
-from analysis.questions.learning.files import read_curve
-from analysis.replication import paper
+from analysis.paper import values
+from analysis.stats.differences import paired
 from analysis.stats.intervals import interval_of, post_stratified
-from analysis.stats.paired import paired
 from dess import load_scenario, simulate_batch
 from dess.files.reading import read_text
 from dess.files.writing import write_file
@@ -54,7 +54,7 @@ def card(folder: Path, command: str, missions: int) -> str:
         f"I = {n}": simulate_batch(
             load_scenario("fig4", uavs=n), policy, EVALUATION_SEED, missions
         ).missions
-        for n in paper.FIG_4
+        for n in values.FIG_4
     }
     environment = Environment(
         loader=FileSystemLoader(BENCHMARKS), undefined=StrictUndefined, trim_blocks=True
@@ -82,7 +82,7 @@ def card(folder: Path, command: str, missions: int) -> str:
             for name, other in others.items()
         },
         cases=_means(cases),
-        paper=paper,
+        paper=values,
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from analysis import load_study, run_study
-from analysis.execution import engines
+from analysis.execution import jobs
 from analysis.results.tables import Results
 from analysis.study.study import Study
 from dess import simulate_batch
@@ -53,7 +53,7 @@ def test_fig5_here(benchmark, fig5, uav_slots, monkeypatch) -> None:
         seconds.append(time.perf_counter() - begin)
         return records
 
-    monkeypatch.setattr(engines, "simulate_batch", timed)
+    monkeypatch.setattr(jobs, "simulate_batch", timed)
     benchmark.pedantic(run, (fig5,), rounds=ROUNDS, warmup_rounds=1)
     benchmark.extra_info["uav_slots"] = uav_slots
     studies = ROUNDS + 1

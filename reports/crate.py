@@ -17,18 +17,18 @@ import tomli_w
 from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
 
 from analysis import numbers
-from analysis.results.evidence import Evidence
-from analysis.results.files import BOUNDS, MANIFEST, partition
+from analysis.results.chunks import BOUNDS, MANIFEST, partition
 from analysis.results.parquet import files_in
+from analysis.results.resimulate import Evidence
 from analysis.results.tables import Results
 from dess import InputError
 from dess.files import documents, tables
 from dess.files.archives import write_zip
 from dess.files.reading import read_bytes, read_text
+from reports.pages.body import template
 from reports.pages.html import STUDY as EVIDENCE
 from reports.pages.html import embedded
 from reports.pages.index import LARGEST
-from reports.pages.template import template
 from reports.pages.verify import LIMIT, is_sealed
 
 _TABLES = ("missions", "uavs", "events", BOUNDS)

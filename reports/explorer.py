@@ -1,6 +1,6 @@
 """The explorer: a slider for each field of a grid, and the metrics of every policy.
 
-It shows the estimates of ``questions.summary.means`` for one design point at a time. A page can
+It shows the estimates of ``answers.summary.means`` for one design point at a time. A page can
 contain one explorer. It needs only a browser with JavaScript; without JavaScript it shows the
 middle setting.
 
@@ -17,12 +17,12 @@ import pandas as pd
 from IPython.display import HTML
 
 from analysis import names, numbers
+from analysis.answers import summary
+from analysis.answers.settings import points, varied
 from analysis.figures import style
-from analysis.questions import summary
-from analysis.questions.settings import points, varied
 from analysis.results.tables import Results
 from dess import InputError
-from reports.pages.template import template
+from reports.pages.body import template
 
 
 class Slider(NamedTuple):

@@ -1,7 +1,7 @@
 """What both the page of a study and the terminal show of it, as tables of text.
 
-Every function turns rows of ``analysis.questions`` into text, with the same columns and words for
-both; ``reports.pages.html.table`` and ``reports.cli.study.tables.print_frame`` write them.
+Every function turns rows of ``analysis.answers`` into text, with the same columns and words for
+both; ``reports.pages.html.table`` and ``reports.cli.tables.print_frame`` write them.
 """
 
 from collections.abc import Callable, Sequence

@@ -19,8 +19,8 @@ FLOORS = ("dess", "policies", "analysis", "reports")  # from the ground up
 # The rooms of a floor; each imports only from those before it.
 ROOMS = {
     "analysis": (
-        *("names", "numbers", "stats", "bound", "study", "results", "execution", "questions"),
-        *("replication", "verification", "figures", "sweeps"),
+        *("names", "numbers", "stats", "bound", "study", "results", "execution", "answers"),
+        *("paper", "verification", "figures", "ask"),
     ),
     "reports": (
         *("folders", "tables", "tools", "pages", "player", "explorer", "crate"),
@@ -55,18 +55,18 @@ MAY_RUN_FILES = {
         *("analysis.results.provenance", "reports.cli.simulate"),
     },
     "policies.registry.typed": {
-        *("analysis.study.study", "analysis.sweeps.question"),
-        *("analysis.questions.what_if.question", "reports.cli.evaluate"),
+        *("analysis.study.study", "analysis.ask.sweep"),
+        *("analysis.ask.what_if", "reports.cli.evaluate"),
     },
     "policies.registry.confirmed": {"analysis.results.provenance", "reports.pages.verify"},
     "policies.load": set(),
     "policies.load_team": set(),
     "policies.about.about": {"reports.cli.lists"},
     "analysis.execution.evaluation.evaluate": {"analysis"},
-    "analysis.sweeps.question.question": {"analysis.sweeps.sweep", "reports.cli.sweep"},
-    "analysis.sweeps.sweep.sweep": {"analysis"},
-    "analysis.questions.what_if.question.question": {"analysis.sweeps.what_if"},
-    "analysis.sweeps.what_if.what_if": {"analysis"},
+    "analysis.ask.sweep.question": {"reports.cli.sweep"},
+    "analysis.ask.sweep.sweep": {"analysis"},
+    "analysis.ask.what_if.question": set(),
+    "analysis.ask.what_if.what_if": {"analysis"},
     **{f"analysis.{name}": set() for name in ("evaluate", "sweep", "what_if")},
 }
 
@@ -216,7 +216,7 @@ def test_the_policies_of_a_study_are_replaced_by_the_words_of_a_user_alone() -> 
         if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("load_study")
         if any(keyword.arg in (None, "policies") for keyword in node.keywords)
     }
-    assert replacing == {"reports.cli.study.run"}
+    assert replacing == {"reports.cli.studies"}
 
 
 @pytest.mark.parametrize(

@@ -18,12 +18,12 @@ from PIL import Image
 import dess
 import policies
 from analysis import load_study
-from analysis.replication import paper
+from analysis.paper import values
 from benchmarks import learning_curves
 from dess import load_scenario
 from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
 from reports import cli
-from reports.cli import commands, ranges, settings
+from reports.cli import commands, options
 
 ROOT = Path(__file__).parents[1]
 TOP = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
@@ -136,10 +136,10 @@ def test_commands_are_accepted(arguments: list[str]) -> None:
     for team in {*map(str, np.atleast_1d(given.get("policy") or []))} - trained:
         assert policies.load_team(team)
     if arguments[0] == "sweep":
-        values = ranges.all_values(given["settings"])
+        values = options.all_values(given["settings"])
         assert load_scenario(given["scenario"], **{field: of[0] for field, of in values.items()})
     elif given.get("scenario"):
-        assert settings.load_space(given["scenario"], given["settings"])
+        assert options.load_space(given["scenario"], given["settings"])
     if arguments[:2] == ["study", "run"]:
         assert all(map(load_study, given["names"]))
 
@@ -277,7 +277,7 @@ def test_the_table_of_policies_is_what_its_command_prints(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     printed = table(POLICIES, "policy | success")
-    assert printed.pop("paper") == [[pytest.approx(100 * paper.TABLE_IV[m])] for m in METRICS]
+    assert printed.pop("paper") == [[pytest.approx(100 * values.TABLE_IV[m])] for m in METRICS]
     (arguments,) = (a for a in command_lines("dess") if {"random-unguarded", "planner"} <= {*a})
     rows = evaluated(arguments, capsys)
     assert list(printed) == [row["policy"] for row in rows]

@@ -108,10 +108,10 @@ PARSED = {
     "analysis.results.parquet": {"validate_json"},
     "reports.pages.verify": {"validate_json"},
     # Keys of dictionaries and of a cache, which are texts of JSON.
-    "analysis.study.candidates": {"loads"},
+    "analysis.study.cheapest": {"loads"},
     "analysis.results.provenance": {"loads"},
     # Lines from the process that has started this one.
-    "reports.pages.running.cells": {"loads"},
+    "reports.pages.cells": {"loads"},
 }
 
 

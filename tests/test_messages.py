@@ -13,9 +13,9 @@ from typing import Any, get_args
 import pytest
 from pydantic import BaseModel
 
-from analysis.questions.decision_times import Times
-from analysis.results.evidence import Evidence
+from analysis.answers.comparison import Times
 from analysis.results.manifest import Manifest
+from analysis.results.resimulate import Evidence
 from analysis.study.study import Study
 from analysis.verification.measurements import CrossCheck
 from dess import InputError

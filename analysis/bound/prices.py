@@ -19,10 +19,9 @@ from analysis.bound.energy import Phases, early_charges, most_flying, phases_of
 from analysis.bound.paths import blocks_of, bound_paths
 from analysis.bound.service import POINTS, rates_of, spread, step_values
 from analysis.bound.slopes import add_slopes
-from dess import rules
+from dess import InputError, rules
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
-from dess.errors import InputError
 from dess.scenario import ScenarioSpace
 from dess.sea import chart
 from dess.state import sample_scenario, starts_of, state_of

@@ -15,8 +15,7 @@ from analysis.execution.effort import (
     check_workers_memory,
     seconds_of,
 )
-from analysis.execution.engines import CHUNK, simulate_missions
-from analysis.execution.jobs import Job, MissionsJob, Problem, Progress
+from analysis.execution.jobs import CHUNK, Job, MissionsJob, Problem, Progress, simulate_missions
 from analysis.execution.workers import Here, Pool
 from analysis.names import MEANS, SHARES
 from analysis.results.chunks import Part, split

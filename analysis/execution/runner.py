@@ -17,10 +17,9 @@ from typing import Any, NamedTuple
 
 from analysis.execution.cluster import Cluster
 from analysis.execution.effort import check_workers
-from analysis.execution.engines import CHUNK
-from analysis.execution.jobs import BoundsJob, Job, LogJob, MissionsJob, Problem, Progress
+from analysis.execution.jobs import CHUNK, BoundsJob, Job, LogJob, MissionsJob, Problem, Progress
 from analysis.execution.workers import Here, Pool
-from analysis.results import commands
+from analysis.results import tables
 from analysis.results.chunks import (
     Chunk,
     Part,
@@ -247,7 +246,7 @@ class _Run:
         command = shlex.join([*self.study.command, "--out", str(self.store.folder)])
         if (mission := problem.mission) and not isinstance(job, BoundsJob):
             which = mission.cell, mission.replications[0]
-            command = commands.of_folder(self.store.folder, self.store.manifest, *which)
+            command = tables.of_folder(self.store.folder, self.store.manifest, *which)
         return Failure(job.policy, job.missions, problem.error, command, problem.traceback)
 
 

@@ -1,8 +1,4 @@
-"""Figures that compare two policies, or two settings, in the same missions.
-
-Each returns a figure of its own; nothing touches pyplot's state. In all figures, blue means better,
-orange worse, and a hollow mark inconclusive.
-"""
+"""Figures that compare policies: wins, regions, gaps to the bound, families of seas."""
 
 from collections.abc import Mapping, Sequence
 from textwrap import fill
@@ -11,13 +7,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.figures import drawings, style
+from analysis.answers.comparison import AHEAD, BEHIND, Pair
+from analysis.answers.optimality import ALL
+from analysis.figures import style
 from analysis.names import BOUND, METRICS, PRODUCT, metric_label, parameter
 from analysis.numbers import counted
-from analysis.questions.head_to_head import Pair
-from analysis.questions.optimality.gap import ALL
-from analysis.questions.regions import AHEAD, BEHIND
-from analysis.questions.what_if.question import SIDES
 from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import INCONCLUSIVE
 
@@ -30,7 +24,7 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
     """The mean difference along a parameter: for each bin a dot with its interval.
 
     Args:
-        table: All rows of ``questions.regions.along``, so that all figures have the same axis.
+        table: All rows of ``answers.comparison.along``, so that all figures have the same axis.
         field: The parameter.
         overall: The mean difference over all missions, drawn as a dashed line.
     """
@@ -81,7 +75,7 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
     of the missions is beyond each end of the axis.
 
     Args:
-        missions: Rows of ``questions.head_to_head.duels``.
+        missions: Rows of ``answers.comparison.duels``.
         pair: The policies.
     """
     values = np.sort(missions["difference"].to_numpy(float))
@@ -108,21 +102,20 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
     return figure
 
 
-def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -> Figure:
+def means(table: pd.DataFrame, metric: str, sides: Sequence[str]) -> Figure:
     """A metric of every policy in the baseline and in the variation, with intervals.
 
     Args:
-        table: Rows of ``questions.what_if.answer.means``.
+        table: Rows of ``ask.what_if.means``.
         metric: One of their metrics.
-        settings: What the baseline and the variation set, in words.
+        sides: The texts below the baseline and the variation.
     """
     rows = table[table["metric"] == metric].dropna(subset="mean")
-    ticks = ["\n".join((side, *words)) for side, words in zip(SIDES, settings, strict=True)]
-    rows = rows.assign(position=rows["point"], value=rows["point"].map(dict(enumerate(ticks))))
+    rows = rows.assign(position=rows["point"], value=rows["point"].map(dict(enumerate(sides))))
     with style.panels(4.1, values="y") as (figure, ax):
-        drawings.along(rows, style.policy_colours(rows["policy"]), style.unit_of(metric), ax)
+        style.along(rows, style.policy_colours(rows["policy"]), style.unit_of(metric), ax)
         ax.set(title=metric_label(metric), xlim=(-0.45, 1.45))
-        ax.set_xticks((0, 1), ticks)
+        ax.set_xticks((0, 1), sides)
         if metric in METRICS:
             ax.set_ylim(style.ends(rows, 0.05))
     return figure
@@ -132,7 +125,7 @@ def gains(answers: pd.DataFrame) -> Figure:
     """The paired differences of the metrics of every policy, with intervals.
 
     Args:
-        answers: Rows of ``questions.what_if.answer.answers``.
+        answers: Rows of ``ask.what_if.answers``.
     """
     names = {metric: name.replace(" and ", "\nand ") for metric, name in METRICS.items()}
     rows = answers[answers["metric"].isin([*names])]
@@ -153,12 +146,12 @@ def spread(differences: Mapping[str, pd.Series]) -> Figure:
     """The distribution of the paired differences of every policy: all, and the central part.
 
     Args:
-        differences: For each policy the result of ``questions.what_if.answer.differences``.
+        differences: For each policy the result of ``ask.what_if.differences``.
     """
     with style.panels(5.6, 2, sharey=True) as (figure, axes):
         titles = ("Share of missions with that difference or less", "The central part of it")
         for ax, title in zip(axes, titles, strict=True):
-            drawings.distributions(differences, ax)
+            style.distributions(differences, ax)
             ax.axvline(0, **style.ZERO)
             ax.axhline(0.5, color=style.MUTED, linewidth=0.9, linestyle=":", zorder=1)
             ax.set_title(title)
@@ -180,7 +173,7 @@ def gaps(table: pd.DataFrame) -> Figure:
             bound, low, high = rows[[BOUND, f"{BOUND}_low", f"{BOUND}_high"]].iloc[0]
             ax.axvspan(low, high, color=style.MUTED, alpha=0.3, linewidth=0)
             ax.axvline(bound, color=style.INK, linewidth=1.3, label="upper bound")
-            drawings.in_rows(rows, ax, PRODUCT, f"{PRODUCT}_low", f"{PRODUCT}_high")
+            style.in_rows(rows, ax, PRODUCT, f"{PRODUCT}_low", f"{PRODUCT}_high")
             ax.set(title=f"{counted(uavs, 'UAV')}: bound {bound:.1%}", xlim=(-0.02, 1.02))
             style.in_units(ax.xaxis, "%")
         ax.set_xlabel(METRICS[PRODUCT])
@@ -189,11 +182,11 @@ def gaps(table: pd.DataFrame) -> Figure:
 
 def _differences(rows: pd.DataFrame, names: pd.Series, title: str) -> Figure:
     """Paired differences of every policy by what has these names, in their order."""
-    rows = drawings.placed(rows.assign(mean=rows["difference"], name=names), "name")
+    rows = style.placed(rows.assign(mean=rows["difference"], name=names), "name")
     with style.panels(3.6, values="y") as (figure, ax):
         ax.axhline(0, **style.ZERO)
         looks = style.policy_colours(rows["policy"])
-        drawings.along(rows, looks, "points", ax, linestyle="")
+        style.along(rows, looks, "points", ax, linestyle="")
         ax.set(title=f"{title} (paired)", ylabel="percentage points")
         ax.margins(x=0.2)
     return figure
@@ -205,3 +198,19 @@ def _middle(values: Sequence[pd.Series], tail: float) -> tuple[float, float]:
     high = max(0.0, *(of.quantile(1 - tail) for of in values))
     room = max(0.04 * (high - low), 0.01)
     return low - room, high + room
+
+
+def groups(table: pd.DataFrame, by: str, title: str) -> Figure:
+    """What every policy reaches in groups of seas, with intervals.
+
+    Args:
+        table: Rows of ``analysis.answers.seas.quality`` or ``shares``.
+        by: The column of the groups.
+        title: Of the vertical axis.
+    """
+    looks = style.policy_colours(table["policy"])
+    with style.panels(4.2) as (figure, ax):
+        style.along(style.placed(table, by), looks, "%", ax, linestyle="")
+        ax.set(ylabel=title)
+        ax.legend(loc="lower left", ncols=4)
+    return figure

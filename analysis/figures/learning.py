@@ -11,9 +11,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.answers.learning import ALPHA, smoothed
+from analysis.answers.learning import LEARNED_REWARD as REWARD
 from analysis.figures import style
 from analysis.names import METRICS, value_text
-from analysis.questions.learning.curves import ALPHA, REWARD, smoothed
 
 EVALUATED = {f"evaluation_{metric}": name for metric, name in METRICS.items()}
 # The metrics that are evaluated while training, and their names.
@@ -30,7 +31,7 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
     phase. The axis at the top shows the UAV-slots that have been simulated.
 
     Args:
-        curves: Curves, see ``analysis.questions.learning.curves``.
+        curves: Curves, see ``analysis.answers.learning``.
         metric: One of ``NAMES``.
         labels: The variants to draw, with their names in the legend.
     """
@@ -65,8 +66,8 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
     """The final metric of every variant: trainings as dots, their mean with interval as a diamond.
 
     Args:
-        table: Rows of ``analysis.questions.learning.ablation.ablation``.
-        last: Rows of ``analysis.questions.learning.ablation.finals``.
+        table: Rows of ``analysis.answers.learning.ablation``.
+        last: Rows of ``analysis.answers.learning.finals``.
         metric: The column of the final metric, ``final_`` and one of ``METRICS``.
         baseline: The variant whose mean is drawn as a line. Variants of which no training reaches
             ``OFF`` times as much are an arrow at the edge, unless another has some that do.

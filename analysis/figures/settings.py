@@ -1,7 +1,4 @@
-"""Figures of the means of policies at the settings of a study, and of what fields change.
-
-Each returns a figure of its own; nothing touches pyplot's state. Shares are in percent.
-"""
+"""Figures of the settings of a study: along a field, effects, fronts of two metrics."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -14,10 +11,21 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import LogLocator, NullLocator
 
-from analysis.figures import drawings, style
-from analysis.names import LESS_IS_BETTER, METRICS, PRODUCT, metric_label, parameter, value_text
-from analysis.questions import settings
+from analysis import numbers
+from analysis.answers import settings
+from analysis.figures import style
+from analysis.names import (
+    COST,
+    LESS_IS_BETTER,
+    METRICS,
+    PRODUCT,
+    metric_label,
+    metric_name,
+    parameter,
+    value_text,
+)
 from analysis.results.tables import Results
 from analysis.study.design import NOISE
 
@@ -36,7 +44,7 @@ def performance(summary: pd.DataFrame, metric: str, printed: float | None = None
     """
     rows = summary[summary["metric"] == metric]
     with style.panels(1.3 + 0.42 * len(rows), values="x") as (figure, ax):
-        drawings.in_rows(rows, ax)
+        style.in_rows(rows, ax)
         for y, mean in enumerate(rows["mean"]):
             style.note_at_right(f"{mean:.1%}", y, ax)
         if printed is not None:
@@ -56,9 +64,9 @@ def by_fleet(
         metric: One of ``METRICS``.
         printed: The paper's numbers by number of UAVs.
     """
-    rows = drawings.placed(summary[summary["metric"] == metric], "uavs")
+    rows = style.placed(summary[summary["metric"] == metric], "uavs")
     with style.panels(3.9, values="y", legend=5) as (figure, ax):
-        drawings.along(rows, style.policy_colours(rows["policy"]), "%", ax)
+        style.along(rows, style.policy_colours(rows["policy"]), "%", ax)
         if printed:
             ax.plot(*zip(*sorted(printed.items()), strict=True), "D", label="paper", **_PRINTED)
         ax.set(title=METRICS[metric], xlabel="UAVs", ylim=(-0.03, 1.04))
@@ -98,15 +106,15 @@ def lines(rows: pd.DataFrame, x: str, line: str, metric: str, panel: str | None 
         metric: The metric.
         panel: A column with a panel for each value; by default there is one panel.
     """
-    parts = [*drawings.placed(rows, x).groupby(panel or (lambda _: ""), sort=False)]
+    parts = [*style.placed(rows, x).groupby(panel or (lambda _: ""), sort=False)]
     of_policies, shared = line == "policy", {"sharex": True, "sharey": True, "squeeze": False}
-    values = drawings.ordered(rows[line])
+    values = style.ordered(rows[line])
     looks = style.policy_colours(values) if of_policies else style.graded(values)
     heading = None if of_policies else parameter(line).label
     height = 2.9 * len(parts) + 0.9
     with style.panels(height, len(parts), "y", 4, heading, **shared) as (figure, axes):
         for ax, (value, part) in zip(axes.flat, parts, strict=True):
-            drawings.along(part, looks, style.unit_of(metric), ax, line)
+            style.along(part, looks, style.unit_of(metric), ax, line)
             title = settings.value_in_words(panel, value) if panel else ""
             ax.set_title(title[:1].upper() + title[1:], fontsize=10, fontweight="normal")
         figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
@@ -156,7 +164,7 @@ def heat_map(
     with _grid(min(height, 9), len(panels), columns, sharex=True) as (figure, axes):
         for ax, value in zip(axes, panels, strict=True):
             part = rows if value is None else rows[rows[facet] == value]
-            mesh = drawings.cells(part, (values[y], values[x]), ax, **scale)
+            mesh = style.cells(part, (values[y], values[x]), ax, **scale)
             for row in part[part["tied"]].itertuples():
                 corner = row.column + 0.06, row.row + 0.06
                 ax.add_patch(Rectangle(corner, 0.88, 0.88, fill=False, edgecolor=MARK))
@@ -187,7 +195,7 @@ def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = N
 
     def draw(field: str, ax: Axes) -> None:
         rows = effects[effects["field"] == field]
-        drawings.along(rows, looks, style.unit_of(metric), ax)
+        style.along(rows, looks, style.unit_of(metric), ax)
 
     return _panel_per_field(settings.by_influence(effects), metric, draw)
 
@@ -204,14 +212,14 @@ def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) 
     looks = style.policy_colours(results.policies, table["policy"])
 
     def draw(field: str, ax: Axes) -> None:
-        rows = drawings.placed(table, field)
+        rows = style.placed(table, field)
         for name, part in rows.groupby("policy", sort=False):
             colour, marker = looks[str(name)]
             ax.scatter(part["position"], part[metric], s=18, alpha=0.7, color=colour, label=name,
                        marker=marker, linewidths=0, rasterized=len(table) > 2000)  # fmt: skip
         ticks = rows.drop_duplicates("position").sort_values("position")
-        if len(ticks) <= drawings.MOST_TICKS:
-            drawings.name_ticks(ax.xaxis, [*ticks["value"]], [*ticks["position"]])
+        if len(ticks) <= style.MOST_TICKS:
+            style.name_ticks(ax.xaxis, [*ticks["value"]], [*ticks["position"]])
         style.in_units(ax.yaxis, style.unit_of(metric))
 
     return _panel_per_field([*settings.varied(results)], metric, draw)
@@ -226,7 +234,7 @@ def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Figure:
     """
     values = {str(name): part[metric] for name, part in missions.groupby("policy", sort=False)}
     with style.panels(3.9, legend=4) as (figure, ax):
-        drawings.distributions(values, ax)
+        style.distributions(values, ax)
         ax.set_xlabel(metric_label(metric))
         style.in_units(ax.xaxis, style.unit_of(metric))
     return figure
@@ -241,7 +249,7 @@ def effect(
     with the differences from the first value, which has its own axis.
 
     Args:
-        table: Rows of ``questions.main_effects.effects``, of the policies to draw.
+        table: Rows of ``answers.main_effects.effects``, of the policies to draw.
         field: The parameter.
         changes: For each policy to draw, its ``main_effects.changes`` in the last of ``METRICS``.
         policies: All policies of the study, so that every policy has the same colour on all pages.
@@ -256,9 +264,9 @@ def effect(
     ratios: dict = {"sharex": True, "height_ratios": (1, 1.6, 1.6, 1.2)}
     with style.panels(7.6, 4, "y", **ratios) as (figure, axes):
         for ax, (metric, name) in zip(axes, METRICS.items(), strict=False):
-            drawings.along(rows[rows["metric"] == metric], looks, "%", ax)
+            style.along(rows[rows["metric"] == metric], looks, "%", ax)
             ax.set(title=name, ylim=style.ends(table[table["metric"] == metric], 0.1))
-        drawings.along(steps, looks, "points", axes[-1])
+        style.along(steps, looks, "points", axes[-1])
         axes[-1].axhline(0, **style.ZERO)
         title = f"Paired difference from the value at {first['value'].iloc[0]}"
         axes[-1].set(title=title, ylabel="points")
@@ -270,14 +278,14 @@ def one_by_one(table: pd.DataFrame, policies: list[str]) -> Figure:
     """The product against every parameter, in panels side by side with the same axis.
 
     Args:
-        table: Rows of ``questions.main_effects.effects``, of the policies to draw.
+        table: Rows of ``answers.main_effects.effects``, of the policies to draw.
         policies: All policies of the study, so that every policy has the same colour on all pages.
     """
     rows = table[table["metric"] == PRODUCT]
     fields, looks = [*rows["field"].unique()], style.policy_colours(policies, rows["policy"])
     with _grid(3.4, len(fields), len(fields)) as (figure, axes):
         for ax, field in zip(axes, fields, strict=True):
-            drawings.along(rows[rows["field"] == field], looks, "%", ax)
+            style.along(rows[rows["field"] == field], looks, "%", ax)
             ax.set_xlabel(fill(parameter(field).label, 24), parse_math=True)
             ax.tick_params(axis="x", labelsize=8)
         figure.suptitle(metric_label(PRODUCT), fontsize=11, fontweight="bold", x=0.01, ha="left")
@@ -288,7 +296,7 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
     """Sobol indices of every parameter as dots with intervals; the noise has its own row.
 
     Args:
-        rows: Rows of ``analysis.questions.summary.sensitivities`` of a policy and a metric.
+        rows: Rows of ``analysis.answers.summary.sensitivities`` of a policy and a metric.
         title: The title of the figure.
     """
     rows, look = rows.reset_index(drop=True), style.dot((style.palette()[0], "o"))
@@ -349,3 +357,78 @@ def _short(value: float, metric: str) -> str:
     if metric in METRICS:
         return f"{100 * value:.1f}"
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+WIDE = 20.0  # if the costs differ by this factor, their axis is logarithmic
+MOST_NAMES = 6  # largest number of settings that are named, of all or of those on the front
+FAINT = 0.15  # the opacity of a setting that is not on the front
+
+
+def costs(table: pd.DataFrame, metric: str, currency: str, required: float | None = None) -> Figure:
+    """Cost against a metric under one condition, with 95 % intervals and the front.
+
+    The larger and darker a mark, the higher the probability that the setting is on the front.
+
+    Args:
+        table: Rows of ``answers.costs.front``.
+        metric: The metric of the front.
+        currency: The currency of the costs.
+        required: The required mean of the metric, drawn as a line.
+    """
+    looks = style.policy_colours(table["policy"])
+    best = table[table["on_front"]].sort_values(COST)
+    with style.panels(4.1) as (figure, ax):
+        if len(best) > 1:
+            _front(best[COST], best[metric], "front of the estimates", ax)
+        for _, row in table.iterrows():
+            colour, marker = looks[row["policy"]]
+            x_arm, y_arm = (style.arms(row, m, f"{m}_low", f"{m}_high") for m in (COST, metric))
+            ax.errorbar(row[COST], row[metric], xerr=x_arm, yerr=y_arm, color=colour, elinewidth=1,
+                        marker=marker, markersize=4 + 5 * row["probability"],
+                        alpha=FAINT + (1 - FAINT) * row["probability"])  # fmt: skip
+        for policy, (colour, marker) in looks.items():
+            ax.plot([], [], color=colour, marker=marker, linestyle="", label=policy)
+        named = table.sort_values(COST) if len(table) <= MOST_NAMES else best
+        for n, row in enumerate(named.to_dict("records") if len(named) <= MOST_NAMES else ()):
+            side = ("top", -5) if n % 2 else ("bottom", 5)  # so that neighbours do not overlap
+            ax.annotate(row["fleet"].replace(" and ", "\n"), (row[COST], row[metric]), va=side[0],
+                        fontsize=8, xytext=(7, side[1]), textcoords="offset points",
+                        **style.OUTLINED)  # fmt: skip
+        if required is not None:
+            ax.axhline(required, color=style.MUTED, linestyle="--", linewidth=1.1, label="required")
+        ax.margins(x=0.12, y=0.12)
+        style.in_units(ax.xaxis, "", 5)
+        if table[COST].max() > WIDE * table[COST].min() > 0:
+            ax.set_xscale("log")
+            ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            ax.xaxis.set_minor_locator(NullLocator())
+            ax.xaxis.set_major_formatter("{x:,g}")
+        style.in_units(ax.yaxis, "%")
+        ax.set(xlabel=f"cost [{currency}]", ylabel=metric_name(metric).lower())
+    return figure
+
+
+def decision_times(table: pd.DataFrame) -> Figure:
+    """Decision time against the product of all policies, and their Pareto front.
+
+    Args:
+        table: Rows of ``optimality.planner.front``.
+    """
+    looks = style.policy_colours(table["policy"])
+    best = table[table["on_front"]].sort_values("seconds")
+    with style.panels(4.2) as (figure, ax):
+        _front(best["seconds"], best["mean"], "Pareto front", ax)
+        for _, row in table.iterrows():
+            ax.errorbar(row["seconds"], row["mean"], yerr=style.arms(row), label=row["policy"],
+                        linestyle="", **style.dot(looks[row["policy"]]))  # fmt: skip
+        ax.set(xscale="log", title="Decision time against quality", ylabel=METRICS[PRODUCT])
+        ax.set_xlabel("time of a decision for one mission, median")
+        ax.set_xlim(table["seconds"].min() / 2, table["seconds"].max() * 2)
+        ax.xaxis.set_major_formatter(lambda time, _: numbers.seconds(time))
+        ax.xaxis.set_minor_locator(NullLocator())
+        style.in_units(ax.yaxis, "%")
+    return figure
+
+
+def _front(paid: pd.Series, reached: pd.Series, label: str, ax: Axes) -> None:
+    ax.step(paid, reached, where="post", color=style.INK, linewidth=1.1, zorder=1, label=label)

@@ -1,15 +1,13 @@
-"""Units of work: replications of cells that are computed and stored together, as one chunk.
-
-A part is a team at a design point with a range of replications. A chunk is some parts of one team;
-the name of its file is a hash of them. Missions, event logs and bounds are asked for as parts.
-"""
+"""The parts of a study's missions, and the files of a results folder in which they lie."""
 
 import json
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
@@ -18,6 +16,7 @@ import pyarrow as pa
 from analysis.results.manifest import Cell, Manifest
 from analysis.study.study import CHECK
 from dess import InputError
+from dess.files.reading import paths_in
 
 Present = defaultdict[str, list[range]]  # replications by the key of their cell
 
@@ -167,3 +166,35 @@ def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
                 "results: two files have different records of a mission; allowed: one of them"
             )
     return frame
+
+
+MANIFEST, LOCK = "manifest.json", ".lock"
+LONG = 150  # largest number of characters of a policy's name in the name of a folder
+BOUNDS = "bounds"  # the folder of the bounds of missions, which are the same for all policies
+FOLDERS = ("missions", "uavs", "events", BOUNDS, "failures")
+
+
+def partition(policy: str) -> str:
+    """The name of the folder with the files of a team."""
+    name = quote(policy, safe="", errors="surrogatepass")
+    if len(name) > LONG:
+        name = f"{name[:LONG]}~{short_hash(name.encode())}"
+    return f"policy={name}"
+
+
+def check_places(folder: Path) -> None:
+    """Refuse links in the places of a run's own files: it would write and delete where they lead.
+
+    Raises:
+        InputError: If there are links, or files and folders in each other's place.
+    """
+    for path in (*(folder / name for name in FOLDERS), *paths_in(folder, "*/policy=*")):
+        if path.is_symlink() or (path.exists() and not path.is_dir()):
+            raise InputError(
+                f"{path}: is a link, or not what a run would write there; allowed: another --out"
+            )
+
+
+def is_ours(path: Path) -> bool:
+    """Whether a run may have made this file or folder before it wrote the manifest."""
+    return path.name == LOCK or (path.name.startswith(".") and path.suffix == ".tmp")

@@ -22,8 +22,7 @@ from analysis.results.provenance import (
     study_of,
     team_of,
 )
-from analysis.study.cheapest import AnySelection, Cheapest, Setting
-from analysis.study.costs import Costs
+from analysis.study.cheapest import AnySelection, Cheapest, Costs, Setting
 from analysis.study.design import DesignPoint
 from analysis.study.study import CHECK, Point, Study, StudyData
 from dess import InputError

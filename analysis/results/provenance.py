@@ -21,8 +21,9 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 import dess
 from analysis.study.stopping import Text
 from analysis.study.study import StudyData
+from dess import InputError
 from dess.code.sources import OURS, code_of, combined
-from dess.errors import InputError, validation_line
+from dess.errors import validation_line
 from dess.files.documents import Document
 from dess.scenario import SEA, ScenarioSpace, fields_of, merged, scenario_at
 from dess.streams import MAX_REPLICATION, MAX_SEED

@@ -24,9 +24,9 @@ import pandas as pd
 import pyarrow as pa
 
 from analysis.bound import Bound
-from analysis.results import files, parquet
-from analysis.results.chunks import Chunk, Part, Present, absent, rows_of
-from analysis.results.files import FOLDERS, LOCK, MANIFEST
+from analysis.results import chunks as files
+from analysis.results import parquet
+from analysis.results.chunks import FOLDERS, LOCK, MANIFEST, Chunk, Part, Present, absent, rows_of
 from analysis.results.manifest import NO_TEAM, Cell, Manifest, Selected
 from analysis.study.study import Study
 from dess import InputError

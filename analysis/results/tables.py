@@ -1,6 +1,7 @@
-"""The results of a study as tables: load a complete results folder."""
+"""The results of a study as tables, and the commands that make a mission of it again."""
 
 import json
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,15 +13,65 @@ import pandas as pd
 
 from analysis.bound import Bound
 from analysis.names import BOUND, GAP, PRODUCT, SWEEP, SWEEPS, measured_in
-from analysis.results import commands
 from analysis.results.chunks import bound_parts, check_parts, parts_of
 from analysis.results.manifest import Cell, Manifest
+from analysis.results.provenance import Origin
 from analysis.results.store import Place, Store
 from analysis.study.cheapest import Cheapest, CheapestChoice
 from analysis.study.selection import Choice, Selection
-from dess.errors import InputError, one_of
+from dess import InputError
+from dess.errors import one_of
 from dess.record import MISSION_RECORD
-from dess.scenario import ScenarioSpace
+from dess.scenario import SEA, ScenarioSpace, dotted, is_scenario_name, load_scenario
+
+
+def of_folder(folder: str | Path, manifest: Manifest, cell: Cell, replication: int) -> str:
+    """The command that reads all but the replication from a results folder.
+
+    Args:
+        folder: The results folder.
+        manifest: What the folder is about.
+        cell: The team and the design point of the mission.
+        replication: Of the mission.
+    """
+    point = ["--point", str(cell.point)] if len(manifest.points) > 1 else []
+    policy = manifest.policies[cell.team].policy
+    which = [*point, "--policy", policy, "--replication", str(replication)]
+    return shlex.join(["dess", "simulate", "--of", str(folder), *which])
+
+
+def of_fields(origin: Origin, policy: str, values: dict[str, Any], replication: int) -> str:
+    """The command that needs no results folder, and sets the fields of the scenario itself.
+
+    Where the scenario is not a shipped one, its file may be anywhere: the command sets all fields
+    that differ from the paper's scenario.
+
+    Args:
+        origin: What the results were made with.
+        policy: The team.
+        values: Of the mission's design point.
+        replication: Of the mission.
+    """
+    changes = origin.study["set"] | values
+    name = changes.pop(SEA, origin.study["scenario"])
+    if not is_scenario_name(name):
+        name, paper = "paper", load_scenario("paper").model_dump(mode="json")
+        fields = origin.space(values).model_dump(mode="json")
+        changes = {k: v for k, v in fields.items() if k not in paper or v != paper[k]}
+    settings = [w for k, v in dotted(changes).items() for w in ("--set", f"{k}={_as_toml(v)}")]
+    acting = ",".join(policy.split(",")[: origin.space(values).uavs[1]])  # the others have no UAV
+    which = ["--policy", acting, "--seed", str(origin.seed), "--replication", str(replication)]
+    return shlex.join(["dess", "simulate", "--scenario", name, *settings, *which])
+
+
+def _as_toml(value: Any) -> str:
+    """A value in the syntax of TOML: as in JSON, but for tables, such as a type of UAVs."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_as_toml, value))}]"
+    if isinstance(value, dict):
+        given = {key: of_key for key, of_key in value.items() if of_key is not None}
+        return f"{{{', '.join(f'{key} = {_as_toml(of_key)}' for key, of_key in given.items())}}}"
+    return json.dumps(value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +159,8 @@ class Results:
         """
         cell, manifest = self.cell(policy, point), self.store.manifest
         if folder is None:
-            return commands.of_fields(manifest, policy, manifest.points[point].values, replication)
-        return commands.of_folder(folder, manifest, cell, replication)
+            return of_fields(manifest, policy, manifest.points[point].values, replication)
+        return of_folder(folder, manifest, cell, replication)
 
     def choice(self, policy: str) -> Choice | None:
         """The design point that was selected as the best for a policy, with its guarantee."""

@@ -1,24 +1,148 @@
-"""Tests of paired differences: Student's t test, McNemar's test for shares, and the sign test.
+"""Differences of treatments on the same missions: matched, tested, corrected for many tests."""
 
-A sample of missions in which neither policy fails alone, or only one of them does, knows too little
-of lone failures: Student's t is far too narrow then. So one mission in which A alone does well and
-one in which B alone does are added to the differences (``stats.bounded.rare_differences``) before
-Student's t is taken, as D. G. Bonett and R. M. Price (Statistical Methods in Medical Research 21
-(2012) 449-466) add them to paired outcomes. The interval and the p-value rest on the same sample,
-so p is below 0.05 where the 95 % interval leaves out 0. Paired outcomes 0 and 1 have the exact
-p-value of McNemar, which may be on the other side of 0.05 where the interval ends close to 0.
-"""
-
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.names import REWARD, SHARES
-from analysis.stats.bounded import rare_differences
-from analysis.stats.intervals import LEVEL, Interval, column_intervals, mean_interval
+from analysis.names import MEANS, MEASURES, REWARD, SHARES
+from analysis.stats.intervals import (
+    LEVEL,
+    Interval,
+    check_columns,
+    check_share,
+    column_intervals,
+    groups,
+    mean_interval,
+    rare_differences,
+    values_within,
+)
+from dess import InputError
+
+Treatment = Literal["policy", "point"]
+
+_MISSION = ("policy", "point", "seed", "replication")  # what identifies a mission
+
+
+def metrics_by_treatment(
+    missions: pd.DataFrame, of: Treatment, metrics: Sequence[str], by: Sequence[str]
+) -> dict[Any, pd.DataFrame]:
+    """The metrics of every policy (or point), indexed by the keys of their missions.
+
+    Raises:
+        InputError: If a column is missing or not of numbers, or a mission appears twice.
+    """
+    if of not in get_args(Treatment):
+        raise InputError(f"of: {of!r}; allowed: {', '.join(get_args(Treatment))}")
+    check_columns(missions, [of, "replication", *metrics, *by])
+    if of in by:
+        raise InputError(f"by: {of} is what is compared; allowed: other columns")
+    for metric in metrics:
+        values = pd.to_numeric(missions[metric], errors="coerce")
+        values = values[missions[metric].notna()] if metric in MEASURES else values
+        if odd := int(len(values) - np.isfinite(values).sum()):
+            raise InputError(f"{metric}: no number in {odd} missions; allowed: finite numbers")
+    keys = list(dict.fromkeys([*by, *(k for k in _MISSION if k in missions and k != of)]))
+    twice = missions.duplicated([of, *keys])
+    if twice.any():
+        first = _first_row(missions.loc[twice, [of, *keys]])
+        raise InputError(f"missions: {first} is there twice; allowed: every mission once")
+    spaces = [of, *(key for key in keys if key in (*by, "policy", "point", "seed"))]
+    values = {metric: values_within(missions, metric, spaces) for metric in metrics}
+    table = missions[[of, *keys]].assign(**values)
+    return {name: part.set_index(keys)[[*values]] for (name,), part in groups(table, [of])}
+
+
+def select(tables: Mapping[Any, pd.DataFrame], of: str, name: str | int) -> pd.DataFrame:
+    """The table of a policy or point.
+
+    Raises:
+        InputError: If there are no missions of it.
+    """
+    if name not in tables:
+        raise InputError(f"{of}: {name} has no missions; allowed: {', '.join(map(str, tables))}")
+    return tables[name]
+
+
+def check_same_missions(tables: Mapping[Any, pd.DataFrame], name: Any, baseline: Any) -> None:
+    """Raise ``InputError`` unless two policies, or points, have the same missions."""
+    for lacking, having in ((name, baseline), (baseline, name)):
+        absent = tables[having].index.difference(tables[lacking].index)
+        if len(absent):
+            raise InputError(
+                f"{lacking}: lacks {len(absent)} of the missions of {having}, the first at "
+                f"{_first_row(absent.to_frame())}; allowed: the same missions for both"
+            )
+
+
+def matched(
+    tables: Sequence[pd.DataFrame], by: Sequence[str]
+) -> Iterator[tuple[tuple, list[dict[str, np.ndarray]]]]:
+    """Groups of independent units: missions, or means over the missions of a replication.
+
+    Yields:
+        The group, and for each table the values of every metric, in the order of the units.
+    """
+    names = tables[0].index.names
+    unit = [name for name in names if name in (*by, "seed", "replication")]
+    means = [table.groupby(level=unit, dropna=False).mean() for table in tables]
+    for group, part in groups(means[0].reset_index(), by):
+        yield group, [{metric: m[metric].to_numpy()[part.index] for metric in m} for m in means]
+
+
+def _first_row(keys: pd.DataFrame) -> str:
+    return ", ".join(f"{name} {keys[name].iloc[0]}" for name in keys)
+
+
+Correction = Literal["holm", "fdr"]
+
+
+def adjust(p: np.ndarray, correction: Correction | None) -> np.ndarray:
+    """Adjust p-values for multiple tests; adjusted values up to alpha are significant at alpha.
+
+    Args:
+        p: (m,) p-values.
+        correction: ``holm`` (Holm 1979) limits the probability of any false claim to alpha, ``fdr``
+            (Benjamini and Hochberg 1995) the expected share of false claims. None: no adjustment.
+
+    Returns:
+        (m,) adjusted p-values, at most 1.
+
+    Raises:
+        InputError: If there is no such correction.
+    """
+    if correction not in (*get_args(Correction), None):
+        allowed = ", ".join(get_args(Correction))
+        raise InputError(f"correction: {correction!r}; allowed: {allowed}, or none")
+    p = np.asarray(p, float)
+    if correction is None:
+        return p
+    if correction == "fdr":
+        return np.asarray(stats.false_discovery_control(p))
+    order = np.argsort(p)
+    adjusted = np.empty_like(p)
+    steps = p[order] * np.arange(len(p), 0, -1)
+    adjusted[order] = np.minimum(np.maximum.accumulate(steps), 1)
+    return adjusted
+
+
+def with_adjusted(table: pd.DataFrame, correction: Correction | None) -> pd.DataFrame:
+    """Add ``p_adjusted`` after ``p`` to a table of comparisons, adjusted over all its rows."""
+    adjusted = adjust(table["p"].to_numpy(float), correction)
+    table.insert(table.columns.get_loc("p") + 1, "p_adjusted", adjusted)
+    return table
+
+
+def for_choice(table: pd.DataFrame, candidates: int) -> pd.DataFrame:
+    """Correct a table of comparisons whose baseline, or pair, was chosen by the same data.
+
+    By Bonferroni, ``p_adjusted`` is multiplied by the number of candidates.
+    """
+    return table.assign(p_adjusted=(table["p_adjusted"] * candidates).clip(upper=1))
+
 
 _ROUNDING = 64 * np.finfo(float).eps  # relative tolerance below which differences count as equal
 
@@ -131,3 +255,132 @@ def smoothed(differences: np.ndarray, rare: Sequence[float] = (1.0, -1.0)) -> np
     """The differences with rare ones added, along the last axis: one gain and one loss."""
     more = np.broadcast_to(np.asarray(rare, float), (*differences.shape[:-1], 2))
     return np.concatenate([differences, more], axis=-1)
+
+
+class Paired(NamedTuple):
+    """A comparison of n pairs: the mean difference, its interval, and the gain by pairing.
+
+    ``variance_reduction`` is v = 1 - Var(A - B) / (Var A + Var B). Without common random numbers,
+    1 / (1 - v) times as many missions would be needed. If v is negative, pairing made the interval
+    wider.
+    """
+
+    difference: float
+    low: float
+    high: float
+    p: float
+    correlation: float
+    variance_reduction: float
+    n: int
+
+
+def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str = "") -> Paired:
+    """Compare two samples pair by pair; differences are A - B.
+
+    Args:
+        a: (n,) values of A.
+        b: (n,) values of B; entry r forms a pair with entry r of A.
+        level: Confidence level.
+        metric: The metric of the values; by default one without bounds. Post-stratified values of
+            shares may lie outside [0, 1].
+
+    Returns:
+        The interval and the p-value of ``differences.difference_test``: of Student's t, with
+        rare differences added for the success, metrics from 0 to 1 and the reward.
+
+        - If all differences of another metric are equal (up to rounding), the interval is
+          degenerate (low = difference = high). p is that of the sign test, 2^(1 - n); it is 1 if
+          all differences are 0.
+        - A single pair of a metric without bounds has no interval: its ends are nan, and p is 1.
+        - If A or B is constant, their correlation is 0. If both are, the variance reduction is 0.
+
+    Raises:
+        ValueError: If the samples are empty or differ in length.
+    """
+    a, b = np.asarray(a, float), np.asarray(b, float)
+    if a.shape != b.shape or not a.size:
+        raise ValueError(f"paired: {a.size} and {b.size} values; allowed: as many, at least one")
+    mean, p = difference_test(a, b, metric, level)
+    differences = differences_of(a, b)
+    of_a, of_b, of_differences = map(_variance, (a, b, differences))
+    correlation = float(np.corrcoef(a, b)[0, 1]) if of_a and of_b else 0.0
+    reduction = 1 - of_differences / (of_a + of_b) if of_a + of_b else 0.0
+    return Paired(*mean, p, correlation, reduction, a.size)
+
+
+def relative_change(values: np.ndarray, reference: np.ndarray, level: float = LEVEL) -> Interval:
+    """The change of a mean as a share of a reference mean, with the interval of a ratio of means.
+
+    Source: W. G. Cochran, Sampling Techniques, 3rd edition, 1977, Section 6.3: the variance of the
+    ratio of two means of paired values; with Student's quantile.
+
+    Args:
+        values: (n,) values.
+        reference: (n,) reference values of the same replications, whose mean is not 0.
+        level: Confidence level.
+    """
+    ratio, n = float(values.mean() / reference.mean()), len(values)
+    if n == 1:
+        return Interval(ratio - 1, np.nan, np.nan)
+    error = np.std(values - ratio * reference, ddof=1) / np.sqrt(n) / abs(reference.mean())
+    half = float(stats.t.isf((1 - level) / 2, n - 1) * error)
+    return Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
+
+
+def compare(
+    missions: pd.DataFrame,
+    baseline: str | int,
+    metrics: Sequence[str] = (*SHARES, *MEANS),
+    by: Sequence[str] = (),
+    level: float = LEVEL,
+    correction: Correction | None = "holm",
+    of: Treatment = "policy",
+) -> pd.DataFrame:
+    """Compare every other policy, or design point, with a baseline, mission by mission.
+
+    Args:
+        missions: A row per mission, with the metrics, the fields of ``by`` and, as far as they
+            exist, ``policy``, ``point``, ``seed`` and ``replication``.
+        baseline: The policy, or the number of the design point, to compare with.
+        metrics: Columns of numbers.
+        by: Columns whose values form groups of missions, compared one by one.
+        level: Confidence level of each interval.
+        correction: Correction of the p-values over all rows, as for ``correction.adjust``.
+        of: What is compared: ``policy`` or ``point``.
+
+    Returns:
+        A row per policy (in order of first appearance), group (in order of their values) and
+        metric: ``policy`` (or ``point``), ``baseline``, the columns ``by``, ``metric``, the fields
+        of ``Paired`` and, after ``p``, ``p_adjusted``. A positive difference means that the value
+        is above that of the baseline. What a mission of a pair did not measure is left out. If a
+        group has several missions of a replication (at several
+        design points, which share its random draws), their means are compared, and ``n`` is the
+        number of replications. Where the number of UAVs is drawn, means and differences are
+        post-stratified by it (``stats.intervals.post_stratified``).
+
+    Raises:
+        InputError: If a column is missing or does not contain numbers, the baseline is missing or
+            the only one, a mission appears twice or only for one of a pair, or an argument is not
+            allowed.
+    """
+    check_share("level", level)
+    tables = metrics_by_treatment(missions, of, metrics, by)
+    reference = select(tables, of, baseline)
+    others = [name for name in tables if name != baseline]
+    if not others:
+        raise InputError(f"{of}: nothing to compare with {baseline}; allowed: two or more")
+    rows = []
+    for name in others:
+        check_same_missions(tables, name, baseline)
+        for group, (a, b) in matched([tables[name], reference], by):
+            for metric in metrics:
+                measured = ~np.isnan(a[metric]) & ~np.isnan(b[metric])
+                if measured.any():
+                    result = paired(a[metric][measured], b[metric][measured], level, metric)
+                    rows.append((name, baseline, *group, metric, *result))
+    columns = [of, "baseline", *by, "metric", *Paired._fields]
+    return with_adjusted(pd.DataFrame(rows, columns=columns), correction)
+
+
+def _variance(values: np.ndarray) -> float:
+    return float(values.var()) if np.ptp(values) else 0.0

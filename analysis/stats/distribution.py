@@ -8,13 +8,14 @@ import pandas as pd
 from scipy import stats
 
 from analysis.names import METRICS
-from analysis.stats.bootstrap import bootstrap_interval, expanded_level
 from analysis.stats.intervals import (
     LEVEL,
     Interval,
+    bootstrap_interval,
     bounded_interval,
     check_columns,
     check_share,
+    expanded_level,
     groups,
 )
 from dess import InputError

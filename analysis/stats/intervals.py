@@ -1,24 +1,78 @@
-"""Means and shares of missions with their confidence intervals.
+"""Intervals of means, shares, quantiles and other statistics of missions, and what they rest on.
 
-Replications are independent, so missions are the sampling unit. Design points share the realisation
-of a replication: compare them by ``analysis.compare``. Intervals are two-sided.
-
-    >>> wilson(9, 10)
-    Interval(mean=0.9, low=0.596, high=0.982)
+Means of the product, whose values are between 0 and 1 and whose failures may be rare, have bounded
+intervals; statistics that have no formula are bootstrapped.
 """
 
-from collections.abc import Iterator, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 from functools import reduce
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import pandas as pd
 from scipy import stats
+from scipy.special import ndtri, stdtrit
 
-from analysis.names import BOUNDED, SHARES, metrics_in
-from analysis.stats.bounded import LEVEL as LEVEL
-from analysis.stats.bounded import bounded_ends
-from dess.errors import InputError, one_of
+from analysis.names import BOUNDED, REWARD, SHARES, metrics_in
+from dess import InputError
+from dess.errors import one_of
+from dess.scenario import ScenarioSpace
+
+LEVEL = 0.95
+# What a failure costs: the reward of a filled quota is not earned, that of an empty battery is.
+_FIELDS = ScenarioSpace.model_fields
+FAILURE_COST = _FIELDS["reward_quota"].default - _FIELDS["reward_depleted"].default
+
+
+def bounded_ends(mean: Any, variance: Any, n: Any, level: float = LEVEL) -> tuple[Any, Any]:
+    """The ends of the confidence intervals of means of values from 0 to 1.
+
+    At levels other than 95 %, not one 0 and one 1 are added but ``ndtri((1 + level) / 2)**2 / 4``
+    of each (0.96 at 95 %, 1.66 at 99 %): the more certain the interval, the rarer the values that
+    it must allow for.
+
+    Args:
+        mean: (...) means of the samples.
+        variance: (...) mean squared deviations of the samples from these means.
+        n: (...) numbers of values, above 0; not whole where it is an effective number.
+        level: Confidence level.
+
+    Returns:
+        (...) lower and (...) upper ends, with 0 <= low <= mean <= high <= 1 and low < high.
+    """
+    added = float(ndtri((1 + level) / 2) ** 2 / 4)
+    size = n + 2 * added
+    centre = (n * mean + added) / size
+    squares = n * (variance + (mean - centre) ** 2) + added * (centre**2 + (1 - centre) ** 2)
+    half = stdtrit(size - 1, (1 + level) / 2) * np.sqrt(squares / (size - 1) / size)
+    low, high = np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0)
+    return np.minimum(low, mean), np.maximum(high, mean)
+
+
+def rare_differences(metric: str, a: Any, b: Any) -> tuple[Any, Any] | None:
+    """The differences A - B of missions in which only one of two policies does well.
+
+    For outcomes, they are 1 and -1. Of a metric from 0 to 1, one value falls to 0 or rises to 1,
+    and the other one stays at its mean: what goes further counts. A reward changes by the cost of
+    a failure.
+
+    Args:
+        metric: The metric.
+        a: (...) means of A.
+        b: (...) means of B.
+
+    Returns:
+        The (...) highest and the (...) lowest differences; None if they are not known.
+    """
+    if metric in SHARES:
+        return 0 * (a - b) + 1, 0 * (a - b) - 1
+    if metric in BOUNDED:
+        return np.maximum(a, 1 - b), -np.maximum(b, 1 - a)
+    if metric == REWARD:
+        return a - b + FAILURE_COST, a - b - FAILURE_COST
+    return None
+
 
 LEAST = 5  # missions of every number of UAVs for a post-stratified mean
 
@@ -380,3 +434,73 @@ def by_replication(
     names = [columns] if isinstance(columns, str) else [*columns]
     table = missions[["replication", *names]].assign(value=values_within(missions, metric, names))
     return table.pivot(index="replication", columns=columns, values="value")
+
+
+_BATCH = 2**18  # resampled values at a time, which take some megabytes for every n
+
+
+def bootstrap_interval(
+    samples: np.ndarray | Sequence[np.ndarray],
+    statistic: Callable[..., float],
+    generator: np.random.Generator,
+    level: float = LEVEL,
+    resamples: int = 9999,
+) -> Interval:
+    """A statistic with its bootstrap interval, for example a median, a ratio or a small sample.
+
+    Args:
+        samples: (n,) values, or several such arrays that are resampled together; entry r of all
+            arrays belongs to the same replication.
+        statistic: A function with as many arguments as there are samples, not a builtin of Python.
+            If it takes ``axis``, like ``np.mean``, it is computed for many resamples at once, in
+            limited memory.
+        generator: The random generator of the resamples.
+        level: Confidence level.
+        resamples: Number of resamples.
+
+    Returns:
+        The statistic of the samples as ``mean``, and its interval. Where BCa is not defined or does
+        not contain the statistic, the interval is that of the percentiles. If all resamples agree,
+        it is degenerate (low = mean = high). The ends of a single value are nan.
+
+    Raises:
+        ValueError: If there are no values.
+    """
+    arrays = (samples,) if isinstance(samples, np.ndarray) else tuple(samples)
+    n = len(arrays[0])
+    if not n:
+        raise ValueError("bootstrap_interval: no values")
+    estimate = float(statistic(*arrays))
+    if n == 1:
+        return Interval(estimate, np.nan, np.nan)
+    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        result = stats.bootstrap(
+            arrays,
+            statistic,
+            n_resamples=resamples,
+            batch=max(1, _BATCH // n),
+            confidence_level=level,
+            paired=True,
+            rng=generator,
+        )
+    low, high = result.confidence_interval
+    if not low <= estimate <= high:  # nan, or too large a bias or level
+        low, high = np.quantile(result.bootstrap_distribution, [(1 - level) / 2, (1 + level) / 2])
+    return Interval(estimate, float(low), float(high))
+
+
+def expanded_level(level: float, n: float) -> float:
+    """The nominal level at which a bootstrap interval of a mean of few values covers at ``level``.
+
+    The variance of resamples is only (n - 1) / n of that of samples, and the bootstrap corresponds
+    to the normal distribution in place of Student's t. The correction is the expanded percentile
+    interval (T. C. Hesterberg, The American Statistician 69 (2015) 371-386).
+
+    Args:
+        level: The coverage that the interval should have.
+        n: Number of values; fewer than 2 count as 2.
+    """
+    n = max(n, 2)
+    end = np.sqrt(n / (n - 1)) * stats.t.ppf((1 + level) / 2, n - 1)
+    return float(1 - 2 * stats.norm.sf(end))

@@ -13,11 +13,20 @@ import pandas as pd
 from scipy import optimize, stats
 
 from analysis.names import MEANS, REWARD, SHARES
-from analysis.stats.bounded import rare_differences
-from analysis.stats.correction import Correction, with_adjusted
-from analysis.stats.differences import difference_test, differences_of, sign_test, smoothed, t_test
-from analysis.stats.intervals import LEVEL, check_share
-from analysis.stats.matching import check_same_missions, matched, metrics_by_treatment, select
+from analysis.stats.differences import (
+    Correction,
+    check_same_missions,
+    difference_test,
+    differences_of,
+    matched,
+    metrics_by_treatment,
+    select,
+    sign_test,
+    smoothed,
+    t_test,
+    with_adjusted,
+)
+from analysis.stats.intervals import LEVEL, check_share, rare_differences
 from dess import InputError
 
 # What a comparison is about: all trainings of the learner, or the only one that there is.

@@ -1,40 +1,8 @@
-"""Select the cheapest setting that meets requirements, such as 99 % success.
+"""The cheapest fleet that meets its requirements: its costs, its tests, and the search for it."""
 
-The design points are grouped by their conditions: the values of the fields that no operator decides
-on, such as the arrival rate. For every condition the procedure asks which setting is the cheapest.
-If there are several conditions, it also asks which setting meets the requirements under all of them
-at the lowest mean cost. Every setting is a candidate of a question, with one design point for each
-condition of the question.
-
-Missions are simulated in rounds; the number of missions grows by half from round to round. After
-each round,
- 1. the requirements of every design point are tested (see ``feasibility``). A candidate is feasible
-    as soon as all requirements of its points are met, and infeasible as soon as one is missed;
- 2. the leader i of a question, which is the feasible candidate with the lowest mean cost, is
-    compared with every other candidate l on common replications. It costs at most
-        D_il + t(n - 1, 1 - e) sqrt(S2_il / n) + L_i ln(1 / e) / n,    e = alpha / (2 P j (j + 1))
-    more than l, after n missions and j such comparisons. D_il is the mean and S2_il the variance of
-    the differences, t is Student's quantile, P the number of ordered pairs over all questions, and
-    L_i the cost of losing all UAVs of i (``Setting.loss``). The last term covers losses of UAVs so
-    rare that the sample has none. If the bound is below 0, l is more expensive than i and is ruled
-    out;
- 3. a question is settled if no other candidate is left, or if the leader costs at most the
-    indifference more than any candidate that is left, whether that candidate is feasible or not.
-A design point gets more missions only as long as a question needs it. So a setting that is clearly
-too expensive gets few missions, and whether it is feasible may stay open.
-
-All statements hold jointly with the confidence 1 - alpha (Bonferroni). Half of alpha is for the
-requirements, split evenly over points and requirements. The other half is for the bounds of costs,
-divided among the successive comparisons. The tests of the requirements keep this confidence for any
-distribution. The bounds of costs assume that the mean difference, apart from rare losses, is
-normally distributed, as is usual.
-
-The two phases and the zone of tolerance follow S. Andradottir, S.-H. Kim, Fully sequential
-procedures for comparing constrained systems via simulation, Nav. Res. Logist. 57 (2010) 403-421.
-The tests of that article assume normal values and are unreliable where missions seldom fail.
-"""
-
-from collections.abc import Mapping, Sequence
+import json
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple, Self
@@ -43,12 +11,233 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.special import stdtrit
 
-from analysis.study.candidates import Answer, questions_about
-from analysis.study.costs import Costs
-from analysis.study.feasibility import MeanTest, Verdict
+from analysis.names import DECISIONS
 from analysis.study.selection import Chosen, Selection, based_on, check_begun, needed
-from analysis.study.stopping import MOST, Samples, StrictTable, of_its_kind
+from analysis.study.stopping import MOST, Line, Samples, StrictTable, of_its_kind
 from dess.scenario import Integer, Number, ScenarioSpace
+
+# A price; the sums of all missions that may be planned are still finite.
+Price = Annotated[float, Field(ge=0, le=10**12, allow_inf_nan=False)]
+
+PARTS = ("purchase", "charging", "hours", "losses")
+
+
+class Costs(StrictTable):
+    """Prices in one currency.
+
+    UAVs and pads are bought once. Charging, hours and lost UAVs are paid for in each of the
+    ``missions`` planned for the fleet.
+
+    Raises:
+        pydantic.ValidationError: If a price is below 0, or hours are without ``slot_seconds``.
+    """
+
+    currency: Line = Field("EUR", min_length=1, max_length=16, description="name of the currency")
+    uav: Price = Field(0.0, description="price of a UAV")
+    pad: Price = Field(0.0, description="price of a charging pad")
+    charge: Price = Field(0.0, description="price of charging a battery from 0 to 100 %")
+    hour: Price = Field(0.0, description="price of an hour of a mission")
+    lost_uav: Price = Field(0.0, description="price of a UAV whose battery is depleted")
+    missions: Integer = Field(1, ge=1, le=MOST, description="missions that the fleet is to fly")
+    slot_seconds: Number | None = Field(
+        None,
+        ge=0.001,
+        le=1_000_000,
+        description="length of a mission slot [s]; needed for the price of an hour",
+    )
+
+    @model_validator(mode="after")
+    def _hours_have_a_length(self) -> Self:
+        if self.hour and self.slot_seconds is None:
+            raise ValueError("slot_seconds: is missing; allowed: with hour, the seconds of a slot")
+        return self
+
+    def parts(
+        self, spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any], uavs: Mapping[str, Any]
+    ) -> dict[str, np.ndarray]:
+        """The parts of the cost of every mission, in the currency.
+
+        Args:
+            spaces: The scenario of every design point.
+            missions: (n,) columns of the missions: ``point`` and the fields of ``MISSION_RECORD``.
+            uavs: Columns of the UAVs of these missions, in the same order: ``slots_charging``, and
+                the name of ``end``.
+
+        Returns:
+            The (n,) amounts of each of ``PARTS``.
+        """
+        fleet, points = np.asarray(missions["uavs"]), np.asarray(missions["point"])
+        mission = np.repeat(np.arange(len(fleet)), fleet)
+        pads, rates = np.array([(space.charging_pads, space.charge_rate) for space in spaces]).T
+        slots = np.bincount(mission, np.asarray(uavs["slots_charging"]), len(fleet))
+        lost = np.bincount(mission, np.asarray(uavs["end"]) == "battery", len(fleet))
+        hours = np.asarray(missions["slots"]) * (self.slot_seconds or 0.0) / 3600
+        return {
+            "purchase": self.uav * fleet + self.pad * pads[points],
+            "charging": self.missions * self.charge * slots * rates[points] / 100,
+            "hours": self.missions * self.hour * hours,
+            "losses": self.missions * self.lost_uav * lost,
+        }
+
+
+Verdict = Literal["met", "missed", "open"]
+
+# The largest stake, as a share of the stake with which a single value could lose everything.
+_BOLDEST = 0.999
+
+
+class MeanTest:
+    """A sequential test of whether a mean meets a requirement; the first verdict is final.
+
+    Attributes:
+        verdict: ``met``, ``missed``, or ``open``.
+        missions: Number of values observed up to the verdict; all values if it is ``open``.
+    """
+
+    def __init__(self, required: float, tolerance: float, error: float):
+        least, most = required - tolerance, required + tolerance
+        self._at_most, self._at_least = _Wealth(least, tolerance), _Wealth(1 - most, tolerance)
+        self._target = -np.log(error)
+        self.verdict: Verdict = "open"
+        self.missions = 0
+
+    def observe(self, values: np.ndarray) -> None:
+        """Take more values into account, in the order of their replications."""
+        if self.verdict != "open" or not len(values):
+            return
+        met = _first(self._at_most.after(values) >= self._target)
+        missed = _first(self._at_least.after(1 - values) >= self._target)
+        if min(met, missed) < len(values):
+            self.verdict = "met" if met < missed else "missed"
+        self.missions += min(met + 1, missed + 1, len(values))
+
+
+class _Wealth:
+    """The wealth of a gambler who bets that a mean is above a bound."""
+
+    def __init__(self, bound: float, tolerance: float):
+        # The best stake is about (mean - bound) / variance, which is 4 * tolerance or more.
+        steps = max(int(np.ceil(np.log2(1 / (4 * tolerance * bound)))), 0)
+        self._bound, self._stakes = bound, _BOLDEST / bound * 0.5 ** np.arange(steps + 1)
+        self._logs = np.full(steps + 1, -np.log(steps + 1))
+
+    def after(self, values: np.ndarray) -> np.ndarray:
+        """The (n,) logarithms of the wealth after each of n more values; the first wealth is 1."""
+        growth = np.log1p(self._stakes[:, None] * (values - self._bound))
+        paths = np.cumsum(np.column_stack([self._logs, growth]), axis=1)[:, 1:]
+        self._logs = paths[:, -1]
+        return np.logaddexp.reduce(paths, axis=0)
+
+
+def _first(holds: np.ndarray) -> int:
+    """The index of the first true value, or the number of values if none is true."""
+    return int(np.argmax(holds)) if holds.any() else len(holds)
+
+
+# A function that estimates costs. It takes the (s, g) design points of s candidates, and for each
+# (s,) whether it is feasible. It returns the feasible candidate with the lowest mean cost, and (s,)
+# an upper bound of how much more it costs than each candidate (0 for itself).
+Costing = Callable[[np.ndarray, np.ndarray], tuple[int, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The cheapest setting under one condition, or under all conditions together.
+
+    Attributes:
+        condition: The fields of the condition with their values; None for all conditions together.
+        points: The design points of the selected setting, one for each condition of the question.
+            Empty if no setting is known to meet the requirements.
+        left: The design points of all settings that may be as good.
+        settled: Whether the answer has the guaranteed confidence. It has not if the budget ended
+            before the question was settled.
+    """
+
+    condition: dict[str, Any] | None
+    points: tuple[int, ...]
+    left: tuple[tuple[int, ...], ...]
+    settled: bool
+
+
+class Question:
+    """The question which of some candidates is the cheapest."""
+
+    def __init__(self, condition: dict[str, Any] | None, candidates: Sequence[Sequence[int]]):
+        self._condition = condition
+        self.candidates = np.array(candidates, int).reshape(len(candidates), -1)
+        self.settled = not candidates
+        self._best: int | None = None
+
+    @property
+    def pairs(self) -> int:
+        """The number of ordered pairs of candidates."""
+        return len(self.candidates) * (len(self.candidates) - 1)
+
+    @property
+    def needed(self) -> set[int]:
+        """The design points that need more missions to settle the question."""
+        return set() if self.settled else set(self.candidates.ravel().tolist())
+
+    @property
+    def answer(self) -> Answer:
+        """The answer as far as it is known."""
+        left = [tuple(points) for points in self.candidates.tolist()]
+        best = () if self._best is None else left[self._best]
+        return Answer(self._condition, best, tuple(left), self.settled)
+
+    def look(self, verdicts: Sequence[Verdict], costs: Costing, indifference: float) -> None:
+        """Rule out candidates that are infeasible or more expensive; check if the rest is settled.
+
+        Args:
+            verdicts: For each design point, whether it meets the requirements, as far as known.
+            costs: The function that estimates the costs of candidates.
+            indifference: The smallest saving that matters, in the currency.
+        """
+        of_points = np.array(verdicts)[self.candidates]
+        possible = ~(of_points == "missed").any(axis=1)
+        feasible = (of_points == "met").all(axis=1)[possible]
+        self.candidates, self._best = self.candidates[possible], None
+        if not feasible.any():
+            self.settled = not len(self.candidates)
+            return
+        leader, excess = costs(self.candidates, feasible)
+        left = excess >= 0
+        self.candidates, self._best = self.candidates[left], int(left[:leader].sum())
+        self.settled = bool((excess <= indifference).all())
+
+
+def questions_about(values: Sequence[Mapping[str, Any]]) -> list[Question]:
+    """A question for each condition and, if there are several, one for all of them together."""
+    conditions = grouped(values, decisions=False)
+    questions = [
+        Question(json.loads(text), [[point] for point in points])
+        for text, points in conditions.items()
+    ]
+    if len(conditions) > 1:
+        everywhere = grouped(values, decisions=True).values()
+        fleets = [points for points in everywhere if len(points) == len(conditions)]
+        questions.append(Question(None, fleets))
+    return questions
+
+
+def grouped(values: Iterable[Mapping[str, Any]], decisions: bool) -> dict[str, list[int]]:
+    """Group design points that share either their decisions or their conditions.
+
+    Args:
+        values: For each design point, the fields that the design sets.
+        decisions: True to group by the fields that an operator decides on, False to group by all
+            other fields.
+
+    Returns:
+        A mapping from the shared fields, as JSON text, to the numbers of the design points in the
+        order of the design.
+    """
+    groups = defaultdict(list)
+    for number, fields in enumerate(values):
+        shared = {field: fields[field] for field in fields if (field in DECISIONS) == decisions}
+        groups[json.dumps(shared, sort_keys=True)].append(number)
+    return dict(groups)
+
 
 # How much longer a search may take for which it is estimated: times its missions, and missions.
 FURTHER, MOST_FURTHER = 64, 10_000_000

@@ -17,8 +17,9 @@ from pydantic import (
 from scipy.special import ndtri, stdtrit
 
 from analysis.names import BOUNDED, MEANS, MEASURES, SHARES
-from analysis.stats.bounded import LEVEL, bounded_ends
-from dess.errors import InputError, listed, one_of, shown, validation_line
+from analysis.stats.intervals import LEVEL, bounded_ends
+from dess import InputError
+from dess.errors import listed, one_of, shown, validation_line
 from dess.scenario import Integer, Number
 
 _METRICS = [*SHARES, *MEANS, *MEASURES]

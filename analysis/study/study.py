@@ -1,11 +1,11 @@
-"""Studies as data: which policies, design points and replications to simulate."""
+"""A study: the missions that are to be simulated, and what is asked of them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import (
     BeforeValidator,
@@ -19,13 +19,13 @@ from pydantic import (
 
 from analysis.bound import check_scenario
 from analysis.names import BOUND, COST, GAP, metrics_in
-from analysis.study.cheapest import AnySelection, Cheapest
-from analysis.study.costs import Costs
+from analysis.study.cheapest import AnySelection, Cheapest, Costs
 from analysis.study.design import Design, DesignPoint, Saltelli
-from analysis.study.engine import Engine, engine_of
 from analysis.study.selection import Selection
 from analysis.study.stopping import MOST, Precision, StrictTable, Text
-from dess.errors import InputError, cut, listed, one_of, validation_line
+from dess import InputError
+from dess.batch import check_slotted
+from dess.errors import cut, listed, one_of, validation_line
 from dess.files.shipped import Shipped
 from dess.record import measures_of
 from dess.scenario import (
@@ -40,6 +40,26 @@ from dess.scenario import (
 from dess.sections.section import tuples
 from dess.streams import MAX_SEED
 from policies.registry import load_team, typed
+
+Engine = Literal["batch", "events"]
+
+
+def engine_of(spaces: Sequence[ScenarioSpace], asked: Engine | None = None) -> Engine:
+    """The engine for missions of some scenarios: the one that was asked for, or the fastest.
+
+    Args:
+        spaces: The scenarios.
+        asked: The engine that was asked for, if any.
+
+    Raises:
+        InputError: If the batch engine was asked for, and one of the scenarios needs the other.
+    """
+    if asked is None:
+        return "events" if any(space.needs_events for space in spaces) else "batch"
+    if asked == "batch":
+        check_slotted(spaces)
+    return asked
+
 
 _STUDIES = Shipped("study", "analysis.study", "shipped")
 

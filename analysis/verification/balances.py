@@ -8,7 +8,7 @@ import pandas as pd
 
 from analysis.numbers import words
 from analysis.results import event_log
-from analysis.results.files import MANIFEST
+from analysis.results.chunks import MANIFEST
 from analysis.results.tables import Results, load_results
 from analysis.verification.checks import CONSERVATION, ENERGY, ENGINES, REALISATIONS, RECORDS, Check
 from analysis.verification.measurements import CrossCheck, Log, longest

@@ -15,7 +15,7 @@ import pandas as pd
 from scipy import stats
 
 from analysis import numbers
-from analysis.stats.correction import adjust
+from analysis.stats.differences import adjust
 from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 

@@ -23,7 +23,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, create_model
 
-from analysis.questions.missions import FOLDER
+from analysis.answers.missions import FOLDER
 from analysis.results import event_log
 from analysis.results.provenance import Key
 from analysis.results.tables import Results

@@ -12,9 +12,9 @@ from typing import Self
 import numpy as np
 import pandas as pd
 
+from analysis.answers.summary import best_policy
 from analysis.names import METRICS, SUCCESS
 from analysis.numbers import words
-from analysis.questions.summary import best_policy
 from analysis.results.tables import Results, load_results
 from analysis.verification import balances, draws, measurements
 from analysis.verification.checks import Check

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 import dess
-from reports.cli import console, evaluate, lists, report, simulate, study, sweep, train
+from reports.cli import console, evaluate, lists, report, simulate, studies, sweep, train
 
 
 def _print_version(is_wanted: bool) -> None:
@@ -37,4 +37,4 @@ for group in (simulate, evaluate, train, sweep, report):
     app.add_typer(group.app)
 for name in ("policies", "scenarios", "studies"):
     app.add_typer(getattr(lists, name), name=name)
-app.add_typer(study.app, name="study")
+app.add_typer(studies.app, name="study")

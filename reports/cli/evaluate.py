@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from reports.cli import completion, console
-from reports.cli.running import YesOption
-from reports.cli.settings import (
+from reports.cli import console, options
+from reports.cli.console import YesOption
+from reports.cli.options import (
     JsonOption,
     ScenarioOption,
     SeedOption,
@@ -23,9 +23,7 @@ app = typer.Typer()
 
 @command(app)
 def evaluate(
-    policy: Annotated[
-        list[str], typer.Option(metavar="P[,P...]", autocompletion=completion.policies)
-    ],
+    policy: Annotated[list[str], typer.Option(metavar="P[,P...]", autocompletion=options.policies)],
     scenario: ScenarioOption = "paper",
     settings: SetOption = None,
     missions: Annotated[int, typer.Option(min=1)] = 1000,
@@ -44,7 +42,7 @@ def evaluate(
             need events.  [default: batch, or events where it is needed]
     """
     from analysis.execution.evaluation import Asked, check_evaluation, means
-    from analysis.study.engine import engine_of
+    from analysis.study.study import engine_of
     from dess.record import measures_of
     from policies.registry import typed
 

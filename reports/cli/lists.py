@@ -6,8 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from dess.errors import cut
-from reports.cli import completion, console
-from reports.cli.settings import JsonOption, SetOption, command, load_space
+from reports.cli import console, options
+from reports.cli.options import JsonOption, SetOption, command, load_space
 
 policies = typer.Typer(invoke_without_command=True)
 scenarios = typer.Typer(invoke_without_command=True)
@@ -26,7 +26,7 @@ def list_policies(context: typer.Context) -> None:
 @command(policies, "show")
 def show_policy(
     name: Annotated[
-        str, typer.Argument(metavar="NAME|DIR|FILE.py:CLASS", autocompletion=completion.policies)
+        str, typer.Argument(metavar="NAME|DIR|FILE.py:CLASS", autocompletion=options.policies)
     ],
     as_json: JsonOption = False,
 ) -> None:
@@ -63,7 +63,7 @@ def list_scenarios(context: typer.Context) -> None:
 
 @command(scenarios, "show")
 def show_scenario(
-    name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=completion.scenarios)],
+    name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=options.scenarios)],
     settings: SetOption = None,
     everything: Annotated[bool, typer.Option("--all")] = False,
     as_json: JsonOption = False,
@@ -108,7 +108,7 @@ def list_studies(context: typer.Context) -> None:
 
 @command(studies, "show")
 def show_study(
-    name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=completion.studies)],
+    name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=options.studies)],
     as_json: JsonOption = False,
 ) -> None:
     """Show a study: every field, as its file would set it.

@@ -12,11 +12,11 @@ import typer
 
 from dess import InputError
 from reports.cli import console
-from reports.cli.running import YesOption
-from reports.cli.settings import PAGES, PARAMETER, RESULTS, JsonOption, command, setting
+from reports.cli.console import YesOption
+from reports.cli.options import PAGES, PARAMETER, RESULTS, JsonOption, command, setting
 
 if TYPE_CHECKING:
-    from reports.pages.running.kernels import Progress
+    from reports.pages.kernels import Progress
     from reports.pages.verify import Check
 
 WHAT_IF = "what-if"  # the only report that has --set

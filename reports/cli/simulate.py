@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from dess.errors import InputError, one_of, shown
-from reports.cli import completion, console
-from reports.cli.running import YesOption
-from reports.cli.settings import (
+from reports.cli import console, options
+from reports.cli.console import YesOption
+from reports.cli.options import (
     JsonOption,
     ScenarioOption,
     SeedOption,
@@ -52,7 +52,7 @@ def simulate(
     scenario: ScenarioOption = "paper",
     settings: SetOption = None,
     policy: Annotated[
-        str | None, typer.Option(metavar="P[,P...]", autocompletion=completion.policies)
+        str | None, typer.Option(metavar="P[,P...]", autocompletion=options.policies)
     ] = None,
     seed: SeedOption = 0,
     replication: int | None = None,
@@ -156,7 +156,7 @@ def _of_study(
     folder: Path, point: int | None, policy: str | None, replication: int | None
 ) -> _Asked:
     """What a results folder says of a mission; a line on stderr if it may be another one now."""
-    from analysis.results.files import MANIFEST
+    from analysis.results.chunks import MANIFEST
     from analysis.results.manifest import Manifest
     from policies.registry import TypedByUser, load_team
 
@@ -219,7 +219,7 @@ class _Mission:
     @property
     def outcome(self) -> str:
         from analysis.numbers import percent
-        from analysis.results.causes import causes
+        from analysis.results.event_log import causes
 
         ends = [uav["end"] for uav in self.record.uav_rows()]
         outcome = (
@@ -258,7 +258,7 @@ def _write_page(mission: _Mission, path: Path) -> None:
     """Write a page with the player of the mission; the same mission gives the same bytes."""
     from dess.files import writing
     from reports import player
-    from reports.pages.template import fill
+    from reports.pages.body import fill
 
     caption = player.reading(mission.scenario)
     played = player.player(mission.log, mission.scenario, "mission", caption=caption)
@@ -270,7 +270,7 @@ def _write_page(mission: _Mission, path: Path) -> None:
 
 def _print_mission(mission: _Mission) -> None:
     from analysis.names import MEASURES
-    from analysis.results.causes import causes
+    from analysis.results.event_log import causes
 
     record = mission.record
     metrics = record.metrics

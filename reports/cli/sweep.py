@@ -9,24 +9,25 @@ import typer
 
 from dess.code.libraries import missing
 from dess.errors import InputError, one_of, shown
-from reports.cli import completion, console
-from reports.cli.ranges import all_settings, all_values
-from reports.cli.report import rendering
-from reports.cli.running import YesOption, complete
-from reports.cli.settings import (
+from reports.cli import console, options
+from reports.cli.console import YesOption, complete
+from reports.cli.options import (
     PAGES,
     RESULTS,
     JsonOption,
     ScenarioOption,
     SeedOption,
     WorkersOption,
+    all_settings,
+    all_values,
     command,
 )
-from reports.cli.study.run import print_plan
+from reports.cli.report import rendering
+from reports.cli.studies import print_plan
 from reports.folders import PREFIX, check_pages
 
 if TYPE_CHECKING:
-    from analysis.sweeps.sweep import Sweep
+    from analysis.ask.sweep import Sweep
 
 SHOWN = 20  # rows of the table
 PRICE = "a price and its amount, e.g. uav=20000"
@@ -39,10 +40,10 @@ app = typer.Typer()
 def sweep(
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUES", autocompletion=completion.fields),
+        typer.Option("--set", metavar="KEY=VALUES", autocompletion=options.fields),
     ] = None,
     policy: Annotated[
-        list[str] | None, typer.Option(metavar="P,P,...", autocompletion=completion.policies)
+        list[str] | None, typer.Option(metavar="P,P,...", autocompletion=options.policies)
     ] = None,
     metric: str | None = None,
     missions: Annotated[int, typer.Option(min=1)] = 300,
@@ -79,10 +80,10 @@ def sweep(
         out: Folder of the page.
         dry_run: Only print the plan and the range of its time.
     """
-    from analysis.execution.dry_run import plan_study
+    from analysis.ask import sweep as question
+    from analysis.ask.sweep import Sweep
+    from analysis.execution.effort import plan_study
     from analysis.names import ALIASES, PRODUCT
-    from analysis.sweeps import question
-    from analysis.sweeps.sweep import Sweep
 
     study = question.question(
         all_values(settings or []),
@@ -137,6 +138,7 @@ def _print(answer: "Sweep", metric: str) -> None:
     import pandas as pd
 
     from analysis import numbers
+    from analysis.answers.settings import varied
     from analysis.names import (
         COST,
         PRODUCT,
@@ -146,7 +148,6 @@ def _print(answer: "Sweep", metric: str) -> None:
         metric_name,
         value_text,
     )
-    from analysis.questions.settings import varied
 
     table, fields, prices = answer.table(metric), [*varied(answer.results)], answer.study.costs
     top = table.head(SHOWN)

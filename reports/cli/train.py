@@ -10,8 +10,8 @@ import typer
 
 from dess.code.libraries import missing, needs
 from dess.errors import InputError, shown
-from reports.cli import completion, console
-from reports.cli.settings import SetOption, command, setting
+from reports.cli import console, options
+from reports.cli.options import SetOption, command, setting
 
 if TYPE_CHECKING:
     from policies.ddqn.training import Training
@@ -22,14 +22,14 @@ MEASURED = 5.0  # seconds of training after which it is said how long it will ta
 
 @command(app)
 def train(
-    name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=completion.configs)],
+    name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=options.configs)],
     out: Annotated[Path, typer.Option(metavar="DIR")],
     resume: Annotated[bool, typer.Option("--resume")] = False,
     device: Literal["auto", "cpu", "cuda"] = "auto",
     seed: int | None = None,
     settings: SetOption = None,
     scenario: Annotated[
-        str | None, typer.Option(metavar="NAME|FILE", autocompletion=completion.scenarios)
+        str | None, typer.Option(metavar="NAME|FILE", autocompletion=options.scenarios)
     ] = None,
     start: Annotated[str | None, typer.Option("--from", metavar="POLICY|DIR")] = None,
     yes: Annotated[bool, typer.Option("--yes")] = False,

@@ -24,25 +24,26 @@ from pathlib import Path
 from IPython.display import display
 
 from analysis import load_results, numbers
+from analysis.answers import comparison as answers
+from analysis.answers import summary
+from analysis.answers.missions import kept_missions
 from analysis.figures import comparison as figures
 from analysis.figures.missions import mission_figure
-from analysis.questions import decision_times, head_to_head, regions, summary
-from analysis.questions.missions import kept_missions
 from reports import tables
 from reports.pages import html
 
 # %%
 study = load_results(Path(results) / "comparison")
-times = decision_times.read(results, study)
-pair = head_to_head.pair_of(study, learned, heuristic)
+times = answers.read(results, study)
+pair = answers.pair_of(study, learned, heuristic)
 policy, title = pair.policy, f"{pair.policy} − {pair.baseline}"
-missions = head_to_head.duels(study, pair)
-comparison = head_to_head.overall(study, pair)
-worst = head_to_head.worst(missions, 5)
-lost = head_to_head.most_lost(missions.drop(worst.index), 5)
+missions = answers.duels(study, pair)
+comparison = answers.overall(study, pair)
+worst = answers.worst(missions, 5)
+lost = answers.most_lost(missions.drop(worst.index), 5)
 
 # %%
-html.answer(head_to_head.answer(comparison, missions, pair))
+html.answer(answers.answer(comparison, missions, pair))
 
 # %%
 lowest, highest = (numbers.difference(end, 0) for end in missions["difference"].agg(["min", "max"]))
@@ -60,7 +61,7 @@ html.lead(
 # orange worse, hollow inconclusive (Holm, over all bins); dashed is the mean of all missions.
 
 # %%
-lead = regions.along(missions, pair.candidates)
+lead = answers.along(missions, pair.candidates)
 html.gallery(
     [
         (
@@ -79,7 +80,7 @@ html.gallery(
 # The two missions with the lowest product of the learned policy, with both policies.
 
 # %%
-kept = kept_missions(study, head_to_head.drawn(missions, pair), results)
+kept = kept_missions(study, answers.drawn(missions, pair), results)
 html.gallery(
     [
         (
@@ -101,7 +102,7 @@ html.gallery(
 
 # %%
 found = {
-    f"{head_to_head.pairing(comparison)} independent missions would be as precise": comparison,
+    f"{answers.pairing(comparison)} independent missions would be as precise": comparison,
     "every learner and the best heuristic": summary.learned_against_heuristic(study),
     "every policy and the best one": summary.comparisons(study),
 }
@@ -115,36 +116,36 @@ for caption, rows in found.items():
 # ## Tables
 
 # %%
-depleted = head_to_head.depleted(study, policy, worst["replication"])
-html.table(head_to_head.outcomes(missions, pair), "Outcomes of the missions")
+depleted = answers.depleted(study, policy, worst["replication"])
+html.table(answers.outcomes(missions, pair), "Outcomes of the missions")
 
 # %%
 html.table(
-    regions.spread(lead, regions.dependence(missions)),
+    answers.spread(lead, answers.dependence(missions)),
     "Lowest and highest mean difference [points] by parameter, the share of the variance that "
     "its bins explain, and the test of equal means (Alexander and Govern, Holm)",
 )
 
 # %%
 html.table(
-    head_to_head.listed(worst, study, pair),
+    answers.outcome_table(worst, study, pair),
     f"The worst missions of {policy}; {depleted} of its UAVs run out of battery in these",
 )
 
 # %%
-html.table(head_to_head.listed(lost, study, pair), f"The greatest losses to {pair.baseline}")
+html.table(answers.outcome_table(lost, study, pair), f"The greatest losses to {pair.baseline}")
 
 # %%
-html.table(decision_times.listed(times), "Time of a decision for the UAVs of a mission")
+html.table(answers.time_table(times), "Time of a decision for the UAVs of a mission")
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-lines = head_to_head.commands(study, policy, [*worst["replication"], *lost["replication"]])
+lines = answers.commands(study, policy, [*worst["replication"], *lost["replication"]])
 html.say(
     "{times} These commands simulate missions of the tables again:\n\n{lines}",
-    times=decision_times.remarks(times, study, pair),
+    times=answers.remarks(times, study, pair),
     lines=html.commands(lines),
 )
 

@@ -21,7 +21,7 @@ results = "../../results"  # folder with the results folder of explorer
 from pathlib import Path
 
 from analysis import load_results, names, numbers
-from analysis.questions.settings import in_words
+from analysis.answers.settings import in_words
 from reports.explorer import Grid, explorer
 from reports.pages import html
 

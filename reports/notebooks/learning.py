@@ -22,26 +22,24 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from analysis import numbers
+from analysis.answers import learning as answers
+from analysis.answers.learning import read_curves
 from analysis.figures import learning as figures
 from analysis.names import PRODUCT
-from analysis.questions.learning import ablation
-from analysis.questions.learning import curves as learning
-from analysis.questions.learning import trained as policies
-from analysis.questions.learning.files import read_curves
-from analysis.replication import claims, paper, verdict_rules
+from analysis.paper import measures, scorecard, values
 from policies.registry import TRAINED
 from reports.pages import html
 
 # %%
 folder = Path(str(trained or TRAINED))
 trainings = read_curves(folder / "curves.parquet")
-last, final = ablation.finals(trainings), f"final_{PRODUCT}"
-baseline, pairs = ablation.BASELINE, learning.pairs_in(trainings)
+last, final = answers.finals(trainings), f"final_{PRODUCT}"
+baseline, pairs = answers.BASELINE, answers.pairs_in(trainings)
 
-rungs, equal = ablation.ladder(last), ablation.of_equal_budget(last, baseline)
+rungs, equal = answers.ladder(last), answers.of_equal_budget(last, baseline)
 
 # %%
-html.answer(ablation.answer(rungs))
+html.answer(answers.answer(rungs))
 
 # %%
 DOTS = (
@@ -49,7 +47,7 @@ DOTS = (
     "t). Dashed: the mean of {}. An arrow: all trainings are left of the axis."
 )
 top = rungs["variant"].iloc[-1]
-steps = ablation.ablation(rungs, final, top).set_index("variant")
+steps = answers.ablation(rungs, final, top).set_index("variant")
 steps = steps.loc[rungs["variant"].unique()].reset_index()
 drawing = figures.ablation(steps, rungs, final, top)
 html.lead(drawing, "The product that trainings reach, method by method", DOTS.format(top))
@@ -64,7 +62,7 @@ html.lead(drawing, "The product that trainings reach, method by method", DOTS.fo
 # paper's network.
 
 # %%
-table = ablation.ablation(equal, final, baseline)
+table = answers.ablation(equal, final, baseline)
 drawing = figures.ablation(table, equal, final, baseline)
 html.figure(drawing, "The product that every variant reaches", DOTS.format(baseline))
 
@@ -84,7 +82,7 @@ def with_and_without(name: str, metric: str) -> tuple[Figure, str, str]:
     return figures.trainings(trainings, metric, labels), alt, caption
 
 
-metrics = (learning.REWARD, learning.PRODUCT)
+metrics = (answers.LEARNED_REWARD, answers.LEARNED_PRODUCT)
 drawn = dict.fromkeys([[*pairs][0], [*pairs][-1]])
 drawings = [with_and_without(name, metric) for name in drawn for metric in metrics]
 html.gallery(drawings, figures.TRAININGS)
@@ -93,8 +91,8 @@ html.gallery(drawings, figures.TRAININGS)
 # ## The shipped policies
 
 # %%
-shipped = policies.trained_policies(folder)
-curves = policies.curves_by_learner(shipped)
+shipped = answers.trained_policies(folder)
+curves = answers.curves_by_learner(shipped)
 labels = {name: name for name in curves["variant"].unique()}
 html.gallery(
     [
@@ -111,8 +109,10 @@ html.gallery(
 # P-values are corrected for the number of tests (Holm).
 
 # %%
-transfers = learning.transfers(trainings, metrics, shortest=paper.CROSSING)
-by_metric = dict(zip(metrics, (claims.RULES["throughout"], claims.RULES["passes"]), strict=True))
+transfers = answers.transfers(trainings, metrics, shortest=values.CROSSING)
+by_metric = dict(
+    zip(metrics, (scorecard.RULES["throughout"], scorecard.RULES["passes"]), strict=True)
+)
 verdicts = {key: by_metric[key[1]].judge(compared) for key, compared in transfers.items()}
 best = last.groupby("variant")[final].max().map(numbers.percent)
 
@@ -122,7 +122,7 @@ html.say(
     "and shorter trainings are inconclusive. With {name}, the best training with transfer reaches "
     "a product of {ends[0]}, the best without {ends[1]}.",
     steps=max(compared.length for compared in transfers.values()),
-    paper=paper.CROSSING,
+    paper=values.CROSSING,
     name=[*pairs][-1],
     ends=[best[variant] for variant in pairs[[*pairs][-1]]],
 )
@@ -132,14 +132,14 @@ html.say(
 
 # %%
 html.table(
-    ablation.ablation_table(table, equal, baseline),
+    answers.ablation_table(table, equal, baseline),
     "Means over n trainings with 95 % intervals, the prediction interval of one new training, "
     "and differences with Welch's t interval. ▲ better, ▼ worse, ≈ inconclusive",
 )
 
 # %%
 html.table(
-    learning.transfer_table(transfers, verdicts),
+    answers.transfer_table(transfers, verdicts),
     "With transfer against without: the last difference with its 99 % interval (of the product "
     "in points)",
 )
@@ -151,7 +151,7 @@ html.table(
 html.say(
     "Where the moving average of the product ends, and from when on it is near:\n\n{courses}",
     courses=html.composed(
-        "\n".join(policies.course_in_words(policy, verdict_rules.MARGIN) for policy in shipped)
+        "\n".join(answers.course_in_words(policy, measures.MARGIN) for policy in shipped)
     ),
 )
 
@@ -160,7 +160,7 @@ html.say(
 
 # %%
 again = "python -m benchmarks.learning_curves --out runs/learning"
-html.say("{lines}", lines=html.commands([again, *policies.commands(shipped)]))
+html.say("{lines}", lines=html.commands([again, *answers.commands(shipped)]))
 
 # %%
 html.weights(folder)

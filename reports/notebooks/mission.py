@@ -26,11 +26,11 @@ from IPython.display import display
 from matplotlib.figure import Figure
 
 from analysis import load_results, numbers
+from analysis.answers import missions
+from analysis.answers.summary import best_policy, ranked_policies
 from analysis.figures.missions import mission_figure
 from analysis.names import RATIO
-from analysis.questions import missions
-from analysis.questions.summary import best_policy, ranked_policies
-from analysis.replication import paper
+from analysis.paper import values
 from reports.pages import html
 from reports.player import READING, library, player, together
 
@@ -40,7 +40,7 @@ shown_policy, best = policy or best_policy(fig4.missions), best_policy(fig1.miss
 seed = fig4.manifest["seed"]
 points = range(len(fig4.manifest["points"]))
 shown = [missions.logged_mission(fig4, shown_policy, point, replication) for point in points]
-printed = [paper.FIG_4[mission.scenario.uavs][RATIO] for mission in shown]
+printed = [values.FIG_4[mission.scenario.uavs][RATIO] for mission in shown]
 example = missions.logged_mission(fig1, best, 0, replication)
 
 # %%

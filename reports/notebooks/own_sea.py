@@ -29,13 +29,12 @@ yes = False  # True if the sweep may take more than an hour
 
 # %%
 from analysis import sweep
+from analysis.answers import costs
 from analysis.figures.missions import mission_figure, sea_figure
-from analysis.questions import costs as questions
 from analysis.results.resimulate import mission_of
 from dess import load_scenario
 from policies import load_team
-from reports.pages import html
-from reports.pages.study import costs
+from reports.pages import html, study
 
 # %%
 sea = load_scenario(scenario)
@@ -44,10 +43,10 @@ about = (scenario, policies, missions, seed, results, workers, priced, requireme
 answer = sweep(*about, yes=yes, **fields)
 
 # %%
-html.answer(questions.answer(answer.results), answer.cheapest() or "none")
+html.answer(costs.answer(answer.results), answer.cheapest() or "none")
 
 # %%
-html.lead(*costs.deciding(answer.results))
+html.lead(*study.deciding(answer.results))
 
 # %% [markdown]
 # ## Why
@@ -56,7 +55,7 @@ html.lead(*costs.deciding(answer.results))
 html.say("{lines}", lines=html.composed("\n".join(f"- {line}" for line in answer.answers())))
 
 # %%
-policy = questions.best_policy(answer.results)
+policy = costs.best_policy(answer.results)
 mission = mission_of(load_scenario(scenario, **example), load_team(policy), seed)
 map_of_mission = mission_figure(mission.events, mission.scenario)
 
@@ -80,7 +79,7 @@ html.say("Guarantee: {guarantee}.", guarantee=answer.guarantee)
 # *Not shown* is a requirement where no decision was needed to find the cheapest fleet.
 
 # %%
-costs.judged_table(answer.results)
+study.judged_table(answer.results)
 
 # %% [markdown]
 # ## With your own sea

@@ -22,9 +22,9 @@ heuristic = None  # the other policy to show; None for the best that is not lear
 from pathlib import Path
 
 from analysis import load_results, names, numbers
-from analysis.figures import settings as figures
-from analysis.questions import main_effects, sensitivity, summary
-from analysis.replication import paper, scorecard, sweet_spot
+from analysis.answers import main_effects, summary
+from analysis.figures import settings
+from analysis.paper import scorecard, values
 from analysis.stats.intervals import LEVEL
 from reports.pages import html
 
@@ -45,11 +45,11 @@ html.answer(main_effects.answer(effects, leading))
 # %%
 most = effects[effects["field"].isin(main_effects.strongest(effects, leading))]
 html.lead(
-    figures.one_by_one(effects, fig5.policies),
+    settings.one_by_one(effects, fig5.policies),
     "The product against every parameter",
     f"n = {numbers.span(effects['n'])} missions per dot, with all other parameters drawn from "
     f"Table II; bars are {level} intervals.",
-    narrow=figures.one_by_one(most, fig5.policies),
+    narrow=settings.one_by_one(most, fig5.policies),
 )
 
 # %% [markdown]
@@ -62,7 +62,7 @@ html.lead(
 html.gallery(
     [
         (
-            figures.effect(effects, field, pairs, fig5.policies),
+            settings.effect(effects, field, pairs, fig5.policies),
             f"The three metrics against the {names.parameter(field).within}",
         )
         for field, pairs in changes.items()
@@ -83,14 +83,14 @@ html.say(
     n=len(sweet.manifest["points"]),
     rule=rule,
     margin=numbers.margin(scorecard.margin({"sweet-spot": sweet})),
-    paper=paper.SWEET_SPOT_MISSIONS,
+    paper=values.SWEET_SPOT_MISSIONS,
 )
 
 # %%
 html.gallery(
     [
         (
-            figures.performance(checks, metric, paper.SWEET_SPOT[metric]),
+            settings.performance(checks, metric, values.SWEET_SPOT[metric]),
             f"{name} of every policy at its best setting, and the paper's number",
             f"n = {numbers.span(checks['n'])} missions; bars are {level} intervals. Dashed: the "
             "paper.",
@@ -113,7 +113,7 @@ of_ratio = indices[indices["metric"] == names.RATIO].dropna()
 caption = f"n = {indices['n'].min():,} missions; bars are {level} intervals, bootstrap over blocks."
 html.gallery(
     [
-        (figures.sensitivity(rows, policy), f"Sobol indices of {policy}", f"{policy}: {caption}")
+        (settings.sensitivity(rows, policy), f"Sobol indices of {policy}", f"{policy}: {caption}")
         for policy, rows in of_ratio.groupby("policy", sort=False)
     ]
 )
@@ -136,7 +136,7 @@ html.table(
 
 # %%
 html.table(
-    sweet_spot.table(sweet),
+    values.table(sweet),
     f"The selected settings and their checks: means with {level} intervals, the difference "
     "from the paper in points (▲ above, ▼ below, ≈ contains it), missions, settings not ruled "
     "out, and what the selection guarantees",
@@ -145,7 +145,7 @@ html.table(
 
 # %%
 html.table(
-    sensitivity.index_table(of_ratio),
+    summary.index_table(of_ratio),
     f"Sobol indices of the collection ratio, with {level} intervals (bootstrap over blocks)",
     data=indices,
 )
@@ -157,7 +157,7 @@ html.table(
 # ## How this page was made
 
 # %%
-ranges = sensitivity.ranges_in_words(sobol.manifest["study"]["design"]["ranges"])
+ranges = summary.ranges_in_words(sobol.manifest["study"]["design"]["ranges"])
 html.say(
     "The policies are the best learned one and the best heuristic of the study. For the Sobol "
     "indices all parameters are drawn together: {ranges}.",

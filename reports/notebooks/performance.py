@@ -23,12 +23,11 @@ from pathlib import Path
 from IPython.display import display
 
 from analysis import load_results, numbers, summary
-from analysis.figures import comparison
-from analysis.figures import settings as figures
+from analysis.answers import optimality
+from analysis.answers import summary as questions
+from analysis.figures import comparison, settings
 from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
-from analysis.questions import summary as questions
-from analysis.questions.optimality import gap
-from analysis.replication import paper
+from analysis.paper import values
 from reports import tables
 from reports.pages import html
 
@@ -37,18 +36,18 @@ table4, fig4 = (load_results(Path(results) / name) for name in ("table4", "fig4"
 policies = questions.ranked_policies(table4.missions)
 overall = summary(table4.missions, by=["policy"]).set_index("policy").loc[policies].reset_index()
 fleets, fig4_fleets = questions.by_fleet(table4.missions), questions.by_fleet(fig4.missions)
-bounded = gap.results_in(Path(results) / "gap")
+bounded = optimality.results_in(Path(results) / "gap")
 caption = f"n = {numbers.span(overall['n'])} missions per policy; bars are 95 % intervals."
 
 # %%
 html.answer(
-    questions.against_paper(overall, policies[0], paper.TABLE_IV),
+    questions.against_paper(overall, policies[0], values.TABLE_IV),
     questions.of_policy(overall, policies[0])[PRODUCT].partition(" [")[0],
 )
 
 # %%
 html.lead(
-    figures.performance(overall, PRODUCT, paper.TABLE_IV[PRODUCT]),
+    settings.performance(overall, PRODUCT, values.TABLE_IV[PRODUCT]),
     "The product of every policy, and the paper's number",
     f"{caption} Dashed: the paper's number.",
 )
@@ -63,7 +62,7 @@ html.say("{text}", text=html.composed(questions.guard_in_words(overall)))
 html.gallery(
     [
         (
-            figures.performance(overall, metric, paper.TABLE_IV[metric]),
+            settings.performance(overall, metric, values.TABLE_IV[metric]),
             f"{METRICS[metric]} of every policy, and the paper's number",
         )
         for metric in (SUCCESS, RATIO)
@@ -79,7 +78,7 @@ html.gallery(
 # %%
 html.gallery(
     [
-        (figures.by_fleet(fleets, metric), f"{name} against the number of UAVs")
+        (settings.by_fleet(fleets, metric), f"{name} against the number of UAVs")
         for metric, name in METRICS.items()
     ],
     f"n = {numbers.span(fleets['n'])} missions per dot; bars are 95 % intervals.",
@@ -92,12 +91,12 @@ html.gallery(
 html.gallery(
     [
         (
-            figures.by_fleet(fig4_fleets, m, {i: p[m] for i, p in paper.FIG_4.items()}),
+            settings.by_fleet(fig4_fleets, m, {i: p[m] for i, p in values.FIG_4.items()}),
             f"{METRICS[m]} against the number of UAVs, and the paper's numbers",
             f"n = {numbers.span(fig4_fleets['n'])} missions per dot; diamonds: the paper's "
             "numbers.",
         )
-        for m in paper.FIG_4[1]
+        for m in values.FIG_4[1]
     ]
 )
 
@@ -109,14 +108,16 @@ html.gallery(
 # does not give all constants, such as the place of the charging zone or the transmit power.
 
 # %%
-html.say("{text}", text=html.composed(gap.in_words(bounded) if bounded else gap.NOT_RUN))
+html.say(
+    "{text}", text=html.composed(optimality.in_words(bounded) if bounded else optimality.NOT_RUN)
+)
 
 # %%
-if bounded and len(gaps := gap.useful(gap.by_fleet(bounded))):
+if bounded and len(gaps := optimality.useful(optimality.by_fleet(bounded))):
     caption = f"n = {numbers.span(gaps['n'])} missions of the study gap, with 95 % intervals."
     display(
         html.figure(comparison.gaps(gaps), "The product of every policy, and the bound", caption),
-        html.table(gap.listed(gaps), "Means, the upper bound, and the gap", data=gaps),
+        html.table(optimality.listed(gaps), "Means, the upper bound, and the gap", data=gaps),
     )
 
 # %% [markdown]
@@ -125,13 +126,13 @@ if bounded and len(gaps := gap.useful(gap.by_fleet(bounded))):
 # %%
 marks = "▲ our interval is above the paper's number, ▼ below, ≈ contains it"
 html.table(
-    questions.beside_paper(overall, {None: paper.TABLE_IV}),
+    questions.beside_paper(overall, {None: values.TABLE_IV}),
     f"Table IV: means with 95 % intervals, and the difference in points; {marks}",
 )
 
 # %%
 html.table(
-    questions.beside_paper(fig4_fleets, paper.FIG_4),
+    questions.beside_paper(fig4_fleets, values.FIG_4),
     f"Fig. 4: means with 95 % intervals, and the difference in points; {marks}",
 )
 

@@ -25,10 +25,10 @@ from pathlib import Path
 from IPython.display import display
 
 from analysis import load_results, numbers
+from analysis.answers.learning import read_curves
 from analysis.figures.comparison import claims
-from analysis.questions.learning.files import read_curves
-from analysis.replication import scorecard
-from analysis.results.files import MANIFEST
+from analysis.paper import scorecard
+from analysis.results.chunks import MANIFEST
 from dess.files.reading import paths_in
 from policies.ddqn.description import read_description
 from reports.pages import html

@@ -25,31 +25,30 @@ import numpy as np
 from IPython.display import display
 
 from analysis import distribution, load_results, names
-from analysis.questions import costs as questions
-from analysis.questions import settings, summary
+from analysis.answers import costs, settings, summary
 from reports.pages import html
-from reports.pages.study import costs, drawings, tables, words
+from reports.pages import study as page
 
 # %%
 study = load_results(Path(results))
-by = words.metric_of(study, metric)
-metrics, called = words.metrics_of(by), names.metric_name(by).lower()
+by = page.metric_of(study, metric)
+metrics, called = page.metrics_of(by), names.metric_name(by).lower()
 
 # %% tags=["if-cheapest"]
-html.answer(questions.answer(study))
+html.answer(costs.answer(study))
 
 # %% tags=["if-ranked"]
 ranked = settings.ranked(study, by)
 best = ranked.iloc[0]
 
 # %% tags=["if-answer"]
-html.answer(words.answer(study, ranked, by))
+html.answer(page.answer(study, ranked, by))
 
 # %% tags=["if-sensitivity"]
-html.answer(words.of_variance(study, by))
+html.answer(page.of_variance(study, by))
 
 # %%
-html.lead(*(costs.deciding(study) if costs.required(study) else drawings.leading(study, by)))
+html.lead(*(page.deciding(study) if page.required(study) else page.leading(study, by)))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## Why
@@ -58,7 +57,7 @@ html.lead(*(costs.deciding(study) if costs.required(study) else drawings.leading
 # setting gets no further missions once a cheaper one is known to meet the requirements.
 
 # %% tags=["if-cheapest"]
-display(html.say("{answers}", answers=costs.reasons(study)), costs.judged_table(study))
+display(html.say("{answers}", answers=page.reasons(study)), page.judged_table(study))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## How far to trust it
@@ -66,7 +65,7 @@ display(html.say("{answers}", answers=costs.reasons(study)), costs.judged_table(
 # The check had no part in the selection, so its means are unbiased.
 
 # %% tags=["if-cheapest"]
-costs.checked_table(study)
+page.checked_table(study)
 
 # %% [markdown] tags=["if-settings"]
 # ## The best settings
@@ -76,10 +75,10 @@ costs.checked_table(study)
 # The mean of the first tends to be too high, since it was ranked first for it.
 
 # %% tags=["if-settings"]
-display(tables.ranked(study, ranked, by), tables.best_of_policies(study, by))
+display(page.ranked(study, ranked, by), page.best_of_policies(study, by))
 
 # %% tags=["if-one-setting"]
-display(html.gallery(drawings.means(study, metrics)), tables.means(study))
+display(html.gallery(page.mean_figures(study, metrics)), page.means(study))
 
 # %% [markdown] tags=["if-costs"]
 # ## Costs
@@ -88,11 +87,11 @@ display(html.gallery(drawings.means(study, metrics)), tables.means(study))
 # The probability of being on it comes from a Bayesian bootstrap over common replications.
 
 # %% tags=["if-costs"]
-fronts = costs.fronts_of(study)
+fronts = page.fronts_of(study)
 display(
-    html.gallery(costs.drawn(study, fronts)),
-    costs.front_table(study, fronts),
-    costs.parts_table(study),
+    html.gallery(page.drawn(study, fronts)),
+    page.front_table(study, fronts),
+    page.parts_table(study),
 )
 
 # %% [markdown] tags=["if-selection"]
@@ -103,9 +102,9 @@ display(
 
 # %% tags=["if-selection"]
 display(
-    tables.selected(study),
-    html.say("{guarantees}", guarantees=words.guarantees(study)),
-    tables.checked(study),
+    page.selected(study),
+    html.say("{guarantees}", guarantees=page.guarantees(study)),
+    page.checked(study),
 )
 
 # %% [markdown] tags=["if-precision"]
@@ -114,46 +113,46 @@ display(
 # Missions were simulated until the estimates were precise enough, or the budget was spent.
 
 # %% tags=["if-precision"]
-tables.precisions(study)
+page.precisions(study)
 
 # %% [markdown] tags=["if-fields"]
 # ## Effects of the fields
 
 # %% tags=["if-one-field"]
-html.gallery(drawings.curves(study, metrics))
+html.gallery(page.curves(study, metrics))
 
 # %% tags=["if-two-fields"]
-html.gallery(drawings.heat_maps(study, metrics))
+html.gallery(page.heat_maps(study, metrics))
 
 # %% tags=["if-many-fields"]
-html.gallery(drawings.small_multiples(study, by))
+html.gallery(page.small_multiples(study, by))
 
 # %% tags=["if-one-at-a-time"]
-html.gallery(drawings.one_at_a_time(study))
+html.gallery(page.one_at_a_time(study))
 
 # %% tags=["if-sampled"]
-html.gallery(drawings.scatter(study, metrics))
+html.gallery(page.scatter(study, metrics))
 
 # %% tags=["if-sensitivity"]
-display(html.gallery(drawings.sensitivity(study, by)), tables.sensitivity(study))
+display(html.gallery(page.index_figures(study, by)), page.sensitivity(study))
 
 # %% [markdown] tags=["if-sensitivity"]
 # A Sobol index is the share of a metric's variance that a field explains: *alone*, or *with all
 # interactions*. The replication counts as a field: its share is noise that no setting removes.
 
 # %% tags=["if-effects"]
-display(html.gallery(drawings.main_effects(study, metrics)), tables.main_effects(study, by))
+display(html.gallery(page.effect_figures(study, metrics)), page.main_effects(study, by))
 
 # %% tags=["if-settings"]
 html.say(
     "## Comparison with a baseline\n\nEvery policy is compared with itself at design point "
     "{point}: {words}. The parameter `baseline` names another point.",
     point=baseline,
-    words=words.setting(study, baseline),
+    words=page.setting(study, baseline),
 )
 
 # %% tags=["if-settings"]
-tables.against(study, baseline, by)
+page.against(study, baseline, by)
 
 # %% [markdown] tags=["if-policies"]
 # ## Comparison of the policies
@@ -161,10 +160,10 @@ tables.against(study, baseline, by)
 # The differences are means over all design points, computed replication by replication.
 
 # %% tags=["if-policies"]
-tables.comparisons(study)
+page.comparisons(study)
 
 # %% tags=["if-learned"]
-tables.learners(study)
+page.learners(study)
 
 # %% [markdown]
 # ## Single missions
@@ -174,8 +173,8 @@ missions = settings.at_best(study, ranked)
 spread = distribution(missions, by, np.random.default_rng(study.store.manifest.seed))
 display(
     html.say("These figures show every policy at its best setting by {metric}:", metric=called),
-    html.gallery(drawings.distribution(missions, by)),
-    tables.spread(spread, by),
+    html.gallery(page.distribution(missions, by)),
+    page.spread(spread, by),
 )
 worst = summary.worst(study, best["policy"], point=best["point"])
 
@@ -184,15 +183,15 @@ worst = summary.worst(study, summary.best_policy(study.missions))
 
 # %%
 display(
-    tables.worst(study, worst),
-    html.say("{commands}", commands=words.commands(study, worst)),
+    page.worst(study, worst),
+    html.say("{commands}", commands=page.commands(study, worst)),
 )
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.say("{simulated}", simulated=words.simulated(study))
+html.say("{simulated}", simulated=page.simulated(study))
 
 # %%
 html.provenance([study])

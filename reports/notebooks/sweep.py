@@ -26,8 +26,7 @@ yes = False  # True if the missions may take more than an hour
 # %%
 from analysis import sweep
 from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
-from reports.pages import html
-from reports.pages.study import tables, words
+from reports.pages import html, study
 
 # %%
 answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **fields)
@@ -40,7 +39,7 @@ drawn = {
 }
 
 # %%
-html.answer(words.answer(answer.results, ranked, PRODUCT))
+html.answer(study.answer(answer.results, ranked, PRODUCT))
 
 # %%
 html.lead(*drawn[PRODUCT])
@@ -59,13 +58,13 @@ html.gallery([drawn[SUCCESS], drawn[RATIO]])
 # `charging.plan_waits` is false.
 
 # %%
-tables.ranked(answer.results, ranked, PRODUCT)
+study.ranked(answer.results, ranked, PRODUCT)
 
 # %% [markdown]
 # ## Tables
 
 # %%
-tables.best_of_policies(answer.results, PRODUCT)
+study.best_of_policies(answer.results, PRODUCT)
 
 # %% [markdown]
 # ## Change the question
@@ -81,7 +80,7 @@ html.say("{lines}", lines=html.commands([answer.command]))
 # ## How this page was made
 
 # %%
-html.say("{simulated}", simulated=words.simulated(answer.results))
+html.say("{simulated}", simulated=study.simulated(answer.results))
 
 # %%
 html.provenance([answer.results])

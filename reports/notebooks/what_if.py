@@ -29,7 +29,7 @@ shown = None  # the policy whose missions are drawn; None for the best in the va
 from IPython.display import display
 
 from analysis import names, what_if
-from analysis.questions.what_if import answer, question
+from analysis.ask import what_if as answer
 from reports.pages import html
 
 # %%
@@ -105,7 +105,7 @@ html.table(
 # %%
 for policy in found.policies:
     marks = "▲ higher in the variation, ▼ lower, ≈ inconclusive"
-    display(html.table(answer.listed(table, policy), f"{policy}, n = {missions:,}; {marks}"))
+    display(html.table(answer.answer_table(table, policy), f"{policy}, n = {missions:,}; {marks}"))
 
 # %% [markdown]
 # ## Change the question
@@ -114,8 +114,8 @@ for policy in found.policies:
 # lines are the same question as a study: every further row is another variation.
 
 # %%
-command = html.commands([question.command(found)])
-study = html.block("toml", question.as_toml(found).rstrip("\n"))
+command = html.commands([answer.command(found)])
+study = html.block("toml", answer.as_toml(found).rstrip("\n"))
 html.say("{command}\n\n{study}", command=command, study=study)
 
 # %% [markdown]
@@ -123,7 +123,7 @@ html.say("{command}\n\n{study}", command=command, study=study)
 
 # %%
 name = found.manifest["study"]["scenario"]
-html.table(question.listed(found), f"Scenario {name}, {missions:,} missions of each policy")
+html.table(answer.field_table(found), f"Scenario {name}, {missions:,} missions of each policy")
 
 # %%
 for example in examples:

@@ -1,21 +1,55 @@
-"""The body of a page: the outputs of its notebook, put into the shape that all pages have.
-
-The answer moves into the header, every second-level heading becomes a section, figures get numbers,
-terms are explained where the pointer rests on them, and the last section is folded::
-
-    body = Body.of(notebook)
-    body.answer, body.sections, body.html
-"""
+"""The body of a page, made of the output of its cells, and the frame around it."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from bs4 import BeautifulSoup, Tag
 from bs4.element import NavigableString
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup
 from nbconvert import HTMLExporter
 from nbformat import NotebookNode
+from pygments.formatters import HtmlFormatter
+
+import dess
+from reports.pages.html import Marked, text
+from reports.pages.verify import sealed
+
+
+def template(name: str, **filters: Callable[..., str]) -> Template:
+    """Load a template, which escapes values and raises an error if one is undefined.
+
+    Args:
+        name: File name in ``reports/templates``.
+        **filters: Filters in addition to those of Jinja.
+    """
+    environment = Environment(
+        loader=PackageLoader("reports", "templates"),
+        autoescape=select_autoescape(),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        finalize=_in_markdown if name.endswith(".md") else None,
+    )
+    environment.filters |= filters
+    return environment.get_template(name)
+
+
+def _in_markdown(value: object) -> object:
+    return value if isinstance(value, int | float | Marked) else text(value)
+
+
+def fill(name: str, scripts: bool = False, **values: Any) -> str:
+    """Fill a template with values, and seal the page.
+
+    A browser makes no request for the page, and runs a script only if ``scripts`` is set.
+    """
+    style = Markup(HtmlFormatter().get_style_defs(".highlight"))
+    return sealed(
+        template(name).render(scripts=scripts, code_style=style, version=dess.__version__, **values)
+    )
+
 
 FOLDED = "How this page was made"  # the heading of the section with method and provenance
 # What the pages explain where a word stands first.
@@ -75,9 +109,9 @@ class Body:
         answer = found.extract() if found else soup.new_tag("p")
         for scrolling in soup.find_all("pre"):
             scrolling["tabindex"] = "0"
-        for text in [*soup.find_all(string=_INDEX)]:
-            if not text.find_parent(["code", "pre", "script", "style"]):
-                text.replace_with(*_with_indices(soup, text))
+        for found in [*soup.find_all(string=_INDEX)]:
+            if not found.find_parent(["code", "pre", "script", "style"]):
+                found.replace_with(*_with_indices(soup, found))
         sections = {str(section["id"]): title for section, title in _sections(soup)}
         number = str(answer.get("data-number", ""))
         return cls(Markup(answer.decode_contents()), number, sections, soup.decode().strip())
@@ -96,11 +130,13 @@ def _number(soup: BeautifulSoup, figure: Tag, number: int) -> None:
 def _explain(soup: BeautifulSoup) -> None:
     """Explain every term where it stands first."""
     left = {*TERMS}
-    for text in [*soup.find_all(string=_TERM)]:
-        if not text.find_parent(_EXPLAINED) or text.find_parent(["code", "a", "button", "script"]):
+    for found in [*soup.find_all(string=_TERM)]:
+        if not found.find_parent(_EXPLAINED) or found.find_parent(
+            ["code", "a", "button", "script"]
+        ):
             continue
         parts: list[str | Tag] = []
-        for part in _TERM.split(text):
+        for part in _TERM.split(found):
             if part in left:
                 left.remove(part)
                 term = soup.new_tag("abbr", title=TERMS[part])
@@ -108,7 +144,7 @@ def _explain(soup: BeautifulSoup) -> None:
                 parts.append(term)
             else:
                 parts.append(part)
-        text.replace_with(*parts)
+        found.replace_with(*parts)
 
 
 def _with_indices(soup: BeautifulSoup, text: NavigableString) -> list[str | Tag]:

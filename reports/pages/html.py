@@ -26,7 +26,7 @@ from matplotlib.figure import Figure
 
 from analysis import numbers
 from analysis.numbers import span
-from analysis.results.evidence import Evidence, learned_files
+from analysis.results.resimulate import Evidence, learned_files
 from analysis.results.tables import Results
 from analysis.study.study import budget_of
 from dess.errors import printable

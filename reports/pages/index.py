@@ -13,13 +13,13 @@ from typing import Any
 
 from markupsafe import Markup
 
-from analysis.results.evidence import Evidence
+from analysis.results.resimulate import Evidence
 from dess import InputError
 from dess.files.reading import Missing, paths_in, read_text
 from reports.folders import INDEX, PREFIX
 from reports.pages import html
+from reports.pages.body import fill
 from reports.pages.notebook import GROUPS, NAMES, SCORECARD
-from reports.pages.template import fill
 from reports.pages.verify import is_sealed, sealed
 
 log = logging.getLogger(__name__)

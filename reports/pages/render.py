@@ -1,37 +1,84 @@
-"""Render reports: run notebooks on results and write a self-contained page for each.
-
-The same results give the same bytes, since a page contains no time and no path of this machine.
-"""
+"""Render notebooks to pages, and leave those that are up to date as they are."""
 
 import logging
 import os
+import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
+from hashlib import sha256
+from importlib import metadata
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import nbformat
 from markupsafe import Markup
 from nbformat import NotebookNode
 from pygments import highlight
 from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer
 
-from analysis.results.files import MANIFEST
+from analysis.results.chunks import MANIFEST
 from analysis.results.manifest import Manifest
 from dess import InputError
+from dess.code.sources import OURS
+from dess.files.documents import LIMIT
 from dess.files.locks import locked
-from dess.files.reading import paths_in
+from dess.files.reading import paths_in, read_bytes, read_text
 from dess.files.writing import delete, write_files
 from reports.folders import INDEX, LOCK, check_pages
-from reports.pages.body import Body
-from reports.pages.index import index_of, pages_in, with_bar
-from reports.pages.keys import has_key, key_of
+from reports.pages import kernels
+from reports.pages.body import Body, fill
+from reports.pages.index import LARGEST, index_of, pages_in, with_bar
+from reports.pages.kernels import Progress
 from reports.pages.notebook import SHIPPED, Report, check_parameters, names_in, read, with_paths
-from reports.pages.running import kernels, missions
-from reports.pages.running.kernels import Progress
-from reports.pages.study.sections import report_of
-from reports.pages.template import fill
+from reports.pages.study import report_of
+from reports.pages.verify import is_sealed
+
+PACKAGES = Path(__file__).parents[2]
+
+
+def key_of(report: Report, studies: Mapping[str, Path]) -> str:
+    """The key of a page whose notebook has its default parameters.
+
+    Args:
+        report: The report.
+        studies: The results folders that it reads, by the names that the page has for them.
+    """
+    parts = [_software(), nbformat.writes(report.original)]
+    for name, folder in studies.items():
+        files = [path.relative_to(folder).as_posix() for path in paths_in(folder, "**/*.parquet")]
+        parts += [name, _hash(folder / MANIFEST), *files]  # the names of files have their hashes
+    return sha256(repr(parts).encode()).hexdigest()
+
+
+def has_key(page: Path, key: str) -> bool:
+    """Whether a file is a page with this key that has not been altered."""
+    try:
+        content = read_text(page, LARGEST)
+    except (OSError, InputError):
+        return False
+    return f'<meta name="dess-key" content="{key}">' in content and is_sealed(content)
+
+
+@lru_cache
+def _software() -> str:
+    """A hash of the files of the four packages and of the versions of all libraries."""
+    folders = [PACKAGES / name for name in (*sorted(OURS), "analysis", "reports")]
+    paths = [path for folder in folders for path in paths_in(folder, "**/*.*") if path.is_file()]
+    files = [
+        (path.relative_to(PACKAGES).as_posix(), _hash(path))
+        for path in paths
+        if path.parent.name != "__pycache__"
+    ]
+    versions = sorted(f"{library.name} {library.version}" for library in metadata.distributions())
+    return repr([sys.version, versions, files])
+
+
+def _hash(path: Path) -> str:
+    return sha256(read_bytes(path, LIMIT)).hexdigest()
+
 
 log = logging.getLogger(__name__)
 
@@ -138,7 +185,7 @@ def _write(
     for report in reports:
         report.key = "" if values else key_of(report, _folders(report, results))
     changed = [report for report in reports if not has_key(out / report.page, report.key)]
-    missions.make([report.name for report in changed], results, values, progress)
+    kernels.make([report.name for report in changed], results, values, progress)
     read_by = Counter(f for report in changed for f in _folders(report, results).values())
     kernels.run(changed, progress, [folder for folder, count in read_by.items() if count > 1])
     files = {report.page: _page(report) for report in changed}

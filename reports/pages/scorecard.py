@@ -10,10 +10,9 @@ import pandas as pd
 from IPython.display import HTML
 
 from analysis import numbers
-from analysis.replication.measures import Quantity
-from analysis.replication.scorecard import COLUMNS, Row
-from analysis.replication.verdict_rules import EXCEEDS, FALLS_SHORT, MATCHES, OUTCOMES
-from reports.pages.template import template
+from analysis.paper.measures import EXCEEDS, FALLS_SHORT, MATCHES, OUTCOMES, Quantity
+from analysis.paper.scorecard import COLUMNS, Row
+from reports.pages.body import template
 
 _LOOKS = dict.fromkeys(OUTCOMES, "") | {EXCEEDS: "better", MATCHES: "better", FALLS_SHORT: "worse"}
 

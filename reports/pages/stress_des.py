@@ -22,8 +22,8 @@ from analysis.numbers import level
 from analysis.stats.intervals import LEVEL
 from dess.record import EVENT_NAMES
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace, fields_of
+from reports.pages.body import template
 from reports.pages.html import Marked, code, marked, text
-from reports.pages.template import template
 
 Manifest = Mapping[str, Any]
 

@@ -19,11 +19,10 @@ from pydantic import TypeAdapter, ValidationError
 
 from analysis.bound import upper_bound
 from analysis.execution.effort import check_missions
-from analysis.results import commands
-from analysis.results.evidence import Evidence, Mission, chosen, learned_files
-from analysis.results.files import MANIFEST
+from analysis.results import tables
+from analysis.results.chunks import MANIFEST
 from analysis.results.parquet import EVENTS
-from analysis.results.resimulate import difference
+from analysis.results.resimulate import Evidence, Mission, chosen, difference, learned_files
 from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from dess import InputError, simulate
@@ -204,7 +203,7 @@ def _compared(evidence: Evidence, drawn: _Drawn, named: Collection[str] = ()) ->
         policy, values, replication = mission.policy, mission.values, mission.replication
         record = simulate(space, team, evidence.seed, replication)
         if changed := difference(record, mission.record):
-            command = commands.of_fields(evidence, policy, values, replication)
+            command = tables.of_fields(evidence, policy, values, replication)
             lines.append(f"{changed}; command: {command}")
     return Check(evidence.study["name"], len(drawn), lines, evidence.changes_here(named))
 
@@ -224,7 +223,7 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
         stored = store.load_log(cell, replication)
         assert log is not None and stored is not None
         if not stored.to_pandas().equals(_as_stored(pd.DataFrame(log.columns()), stored)):
-            command = commands.of_folder(store.folder, manifest, cell, replication)
+            command = tables.of_folder(store.folder, manifest, cell, replication)
             lines.append(f"the event log differs when simulated again; command: {command}")
     return Check(f"{manifest.study['name']}, event logs", len(logged), lines)
 

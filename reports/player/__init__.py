@@ -14,7 +14,7 @@ from IPython.display import HTML
 from analysis.figures import style
 from analysis.results.event_log import Events
 from dess.scenario import Scenario
-from reports.pages.template import template
+from reports.pages.body import template
 from reports.player.playback import Playback
 
 READING = (

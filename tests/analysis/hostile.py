@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from analysis.results import parquet
-from analysis.results.chunks import Chunk, Part, check_parts, parts_of, rows_of
-from analysis.results.files import FOLDERS
+from analysis.results.chunks import FOLDERS, Chunk, Part, check_parts, parts_of, rows_of
 from analysis.results.manifest import Manifest
 from analysis.results.store import Store
 

@@ -8,7 +8,7 @@ from typing import Any
 import tomli_w
 
 from analysis import load_study
-from analysis.questions.what_if import question as what_if
+from analysis.ask import what_if
 from analysis.results.tables import Results
 from analysis.study.study import Study
 

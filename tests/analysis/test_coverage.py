@@ -14,12 +14,10 @@ import pytest
 from scipy import stats
 
 from analysis.names import PRODUCT, REWARD
-from analysis.stats.bounded import bounded_ends
-from analysis.stats.correction import adjust
+from analysis.stats.differences import adjust, paired
 from analysis.stats.distribution import quantile_interval
-from analysis.stats.intervals import mean_interval, stratified
+from analysis.stats.intervals import bounded_ends, mean_interval, stratified
 from analysis.stats.learners import crossed
-from analysis.stats.paired import paired
 
 Drawing = tuple[Callable[[np.random.Generator, tuple[int, int]], np.ndarray], float]
 Intervals = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]

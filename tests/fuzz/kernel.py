@@ -15,10 +15,9 @@ import IPython.display
 from nbformat.v4 import new_output
 
 from dess import InputError
-from reports.pages import html
+from reports.pages import html, kernels
+from reports.pages.kernels import Progress
 from reports.pages.notebook import Report
-from reports.pages.running import kernels
-from reports.pages.running.kernels import Progress
 
 
 def run_here() -> None:

@@ -5,11 +5,11 @@ from importlib.resources import files
 from pathlib import Path
 
 from analysis import load_study, run_study
-from analysis.questions.missions import FOLDER
+from analysis.answers.missions import FOLDER
 from analysis.verification import measurements
 from policies import registry
+from reports.pages import kernels
 from reports.pages.notebook import NAMES
-from reports.pages.running import missions
 from tests.fuzz.case import OUT, Case
 from tests.fuzz.child import STDERR
 from tests.fuzz.forks import Forks
@@ -70,7 +70,7 @@ def _make_reports(folder: Path) -> None:
             study = run_study(load_study(name, **changes | fewer), folder / name)
             if name == measurements.STUDY:
                 measurements.write(measurements.simulate_missions(study, 2), folder)
-        missions.make(NAMES, folder, {})
+        kernels.make(NAMES, folder, {})
 
 
 def write_texts(ready: Path) -> None:

@@ -227,7 +227,7 @@ def judged(
 def main(arguments: Sequence[str]) -> None:
     """Judge the mission that the command line names: SEA POLICY SEED REPLICATION KEY=VALUE..."""
     from policies.registry import load
-    from reports.cli.settings import load_space
+    from reports.cli.options import load_space
 
     sea, policy, seed, replication, *settings = arguments
     space = ScenarioSpace.of(load_space(sea, settings))

@@ -20,8 +20,8 @@ results = "../../results"  # folder with the results folder of the study age
 from pathlib import Path
 
 from analysis import load_results, names, numbers
+from analysis.answers import operations
 from analysis.figures.settings import lines
-from analysis.questions import operations
 from analysis.stats.intervals import LEVEL
 from reports import tables
 from reports.pages import html

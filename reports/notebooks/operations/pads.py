@@ -23,9 +23,9 @@ from pathlib import Path
 from IPython.display import display
 
 from analysis import load_results, names, numbers
+from analysis.answers import operations
 from analysis.figures.learning import courses
 from analysis.figures.settings import lines
-from analysis.questions import operations
 from analysis.stats.intervals import LEVEL
 from reports import tables
 from reports.pages import html

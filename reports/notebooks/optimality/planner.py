@@ -23,32 +23,30 @@ learner = "ddqn"  # the policy that has learned
 from pathlib import Path
 
 from analysis import load_results, numbers
-from analysis.figures import comparison as figures
-from analysis.figures import fronts, learning
+from analysis.answers import comparison as answers
+from analysis.answers import optimality
+from analysis.figures import comparison, learning, settings
 from analysis.figures import missions as maps
 from analysis.names import PRODUCT
-from analysis.questions import decision_times, head_to_head, regions
-from analysis.questions.optimality import gap
-from analysis.questions.optimality import planner as questions
 from reports import tables
 from reports.pages import html
 
 # %%
 study = load_results(Path(results) / "gap")
-times = decision_times.read(results, study)
+times = answers.read(results, study)
 planners = [planner, *(name for name in [longer] if name in study.policies)]
-differences = questions.differences(study, planners, learner)
-pair = head_to_head.pair_of(study, planner, learner)
-missions = head_to_head.duels(study, pair)
+differences = optimality.differences(study, planners, learner)
+pair = answers.pair_of(study, planner, learner)
+missions = answers.duels(study, pair)
 logged = study.manifest["study"]["logged"]
 
 # %%
-html.answer(questions.answer(differences, planner), questions.ahead(differences, planner))
+html.answer(optimality.answer(differences, planner), optimality.ahead(differences, planner))
 
 # %%
 by_product = differences[differences["metric"] == PRODUCT]
 html.lead(
-    figures.differences(by_product),
+    comparison.differences(by_product),
     f"Paired differences from {learner} in the product, by number of UAVs",
     f"n = {numbers.span(by_product['n'])} missions; bars are 95 % intervals.",
 )
@@ -60,11 +58,11 @@ html.lead(
 # bins); dashed is the mean of all missions.
 
 # %%
-lead = regions.along(missions, pair.candidates)
+lead = answers.along(missions, pair.candidates)
 html.gallery(
     [
         (
-            figures.lead(lead, field, missions["difference"].mean()),
+            comparison.lead(lead, field, missions["difference"].mean()),
             f"Mean difference {planner} − {learner} against {field}",
             f"{planner} − {learner}, n = {numbers.span(bins['n'])} missions per dot.",
         )
@@ -73,7 +71,7 @@ html.gallery(
 )
 
 # %%
-first, second = (questions.coverage(study, policy) for policy in (planner, learner))
+first, second = (optimality.coverage(study, policy) for policy in (planner, learner))
 collected = {f"Collected by {planner}": first, f"Collected by {learner}": second}
 shown = collected | {f"{planner} − {learner}": first - second}
 counted = f"means over n = {logged} missions, in percent of the node's data."
@@ -86,13 +84,13 @@ html.gallery(
 )
 
 # %%
-home = questions.at_home(study, [planner, learner])
+home = optimality.at_home(study, [planner, learner])
 rows = home.assign(panel=0, **dict.fromkeys(("mean", "low", "high"), home["share"]))
 zone = learning.courses(rows, "policy", "%", {0: "Share of the UAVs in the charging zone"})
-mission = questions.example(study, planner)
+mission = optimality.example(study, planner)
 replication = int(mission.row["replication"])
-plan = maps.plan(mission.log, mission.scenario, questions.plan(study, planner, replication))
-values, title = questions.node_prices(study, replication), "Price of a node's data"
+plan = maps.plan(mission.log, mission.scenario, optimality.plan(study, planner, replication))
+values, title = optimality.node_prices(study, replication), "Price of a node's data"
 prices = maps.node_map(nodes, title, values, write="{:.2f}".format)
 
 # %%
@@ -113,17 +111,17 @@ html.gallery(
 # upper bound.
 
 # %%
-html.say("{gap}", gap=html.composed(gap.in_words(study, planners[-1])))
+html.say("{gap}", gap=html.composed(optimality.in_words(study, planners[-1])))
 
 # %%
-points, gaps = questions.front(study, times), gap.by_fleet(study)
-useful = gap.useful(gaps)
+points, gaps = optimality.front(study, times), optimality.by_fleet(study)
+useful = optimality.useful(gaps)
 alt = "Decision time against the product of all policies, and their Pareto front"
 caption = "No policy is both faster and better than one on the line. Medians on one core."
-drawn: list[html.Drawing] = [(fronts.decision_times(points), alt, caption, points)]
+drawn: list[html.Drawing] = [(settings.decision_times(points), alt, caption, points)]
 if len(useful):
     alt = "The product of every policy and the upper bound, by number of UAVs"
-    drawn.append((figures.gaps(useful), alt, "The band is the 95 % interval of the bound."))
+    drawn.append((comparison.gaps(useful), alt, "The band is the 95 % interval of the bound."))
 html.gallery(drawn, f"n = {len(missions):,} missions per policy; bars are 95 % intervals.")
 
 # %% [markdown]
@@ -141,22 +139,22 @@ html.table(
 )
 
 # %%
-html.table(gap.listed(gaps), "Means, the upper bound, and the gap in points", data=gaps)
+html.table(optimality.listed(gaps), "Means, the upper bound, and the gap in points", data=gaps)
 
 # %%
 html.table(
-    questions.returns(study, [planner, learner]),
+    optimality.returns(study, [planner, learner]),
     f"Means over charging sessions of the same {logged} missions",
 )
 
 # %%
-html.table(decision_times.listed(times), "Time of a decision for the UAVs of a mission")
+html.table(answers.time_table(times), "Time of a decision for the UAVs of a mission")
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.say("{remarks}", remarks=decision_times.remarks(times, study, pair))
+html.say("{remarks}", remarks=answers.remarks(times, study, pair))
 
 # %%
 html.provenance([study])

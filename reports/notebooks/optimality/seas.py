@@ -23,11 +23,10 @@ heuristic = "greedy"  # a fast policy without learning
 from pathlib import Path
 
 from analysis import load_results
-from analysis.figures import fronts
-from analysis.figures import seas as figures
+from analysis.answers import comparison as answers
+from analysis.answers import seas
+from analysis.figures import comparison, settings
 from analysis.names import METRICS, PRODUCT, SUCCESS
-from analysis.questions import decision_times
-from analysis.questions.optimality import seas
 from reports import tables
 from reports.pages import html
 
@@ -35,7 +34,7 @@ from reports.pages import html
 study = load_results(Path(results) / "seas")
 for name in (policy, reference, heuristic):
     study.check_policy(name)
-times = decision_times.read(results, study)
+times = answers.read(results, study)
 shares = {by: seas.shares(study, reference, by) for by in seas.GROUPS}
 gains = {by: seas.gains(study, heuristic, by) for by in seas.GROUPS}
 
@@ -45,7 +44,7 @@ html.answer(seas.answer(study, times, policy, reference, heuristic))
 # %%
 points = seas.front(study, times)
 html.lead(
-    fronts.decision_times(points),
+    settings.decision_times(points),
     "Time of a decision against the product over all seas, and the Pareto front",
     f"n = {points['n'].max()} seas; bars are 95 % intervals over seas. Times are those of a "
     "decision for a UAV on one core, many missions side by side.",
@@ -59,7 +58,7 @@ html.lead(
 html.gallery(
     [
         (
-            figures.groups(shares[by], by, f"product, share of {reference}"),
+            comparison.groups(shares[by], by, f"product, share of {reference}"),
             f"The product as a share of that of {reference}, by {name.lower()}",
             f"n = {shares[by]['n'].min()} seas and more per dot; bars are 95 % intervals.",
             shares[by],

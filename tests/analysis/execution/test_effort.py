@@ -1,28 +1,87 @@
+"""The lower end of the range decides; what may be long is run."""
+
 import faulthandler
 import os
 import signal
 import subprocess
 import sys
 import time
+from itertools import count
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from analysis import run_study
 from analysis.execution import effort
 from analysis.execution.effort import (
+    BASELINE,
+    BOUND,
     EVENT,
     MAX_WORKERS,
+    OF_LARGE_FLEETS,
+    OF_SMALL_FLEETS,
+    SECONDS,
+    SPREAD,
+    START,
+    Range,
+    budget,
     check_missions,
+    check_run,
     check_workers,
     check_workers_memory,
     mission_memory,
+    plan_study,
+    policies_for,
+    total,
 )
 from dess import InputError, load_scenario, simulate
 from dess.channel import world_of
 from dess.code import memory
 from policies import load_team
-from tests.analysis.small import environment
+from policies.registry import names
+from tests.analysis.small import environment, files_of, grid, small_study
+
+FASTER = [*SECONDS]
+
+
+def test_the_policies_exist_and_each_is_faster_than_the_one_before() -> None:
+    assert set(FASTER) <= {*names()}
+    assert [*SECONDS.values()] == sorted(SECONDS.values(), reverse=True)
+    assert {*OF_SMALL_FLEETS} == {*OF_LARGE_FLEETS} == {*SECONDS}
+
+
+@pytest.mark.parametrize("uavs", [1, 5])
+def test_a_larger_question_never_has_a_slower_policy(uavs: int) -> None:
+    space = load_scenario("bay", uavs=uavs)
+    sizes = np.geomspace(1, 1e8, 60).astype(int)
+    chosen = [policies_for([space], int(missions))[0] for missions in sizes]
+    assert chosen[0] == FASTER[0]
+    assert chosen[-1] == BASELINE
+    places = [FASTER.index(name) for name in chosen]
+    assert places == sorted(places)
+    assert ("planner-short" in chosen) == (uavs == 1)  # any is better for large fleets
+    assert "any" in chosen
+    twice = policies_for([space, space], 150)
+    assert twice == policies_for([space], 300)  # settings count as missions do
+
+
+def test_the_baseline_stands_beside_it_once() -> None:
+    space = load_scenario("bay")
+    assert policies_for([space], 1) == (FASTER[0], BASELINE)
+    assert policies_for([space], 10**8) == (BASELINE,)
+
+
+def test_without_its_library_a_learned_policy_gives_way(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    space = load_scenario("bay", uavs=5)
+    missions = next(n for n in count(1000, 1000) if policies_for([space], n)[0] == "any")
+    monkeypatch.setattr(effort, "missing", lambda extra, what: f"{what} needs {extra}")
+    assert policies_for([space], missions) == ("planner-short", BASELINE)
+    assert "policy any needs learning; planner-short answers" in caplog.text
+
 
 PAPER = load_scenario("paper")
 CONTINUOUS = {"arrivals.process": "continuous"}
@@ -89,7 +148,7 @@ def test_every_mission_ends_or_is_refused(fields):
 
 def test_a_worker_ends_with_a_killed_parent_before_it_has_loaded_anything():
     """The parent starts a process as joblib does, which is busy, and is killed."""
-    busy = "import os, time; from analysis.execution.orphans import live_and_die_with as live; "
+    busy = "import os, time; from analysis.execution.workers import live_and_die_with as live; "
     busy += "live(int(os.sys.argv[1])); print(os.getpid(), flush=True); time.sleep(60)"
     script = "import os, subprocess, sys; subprocess.run([sys.executable, '-c', sys.argv[1], "
     script += "str(os.getpid())])"
@@ -105,7 +164,124 @@ def test_a_worker_ends_with_a_killed_parent_before_it_has_loaded_anything():
             os.kill(worker, 0)
             time.sleep(0.01)
     loaded = subprocess.run(
-        [sys.executable, "-c", "import analysis.execution.orphans, sys; print(*sys.modules)"],
+        [sys.executable, "-c", "import analysis.execution.workers, sys; print(*sys.modules)"],
         capture_output=True, text=True, check=True, env=environment(),
     )  # fmt: skip
     assert not {"numpy", "numba", "pandas", "joblib"} & {*loaded.stdout.split()}
+
+
+def test_a_plan_counts_and_writes_nothing(tmp_path):
+    study = small_study(tmp_path, design=grid(uavs=[1, 2]))
+    before = files_of(tmp_path)
+    plan = plan_study(study, tmp_path / "out")
+    assert [(p.policy, p.missions, p.present) for p in plan] == [
+        ("greedy", 20, 0),
+        ("random", 20, 0),
+    ]
+    assert files_of(tmp_path) == before
+
+
+def test_a_plan_knows_what_is_there(tmp_path):
+    run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "out")
+    before = files_of(tmp_path / "out")
+    plan = plan_study(small_study(tmp_path, missions=25), tmp_path / "out")
+    assert [(p.missions, p.present) for p in plan] == [(25, 10), (25, 0)]
+    assert files_of(tmp_path / "out") == before
+    done = plan_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "out")
+    assert [p.seconds for p in done] == [(0.0, 0.0)]
+    assert total(done, 1) == (0.0, 0.0)
+
+
+DECISIONS = 2 * 60 / 4  # of a mission of the small scenario
+
+
+def test_the_time_is_a_range_and_nothing_is_simulated(tmp_path, monkeypatch):
+    monkeypatch.setattr("analysis.execution.jobs.simulate", None)
+    monkeypatch.setattr("analysis.execution.jobs.simulate_batch", None)
+    study = small_study(tmp_path, policies=["greedy", "planner"])
+    plan = plan_study(study, tmp_path / "out")
+    expected = [10 * DECISIONS * each for each in (2e-6, 4e-4)]
+    for planned, seconds in zip(plan, expected, strict=True):
+        assert planned.seconds == pytest.approx((seconds / SPREAD, seconds * SPREAD))
+    ends = sum(expected) / 2 / SPREAD, sum(expected) / 2 * SPREAD + START
+    assert total(plan, 2) == pytest.approx(ends)
+    assert str(Range(1.0, 90.0)) == "up to 90 seconds"
+    assert str(Range(5.0, 90.0)) == "5 to 90 seconds"
+    assert str(Range(5.0, 240.0)) == "5 seconds to 4 minutes"
+
+
+def test_event_logs_take_time_as_well(tmp_path):
+    logged, plain = small_study(tmp_path, logged=4), small_study(tmp_path)
+    plans = [plan_study(study, tmp_path / "out") for study in (logged, plain)]
+    for more, less in zip(*plans, strict=True):
+        assert more.seconds.low - less.seconds.low == pytest.approx(4 * DECISIONS * 1.2e-5 / SPREAD)
+    run_study(logged, tmp_path / "out")
+    assert [p.seconds for p in plan_study(logged, tmp_path / "out")] == [(0.0, 0.0)] * 2
+
+
+def test_a_rule_has_a_least_and_a_most(tmp_path):
+    targets = {"success": {"absolute": 0.1}}
+    precise = {"first": 5, "look_ahead": 5, "budget": 50, "targets": targets}
+    design = grid(uavs=[1, 2])
+    study = small_study(tmp_path, precision=precise, design=design)
+    assert [p.missions for p in plan_study(study, tmp_path / "out")] == [2 * 5] * 2
+    assert budget(study) == 2 * 2 * 50
+    rule = {
+        "procedure": "kn",
+        "metric": "collection_ratio",
+        "first": 8,
+        "indifference": 0.1,
+        "budget": 200,
+        "check": 7,
+    }
+    study = small_study(tmp_path, selection=rule, design=design)
+    assert [p.missions for p in plan_study(study, tmp_path / "out")] == [2 * 8] * 2
+    assert budget(study) == 2 * (200 + 7)
+    run_study(study, tmp_path / "out")
+    done = plan_study(study, tmp_path / "out")
+    assert all(p.missions == p.present > 7 for p in done)
+
+
+def test_a_plan_refuses_what_a_run_would(tmp_path):
+    with pytest.raises(InputError, match="holds other files"):
+        plan_study(small_study(tmp_path), tmp_path)
+    with pytest.raises(InputError, match="workers: 0 is out of range"):
+        plan_study(small_study(tmp_path), tmp_path / "out", workers=0)
+
+
+def test_a_run_that_is_surely_long_has_to_be_confirmed(tmp_path, monkeypatch):
+    """The lower end of the range decides; what may be long is run."""
+    study, out = small_study(tmp_path), tmp_path / "out"
+    ends = total(plan_study(study, out, workers=2), 2)
+    monkeypatch.setattr(effort, "LONG_RUN", ends.low * 1.01)
+    check_run(study, out, workers=2)
+    monkeypatch.setattr(effort, "LONG_RUN", ends.low * 0.99)
+    before = files_of(tmp_path)
+    line = (
+        r"study trial: 20 missions to simulate \(policies: 2, design points: 1, workers: 2\), "
+        r"about up to 15 seconds; allowed: --yes, or less"
+    )
+    with pytest.raises(InputError, match=line):
+        check_run(study, out, workers=2)
+    check_run(study, out, yes=True)
+    assert files_of(tmp_path) == before
+    run_study(study, out)
+    check_run(study, out)  # all of it is there
+
+
+def test_missions_are_counted_and_not_listed(tmp_path, monkeypatch):
+    study = small_study(tmp_path, missions=10**9)
+    monkeypatch.setattr(memory, "available_memory", lambda: 2**40)
+    monkeypatch.setattr(effort, "LONG_RUN", 1e9)
+    line = r"2,000,000,000 missions .*: about 2,23\d\.\d GiB of memory, of which 1,024.0 are avail"
+    with pytest.raises(InputError, match=line):
+        check_run(study, tmp_path / "out")
+    assert [p.missions for p in plan_study(study, tmp_path / "out")] == [10**9] * 2
+
+
+def test_bounds_are_part_of_the_plan_and_of_the_time(tmp_path):
+    study = small_study(tmp_path, bounds=True)
+    plan = plan_study(study, tmp_path / "out")
+    assert (plan[2].missions, plan[2].present) == (10, 0)
+    assert plan[2].seconds == pytest.approx([10 * DECISIONS * each for each in BOUND])
+    assert len(plan_study(small_study(tmp_path), tmp_path / "out")) == 2

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from analysis import evaluate, load_results, load_study, resimulate, run_study
+from analysis.answers.summary import sensitivity
 from analysis.execution import jobs
-from analysis.questions.sensitivity import sensitivity
 from analysis.results import parquet
 from analysis.study.study import CHECK
 from dess import InputError, load_scenario, simulate
@@ -17,7 +17,7 @@ from dess.state import END_NAMES
 from policies import load_team
 from policies.heuristics import Greedy
 from reports import cli
-from reports.cli.settings import setting
+from reports.cli.options import setting
 from tests.analysis.small import files_of, grid, small_study
 
 

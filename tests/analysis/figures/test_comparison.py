@@ -4,15 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.figures import comparison as drawings
+from analysis.answers import comparison as regions
+from analysis.answers.comparison import AHEAD, BEHIND, Pair
+from analysis.ask import what_if
+from analysis.figures import comparison
 from analysis.figures.comparison import COLOURS
 from analysis.names import BOUND, GAP, METRICS, PARAMETERS, PRODUCT
-from analysis.questions import regions
-from analysis.questions.head_to_head import Pair
-from analysis.questions.regions import AHEAD, BEHIND
-from analysis.questions.what_if import answer as what_if_answer
 from analysis.stats.verdict import INCONCLUSIVE
-from tests.analysis.questions.test_regions import missions_of
+from tests.analysis.answers.test_regions import missions_of
 from tests.analysis.small import asked
 
 PAIR, POLICIES = Pair("ours", "theirs", 1), ["random", "greedy"]
@@ -35,7 +34,7 @@ def table(missions):
 
 
 def test_a_dot_per_bin_with_its_interval_and_its_verdict(table):
-    (ax,) = drawings.lead(table, "uavs", 0.012).axes
+    (ax,) = comparison.lead(table, "uavs", 0.012).axes
     rows = table[table["field"] == "uavs"]
     for bar, (verdict, own) in zip(ax.containers, rows.groupby("verdict"), strict=True):
         dot = bar.lines[0]
@@ -50,16 +49,16 @@ def test_a_dot_per_bin_with_its_interval_and_its_verdict(table):
 
 
 def test_all_parameters_have_the_same_axis_and_all_intervals_on_it(table):
-    axes = [drawings.lead(table, field, 0.0).axes[0] for field in PARAMETERS]
+    axes = [comparison.lead(table, field, 0.0).axes[0] for field in PARAMETERS]
     ((low, high),) = {ax.get_ylim() for ax in axes}
     assert low < table["low"].min() < table["high"].max() < high
     ahead = regions.along(missions_of(lambda t: 0.3))
-    assert drawings.lead(ahead, "uavs", 0.3).axes[0].get_ylim()[0] < 0
+    assert comparison.lead(ahead, "uavs", 0.3).axes[0].get_ylim()[0] < 0
     assert axes[-1].get_title(loc="left") == "Flying time [mission slots]"
 
 
 def test_the_curve_is_the_share_of_missions_up_to_a_difference(missions):
-    (ax,) = drawings.distribution(missions, PAIR).axes
+    (ax,) = comparison.distribution(missions, PAIR).axes
     (curve,) = (line for line in ax.lines if line.get_gid() == "shares")
     x, y = curve.get_data()
     for value in (-0.05, 0.0, 0.03):
@@ -77,7 +76,7 @@ def test_the_band_holds_the_whole_curve(missions):
     generator, outside = np.random.default_rng(1), 0
     for _ in range(40):
         sample = missions.head(60).assign(difference=generator.uniform(-0.2, 0.2, 60))
-        (ax,) = drawings.distribution(sample, PAIR).axes
+        (ax,) = comparison.distribution(sample, PAIR).axes
         (band,) = (c for c in ax.collections if c.get_gid() == "band")
         vertices = band.get_paths()[0].vertices
         half = len(vertices) // 2
@@ -96,17 +95,17 @@ def results(tmp_path_factory):
 
 
 def test_figures_show_the_means_and_the_gains(results):
-    table, answers = what_if_answer.means(results), what_if_answer.answers(results)
-    settings = (["uavs 2", "pads 6"], ["uavs 6", "pads 1"])
+    table, answers = what_if.means(results), what_if.answers(results)
+    sides = ["baseline\nuavs 2\npads 6", "variation\nuavs 6\npads 1"]
     for metric in METRICS:
-        (ax,) = drawings.means(table, metric, settings).axes
+        (ax,) = comparison.means(table, metric, sides).axes
         ticks = [tick.get_text() for tick in ax.get_xticklabels()]
-        assert ticks == ["baseline\nuavs 2\npads 6", "variation\nuavs 6\npads 1"]
+        assert ticks == sides
         for bar, policy in zip(ax.containers, POLICIES, strict=True):
             own = table[(table["metric"] == metric) & (table["policy"] == policy)]
             assert bar.lines[0].get_ydata() == pytest.approx(own["mean"])
             assert drawn_interval(bar, 1) == pytest.approx(own[["low", "high"]].to_numpy())
-    (ax,) = drawings.gains(answers).axes
+    (ax,) = comparison.gains(answers).axes
     for bar, policy in zip(ax.containers, POLICIES, strict=True):
         own = answers[answers["policy"] == policy].set_index("metric").loc[[*METRICS]]
         assert bar.lines[0].get_ydata() == pytest.approx(own["difference"])
@@ -118,7 +117,7 @@ def test_the_spread_is_the_share_of_missions_up_to_a_difference():
         "ours": pd.Series([0.0, 0.1, -0.5, 0.1]),
         "theirs": pd.Series(np.linspace(-0.02, 0.04, 100)),
     }
-    above, below = drawings.spread(gaps).axes
+    above, below = comparison.spread(gaps).axes
     for ax in (above, below):
         for line, own in zip(ax.lines, gaps.values(), strict=False):
             for x, share in list(zip(line.get_xdata(), line.get_ydata(), strict=True))[1:]:
@@ -126,7 +125,7 @@ def test_the_spread_is_the_share_of_missions_up_to_a_difference():
             assert line.get_ydata()[0] == 0 and line.get_ydata()[-1] == 1
     assert below.get_xlim()[0] > above.get_xlim()[0]
 
-    drawings.spread({"ours": pd.Series([0.0, 0.0])}).canvas.draw()
+    comparison.spread({"ours": pd.Series([0.0, 0.0])}).canvas.draw()
 
 
 def gap_rows() -> pd.DataFrame:
@@ -143,7 +142,7 @@ def gap_rows() -> pd.DataFrame:
 
 def test_a_panel_per_fleet_shows_products_and_the_bound() -> None:
     table = gap_rows()
-    figure = drawings.gaps(table)
+    figure = comparison.gaps(table)
     assert len(figure.axes) == 2
     for ax, uavs in zip(figure.axes, (1, 2), strict=True):
         rows = table[table["uavs"] == uavs]
@@ -160,7 +159,7 @@ def test_differences_are_beside_each_other_by_fleet() -> None:
         {"policy": ["a", "a", "b", "b"], "uavs": [1, "all"] * 2, "baseline": "c"}
         | {"difference": [0.1, 0.2, 0.3, 0.4], "low": 0.0, "high": 0.5}
     )
-    (ax,) = drawings.differences(table).axes
+    (ax,) = comparison.differences(table).axes
     drawn = [bar.lines[0].get_ydata().tolist() for bar in ax.containers]
     assert drawn == [[0.1, 0.2], [0.3, 0.4]]
     assert [label.get_text() for label in ax.get_xticklabels()] == ["1 UAV", "all"]

@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.answers import learning as ablation
 from analysis.figures import learning as learning_figures
 from analysis.names import METRICS
-from analysis.questions.learning import ablation, curves
-from tests.analysis.questions.learning.test_curves import training
+from tests.analysis.answers.test_learning import training
 
 METRIC = "evaluation_collection_ratio_and_communication"
 LABELS = {"one": "with", "two": "without"}
@@ -32,7 +32,7 @@ def panel(table):
 
 
 def test_fig_3_shows_every_training(table, panel):
-    averages = curves.smoothed(table, METRIC)
+    averages = ablation.smoothed(table, METRIC)
     expected = [own["value"].tolist() for _, own in averages.groupby(["variant", "seed", "phase"])]
     drawn = [line.get_ydata().tolist() for line in panel.lines if line.get_gid() is None]
     assert sorted(drawn) == sorted(expected)
@@ -50,7 +50,7 @@ def test_fig_3_tells_the_phases_and_the_trainings(table, panel):
     (slots,) = panel.child_axes  # the axis at the top
     assert slots.get_xlim() == pytest.approx([500e-6 * end for end in panel.get_xlim()])
     low, high = panel.get_ylim()
-    assert curves.smoothed(table, METRIC)["value"].between(low, high).all()
+    assert ablation.smoothed(table, METRIC)["value"].between(low, high).all()
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Figures of settings show means with intervals, the best cell and those that may be as good."""
+"""Fronts go through what is not dominated; the front of costs is tested with its question."""
 
 from dataclasses import replace
 
@@ -8,13 +8,13 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from analysis import run_study
-from analysis.figures import drawings, style
+from analysis.answers import settings
 from analysis.figures import settings as figures
+from analysis.figures import style
 from analysis.names import METRICS, PRODUCT, SUCCESS
-from analysis.questions import settings
 from analysis.study.design import NOISE
 from dess import InputError
-from tests.analysis.questions.test_main_effects import pairs_of
+from tests.analysis.answers.test_main_effects import pairs_of
 from tests.analysis.small import grid, small_study
 
 
@@ -64,7 +64,7 @@ def test_names_of_near_values_are_turned_so_that_they_do_not_touch():
         rows = pd.DataFrame({"rate": values, "policy": "greedy", "mean": 0.5, "low": 0.4})
         with style.panels(3) as (figure, ax):
             looks = style.policy_colours(["greedy"])
-            drawings.along(drawings.placed(rows.assign(high=0.6), "rate"), looks, "%", ax)
+            style.along(style.placed(rows.assign(high=0.6), "rate"), looks, "%", ax)
         assert [t.get_rotation() for t in ax.get_xticklabels()] == [angle] * len(values)
 
 
@@ -241,3 +241,14 @@ def test_sensitivities_are_bars_with_intervals(indices):
     names = [label.get_text().replace("\n", " ") for label in ax.get_yticklabels()]
     assert names == ["UAVs", "$C_S$", "noise of the replication"]
     assert ax.get_ylim() == (2.5, -0.5)  # the first on top
+
+
+def test_the_front_goes_through_policies_that_are_not_dominated() -> None:
+    table = pd.DataFrame(
+        {"policy": ["a", "b", "c"], "seconds": [1e-5, 1e-4, 1e-3], "mean": [0.5, 0.4, 0.9]}
+        | {"low": 0.3, "high": 0.95, "on_front": [True, False, True]}
+    )
+    (ax,) = figures.decision_times(table).axes
+    (line,) = (line for line in ax.lines if line.get_label() == "Pareto front")
+    assert (list(line.get_xdata()), list(line.get_ydata())) == ([1e-5, 1e-3], [0.5, 0.9])
+    assert len(ax.containers) == 3

@@ -11,11 +11,11 @@ from analysis import run_study, summary
 from analysis.execution.evaluation import Asked, means
 from analysis.names import MEASURES, measured_in
 from analysis.results.resimulate import difference, recorded, resimulate
+from analysis.stats.differences import compare
 from analysis.stats.intervals import interval_of
-from analysis.stats.paired import compare
 from dess import load_scenario, simulate_batch
 from policies import load
-from reports.cli.settings import load_space
+from reports.cli.options import load_space
 from tests.analysis.small import grid, small_study
 
 MEASURED = {"charging.measured": True, "age.measured": True}

@@ -4,9 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.stats.bootstrap import bootstrap_interval
 from analysis.stats.distribution import distribution, quantile_interval, tail_mean
-from analysis.stats.intervals import bounded_interval
+from analysis.stats.intervals import bootstrap_interval, bounded_interval
 from dess import InputError
 
 

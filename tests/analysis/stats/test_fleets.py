@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.answers.summary import best_policy
 from analysis.execution.evaluation import Asked, evaluate, means
 from analysis.names import PRODUCT, RATIO, REWARD, SUCCESS
-from analysis.questions.summary import best_policy
+from analysis.stats.differences import compare
 from analysis.stats.intervals import by_replication, interval_of, post_stratified, summary
-from analysis.stats.paired import compare
 from dess.scenario import ScenarioSpace
 
 LEVELS = np.array([0.5, 0.8, 0.9])  # the product of one, two and three UAVs

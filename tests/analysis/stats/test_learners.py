@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from pandas.testing import assert_frame_equal
 
-from analysis.stats.correction import adjust
+from analysis.stats.differences import adjust, compare
 from analysis.stats.intervals import mean_interval
 from analysis.stats.learners import compare_learners, crossed
-from analysis.stats.paired import compare
 from dess import InputError
 from tests.analysis.stats.matched_missions import METRIC, STUDY, ratios, rng
 

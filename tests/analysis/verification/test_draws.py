@@ -1,4 +1,4 @@
-"""Draws from the distributions of the scenario hold; draws from others do not."""
+"""Intervals of blocks hold the mean as often as they should, if missions are independent."""
 
 from typing import Any
 
@@ -7,10 +7,13 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.verification import draws
+from analysis.stats.intervals import mean_interval, wilson
+from analysis.verification import balances, draws
+from analysis.verification.measurements import Log
 from dess import load_scenario
 from dess.scenario import SAMPLED
-from tests.analysis.verification.verdicts import failing
+from tests.analysis.verification.changes import altered
+from tests.analysis.verification.verdicts import failing, fails
 
 SPACE = load_scenario("paper")
 
@@ -154,3 +157,70 @@ def test_start_cells_are_uniform_over_the_zone() -> None:
     beside = cells.T.copy()
     beside[0] = [x + width, y]
     assert failing([draws.start_check(beside, SPACE)])
+
+
+def test_the_logs_have_what_is_audited(logs: list[Log]) -> None:
+    table = pd.concat([draws.communications(log, 7) for log in logs])
+    assert (table["known"] == table["residual"]).any()  # nodes that were emptied
+    assert (table["known"] < table["residual"]).any()
+    assert any(log.uav_slots["charging"].any() for log in logs)
+    assert any(log.uav_slots["waiting"].any() for log in logs)
+
+
+def test_another_seed_has_other_shadowing(logs: list[Log]) -> None:
+    assert all(map(fails, draws.communication_checks(logs, 8)))
+
+
+def test_data_that_are_a_trifle_off_are_noticed(logs: list[Log]) -> None:
+    changed = altered(logs, "communication", 5, value=lambda value: value * (1 + 1e-9))
+    choice, amount = draws.communication_checks(changed, 7)
+    assert fails(amount) and not fails(choice)
+    assert fails(balances.balance_check(changed))
+
+
+def test_another_node_is_noticed(logs: list[Log]) -> None:
+    changed = altered(logs, "communication", 5, node=lambda node: (node + 1) % 3)
+    choice, _ = draws.communication_checks(changed, 7)
+    assert fails(choice)
+    assert fails(balances.balance_check(changed))
+
+
+def test_another_place_is_noticed(logs: list[Log]) -> None:
+    changed = altered(logs, "communication", 0, x=lambda x: x + 1 / 6)
+    assert any(map(fails, draws.communication_checks(changed, 7)))
+
+
+def test_blocks_have_the_intervals_of_their_missions() -> None:
+    values = np.random.default_rng(12).uniform(size=45)
+    table = draws.blocks(values, 10, share=False)
+    assert len(table) == 4
+    assert tuple(table.loc[1, ["mean", "low", "high"]]) == mean_interval(values[10:20])
+    held = [low <= values[:40].mean() <= high for low, high in table[["low", "high"]].to_numpy()]
+    assert table["holds"].tolist() == held
+    successes = (values > 0.3).astype(int)
+    ends = tuple(draws.blocks(successes, 10, share=True).loc[0, ["mean", "low", "high"]])
+    assert ends == wilson(successes[:10].sum(), 10)
+
+
+def covered(values: np.ndarray, share: bool) -> set[str]:
+    return failing([draws.coverage_check("metric", values, 100, share)])
+
+
+def test_intervals_of_independent_missions_cover_as_often_as_they_promise() -> None:
+    generator = np.random.default_rng(13)
+    assert not covered(generator.beta(8, 2, 20_000), share=False)
+    for p in (0.6, 0.97, 0.9995):  # here Wilson covers more or less often than 95 %
+        assert not covered((generator.random(20_000) < p).astype(int), share=True)
+
+
+def test_missions_that_depend_on_each_other_are_covered_too_rarely() -> None:
+    generator = np.random.default_rng(14)
+    shifts = np.repeat(generator.normal(size=200), 100)
+    assert covered(shifts + generator.normal(size=20_000), share=False)
+    assert covered((generator.random(20_000) < np.where(shifts > 0, 0.9, 0.7)).astype(int), True)
+
+
+def test_nothing_to_cover_tells_nothing() -> None:
+    for values in (np.ones(20_000), np.random.default_rng(17).uniform(size=150)):
+        check = draws.coverage_check("metric", values, 100, share=False)
+        assert check.p is None and check.error is None

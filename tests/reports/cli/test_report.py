@@ -103,7 +103,7 @@ def odd(path: Path, kind: str) -> None:
 def test_a_folder_of_pages_is_checked_before_the_first_cell(
     dess, monkeypatch, tmp_path, name, kind
 ):
-    monkeypatch.delattr("reports.pages.running.kernels.run")
+    monkeypatch.delattr("reports.pages.kernels.run")
     monkeypatch.setattr("reports.pages.render._lacking", lambda *_: {})
     odd(tmp_path / "pages" / name, kind)
     code, out, err = dess("report", "mission", "--out", "pages")
@@ -115,7 +115,7 @@ def test_a_parameter_that_the_study_refuses_is_refused_before_any_cell(dess, mon
     def fail(*_):
         raise AssertionError("a cell runs")
 
-    monkeypatch.setattr("reports.pages.running.kernels.run", fail)
+    monkeypatch.setattr("reports.pages.kernels.run", fail)
     assert dess("study", "run", "trial.toml", "--missions", 2, "--out", "out")[0] == 0
     before = files_of(tmp_path)
     for value, words in {

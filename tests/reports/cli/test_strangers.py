@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 from analysis import load_study, run_study
+from analysis.answers.diff import at_hand
 from analysis.execution.jobs import MissionsJob
-from analysis.questions.diff import at_hand
 from analysis.results.chunks import parts_of, split
-from analysis.results.evidence import Evidence
-from analysis.results.resimulate import resimulate
+from analysis.results.resimulate import Evidence, resimulate
 from analysis.results.tables import Results, load_results
 from analysis.verification import measurements
 from analysis.verification.balances import engine_check

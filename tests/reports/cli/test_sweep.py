@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from analysis import load_results, load_study
+from analysis.ask.sweep import command
 from analysis.execution import runner
-from analysis.sweeps.question import command
 from reports.pages import render
 from tests.analysis.small import files_of
 from tests.reports.small import words

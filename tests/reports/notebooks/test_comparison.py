@@ -9,12 +9,12 @@ import pytest
 from scipy import stats
 
 from analysis import load_results, load_study, numbers, run_study
-from analysis.questions import decision_times, head_to_head, regions, summary
-from analysis.questions.missions import FOLDER
+from analysis.answers import comparison, summary
+from analysis.answers.missions import FOLDER
+from analysis.stats.differences import paired
 from analysis.stats.intervals import by_replication
-from analysis.stats.paired import paired
 from dess import InputError
-from reports.pages.running import missions as missions_of_pages
+from reports.pages import kernels
 from tests.reports.small import said_by, shown_by
 
 NAME = "comparison"
@@ -25,7 +25,7 @@ POLICIES = ["random", "greedy", "nearest", "ddqn"]
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("results")
     study = run_study(load_study(NAME, policies=POLICIES, missions=120), folder / NAME)
-    decision_times.make(folder, study)
+    comparison.make(folder, study)
     return folder
 
 
@@ -40,7 +40,7 @@ def text(results: Path) -> str:
 
 def with_studies_of(folder: Path, **changes: Any) -> Path:
     """Results of other missions."""
-    decision_times.make(folder, run_study(load_study(NAME, **changes), folder / NAME))
+    comparison.make(folder, run_study(load_study(NAME, **changes), folder / NAME))
     return folder
 
 
@@ -65,13 +65,13 @@ def test_the_difference_is_computed_anew_from_the_files(text: str, results: Path
 
 def test_the_page_says_what_the_missions_say(text: str, results: Path) -> None:
     study = load_results(results / NAME)
-    pair = head_to_head.pair_of(study)
+    pair = comparison.pair_of(study)
     assert (pair.policy, pair.candidates) == ("ddqn", 3)
     for table in (summary.learned_against_heuristic(study), summary.comparisons(study)):
         for _, row in table.iterrows():
             assert numbers.points(row["difference"], row["low"], row["high"]) in text
-    missions = head_to_head.duels(study, pair)
-    lead = regions.along(missions, pair.candidates)
+    missions = comparison.duels(study, pair)
+    lead = comparison.along(missions, pair.candidates)
     for row in lead.itertuples():
         assert f"n = {numbers.span(lead[lead['field'] == row.field]['n'])} missions per dot" in text
 
@@ -81,7 +81,7 @@ def test_the_worst_missions_are_drawn_by_both_policies(results: Path, tmp_path: 
     assert "a single one (n = 1)" not in said(results)
     (tmp_path / NAME).symlink_to(results / NAME)
     for chosen in ({}, {"learned": "random", "heuristic": "nearest"}):
-        missions_of_pages.make([NAME, "learning"], tmp_path, chosen)
+        kernels.make([NAME, "learning"], tmp_path, chosen)
         shown = shown_by(NAME, results=str(tmp_path), **chosen)
         assert shown.count('alt="Map of mission ') == 4
     assert len([*(tmp_path / FOLDER).glob("*.parquet")]) == 8
@@ -98,7 +98,7 @@ def test_the_worst_missions_are_drawn_by_both_policies(results: Path, tmp_path: 
 
 
 def test_the_times_are_those_that_were_kept(text: str, results: Path) -> None:
-    times = decision_times.read(results, load_results(results / NAME))
+    times = comparison.read(results, load_results(results / NAME))
     assert [cost.policy for cost in times.costs] == POLICIES
     for cost in times.costs:
         shown = f"{cost.policy} {numbers.seconds(cost.median)} {numbers.seconds(cost.slow)}"

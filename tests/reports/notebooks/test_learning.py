@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import t
 
 from analysis.names import PRODUCT
-from analysis.replication import paper
+from analysis.paper import values
 from analysis.stats.verdict import HOLDS, INCONCLUSIVE
 from policies.registry import TRAINED
 from tests.reports.small import said_by
@@ -22,14 +22,14 @@ def test_the_table_of_variants_is_that_of_the_curves() -> None:
     text = said_by("learning")
     equal = curves.groupby("variant")["updates"].transform("max") == 12_000
     ends = ends[ends.index.get_level_values("variant").isin(curves[equal]["variant"])]
-    for variant, values in ends.groupby("variant"):
-        n, mean = len(values), 100 * values.mean()
-        half = t.ppf(0.975, n - 1) * 100 * values.std(ddof=1) / np.sqrt(n) if n > 1 else 0
+    for variant, shares in ends.groupby("variant"):
+        n, mean = len(shares), 100 * shares.mean()
+        half = t.ppf(0.975, n - 1) * 100 * shares.std(ddof=1) / np.sqrt(n) if n > 1 else 0
         interval = f" [{mean - half:.1f}, {mean + half:.1f}]" if half else ""
         assert f"{variant} {n} {mean:.1f} %{interval}" in text
 
 
-@pytest.mark.parametrize(("length", "verdict"), [(paper.CROSSING, HOLDS), (12_000, INCONCLUSIVE)])
+@pytest.mark.parametrize(("length", "verdict"), [(values.CROSSING, HOLDS), (12_000, INCONCLUSIVE)])
 def test_the_learning_page_judges_by_the_curves_it_is_given(
     tmp_path: Path, length: int, verdict: str
 ) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis import load_results
-from analysis.questions import operations
+from analysis.answers import operations
 from tests.by_hand import bounded
 from tests.reports.small import run_small_studies, said_by, words
 

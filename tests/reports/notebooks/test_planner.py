@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from analysis import load_results, load_study, numbers, run_study
+from analysis.answers import comparison, optimality
 from analysis.names import BOUND
-from analysis.questions import decision_times
-from analysis.questions.optimality import gap, planner
 from tests.reports.small import quick, run_small_studies, said_by, words
 
 NAMES = {"planner": "tour", "longer": "greedy", "learner": "random"}
@@ -18,18 +17,18 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("results")
     study = load_study("gap", policies=[*NAMES.values()], missions=30, logged=3)
     with quick():
-        decision_times.make(folder, run_study(study, folder / "gap"))
+        comparison.make(folder, run_study(study, folder / "gap"))
     return folder
 
 
 def test_it_begins_with_the_answer(results: Path) -> None:
     text = said_by("planner", results=str(results), **NAMES)
     study = load_results(results / "gap")
-    table = planner.differences(study, ["tour", "greedy"], "random")
-    answer = words(planner.answer(table, "tour"))
+    table = optimality.differences(study, ["tour", "greedy"], "random")
+    answer = words(optimality.answer(table, "tour"))
     assert text.lstrip().startswith(answer[:60])
-    assert words(gap.in_words(study, "greedy"))[:60] in text
-    row = gap.listed(gap.by_fleet(study)).iloc[0]
+    assert words(optimality.in_words(study, "greedy"))[:60] in text
+    row = optimality.listed(optimality.by_fleet(study)).iloc[0]
     assert row["Gap [points]"] in text
     assert "Collected by tour: means over n = 3 missions" in text
     assert "mission 0" in text or "mission 1" in text or "mission 2" in text
@@ -44,6 +43,6 @@ def test_the_performance_page_has_the_gap_where_the_study_was_run(
     (tmp_path / "gap").symlink_to(results / "gap", target_is_directory=True)
     text = said_by("performance", results=str(tmp_path))
     study = load_results(tmp_path / "gap")
-    assert words(gap.in_words(study))[:60] in text
-    table = gap.by_fleet(study)
-    assert numbers.percent(table[BOUND].iloc[0]) in text or gap.useful(table).empty
+    assert words(optimality.in_words(study))[:60] in text
+    table = optimality.by_fleet(study)
+    assert numbers.percent(table[BOUND].iloc[0]) in text or optimality.useful(table).empty

@@ -2,7 +2,7 @@
 
 import pytest
 
-from analysis.replication.verdict_rules import VERDICTS
+from analysis.paper.measures import VERDICTS
 from tests.reports.small import run_small_studies, shown_by, words
 
 STUDIES = ("table4", "fig4", "fig5", "sweet-spot")

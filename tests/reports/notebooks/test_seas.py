@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from analysis import load_study, run_study
-from analysis.questions import decision_times
-from analysis.questions.optimality import seas
+from analysis.answers import comparison, seas
 from tests.reports.small import quick, said_by, words
 
 NAMES = {"policy": "nearest", "reference": "greedy", "baseline": "tour"}
@@ -15,8 +14,8 @@ def test_it_begins_with_the_answer(tmp_path: Path) -> None:
     study = load_study("seas", policies=[*NAMES.values()], missions=4, design=design)
     with quick():
         results = run_study(study, tmp_path / "seas")
-        decision_times.make(tmp_path, results)
+        comparison.make(tmp_path, results)
     text = said_by("seas", results=str(tmp_path), **NAMES)
-    answer = seas.answer(results, decision_times.read(tmp_path, results), *NAMES.values())
+    answer = seas.answer(results, comparison.read(tmp_path, results), *NAMES.values())
     assert text.lstrip().startswith(words(answer)[:60])
     assert "coast:2" in text

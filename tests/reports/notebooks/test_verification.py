@@ -11,13 +11,13 @@ import pytest
 from scipy import stats
 
 from analysis import load_study, run_study
-from analysis.execution import engines, jobs
+from analysis.execution import jobs
 from analysis.stats.verdict import HOLDS, REFUTED
 from analysis.verification import measurements
 from analysis.verification.measurements import simulate_missions, write
 from dess import simulate, simulate_batch
 from dess.scenario import ScenarioSpace
-from reports.pages.running import missions
+from reports.pages import kernels
 from tests.reports.small import said_by, shown_by, words
 
 NAME = "verification"
@@ -40,7 +40,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run_study(load_study(NAME, **SMALL), folder / NAME)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(measurements, "simulate_missions", partial(simulate_missions, count=10))
-        missions.make([NAME], folder, {})
+        kernels.make([NAME], folder, {})
     run_study(load_study("fig4", policies=["random"], missions=2, logged=1), folder / "fig4")
     return folder
 
@@ -99,10 +99,8 @@ def run_with(folder: Path, monkeypatch: pytest.MonkeyPatch, **changes: Any) -> P
         )
 
     with monkeypatch.context() as patch:
-        patch.setattr(
-            engines, "simulate_batch", lambda s, *a, **k: simulate_batch(other(s), *a, **k)
-        )
-        for module in (engines, jobs):
+        patch.setattr(jobs, "simulate_batch", lambda s, *a, **k: simulate_batch(other(s), *a, **k))
+        for module in (jobs, jobs):
             patch.setattr(module, "simulate", lambda s, *a, **k: simulate(other(s), *a, **k))
         study = run_study(load_study(NAME, **SMALL | {"policies": ["greedy"]}), folder / NAME)
     write(simulate_missions(study, 2), folder)

@@ -12,10 +12,9 @@ from nbclient import NotebookClient
 
 from analysis import load_results, numbers
 from analysis import what_if as ask
+from analysis.ask import what_if as what_if_answer
 from analysis.names import METRICS, PRODUCT
-from analysis.questions.what_if import answer as what_if_answer
-from analysis.questions.what_if import question as what_if
-from analysis.stats.paired import paired
+from analysis.stats.differences import paired
 from reports.pages.notebook import read
 from tests.analysis.small import write_scenario
 from tests.reports.small import said_by
@@ -72,7 +71,7 @@ def test_the_page_says_what_the_missions_say(text: str, results: Any) -> None:
             assert numbers.percent(answer.before) in text and numbers.percent(answer.after) in text
     for line in what_if_answer.conclusions(answers).replace("**", "").splitlines():
         assert line in text
-    assert what_if.command(results) in text
+    assert what_if_answer.command(results) in text
 
 
 @pytest.mark.slow  # test_render.py runs a smaller notebook in Jupyter

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from analysis import run_study
-from reports.pages import keys
-from reports.pages.render import render, render_study
-from reports.pages.running import kernels
+from reports.pages import kernels, render
+from reports.pages.render import render as render_pages
+from reports.pages.render import render_study
 from tests.analysis.small import small_study
 from tests.reports.pages.test_render import MISSION, SCORECARD, results, write_notebooks
 
@@ -38,7 +38,7 @@ class Folder:
 
     def render(self, **parameters: str) -> set[str]:
         self.rendered.clear()
-        render([], self.results, self.out, parameters=parameters, notebooks=self.notebooks)
+        render_pages([], self.results, self.out, parameters=parameters, notebooks=self.notebooks)
         return {*self.rendered}
 
 
@@ -73,15 +73,15 @@ def test_another_notebook_changes_its_page(folder: Folder) -> None:
 def test_other_code_and_libraries_change_all_pages(
     folder: Folder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
-    keys._software.cache_clear()
+    render._software.cache_clear()
     if what == "library":
-        monkeypatch.setattr(keys.metadata, "distributions", list)
+        monkeypatch.setattr(render.metadata, "distributions", list)
     else:
-        root = shutil.copytree(keys.PACKAGES / "reports", tmp_path / "code" / "reports").parent
+        root = shutil.copytree(render.PACKAGES / "reports", tmp_path / "code" / "reports").parent
         (root / "reports" / "templates" / "style.css").write_text("")
-        monkeypatch.setattr(keys, "PACKAGES", root)
+        monkeypatch.setattr(render, "PACKAGES", root)
     assert folder.render() == {"mission", "scorecard"}
-    keys._software.cache_clear()
+    render._software.cache_clear()
 
 
 def test_pages_that_are_altered_or_gone_are_rendered_again(folder: Folder) -> None:

@@ -21,10 +21,10 @@ from nbclient import NotebookClient
 from analysis import load_results, run_study
 from dess import InputError
 from reports.cli import main
+from reports.pages import kernels
 from reports.pages.html import STUDY, embedded
 from reports.pages.notebook import Report
 from reports.pages.render import ReportError, body_of, render
-from reports.pages.running import kernels
 from tests.analysis.small import environment, small_study
 from tests.reports.browser import Visit
 from tests.reports.small import Links, words_of

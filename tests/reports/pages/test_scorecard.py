@@ -7,11 +7,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from analysis.replication import measures
-from analysis.replication.claims import RULES, Claim, Section
-from analysis.replication.measures import Quantity
-from analysis.replication.scorecard import COLUMNS, Finding, Row
-from analysis.replication.verdict_rules import NO_RESULTS
+from analysis.paper import measures
+from analysis.paper.measures import NO_RESULTS, Quantity
+from analysis.paper.scorecard import COLUMNS, RULES, Claim, Finding, Row, Section
 from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from reports.pages.scorecard import answer, as_html, counts
 

@@ -16,7 +16,7 @@ from playwright.sync_api import expect
 
 import reports
 from analysis import load_results
-from analysis.questions.missions import FOLDER
+from analysis.answers.missions import FOLDER
 from dess import InputError
 from reports.pages.html import STUDY, embedded
 from reports.pages.notebook import NAMES, read

@@ -15,17 +15,16 @@ from markupsafe import Markup
 
 from analysis import load_study, run_study
 from analysis.bound import Bound
-from analysis.results.evidence import Evidence, learned_files
+from analysis.results.resimulate import Evidence, learned_files
 from analysis.results.tables import load_results
 from dess import InputError
 from policies.registry import TRAINED
 from reports.cli import main
 from reports.pages import html, verify
-from reports.pages.body import Body
+from reports.pages.body import Body, fill
 from reports.pages.html import STUDY, embedded
 from reports.pages.index import index_of, pages_in
 from reports.pages.notebook import read
-from reports.pages.template import fill
 from reports.pages.verify import sealed, verify_page, verify_results
 from tests.analysis.small import small_study
 from tests.reports.small import made_up, quick

@@ -14,7 +14,7 @@ import pytest
 from nbclient import NotebookClient
 
 from analysis import load_results, run_study
-from analysis.questions import settings
+from analysis.answers import settings
 from dess import InputError
 from reports.pages import html
 from reports.pages.html import STUDY, embedded

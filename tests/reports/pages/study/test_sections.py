@@ -7,9 +7,9 @@ import pytest
 
 from analysis import run_study
 from dess import InputError
+from reports.pages import study
 from reports.pages.notebook import SHIPPED
-from reports.pages.study import words
-from reports.pages.study.sections import TAGS, report_of
+from reports.pages.study import TAGS, report_of
 from tests.analysis.small import grid, small_study
 from tests.reports.small import shown_by
 
@@ -117,11 +117,11 @@ def test_the_title_is_that_of_the_study(tmp_path):
 
 def test_a_metric_or_baseline_that_is_none_is_refused(tmp_path):
     results = run_study(small_study(tmp_path, design=grid(quota=[20, 60])), tmp_path / "out")
-    assert words.metric_of(results, "reward") == "reward"
-    assert words.setting(results, 1) == "communication quota 60"
+    assert study.metric_of(results, "reward") == "reward"
+    assert study.setting(results, 1) == "communication quota 60"
     for metric in ("speed", "", 3):
         with pytest.raises(InputError, match=f"metric: {metric!r} is unknown; allowed: success"):
-            words.metric_of(results, metric)
+            study.metric_of(results, metric)
     for point in (2, -1, "x"):
         with pytest.raises(InputError, match=f"baseline: {point!r} is not a design .*: 0..1$"):
-            words.setting(results, point)
+            study.setting(results, point)

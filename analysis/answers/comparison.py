@@ -1,0 +1,548 @@
+"""Policies compared: wins, regions of the parameters, times of a decision."""
+
+import platform
+from collections.abc import Callable, Iterable, Mapping
+from itertools import product
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+from scipy import stats
+from threadpoolctl import threadpool_limits
+
+from analysis import numbers
+from analysis.answers.missions import FOLDER
+from analysis.answers.summary import learners, ranked_policies
+from analysis.names import METRICS, PARAMETERS, PRODUCT, RATIO, SUCCESS, parameter, value_text
+from analysis.results.provenance import Count, Finite
+from analysis.results.tables import Results
+from analysis.stats.choices import on_front
+from analysis.stats.differences import compare, for_choice, paired, with_adjusted
+from analysis.stats.intervals import by_replication, values_within, wilson
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
+from analysis.study.stopping import Text
+from dess import InputError, simulate, simulate_batch
+from dess.errors import one_of
+from dess.files.documents import Document
+from dess.files.reading import read_text
+from dess.files.writing import check_target, write_file
+from dess.view import View
+from policies.base import Policy
+from policies.registry import load_team
+
+OF_BASELINE = "_baseline"  # suffix of the names of the baseline's metrics
+
+_ROUNDING = 1e-12  # the largest difference between equal results
+
+
+class Pair(NamedTuple):
+    """Two policies to compare.
+
+    Attributes:
+        policy: The policy that is compared with the other one.
+        baseline: The other policy.
+        candidates: Number of pairs among which this pair was chosen, by the same data.
+    """
+
+    policy: str
+    baseline: str
+    candidates: int
+
+
+def pair_of(results: Results, learned: str | None = None, heuristic: str | None = None) -> Pair:
+    """The best learned policy of a study, and the best of the other policies.
+
+    Policies are ranked by mean product. A learner with several trainings
+    is ranked by their mean and represented by its first training, because the best of several
+    trainings would give a biased picture of the learner. If all policies are learned, or none is,
+    the best two policies are compared.
+
+    Args:
+        results: The study.
+        learned: The first policy, in place of the best learned one.
+        heuristic: The second policy, in place of the best of the others.
+
+    Raises:
+        InputError: If the study has fewer than two policies, or lacks a policy that is named.
+    """
+    for name, given in (("learned", learned), ("heuristic", heuristic)):
+        if given is not None and given not in results.policies:
+            allowed = one_of(given, results.policies)
+            raise InputError(f"{name}: {given!r} is not in the study{allowed}")
+    means = by_replication(results.missions, PRODUCT, ["policy", "point"]).mean()
+    means = means.groupby("policy").mean()
+    trained = sorted(learners(results).values(), key=lambda trainings: -means[trainings].mean())
+    ranked, of_learners = ranked_policies(results.missions), {*sum(trained, [])}
+    firsts = [trainings[0] for trainings in trained]
+    others = [policy for policy in ranked if policy not in of_learners]
+    if not firsts or not others:
+        firsts = others = ranked
+    asked = product([learned] if learned else firsts, [heuristic] if heuristic else others)
+    pairs = [pair for pair in asked if pair[0] != pair[1]]
+    if not pairs:
+        raise InputError(
+            f"learned, heuristic: no two policies to compare among {', '.join(results.policies)}; "
+            "allowed: two or more, and not one for both"
+        )
+    return Pair(*pairs[0], len({frozenset(pair) for pair in pairs}))
+
+
+def answer(comparison: pd.DataFrame, missions: pd.DataFrame, pair: Pair) -> str:
+    """By how much a policy is ahead of the other one on average, and in how many missions.
+
+    Args:
+        comparison: The rows of ``overall``.
+        missions: The rows of ``duels``.
+        pair: The policies.
+    """
+    row = comparison.set_index("metric").loc[PRODUCT]
+    share = numbers.percent((missions["difference"] > 0).mean())
+    return (
+        f"The product of {pair.policy} minus that of {pair.baseline} is "
+        f"{numbers.points(*row[['difference', 'low', 'high']])} points on average over "
+        f"{len(missions):,} missions; {pair.policy} is ahead in {share} of them."
+    )
+
+
+def duels(results: Results, pair: Pair) -> pd.DataFrame:
+    """Two policies in the same missions.
+
+    Returns:
+        A row per mission: ``replication``, the parameters (``initial_data`` is the mean over the
+        nodes), ``METRICS`` of the policy, those of the baseline under names that end in
+        ``_baseline``, and ``difference``, by how much the policy is ahead in collection ratio and
+        communication.
+
+    Raises:
+        InputError: If the study has several design points.
+    """
+    if (points := len(results.store.manifest.points)) > 1:
+        name = results.store.manifest.study["name"]
+        raise InputError(f"study {name}: {points} design points; allowed: one for all missions")
+    table = results.missions.assign(
+        initial_data=results.missions["initial"] / len(results.scenario().nodes)
+    )
+    columns = ["replication", *PARAMETERS, *METRICS]
+    of_policy = table.loc[table["policy"] == pair.policy, columns]
+    of_baseline = table.loc[table["policy"] == pair.baseline, ["replication", *METRICS]]
+    both = of_policy.merge(of_baseline, on="replication", suffixes=("", OF_BASELINE))
+    difference = both[PRODUCT] - both[PRODUCT + OF_BASELINE]
+    return both.assign(difference=difference.where(difference.abs() > _ROUNDING, 0.0))
+
+
+def overall(results: Results, pair: Pair) -> pd.DataFrame:
+    """The policy compared with the baseline in every metric, over all missions.
+
+    Returns:
+        A row per metric, as ``stats.paired.compare`` returns it; ``p_adjusted`` also corrects for
+        the choice of the pair.
+    """
+    missions = results.missions[results.missions["policy"].isin(pair[:2])]
+    return for_choice(compare(missions, pair.baseline, [*METRICS]), pair.candidates)
+
+
+def pairing(comparison: pd.DataFrame) -> str:
+    """How many times as many independent missions would give equally narrow intervals.
+
+    Args:
+        comparison: The rows of ``overall``.
+    """
+    reduction = comparison.set_index("metric").loc[PRODUCT, "variance_reduction"]
+    return f"{1 / (1 - reduction):.0f} times as many" if reduction < 1 else "infinitely many"
+
+
+def outcomes(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
+    """A table to print: in how many missions each policy is ahead, and fails alone."""
+    gap = missions["difference"]
+    more = missions[SUCCESS] - missions[SUCCESS + OF_BASELINE]
+    cases = {
+        f"{pair.policy} ahead": gap > 0,
+        "level": gap == 0,
+        f"{pair.policy} behind": gap < 0,
+        f"only {pair.policy} fails": more < 0,
+        f"only {pair.baseline} fails": more > 0,
+    }
+    counts = pd.DataFrame(cases).sum()
+    shares = [numbers.interval(*wilson(count, len(missions))) for count in counts]
+    columns = {"Outcome": counts.index, "Missions": counts.map("{:,}".format), "Share": shares}
+    return pd.DataFrame(columns).reset_index(drop=True)
+
+
+def worst(missions: pd.DataFrame, count: int) -> pd.DataFrame:
+    """The missions of ``duels`` with the policy's lowest product.
+
+    The worst mission is first; among equal ones, the one with the lowest collection ratio.
+    """
+    return missions.sort_values([PRODUCT, RATIO], kind="stable").head(count)
+
+
+def drawn(missions: pd.DataFrame, pair: Pair) -> list[tuple[str, int]]:
+    """The missions to draw: the worst two of ``duels``, each with both policies."""
+    replications = worst(missions, 2)["replication"]
+    return [(policy, int(n)) for n in replications for policy in (pair.policy, pair.baseline)]
+
+
+def most_lost(missions: pd.DataFrame, count: int) -> pd.DataFrame:
+    """The missions of ``duels`` in which the policy is furthest behind, if it is behind."""
+    lost = missions[missions["difference"] < 0]
+    return lost.sort_values("difference", kind="stable").head(count)
+
+
+def depleted(results: Results, policy: str, replications: Iterable[int]) -> int:
+    """The number of UAVs of a policy whose battery is depleted before their quota is filled."""
+    return int(_ends(results, policy, replications)["battery"].sum())
+
+
+def commands(results: Results, policy: str, replications: Iterable[int]) -> list[str]:
+    """The commands that simulate missions again, from the usual results folder, and draw them."""
+    folder = results.usual_folder
+    return [
+        f"{results.command(policy, 0, number, folder)} --figure mission-{number}.png"
+        for number in replications
+    ]
+
+
+def outcome_table(missions: pd.DataFrame, results: Results, pair: Pair) -> pd.DataFrame:
+    """Missions of ``duels`` as a table to print: parameters, and the outcome of both policies."""
+    table = missions.reset_index(drop=True)
+    columns = {("", "Mission"): table["replication"].astype(str)}
+    for field in PARAMETERS:
+        columns["", parameter(field).short] = table[field].map("{:.3g}".format)
+    columns["", "Points"] = table["difference"].map(lambda gap: numbers.difference(gap, 0))
+    for policy, end in ((pair.policy, ""), (pair.baseline, OF_BASELINE)):
+        ends = _ends(results, policy, table["replication"])
+        filled = [f"{quota} of {n}" for quota, n in ends[["quota", "all"]].to_numpy()]
+        columns[policy, "Success"] = table[SUCCESS + end].map({1: "yes", 0: "no"})
+        columns[policy, "Quotas"] = pd.Series(filled, dtype=object)
+        columns[policy, "Collected"] = table[RATIO + end].map(numbers.percent)
+    return pd.DataFrame(columns)
+
+
+def _ends(results: Results, policy: str, replications: Iterable[int]) -> pd.DataFrame:
+    """How the UAVs of missions end: a row per mission, and a column of counts per kind of end."""
+    uavs = results.uavs[results.uavs["policy"] == policy]
+    ends = pd.crosstab(uavs["replication"], uavs["end"], margins=True, margins_name="all")
+    return ends.reindex([*replications], columns=["quota", "battery", "all"], fill_value=0)
+
+
+BINS = 5  # largest number of bins of a parameter
+
+AHEAD, BEHIND = "ahead", "behind"
+VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}
+
+
+def varied(missions: pd.DataFrame) -> list[str]:
+    """The parameters that differ between the missions of ``duels``."""
+    return [field for field in PARAMETERS if missions[field].nunique() > 1]
+
+
+def bins(values: pd.Series, most: int = BINS) -> tuple[np.ndarray, list[str]]:
+    """Divide values into at most ``most`` bins: one per value if possible, else by quantiles.
+
+    Returns:
+        (n,) the bin of each value, and the names of the bins, from the lowest on.
+    """
+    array = values.to_numpy()
+    distinct = np.unique(array)
+    edges = distinct[:-1]
+    if len(distinct) > most:
+        edges = np.quantile(array, np.arange(1, most) / most)
+    _, codes = np.unique(np.searchsorted(edges, array), return_inverse=True)
+    return codes, [_range_text(array[codes == code]) for code in range(codes.max() + 1)]
+
+
+def along(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
+    """The mean difference along every parameter that varies.
+
+    Args:
+        missions: Rows of ``duels``.
+        candidates: Number of pairs among which the two policies were chosen.
+
+    Returns:
+        A row per parameter and bin; a parameter has at most ``BINS`` bins of about equally many
+        missions. The columns are ``field``, ``position``, ``value`` in words, and those of a
+        comparison: ``mean``, ``low``, ``high`` (by ``paired``, 95 %), ``p``, ``p_adjusted``
+        (Holm over all rows, Bonferroni for the choice of the pair), ``verdict``, ``n``, and
+        ``behind``, the share of missions in which the policy is worse, with ``behind_low`` and
+        ``behind_high``.
+    """
+    parts = [missions[:0].assign(field="", position=0, value="")]
+    for field in varied(missions):
+        part = _binned(missions, field).assign(field=field)
+        parts.append(part.sort_values("position", kind="stable"))
+    return _compared(pd.concat(parts), ["field", "position", "value"], candidates)
+
+
+def dependence(missions: pd.DataFrame) -> pd.DataFrame:
+    """Whether the difference depends on each parameter.
+
+    Returns:
+        A row per parameter that varies, the one that explains most first: ``field``, ``explained``
+        (share of the variance between the bins of ``along``), ``p`` (Alexander and Govern's test
+        of equal means, which lets the variances differ; 1 where the data are too few) and
+        ``p_adjusted`` (Holm).
+    """
+    rows = []
+    difference = missions["difference"]
+    total = float(difference.var(ddof=0))
+    for field in varied(missions):
+        groups = difference.groupby(bins(missions[field])[0])
+        between = float(groups.transform("mean").var(ddof=0))
+        rows.append((field, between / total if total else 0.0, _equal_means(groups)))
+    table = pd.DataFrame(rows, columns=["field", "explained", "p"])
+    return with_adjusted(table, "holm").sort_values(
+        "explained", ascending=False, kind="stable", ignore_index=True
+    )
+
+
+def spread(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFrame:
+    """How the difference depends on every parameter, as a table to print.
+
+    Args:
+        lead: Rows of ``along``.
+        dependences: Rows of ``dependence``.
+    """
+    lines = []
+    for row in dependences.itertuples():
+        rows = lead[lead["field"] == row.field].sort_values("mean", kind="stable")
+        bins_ = [f"{_points(one)} at {one.value}" for one in rows.itertuples()]
+        shown = numbers.percent(row.explained), numbers.p_value(row.p_adjusted)
+        lines.append((parameter(row.field).name, bins_[0], bins_[-1], *shown))
+    heads = ["Parameter", "Lowest difference", "Highest difference", "Variance explained"]
+    return pd.DataFrame(lines, columns=[*heads, "p, adjusted"])
+
+
+def _compared(missions: pd.DataFrame, columns: list[str], candidates: int) -> pd.DataFrame:
+    """A row for every group of missions with the same labels: the labels and the comparison."""
+    rows = []
+    for labels, part in missions.groupby(columns, sort=False):
+        of_policy, of_baseline = (
+            values_within(part, PRODUCT + end, ()) for end in ("", OF_BASELINE)
+        )
+        pair = paired(of_policy, of_baseline, metric=PRODUCT)
+        behind = wilson(int((part["difference"] < 0).sum()), len(part))
+        rows.append((*labels, pair.difference, pair.low, pair.high, pair.p, len(part), *behind))
+    names = ["mean", "low", "high", "p", "n", "behind", "behind_low", "behind_high"]
+    table = pd.DataFrame(rows, columns=[*columns, *names])
+    table = for_choice(with_adjusted(table, "holm"), candidates)
+    sides = zip(table["mean"], table["p_adjusted"], strict=True)
+    return table.assign(verdict=[VERDICTS[position_by_test(*side)] for side in sides])
+
+
+def _binned(missions: pd.DataFrame, field: str) -> pd.DataFrame:
+    """The missions with ``position`` and ``value``, the number and the name of a field's bin."""
+    codes, names = bins(missions[field])
+    return missions.assign(position=codes, value=np.array(names)[codes])
+
+
+def _equal_means(groups: Any) -> float:
+    """The p-value of equal means; 1 if fewer than two groups have different values."""
+    samples = [group.to_numpy() for _, group in groups if np.ptp(group) > 0]
+    return float(stats.alexandergovern(*samples).pvalue) if len(samples) > 1 else 1.0
+
+
+def _range_text(values: np.ndarray) -> str:
+    """The range of values: ``3``, ``70–72``, or ``11.7–12.1``, rounded."""
+    ends = [float(f"{end:.3g}") for end in (values.min(), values.max())]
+    return value_text(ends if ends[0] < ends[1] else ends[0])
+
+
+def _points(row: Any) -> str:
+    return numbers.points(row.mean, row.low, row.high)
+
+
+CALLS = 60  # calls of every policy that are timed at least: those of about one mission
+# In batches: the most design points, and the missions of each that are simulated side by side; one
+# of a policy that is too slow for many (``Policy.chunk``).
+POINTS, SIDE_BY_SIDE = 20, 16
+SLOW = 0.95  # the quantile that is reported for slow calls
+
+Seconds = Annotated[Finite, Field(gt=0, le=1e6)]
+Clock = Callable[[], float]
+# Called with the number of policies done and of all policies.
+Progress = Callable[[int, int], None]
+
+
+class Cost(Document):
+    """The time of a call of ``Policy.act``, which decides for all UAVs of a mission that must act.
+
+    Attributes:
+        policy: The team.
+        calls: The number of calls.
+        median: Their median time [s].
+        slow: The ``SLOW`` quantile of their times [s].
+        batch: The mean time of the decision for one UAV, where many missions are simulated side by
+            side [s]; None where only the SimPy engine can simulate them.
+    """
+
+    policy: Text
+    calls: Count
+    median: Seconds
+    slow: Seconds
+    batch: Seconds | None = None
+
+
+class Times(Document):
+    """The measured times of a study's policies, and the processor on which they were measured."""
+
+    processor: Text
+    costs: list[Cost] = Field(max_length=10_000)
+
+
+def make(folder: str | Path, results: Results, progress: Progress | None = None) -> None:
+    """Measure the times and write them, unless the folder has those of this study.
+
+    Args:
+        folder: A folder that contains a results folder per study.
+        results: The results of the study.
+        progress: Called after every policy.
+
+    Raises:
+        InputError: If the times cannot be written.
+    """
+    path = _file(folder, results)
+    if not path.exists():
+        check_target(path)
+        write_file(path, measure(results, progress=progress).model_dump_json(indent=1))
+
+
+def read(folder: str | Path, results: Results) -> Times:
+    """Read the times that ``make`` has written.
+
+    Raises:
+        InputError: If there are none, or they are damaged.
+    """
+    return Times.load(_file(folder, results), "allowed: what is made by: dess report")
+
+
+def _file(folder: str | Path, results: Results) -> Path:
+    return Path(folder, FOLDER, f"times-{results.store.manifest.key}.json")
+
+
+def measure(
+    results: Results, clock: Clock = perf_counter, progress: Progress | None = None
+) -> Times:
+    """Measure the times of a study's policies: one mission at a time, on one thread.
+
+    Policies that cannot be loaded here are left out, and so are classes of Python files, since
+    anybody may have made the results.
+
+    Args:
+        results: The results of the study.
+        clock: Returns the time [s].
+        progress: Called after every policy.
+    """
+    costs = []
+    for done, policy in enumerate(results.policies, 1):
+        try:
+            team = load_team(str(policy))  # for plain text, no file is run
+        except InputError:
+            team = []
+        if team:
+            seconds = _calls(team, results, clock)
+            median, slow = np.quantile(seconds, [0.5, SLOW]).tolist()
+            batch = _in_batches(team, results, clock)
+            costs.append(
+                Cost(policy=policy, calls=len(seconds), median=median, slow=slow, batch=batch)
+            )
+        if progress:
+            progress(done, len(results.policies))
+    return Times(processor=_processor(), costs=costs)
+
+
+def _calls(team: list[Policy], results: Results, clock: Clock) -> list[float]:
+    """The times of the calls of a team [s], in as many whole missions as ``CALLS`` calls take."""
+    calls: list[float] = []
+    timed = [_Timed(policy, clock, calls) for policy in team]
+    space, seed, replication = results.scenario(), results.store.manifest.seed, 0
+    with threadpool_limits(1):
+        while len(calls) < CALLS:
+            simulate(space, timed, seed, replication)
+            replication += 1
+    return calls
+
+
+def _in_batches(team: list[Policy], results: Results, clock: Clock) -> float | None:
+    """The mean time of a decision [s], over design points that are spread over the design."""
+    scenarios, seed = results.store.manifest.scenarios, results.store.manifest.seed
+    if any(space.needs_events for space in scenarios):
+        return None
+    calls: list[float] = []
+    timed = [_Timed(policy, clock, calls) for policy in team]
+    missions = 1 if any(hasattr(policy, "chunk") for policy in team) else SIDE_BY_SIDE
+    with threadpool_limits(1):
+        for space in scenarios[:: -(-len(scenarios) // POINTS)]:
+            simulate_batch(space, timed, seed, range(missions))
+    return sum(calls) / max(sum(policy.decisions for policy in timed), 1)
+
+
+class _Timed:
+    """A policy whose calls are timed; the first one is made twice, since it compiles and loads."""
+
+    def __init__(self, policy: Policy, clock: Clock, calls: list[float]):
+        self.name, self.policy, self.clock, self.calls = policy.name, policy, clock, calls
+        self.decisions = 0
+
+    def act(self, view: View) -> np.ndarray:
+        """Return the actions of the policy, and note the time."""
+        if not self.calls:
+            self.policy.act(view)
+        begin = self.clock()
+        actions = self.policy.act(view)
+        self.calls.append(self.clock() - begin)
+        self.decisions += len(view)
+        return actions
+
+
+def _processor() -> str:
+    """The model of the processor, as the operating system names it."""
+    try:
+        lines = read_text(Path("/proc/cpuinfo")).splitlines()
+    except (OSError, InputError):
+        lines = []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return next(filter(None, [*models, platform.processor(), platform.machine()]), "unknown")
+
+
+def front(means: pd.DataFrame, seconds: Mapping[str, float | None]) -> pd.DataFrame:
+    """The policies that were timed, the fastest first, with their times and the Pareto front.
+
+    Args:
+        means: A row per policy, with the ``mean`` of what it reaches.
+        seconds: The time of a decision of policies [s].
+
+    Returns:
+        The rows of these policies, with ``seconds`` and ``on_front``: whether no other policy is at
+        least as fast and as good, and better in one of the two.
+    """
+    table = means.assign(seconds=means["policy"].map(seconds)).dropna()
+    table = table.sort_values("seconds", ignore_index=True)
+    return table.assign(on_front=on_front(table["seconds"].to_numpy(), table["mean"].to_numpy()))
+
+
+def time_table(times: Times) -> pd.DataFrame:
+    """The times as a table to print, with a row per policy."""
+    return pd.DataFrame(
+        {
+            "Policy": cost.policy,
+            "Median": numbers.seconds(cost.median),
+            "95 % below": numbers.seconds(cost.slow),
+            "Calls": f"{cost.calls:,}",
+            "In batches, per UAV": numbers.seconds(cost.batch) if cost.batch else "",
+        }
+        for cost in times.costs
+    )
+
+
+def remarks(times: Times, results: Results, pair: Pair) -> str:
+    """On what decisions were timed, how a pair of policies compares, and what was not timed."""
+    medians = {cost.policy: cost.median for cost in times.costs}
+    text = f"Measured once, on one core of a processor {times.processor}."
+    if {pair.policy, pair.baseline} <= medians.keys():
+        ratio = medians[pair.policy] / medians[pair.baseline]
+        text += f" {pair.policy} takes {ratio:,.3g} times as long as {pair.baseline}."
+    missing = [policy for policy in results.policies if policy not in medians]
+    return text + f" Not timed: {numbers.words(missing)}." * bool(missing)

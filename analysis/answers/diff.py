@@ -1,0 +1,245 @@
+"""Compare two results folders, mission by mission: the effect of changed code or weights.
+
+    found = diff(load_results("results/before"), load_results("results/after"))
+    found.identical, found.changed, effects(found)
+
+A mission is in both folders if policy, scenario, seed and replication are the same. Then it has the
+same random draws in both, so that every difference is an effect of the change.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from analysis.answers.summary import settings
+from analysis.names import METRICS, PRODUCT, RATIO, REWARD
+from analysis.results.chunks import check_parts
+from analysis.results.provenance import differing
+from analysis.results.tables import Results
+from analysis.stats.differences import compare
+from dess import InputError
+from dess.record import MISSION_RECORD, OPERATIONS, UAV_RECORD
+
+_KEYS = ["team", "scenario", "replication"]  # columns by which missions are matched
+_MISSION_FIELDS = [n for n in MISSION_RECORD.names or () if n not in ("seed", "replication")]
+_MISSION_FIELDS += OPERATIONS.names or ()
+_UAV_FIELDS = [*(UAV_RECORD.names or ())]
+_ORDER = [PRODUCT, RATIO, REWARD]  # metrics by whose changes missions are sorted
+
+
+@dataclass(frozen=True, eq=False)
+class Diff:
+    """The differences between two results folders.
+
+    Attributes:
+        a: The results of A.
+        b: The results of B.
+        missions: A row per mission that both have, in the order of A: ``fields`` (the names of
+            those that differ in the records of the mission and of its UAVs, empty if none does),
+            ``replication``, and with ``_a`` and ``_b`` each ``policy``, ``point`` and the fields of
+            ``MISSION_RECORD`` and ``OPERATIONS`` (nan where not measured).
+        alone: The missions that only one folder has: ``only_in`` (``A`` or ``B``), ``what`` they
+            are, and the number ``missions``.
+    """
+
+    a: Results
+    b: Results
+    missions: pd.DataFrame
+    alone: pd.DataFrame
+
+    @property
+    def identical(self) -> bool:
+        """Whether both have the same missions, and their records are the same bit for bit."""
+        return self.changed.empty and self.alone.empty
+
+    @cached_property
+    def changed(self) -> pd.DataFrame:
+        """The missions that differ, the most changed first: by product, ratio, then reward."""
+        rows = self.missions[self.missions["fields"] != ""]
+        sizes = {name: (rows[f"{name}_b"] - rows[f"{name}_a"]).abs() for name in _ORDER}
+        order = pd.DataFrame(sizes).sort_values(_ORDER, ascending=False, kind="stable").index
+        return rows.loc[order].reset_index(drop=True)
+
+
+def diff(a: Results, b: Results) -> Diff:
+    """Compare two results, mission by mission.
+
+    If each has a single policy, the two policies are compared, whatever their names are; otherwise
+    policies of the same name are compared. Two design points are the same if their scenarios are
+    equal in all fields. Missions that check a selection are compared as well.
+
+    Raises:
+        InputError: If the seeds differ, or no mission is in both.
+    """
+    both = f"{a.store.folder} and {b.store.folder}"
+    seeds = a.store.manifest.seed, b.store.manifest.seed
+    if seeds[0] != seeds[1]:
+        raise InputError(
+            f"{both}: their seeds {seeds[0]} and {seeds[1]} give different random draws; "
+            "allowed: two results folders of one seed"
+        )
+    single = len(a.policies) == len(b.policies) == 1
+    teams = dict(zip(b.policies, a.policies if single else b.policies, strict=True))
+    of_a, of_b = _scenarios(a, b)
+    missions_a = _missions(a, {name: name for name in a.policies}, of_a)
+    missions_b = _missions(b, teams, of_b)
+    alone = [_alone("A", a, missions_a, missions_b), _alone("B", b, missions_b, missions_a)]
+    common = missions_a.merge(missions_b, on=_KEYS, suffixes=("_a", "_b"))
+    if common.empty:
+        lacking = ", ".join(f"only {rows['only_in'][0]} has {rows['what'][0]}" for rows in alone)
+        raise InputError(f"{both}: no mission is in both: {lacking}; allowed: {_ALLOWED}")
+    numbered = common[_KEYS].assign(mission=np.arange(len(common)))
+    uavs = [_uavs(a, missions_a, numbered), _uavs(b, missions_b, numbered)]
+    pairs = uavs[0].merge(uavs[1], on=["mission", "uav"], how="outer", suffixes=("_a", "_b"))
+    common.insert(0, "fields", _differing_fields(common, pairs))
+    return Diff(a, b, common.drop(columns=_KEYS[:2]), pd.concat(alone, ignore_index=True))
+
+
+_ALLOWED = "results folders that share policies, scenarios and replications"
+
+
+def effects(found: Diff, by: Sequence[str] = ("policy_a",)) -> pd.DataFrame:
+    """The paired differences B - A over the missions that both folders have.
+
+    Args:
+        found: The result of ``diff``.
+        by: The columns that form groups: ``policy_a``, or ``policy_a`` and ``point_a``.
+
+    Returns:
+        A row per group and metric, the group with most differing missions first: the columns
+        ``by``, ``missions``, ``differ`` (number of missions that differ), ``metric``, and the
+        columns that follow ``metric`` in ``analysis.compare``.
+    """
+    groups = found.missions.assign(differ=found.missions["fields"] != "").groupby([*by])
+    counts = groups["differ"].agg(missions="size", differ="sum").reset_index()
+    keys, sides = ["policy_a", "point_a", "replication"], []
+    for side in "ab":
+        metrics = {f"{name}_{side}": name for name in METRICS}
+        metrics["uavs_a"] = "uavs"  # by which means are post-stratified
+        side_missions = found.missions[[*keys, *metrics]].rename(columns=metrics)
+        sides.append(side_missions.assign(policy=side, point=side_missions["point_a"]))
+    table = compare(pd.concat(sides), "a", [*METRICS], by).drop(columns=["policy", "baseline"])
+    ordered = counts.merge(table, on=[*by])
+    return ordered.sort_values("differ", ascending=False, kind="stable", ignore_index=True)
+
+
+def most_changed(found: Diff, missions: int) -> pd.DataFrame:
+    """The most changed missions, with the commands that simulate them again.
+
+    Returns:
+        The first rows of ``changed`` with ``command_a`` and ``command_b``.
+    """
+    rows = found.changed[:missions]
+    for side, results in (("a", found.a), ("b", found.b)):
+        which = rows[[f"policy_{side}", f"point_{side}", "replication"]]
+        asked, folder = which.itertuples(index=False), results.store.folder
+        commands = [results.command(p, point, n, folder) for p, point, n in asked]
+        rows = rows.assign(**{f"command_{side}": commands})
+    return rows
+
+
+def origins(found: Diff) -> list[str]:
+    """In what the origins of the two results differ, with a line for each part."""
+    a, b = found.a.store.manifest, found.b.store.manifest
+    modules = sorted({*differing(a.code, b.code), *differing(b.code, a.code)})
+    teams = {(row.policy_a, row.policy_b): None for row in _policies(found).itertuples()}
+    weights_a, weights_b = ({t.policy: t.weights for t in m.policies} for m in (a, b))
+    changed = [" and ".join({p: None, q: None}) for p, q in teams if weights_a[p] != weights_b[q]]
+    names = [n for n in {**a.libraries, **b.libraries} if a.libraries.get(n) != b.libraries.get(n)]
+    libraries = [f"{n} {a.libraries.get(n, '-')} and {b.libraries.get(n, '-')}" for n in names]
+    parts = {
+        "version": [f"{a.version} and {b.version}"] if a.version != b.version else [],
+        "code": modules,
+        "weights": changed,
+        "libraries": libraries,
+        "accepted in A": [change.text for change in a.accepted],
+        "accepted in B": [change.text for change in b.accepted],
+    }
+    return [f"{part}: {', '.join(words)}" for part, words in parts.items() if words]
+
+
+def at_hand(results: Results) -> str:
+    """In words: whether the code, weights and libraries of this process made the results."""
+    try:
+        changes = results.store.manifest.changes_here()
+    except InputError as error:
+        changes = [str(error)]
+    return "; ".join(changes) or "made by the code, weights and libraries that are here"
+
+
+def _policies(found: Diff) -> pd.DataFrame:
+    """The pairs of policies that are compared."""
+    return found.missions[["policy_a", "policy_b"]].drop_duplicates()
+
+
+def _scenarios(a: Results, b: Results) -> tuple[np.ndarray, np.ndarray]:
+    """A number for the scenario of every design point, the same for equal scenarios."""
+    texts = [[s.model_dump_json() for s in r.store.manifest.scenarios] for r in (a, b)]
+    numbers, _ = pd.factorize(np.array([*texts[0], *texts[1]], object))
+    return numbers[: len(texts[0])], numbers[len(texts[0]) :]
+
+
+def _missions(results: Results, teams: Mapping[str, str], scenarios: np.ndarray) -> pd.DataFrame:
+    """All missions with the columns that match them; equal design points count once."""
+    rows = pd.concat([results.missions, results.checks], ignore_index=True)
+    rows = rows.reindex(columns=["policy", "point", "replication", *_MISSION_FIELDS])
+    rows = rows.assign(team=rows["policy"].map(teams), scenario=scenarios[rows["point"]])
+    return rows.drop_duplicates(_KEYS, ignore_index=True)
+
+
+def _uavs(results: Results, missions: pd.DataFrame, numbered: pd.DataFrame) -> pd.DataFrame:
+    """The UAVs of the numbered missions."""
+    manifest, tables = results.store.manifest, [results.uavs]
+    for number, policy in enumerate(results.policies):
+        if parts := check_parts(manifest, number):
+            tables.append(results.store.uavs(parts).assign(policy=policy))
+    which = missions[["policy", "point", *_KEYS]].merge(numbered, on=_KEYS)
+    which = which[["policy", "point", "replication", "mission"]]
+    rows = pd.concat(tables, ignore_index=True).merge(which)
+    return rows[["mission", "uav", *_UAV_FIELDS]]
+
+
+def _differing_fields(missions: pd.DataFrame, uavs: pd.DataFrame) -> np.ndarray:
+    """For every mission the names of the fields that differ; fields of UAVs are ``uav quota``."""
+    differ = np.zeros((len(missions), len(_MISSION_FIELDS) + len(_UAV_FIELDS)), bool)
+    for column, name in enumerate(_MISSION_FIELDS):
+        differ[:, column] = _differs(missions, name)
+    for column, name in enumerate(_UAV_FIELDS, len(_MISSION_FIELDS)):
+        differ[uavs["mission"].to_numpy()[_differs(uavs, name)], column] = True
+    names = np.array([*_MISSION_FIELDS, *(f"uav {name}" for name in _UAV_FIELDS)])
+    patterns, which = np.unique(differ, axis=0, return_inverse=True)
+    return np.array([", ".join(names[pattern]) for pattern in patterns], object)[which.ravel()]
+
+
+def _differs(pairs: pd.DataFrame, name: str) -> np.ndarray:
+    """For every mission, whether a field of A and B differs in any bit."""
+    a, b = (pairs[f"{name}_{side}"] for side in "ab")
+    if not pd.api.types.is_numeric_dtype(a):
+        return (a != b).to_numpy()
+    bits = [np.ascontiguousarray(values, float).view(np.int64) for values in (a, b)]
+    return (bits[0] != bits[1]) & ~(a.isna() & b.isna()).to_numpy()  # nan: not measured
+
+
+def _alone(
+    side: str, results: Results, missions: pd.DataFrame, others: pd.DataFrame
+) -> pd.DataFrame:
+    """What only one side has: complete policies, complete design points, or replications."""
+    found = missions[_KEYS].merge(others[_KEYS], how="left", indicator="found")["found"]
+    rows = missions[found.to_numpy() != "both"]
+    scenario = f"the scenario of study {results.manifest['study']['name']}"
+    words = pd.Series([setting or scenario for setting in settings(results)])
+    points, no_policy = rows["point"].map(words), ~rows["team"].isin(others["team"])
+    no_point = ~rows["scenario"].isin(others["scenario"])
+    cells = "policy " + rows["policy"] + " at " + points
+    what = cells.mask(no_point, points).mask(no_policy, "policy " + rows["policy"])
+    groups = rows.assign(part=~no_policy & ~no_point).groupby(what.rename("what"), sort=False)
+    spans = groups.agg(part=("part", "all"), missions=("part", "size"))
+    first, last = groups["replication"].min(), groups["replication"].max()
+    replications = ", replications " + first.astype(str) + " to " + last.astype(str)
+    names = spans.index.to_series() + replications.where(spans["part"], "")
+    return pd.DataFrame(
+        {"only_in": side, "what": [*names], "missions": spans["missions"].to_numpy(int)}
+    )

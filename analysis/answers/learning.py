@@ -1,0 +1,522 @@
+"""Training: its curves, what a choice of the trainer is worth, and trained policies."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from scipy import stats
+
+from analysis import numbers
+from analysis.answers.summary import learners, settings
+from analysis.names import MEANS, METRICS, PRODUCT, RATIO, SHARES, SUCCESS
+from analysis.results.tables import Results
+from analysis.stats.differences import adjust
+from analysis.stats.intervals import LEVEL, Interval, mean_interval
+from analysis.stats.verdict import INCONCLUSIVE, MARKS, above, judged, position
+from dess import InputError
+from dess.errors import one_of
+from dess.files.reading import paths_in
+from dess.files.tables import read_table
+from policies.ddqn.config import TrainingConfig, learner_of
+from policies.ddqn.description import read_description
+
+BASELINE = "quick"  # the variant with which the others of the shipped curves are compared
+SHIPPED = "ddqn"  # the variant of the shipped policy, which is trained longer
+LEARNED = 0.5  # a training with at least this success has learned to charge
+# From the paper's methods to the shipped policy: variants, by what each adds to the one before.
+LADDER = {
+    "the paper's methods": "none of the three",
+    "the same, 8 times the updates": "none of the three, long",
+    "with the return guard": "no low-battery starts, no early returns",
+    "and low-battery starts": "no early returns",
+    "and early returns (quick)": BASELINE,
+    f"{SHIPPED}, trained longer": SHIPPED,
+}
+
+
+def finals(curves: pd.DataFrame) -> pd.DataFrame:
+    """The last row of every training, which has the metrics of the selected weights."""
+    return curves.groupby(["variant", "seed"], sort=False, as_index=False).last()
+
+
+def of_equal_budget(last: pd.DataFrame, baseline: str) -> pd.DataFrame:
+    """Those of ``finals`` that have made as many updates as the trainings of the baseline."""
+    budget = last.loc[last["variant"] == baseline, "updates"].max()
+    return last[last["updates"] == budget]
+
+
+def ladder(last: pd.DataFrame) -> pd.DataFrame:
+    """Those of ``finals`` whose variants are in ``LADDER``, in its order, by what they add."""
+    rungs = {variant: rung for rung, variant in LADDER.items()}
+    named = last[last["variant"].isin(rungs)].replace({"variant": rungs})
+    return named.sort_values("variant", key=lambda names: names.map([*LADDER].index), kind="stable")
+
+
+def ablation(last: pd.DataFrame, metric: str, baseline: str, level: float = LEVEL) -> pd.DataFrame:
+    """The final metric of every variant, and its difference from the baseline.
+
+    Args:
+        last: Rows of ``finals``.
+        metric: The column of the final metric.
+        baseline: The variant with which the others are compared.
+        level: Confidence level.
+
+    Returns:
+        A row per variant, the highest mean first: ``variant``, ``n`` trainings; ``mean``, ``low``,
+        ``high`` of the expected result; ``new_low`` and ``new_high`` of one new training (nan with
+        one training; the ends for metrics from 0 to 1 are cut there); ``difference``,
+        ``difference_low``, ``difference_high``, ``p`` and ``p_adjusted`` (Holm), of ``difference``;
+        nan for the baseline.
+    """
+    values = {v: part[metric].to_numpy() for v, part in last.groupby("variant", sort=False)}
+    limits = (0.0, 1.0) if metric.removeprefix("final_") in METRICS else (-np.inf, np.inf)
+    rows = []
+    for variant, sample in values.items():
+        mean, _, high = mean_interval(sample, level)
+        alone, half = len(sample) == 1, high - mean
+        room = np.array([-half, half, *(np.sqrt(len(sample) + 1) * np.array([-half, half]))])
+        ends = np.full(4, np.nan) if alone else np.clip(mean + room, *limits)
+        gap, p = Interval(np.nan, np.nan, np.nan), np.nan
+        if variant != baseline:
+            gap, p = difference(sample, values[baseline], level)
+        rows.append((variant, len(sample), mean, *ends, *gap, p))
+    columns = ["variant", "n", "mean", "low", "high", "new_low", "new_high"]
+    columns += ["difference", "difference_low", "difference_high", "p"]
+    table = pd.DataFrame(rows, columns=columns)
+    known = table["p"].notna()
+    table.loc[known, "p_adjusted"] = adjust(table.loc[known, "p"].to_numpy(), "holm")
+    return table.sort_values("mean", ascending=False, kind="stable", ignore_index=True)
+
+
+def answer(rungs: pd.DataFrame) -> str:
+    """What the methods add up to, and which adds most, in a sentence.
+
+    Args:
+        rungs: Rows of ``ladder``.
+    """
+    by_rung = rungs.groupby("variant", sort=False)
+    means = by_rung[f"final_{PRODUCT}"].mean()
+    reached = [f"{numbers.percent(mean)} ({rung})" for rung, mean in means.items()]
+    if len(reached) == 1:
+        return f"Trainings reach a product of {reached[0]}."
+    learned = by_rung[f"final_{SUCCESS}"].agg(lambda shares: (shares > LEARNED).sum())
+    counts = [
+        f"{count} of {n} ({rung})"
+        for rung, count, n in zip(means.index, learned, by_rung.size(), strict=True)
+    ]
+    return (
+        f"The product rises from {reached[0]} to {reached[-1]}; the largest step: "
+        f"{means.diff().idxmax()}. "
+        f"Trainings that learn to charge: {numbers.words(counts[:3])}."
+    )
+
+
+def difference(
+    a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray, level: float = LEVEL
+) -> tuple[Interval, float]:
+    """The mean of A minus the mean of B, over independent trainings (Welch's t).
+
+    If one of the two is a single training, Student's t with the standard deviation of the other is
+    used; the interval then contains 0 if the single value could be one more training of the other.
+
+    Returns:
+        The interval and the p-value. The ends are nan if both are single trainings, and equal to
+        the difference if all trainings of each side agree. The p-value is 1 if it is unknown.
+    """
+    a, b = np.asarray(a, float), np.asarray(b, float)
+    gap = float(a.mean() - b.mean())
+    if a.size + b.size < 3:
+        return Interval(gap, np.nan, np.nan), 1.0
+    if np.ptp(a) == np.ptp(b) == 0:
+        return Interval(gap, gap, gap), 1.0
+    test = stats.ttest_ind(a, b, equal_var=min(a.size, b.size) == 1)
+    ends = test.confidence_interval(level)
+    return Interval(gap, float(ends.low), float(ends.high)), float(test.pvalue)
+
+
+def ablation_table(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> pd.DataFrame:
+    """The rows of ``ablation`` for product, as a table of text.
+
+    Args:
+        table: Rows of ``ablation``.
+        last: Rows of ``finals``, for the means of the other metrics.
+        baseline: The variant with which the others are compared.
+    """
+    means = last.groupby("variant")[[f"final_{SUCCESS}", f"final_{RATIO}"]].mean()
+    others = means.loc[table["variant"]].map(numbers.percent).to_numpy()
+    gaps = table[["difference", "difference_low", "difference_high"]].to_numpy()
+    columns = {
+        "Variant": table["variant"],
+        "n": table["n"],
+        METRICS[PRODUCT]: [*map(_interval, table["mean"], table["low"], table["high"])],
+        "One new training": [
+            _interval(*ends).partition(" % ")[2]
+            for ends in table[["mean", "new_low", "new_high"]].to_numpy()
+        ],
+        f"Difference from {baseline} [points]": [
+            f"{numbers.points(*gap)} {MARKS[position(Interval(*gap))]}" if gap[0] == gap[0] else ""
+            for gap in gaps
+        ],
+        "p (Holm)": table["p_adjusted"].map(numbers.p_value, na_action="ignore"),
+        METRICS[SUCCESS]: others[:, 0],
+        METRICS[RATIO]: others[:, 1],
+    }
+    return pd.DataFrame(columns)
+
+
+def _interval(mean: float, low: float, high: float) -> str:
+    """A mean with its interval, if it has one with a length."""
+    return numbers.interval(mean, low, high) if low < high else numbers.percent(mean)
+
+
+# The metric that is evaluated while training.
+LEARNED_REWARD, LEARNED_PRODUCT = (
+    "evaluation_reward",
+    "evaluation_collection_ratio_and_communication",
+)
+# Pairs of variants of the shipped curves, with and without transfer learning, by what both have in
+# common otherwise.
+PAIRS = {
+    "all methods of this project": ("quick", "no transfer"),
+    "no return guard": ("no guard", "no guard, no transfer"),
+    "the paper's methods alone": ("none of the three", "none of the three, no transfer"),
+    "the paper's methods alone, long": (
+        "none of the three, long",
+        "none of the three, no transfer, long",
+    ),
+}
+# Weight of the newest evaluation in the exponential moving average.
+ALPHA = 0.5
+# Level of the intervals of the paper's Fig. 3.
+BAND = 0.99
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """How trainings with transfer learning compare with those without it.
+
+    Attributes:
+        verdict: Of ``verdicts``, whether the mean curve with transfer ends above, by the interval
+            of the last difference; ``INCONCLUSIVE`` if the trainings are too short.
+        since: The training step from which on the mean curve stays above; None if it ends below.
+        throughout: Whether that is the first step that both have.
+        last: Difference of the curves at the last step, with its interval.
+        length: The last step that both reach.
+        trainings: Numbers of trainings with and without transfer.
+    """
+
+    verdict: str
+    since: int | None
+    throughout: bool
+    last: Interval
+    length: int
+    trainings: tuple[int, int]
+
+    @property
+    def course(self) -> str:
+        """Where the mean curve with transfer is above, in words."""
+        if self.since is None:
+            return "ends below, or level"
+        where = "in all of phase II" if self.throughout else f"from step {self.since:,} on"
+        return f"is above {where}"
+
+
+def smoothed(curves: pd.DataFrame, metric: str) -> pd.DataFrame:
+    """The exponential moving average of every training, started again in every phase.
+
+    For evaluations x(t) it is e(t) = (1 - ALPHA) e(t - 1) + ALPHA x(t). At the first evaluation of
+    a phase e = x, because the missions of different phases cannot be compared.
+
+    Returns:
+        A row per evaluation: ``variant``, ``seed``, ``phase``, ``updates``, ``value``.
+    """
+    keys = ["variant", "seed", "phase"]
+    averages = curves.groupby(keys, sort=False)[metric].transform(_average)
+    return curves[[*keys, "updates"]].assign(value=averages)
+
+
+def pairs_in(curves: pd.DataFrame) -> dict[str, tuple[str, str]]:
+    """Those of ``PAIRS`` that have trainings of both variants."""
+    variants = {*curves["variant"]}
+    return {name: pair for name, pair in PAIRS.items() if {*pair} <= variants}
+
+
+def last_phase(averages: pd.DataFrame, variant: str) -> pd.DataFrame:
+    """The (steps, trainings) averages of a variant in its last phase, at their common steps."""
+    curves = averages[averages["variant"] == variant]
+    curves = curves[curves["phase"] == curves["phase"].iloc[-1]]
+    return curves.pivot(index="updates", columns="seed", values="value").dropna()
+
+
+def transfer(
+    averages: pd.DataFrame, using: str, without: str, shortest: int, level: float = BAND
+) -> Transfer:
+    """Whether a variant with transfer learning overtakes the one without it and ends higher.
+
+    They are compared in the last phase of both, in which both train in missions with battery
+    decrease.
+
+    Args:
+        averages: Rows of ``smoothed``.
+        using: The variant with transfer learning.
+        without: The variant without it.
+        shortest: Trainings of fewer steps are inconclusive.
+        level: Confidence level of the last difference.
+    """
+    a, b = (last_phase(averages, variant) for variant in (using, without))
+    steps = a.index.intersection(b.index)
+    lead = a.loc[steps].mean(axis=1) - b.loc[steps].mean(axis=1)
+    behind = np.flatnonzero(lead <= 0)
+    first = behind[-1] + 1 if len(behind) else 0
+    since = int(steps[first]) if first < len(steps) else None
+    last = difference(a.loc[steps[-1]].to_numpy(), b.loc[steps[-1]].to_numpy(), level)[0]
+    length = int(steps[-1])
+    verdict = judged(above(last)) if length >= shortest else INCONCLUSIVE
+    return Transfer(verdict, since, not len(behind), last, length, (a.shape[1], b.shape[1]))
+
+
+def transfers(
+    curves: pd.DataFrame, metrics: Iterable[str], shortest: int
+) -> dict[tuple[str, str], Transfer]:
+    """``transfer`` of all pairs of variants, by the name of the pair and the metric."""
+    averages = {metric: smoothed(curves, metric) for metric in metrics}
+    return {
+        (name, metric): transfer(averages[metric], *pair, shortest)
+        for name, pair in pairs_in(curves).items()
+        for metric in averages
+    }
+
+
+def settled(averages: pd.Series, margin: float) -> int:
+    """The position from which on the averages stay within a margin of the last one."""
+    far = np.flatnonzero((averages - averages.iloc[-1]).abs() > margin)
+    return int(far[-1]) + 1 if len(far) else 0
+
+
+def transfer_table(
+    transfers: Mapping[tuple[str, str], Transfer], verdicts: Mapping[tuple[str, str], str]
+) -> pd.DataFrame:
+    """Trainings with transfer learning compared with those without, as a table of text.
+
+    Args:
+        transfers: The result of ``transfers``, by the name of the pair and the metric.
+        verdicts: The verdict on each.
+    """
+    rows = []
+    for (name, metric), compared in transfers.items():
+        last, named = compared.last, "Reward" if metric == LEARNED_REWARD else "Product"
+        write = numbers.points if metric == LEARNED_PRODUCT else _rewards
+        difference_at_end = write(*last)
+        if last.low == last.high:
+            difference_at_end = f"{difference_at_end.split()[0]}, the same in all trainings"
+        n = "{} and {}".format(*compared.trainings)
+        found = named, verdicts[name, metric], compared.course, difference_at_end
+        rows.append((name[0].upper() + name[1:], n, *found))
+    head = ["Trainings with", "n", "Metric", "Verdict", "With transfer, the mean curve"]
+    return pd.DataFrame(rows, columns=[*head, "Difference at the end"])
+
+
+def _rewards(*ends: float) -> str:
+    return numbers.with_ends(lambda value: numbers.minus(f"{value:+.0f}"), *ends)
+
+
+def _average(values: pd.Series) -> pd.Series:
+    return values.ewm(alpha=ALPHA, adjust=False).mean()
+
+
+_COURSE = {"phase": pa.string(), "updates": pa.int64(), "uav_slots": pa.float64()}
+_COURSE |= dict.fromkeys((LEARNED_REWARD, LEARNED_PRODUCT), pa.float64())
+_EVALUATED = {f"evaluation_{metric}": pa.float64() for metric in METRICS}
+_FINAL = {f"final_{metric}": pa.float64() for metric in METRICS}
+_OF_TRAINING = {"tick": pa.int64(), "seconds": pa.float64(), "is_best": pa.bool_()}
+CURVE = pa.schema(_COURSE | _OF_TRAINING | _EVALUATED)
+CURVES = pa.schema(_COURSE | {"variant": pa.string(), "seed": pa.int64()} | _FINAL)
+
+
+def read_curve(path: Path) -> pd.DataFrame:
+    """The curve of a training, a row per evaluation.
+
+    Raises:
+        InputError: If the file is missing or damaged, or holds no such curve.
+    """
+    curve = read_table(path, CURVE).to_pandas()
+    if not curve["updates"].is_monotonic_increasing or curve["updates"].iloc[0] < 1:
+        raise InputError(f"{path}: updates: do not grow; allowed: the training step of each row")
+    if not curve["is_best"].any():
+        raise InputError(f"{path}: is_best: is never true; allowed: the selected weights")
+    return curve
+
+
+def read_curves(path: Path) -> pd.DataFrame:
+    """The curves of trainings of several variants, with the metrics of the weights they selected.
+
+    Raises:
+        InputError: If the file is missing or damaged, or holds no such curves.
+    """
+    curves = read_table(path, CURVES).to_pandas()
+    if curves.duplicated(["variant", "seed", "phase", "updates"]).any():
+        raise InputError(f"{path}: updates: are there twice; allowed: once in a phase")
+    averages, pairs = curves.assign(value=0.0), pairs_in(curves).values()
+    ends = [{*last_phase(averages, a).index} & {*last_phase(averages, b).index} for a, b in pairs]
+    if BASELINE not in {*curves["variant"]} or not ends or not all(ends):
+        known = " and ".join(next(iter(PAIRS.values())))
+        raise InputError(f"{path}: variant: has no pair of trainings; allowed: {known}")
+    return curves
+
+
+RUNS = 10  # where no learner has several trainings
+
+
+def rliable_scores(results: Results, metric: str = PRODUCT) -> dict[str, np.ndarray]:
+    """The scores that ``rliable.library.get_interval_estimates`` and its other functions take.
+
+    Args:
+        results: The study.
+        metric: A metric of missions. Those with values between 0 and 1 need no normalisation.
+
+    Returns:
+        For every algorithm the mean of the metric over the missions of each run, (runs, tasks).
+
+    Raises:
+        InputError: If there is no such metric, a policy has fewer missions than there are runs, or
+            learners have different numbers of trainings.
+    """
+    if metric not in (*SHARES, *MEANS):
+        raise InputError(f"metric: {metric!r} is unknown{one_of(metric, [*SHARES, *MEANS])}")
+    algorithms, points = _policies_of_runs(results), range(len(results.store.manifest.points))
+    runs = len(next(iter(algorithms.values())))
+    cells = results.missions.groupby(["policy", "point"], sort=False)[metric]
+    size = int(cells.size().min()) // runs
+    if not size:
+        raise InputError(f"missions: {cells.size().min()} for {runs} runs; allowed: at least one")
+    means = {
+        cell: values.to_numpy(float)[: runs * size].reshape(runs, size).mean(axis=1)
+        for cell, values in cells
+    }
+    return {
+        name: np.array([[means[p, point][run] for point in points] for run, p in enumerate(flown)])
+        for name, flown in algorithms.items()
+    }
+
+
+def marl_eval_data(results: Results, metrics: Sequence[str] = (*METRICS,)) -> dict[str, Any]:
+    """The data that ``marl_eval.utils.data_processing_utils.data_process_pipeline`` takes.
+
+    Its levels are the study, the task, the algorithm, the run and the step. A study evaluates
+    policies that are ready, so there is one step, ``step_1``, at ``step_count`` 0, and
+    ``absolute_metrics`` has the same values. Commas in names of algorithms, which marl-eval does
+    not allow, become plus signs.
+
+    Args:
+        results: The study.
+        metrics: Metrics of missions.
+
+    Returns:
+        Plain data that ``json.dump`` writes, with the mean of each metric over the missions of
+        each run.
+
+    Raises:
+        InputError: As for ``rliable_scores``.
+    """
+    study = results.store.manifest.study["name"]
+    scores = {metric: rliable_scores(results, metric) for metric in metrics}
+    runs = {name: range(len(rows)) for name, rows in scores[metrics[0]].items()}
+
+    def steps(name: str, run: int, task: int) -> dict[str, Any]:
+        values = {metric: [float(scores[metric][name][run, task])] for metric in metrics}
+        return {"step_1": {"step_count": 0, **values}, "absolute_metrics": values}
+
+    return {
+        study: {
+            setting or study: {
+                name.replace(",", "+"): {f"run_{r + 1}": steps(name, r, task) for r in runs[name]}
+                for name in runs
+            }
+            for task, setting in enumerate(settings(results))
+        }
+    }
+
+
+def _policies_of_runs(results: Results) -> dict[str, list[str]]:
+    """For every algorithm the policy of each run."""
+    trained = learners(results)
+    others = set(results.policies).difference(*trained.values())
+    algorithms = trained | {policy: [policy] for policy in results.policies if policy in others}
+    counts = {len(policies) for policies in algorithms.values()} - {1}
+    if len(counts) > 1:
+        raise InputError(f"trainings: {sorted(counts)}; allowed: as many of every learner")
+    runs = max(counts, default=RUNS)
+    return {name: of if len(of) == runs else of * runs for name, of in algorithms.items()}
+
+
+class Trained(NamedTuple):
+    """A trained policy.
+
+    Attributes:
+        name: The policy.
+        config: Its training.
+        curve: A row per evaluation while training.
+    """
+
+    name: str
+    config: TrainingConfig
+    curve: pd.DataFrame
+
+
+def trained_policies(folder: Path) -> list[Trained]:
+    """The trained policies in a folder that come with the curve of their training, by name.
+
+    Curves on many seas are left out: they do not compare with those on one.
+
+    Raises:
+        InputError: If a policy or a curve is damaged.
+    """
+    paths = paths_in(folder, "*/training.parquet")
+    found = [(path, read_description(path.parent).training) for path in paths]
+    return [
+        Trained(path.parent.name, config, read_curve(path))
+        for path, config in found
+        if not config.seas
+    ]
+
+
+def curves_by_learner(policies: Iterable[Trained]) -> pd.DataFrame:
+    """The curves of trainings, as in ``learning.curves``.
+
+    A variant is a learner, the trainings that differ in their seed alone, by its policies' names.
+    """
+    learners: dict[str, list[Trained]] = {}
+    for policy in policies:
+        learners.setdefault(learner_of(policy.config), []).append(policy)
+    return pd.concat(
+        policy.curve.assign(variant=numbers.words([p.name for p in group]), seed=policy.config.seed)
+        for group in learners.values()
+        for policy in group
+    )
+
+
+def course_in_words(policy: Trained, margin: float) -> str:
+    """Where a training ends, and since when it has stayed within a margin: a Markdown item."""
+    end = policy.curve.iloc[-1]
+    averages = last_phase(smoothed(curves_by_learner([policy]), LEARNED_PRODUCT), policy.name)[
+        policy.config.seed
+    ]
+    near = policy.curve.iloc[settled(averages, margin) - len(averages)]
+    return (
+        f"- **{policy.name}**: {numbers.percent(averages.iloc[-1])} after {end['updates']:,} "
+        f"updates ({end['uav_slots'] / 1e6:.1f} million UAV-slots, {end['seconds'] / 60:.0f} "
+        f"minutes); within {numbers.margin(margin)} of it from update {near['updates']:,} on "
+        f"({near['seconds'] / 60:.0f} minutes)."
+    )
+
+
+def commands(policies: Iterable[Trained]) -> list[str]:
+    """The commands that train the policies again."""
+    return [
+        f"dess train {policy.config.name} --seed {policy.config.seed} --out runs/{policy.name}"
+        for policy in policies
+    ]

@@ -1,0 +1,285 @@
+"""Missions of a study: which one is typical, its cost in words, and the data of its nodes."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from analysis import numbers
+from analysis.names import PRODUCT, RATIO
+from analysis.results import parquet
+from analysis.results.event_log import Events, causes
+from analysis.results.resimulate import resimulate
+from analysis.results.tables import Results
+from analysis.stats.intervals import summary
+from dess import InputError
+from dess.files.reading import paths_in
+from dess.scenario import SAMPLED, Scenario
+
+FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
+
+
+@dataclass(frozen=True, eq=False)
+class LoggedMission:
+    """A mission of a study whose event log is stored.
+
+    Attributes:
+        row: The row of the mission in ``Results.missions``.
+        scenario: The scenario with the parameters that the mission drew.
+        log: The event log.
+    """
+
+    row: pd.Series
+    scenario: Scenario
+    log: pd.DataFrame
+
+    @property
+    def collected(self) -> str:
+        """How much data the mission collected, as a part of a sentence."""
+        total = self.row["initial"] + self.row["arrived"]
+        return f"{self.row['collected']:.1f} of {total:.1f} data units collected"
+
+    @property
+    def fleet(self) -> str:
+        """The fleet of the mission, as ``3 UAVs``."""
+        return numbers.counted(self.scenario.uavs, "UAV")
+
+    @property
+    def causes(self) -> str:
+        """What ended the mission of each UAV that did not fill its quota, as sentences."""
+        return " ".join(f"{cause}." for cause in causes(self.log, self.scenario))
+
+    @property
+    def caption(self) -> str:
+        """What happened in the mission, as the caption of a figure."""
+        policy, replication = self.row["policy"], self.row["replication"]
+        return (
+            f"{policy} in mission {replication}, a single one (n = 1): "
+            f"{self.causes or 'All UAVs filled their quota.'} "
+            f"{self.collected} in {self.row['slots']} mission slots."
+        )
+
+
+def answer(missions: Sequence[LoggedMission]) -> str:
+    """What share of the data single missions of fleets of different sizes collect."""
+    parts = [
+        f"{numbers.percent(m.row[RATIO])} with {m.fleet} in {m.row['slots']} slots"
+        for m in missions
+    ]
+    return (
+        f"Of the data, single missions of {missions[0].row['policy']} collect "
+        f"{numbers.words(parts)}: the UAVs share the nodes, and fly home to charge before their "
+        "batteries are empty."
+    )
+
+
+def logged_mission(
+    results: Results, policy: str, point: int = 0, replication: int = 0
+) -> LoggedMission:
+    """A mission of a study with its event log.
+
+    Raises:
+        InputError: If the event log has not been stored.
+    """
+    return _mission(results, policy, point, replication, results.events(policy, point, replication))
+
+
+def keep_logs(
+    results: Results,
+    wanted: Sequence[tuple[str, int]],
+    folder: str | Path,
+    progress: Callable[[int, int], None],
+) -> None:
+    """Simulate missions again whose event logs are not in ``FOLDER``, and store the logs there.
+
+    If the new record of a mission differs from the stored one, because other code simulated it, no
+    log is stored. Nor is one of a policy of a Python file, which may be anybody's code.
+
+    Args:
+        results: The study.
+        wanted: Policies and replications of the missions, at the first design point.
+        folder: A folder that contains a results folder per study.
+        progress: Called with the number of missions done and of all missions.
+
+    Raises:
+        InputError: If a log cannot be written.
+    """
+    for done, (policy, replication) in enumerate(wanted, 1):
+        if _kept_log(results, policy, replication, folder) is None:
+            _keep_log(results, policy, replication, folder)
+        progress(done, len(wanted))
+
+
+def kept_missions(
+    results: Results, wanted: Sequence[tuple[str, int]], folder: str | Path
+) -> list[LoggedMission]:
+    """Those of the missions whose event logs ``keep_logs`` has stored."""
+    return [
+        _mission(results, policy, 0, replication, log)
+        for policy, replication in wanted
+        if (log := _kept_log(results, policy, replication, folder)) is not None
+    ]
+
+
+def _keep_log(results: Results, policy: str, replication: int, folder: str | Path) -> None:
+    try:
+        events = resimulate(results, policy, 0, replication).events
+    except InputError:  # the record is another one, or the policy is a Python file
+        return
+    # Arrow would read the nan of a pandas column as a missing value.
+    table = pa.table({name: events[name].to_numpy() for name in events}, schema=parquet.EVENTS)
+    parquet.write(Path(folder, FOLDER), _name(results, policy, replication), table)
+
+
+def _kept_log(
+    results: Results, policy: str, replication: int, folder: str | Path
+) -> pd.DataFrame | None:
+    files = paths_in(Path(folder, FOLDER), f"{_name(results, policy, replication)}-*.parquet")
+    tables = (parquet.read(path) for path in files)
+    return next((table.to_pandas() for table in tables if table is not None), None)
+
+
+def _name(results: Results, policy: str, replication: int) -> str:
+    return f"{results.cell(policy, 0).key}-{replication:06}"
+
+
+def _mission(
+    results: Results, policy: str, point: int, replication: int, log: pd.DataFrame
+) -> LoggedMission:
+    of_mission = "policy == @policy and point == @point and replication == @replication"
+    row = results.missions.query(of_mission).iloc[0]
+    sampled = {key: int(row[key]) for key in SAMPLED}
+    scenario = results.scenario(point).scenario_at(**sampled)
+    return LoggedMission(row, scenario, log)
+
+
+def estimate(results: Results, policy: str, metric: str = PRODUCT, point: int | None = None) -> Any:
+    """The mean of a metric over the missions of a policy, at one design point or at all.
+
+    Returns:
+        A row of ``analysis.summary``.
+    """
+    missions = results.missions[results.missions["policy"] == policy]
+    if point is not None:
+        missions = missions[missions["point"] == point]
+    return summary(missions, by=["policy"]).query("metric == @metric").iloc[0]
+
+
+def outcome_table(missions: Sequence[LoggedMission]) -> pd.DataFrame:
+    """A table to print with a row per mission; data are in data units."""
+    return pd.DataFrame([_outcome(mission) for mission in missions])
+
+
+def _outcome(mission: LoggedMission) -> dict[str, Any]:
+    row, log = mission.row, mission.log
+    served = log.loc[log["event"] == "communication", "node"].nunique()
+    left = log[(log["event"] == "mission_end") & (log["node"] >= 0)]
+    fullest = left.loc[left["value"].idxmax()]
+    collected, _, total, *_ = mission.collected.split()
+    return {
+        "UAVs": row["uavs"],
+        "Success": "yes" if row["success"] else "no",
+        "Collected": numbers.percent(row[RATIO]),
+        "Mission slots": row["slots"],
+        "Charging sessions": (log["event"] == "charge_start").sum(),
+        "Nodes never served": f"{len(left) - served} of {len(left)}",
+        "Data collected": f"{collected} of {total}",
+        "Data left": f"{max(float(total) - float(collected), 0.0):.1f}",  # as they are printed
+        "Fullest node left": f"{fullest['value']:.1f} at ({fullest['x']:.0f}, {fullest['y']:.0f})",
+    }
+
+
+# A node counts as left behind if less than this share of all its data was collected.
+LEFT_BEHIND = 0.5
+
+
+def collected(events: Events, uavs: int, nodes: int) -> np.ndarray:
+    """The (I, K) data that every UAV collected from every node [data units]."""
+    log = pd.DataFrame(events)
+    served = log[log["event"] == "communication"]
+    data = np.zeros((uavs, nodes))
+    np.add.at(data, (served["uav"].to_numpy(int), served["node"].to_numpy(int)), served["value"])
+    return data
+
+
+def held(events: Events, nodes: int) -> np.ndarray:
+    """The (K,) data of every node in the whole mission: initial and arrived [data units]."""
+    return _of_nodes(events, ["mission_start", "arrival"], nodes)
+
+
+def left_behind(events: Events, nodes: int) -> np.ndarray:
+    """For each of the K nodes, whether less than ``LEFT_BEHIND`` of its data was collected."""
+    return np.asarray(
+        _of_nodes(events, ["communication"], nodes) < LEFT_BEHIND * held(events, nodes)
+    )
+
+
+def far_edges(nodes: np.ndarray) -> np.ndarray:
+    """For each of the K nodes, whether it is in the leftmost column or the bottommost row.
+
+    In the paper's layout these are x = 3 and y = 26, the edges far from the charging zone.
+
+    Args:
+        nodes: (K, 2) cells x, y; y grows south.
+    """
+    return np.asarray((nodes[:, 0] == nodes[:, 0].min()) | (nodes[:, 1] == nodes[:, 1].max()))
+
+
+def division(data: np.ndarray) -> float:
+    """The share of the data that was collected by the UAV which serves the node most.
+
+    It is 1 if every node is served by only one UAV, and 1 / I if all UAVs collect the same amount
+    from every node. Nodes are weighted by the data collected from them. It is nan if nothing was
+    collected.
+
+    Args:
+        data: (I, K) result of ``collected``.
+    """
+    total = data.sum()
+    return float(data.max(axis=0).sum() / total) if total else np.nan
+
+
+def sectors(data: np.ndarray, nodes: np.ndarray) -> float:
+    """The share of the data that two UAVs collected, each from its own sector.
+
+    The sectors are the two sides of the straight line that gives the highest share. The share is 1
+    if a line separates the nodes of the two UAVs, and it is at least 0.5. It is nan if nothing was
+    collected.
+
+    Args:
+        data: (2, K) result of ``collected``.
+        nodes: (K, 2) cells x, y.
+    """
+    total = data.sum()
+    if not total:
+        return np.nan
+    orders = np.array([np.argsort(nodes @ way, kind="stable") for way in _directions(nodes)])
+    # What the first UAV collects before the line and the second behind it, for every line.
+    lead = np.cumsum((data[0] - data[1])[orders], axis=1)
+    own_side = data[1].sum() + np.concatenate([lead.ravel(), [0.0]])
+    return float(max(own_side.max(), total - own_side.min()) / total)
+
+
+def _directions(nodes: np.ndarray) -> np.ndarray:
+    """The (D, 2) directions that order the nodes in all different ways.
+
+    The order along a direction changes where two nodes have the same position on it; the returned
+    directions lie between these changes.
+    """
+    one, other = np.triu_indices(len(nodes), 1)
+    gaps = (nodes[other] - nodes[one])[(nodes[other] != nodes[one]).any(axis=1)]
+    turns = np.unique(np.round(np.arctan2(gaps[:, 0], -gaps[:, 1]) % np.pi, 9))
+    turns = turns if turns.size else np.zeros(1)
+    between = turns + np.diff(turns, append=turns[0] + np.pi) / 2
+    return np.column_stack([np.cos(between), np.sin(between)])
+
+
+def _of_nodes(events: Events, names: Sequence[str], nodes: int) -> np.ndarray:
+    """The sum of the values of these events at every node, (K,)."""
+    log = pd.DataFrame(events)
+    at_nodes = log[log["event"].isin(names) & (log["node"] >= 0)]
+    return np.bincount(at_nodes["node"].to_numpy(int), at_nodes["value"], minlength=nodes)

@@ -1,0 +1,247 @@
+"""Questions about the operation of a fleet: charging pads, the age of the data, failures.
+
+table = changes(results, "pads", 4, PRODUCT)  # of the study ``pads``
+pads(results, margin=0.01)  # the answer in words
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis import numbers
+from analysis.answers import settings
+from analysis.names import AGE, PRODUCT, value_text
+from analysis.results.event_log import duration
+from analysis.results.tables import Results
+from analysis.stats.differences import column_tests, relative_change
+from analysis.stats.intervals import by_replication, check_share
+from dess import InputError
+
+# The published changes of the average age of information, from one UAV to this number, in another
+# model of the same kind (Mathematics 13(21) 3564).
+PUBLISHED = {2: -0.46, 10: -0.79}
+RATE, REPAIR = "failures.uav_rate", "failures.uav_repair"
+BAND = (0.1, 0.9)  # the quantiles between which most queues are
+# The events that begin and end the wait of a UAV for a pad.
+_WAITS = (
+    *("charge_request", "charge_start", "charge_withdrawal", "uav_failure", "quota_filled"),
+    *("battery_empty", "mission_end"),
+)
+_ENDS = ["mean", "low", "high"]
+
+
+def means(results: Results, metrics: Iterable[str]) -> pd.DataFrame:
+    """The means of metrics at every design point.
+
+    Returns:
+        A row per metric, policy and design point: ``metric``, ``policy``, the varied fields,
+        ``mean``, ``low``, ``high`` (95 %) and ``n``.
+
+    Raises:
+        InputError: If there is no such metric.
+    """
+    fields = [*settings.varied(results)]
+    tables = [settings.averaged(results, fields, m).assign(metric=m) for m in metrics]
+    return pd.concat(tables, ignore_index=True)[["metric", "policy", *fields, *_ENDS, "n"]]
+
+
+def changes(
+    results: Results, field: str, reference: Any, metric: str, relative: bool = False
+) -> pd.DataFrame:
+    """How a metric changes with a field, from a reference value and in the same replications.
+
+    Args:
+        results: The study.
+        field: The field.
+        reference: The value with which all others are compared.
+        metric: The metric.
+        relative: Whether changes are shares of the mean at the reference value.
+
+    Returns:
+        A row per policy and design point with another value: ``policy``, the varied fields,
+        ``mean`` (the change) with ``low`` and ``high`` (95 %), and ``n`` pairs. A point without a
+        partner, the same but for the field, has no row.
+
+    Raises:
+        InputError: If there is no such metric, or the field never has the reference value.
+    """
+    settings.check_metric(results, metric)
+    table = settings.points(results)
+    if field not in table or reference not in table[field].to_numpy():
+        raise InputError(
+            f"{field}: is never {reference!r} in the study; allowed: one of its values"
+        )
+    rows = []
+    for policy, missions in results.missions.groupby("policy", sort=False):
+        wide = by_replication(missions, metric, "point")
+        for point, partner in _pairs(table, field, reference):
+            both = wide[[point, partner]].dropna()
+            if both.empty:
+                continue
+            if relative:
+                change = relative_change(both[point].to_numpy(), both[partner].to_numpy())
+            else:
+                tests = column_tests(both[[point]], both[partner], metric)
+                change = tests[["difference", "low", "high"]].iloc[0]
+            rows.append((policy, *table.to_dict("records")[point].values(), *change, len(both)))
+    return pd.DataFrame(rows, columns=["policy", *table, *_ENDS, "n"])
+
+
+def enough_pads(results: Results, margin: float) -> pd.DataFrame:
+    """The fewest pads that are enough for every fleet, and the most that are too few.
+
+    A number of pads is enough if with it, and with every larger number, the product is at most
+    ``margin`` below that with most pads: the lower end of the 95 % interval says so. It is too few
+    if the whole interval says that more is lost. What is neither is open.
+
+    Args:
+        results: The study ``pads``, or another one that varies ``uavs`` and ``pads``.
+        margin: The difference that does not matter, as a share.
+
+    Returns:
+        A row per policy and fleet: ``policy``, ``uavs``, ``pads`` (the fewest that are enough),
+        ``too_few`` (the most that are too few, 0 if none is), and ``open``, those in between.
+
+    Raises:
+        InputError: If the study does not vary these fields, or the margin is no share.
+    """
+    check_share("margin", margin)
+    pads = settings.varied(results).get("pads", [0])
+    lost = changes(results, "pads", max(pads), PRODUCT)
+    rows = []
+    for (policy, uavs), part in lost.groupby(["policy", "uavs"], sort=False):
+        short = part.loc[part["low"] < -margin, "pads"].max()
+        enough = min(n for n in (*part["pads"], max(pads)) if not n <= short)
+        few = part.loc[(part["high"] < -margin) & (part["pads"] < enough), "pads"].max()
+        few = 0 if np.isnan(few) else int(few)
+        rows.append((policy, uavs, enough, few, [n for n in part["pads"] if few < n < enough]))
+    return pd.DataFrame(rows, columns=["policy", "uavs", "pads", "too_few", "open"])
+
+
+def short_of_pads(results: Results, margin: float) -> list[int]:
+    """The design points with one pad, and with one pad less than is enough, for every fleet."""
+    table, found = settings.points(results), enough_pads(results, margin)
+    enough = found[found["policy"] == results.policies[0]].set_index("uavs")["pads"]
+    fewer = table[table["pads"] < table["uavs"].map(enough)]
+    fewest = table[table["pads"] == table["pads"].min()]
+    return sorted({*fewest.index, *fewer.groupby("uavs")["pads"].idxmax()})
+
+
+def pads(results: Results, margin: float) -> str:
+    """How many pads are enough for every fleet, by the first policy of the study."""
+    found = enough_pads(results, margin)
+    parts = []
+    for row in found[found["policy"] == results.policies[0]].itertuples():
+        part = f"{row.pads} {'are' if row.pads > 1 else 'is'} enough for {row.uavs} UAVs"
+        if row.too_few:
+            part += f", {row.too_few} {'are' if row.too_few > 1 else 'is'} too few"
+        parts.append(part + f", {numbers.words([*map(str, row.open)])} open" * bool(row.open))
+    return (
+        f"Of charging pads, {'; '.join(parts)} (policy {results.policies[0]}, at most "
+        f"{numbers.margin(margin)} of the product lost)."
+    )
+
+
+def age_changes(results: Results) -> pd.DataFrame:
+    """The change of the average age from one UAV to more, as a share, by arrival rate.
+
+    Returns:
+        The rows of ``changes``, with the column ``published`` (nan where nothing is).
+    """
+    table = changes(results, "uavs", 1, AGE, relative=True)
+    return table.assign(published=table["uavs"].map(PUBLISHED))
+
+
+def age(results: Results) -> str:
+    """The mean age with the smallest and the third fleet, at the extreme arrival rates."""
+    table = means(results, [AGE])
+    table = table[table["policy"] == results.policies[0]].sort_values("uavs")
+    few, more = table["uavs"].unique()[:3][[0, -1]]
+    ends = table[table["uavs"].isin([few, more])].set_index("arrival_rate")[_ENDS]
+    parts = [
+        f"from {' to '.join(ages)} slots at an arrival rate of {value_text(rate)}"
+        for rate in dict.fromkeys([ends.index.min(), ends.index.max()])
+        for rows in [ends.loc[[rate]].to_numpy()]
+        for ages in [[numbers.decimals(mean, low, high, 1) for mean, low, high in rows]]
+    ]
+    return (
+        f"From {few} to {more} UAVs the mean age of the data falls {numbers.words(parts)} "
+        f"(policy {results.policies[0]})."
+    )
+
+
+def failures(results: Results) -> str:
+    """What the lowest failure rate costs the smallest fleet, by the first policy."""
+    lost = changes(results, RATE, 0.0, PRODUCT)
+    rows = lost[lost["policy"] == results.policies[0]]
+    rows = rows[(rows["uavs"] == rows["uavs"].min()) & (rows[RATE] == rows[RATE].min())]
+    parts = [
+        f"by {numbers.points(*row[_ENDS])} points if it is "
+        + (f"repaired in {row[REPAIR]:g} slots" if row[REPAIR] else "lost")
+        for _, row in rows.iterrows()
+    ]
+    return (
+        f"If a UAV fails in each slot with probability {value_text(rows[RATE].iloc[0])}, the "
+        f"product of {rows['uavs'].iloc[0]} UAVs changes {numbers.words(parts)} "
+        f"(policy {results.policies[0]})."
+    )
+
+
+def relative(mean: float, low: float, high: float) -> str:
+    """A relative change with its interval, as ``−46.0 % [−47.1, −44.9]``."""
+    middle, *ends = [numbers.minus(f"{100 * value:+.1f}") for value in (mean, low, high)]
+    return f"{middle} % [{ends[0]}, {ends[1]}]"
+
+
+def waiting(events: pd.DataFrame) -> np.ndarray:
+    """The number of UAVs that wait for a pad in every mission slot, (slots,)."""
+    log = events[(events["uav"] >= 0) & events["event"].isin(_WAITS)]
+    ends = log.groupby("uav")["time"].shift(-1)
+    waits = log.assign(end=ends)[log["event"] == "charge_request"].dropna(subset="end")
+    begin, end = waits[["time", "end"]].to_numpy(int).T[..., None]
+    slots = np.arange(duration(events))
+    return np.asarray(((begin <= slots) & (slots < end)).sum(axis=0))
+
+
+def queues(results: Results, policy: str, points: Iterable[int]) -> pd.DataFrame:
+    """The queue for pads in every mission slot, over the missions whose event logs are kept.
+
+    A mission that is over has no queue. The last slot is that of the longest mission.
+
+    Args:
+        results: The study.
+        policy: The policy.
+        points: Numbers of design points.
+
+    Returns:
+        A row per design point and slot: ``point``, the varied fields, ``slot``, the ``mean`` number
+        of UAVs that wait, ``low`` and ``high`` (the quantiles ``BAND`` over missions), and ``n``
+        missions.
+
+    Raises:
+        InputError: If no event log is kept.
+    """
+    tables = []
+    for point in points:
+        first = results.cell(policy, point).first
+        logged = range(first, first + max(results.manifest["study"]["logged"], 1))
+        of_missions = [pd.Series(waiting(results.events(policy, point, n))) for n in logged]
+        counts = pd.concat(of_missions, axis=1).fillna(0)
+        ends = dict(zip(("low", "high"), counts.quantile(BAND, axis=1).to_numpy(), strict=True))
+        rows = pd.DataFrame({"slot": counts.index, "mean": counts.mean(axis=1), **ends})
+        fields = settings.points(results).loc[[point] * len(rows)].rename_axis("point")
+        rows = pd.concat([fields.reset_index(), rows], axis=1)
+        tables.append(rows.assign(n=len(logged)))
+    return pd.concat(tables, ignore_index=True)
+
+
+def _pairs(table: pd.DataFrame, field: str, reference: Any) -> Iterator[tuple[int, int]]:
+    """Every design point, and the one that differs from it only by the reference value."""
+    others = [name for name in table if name != field]
+    for _, part in table.groupby(others, sort=False) if others else [((), table)]:
+        partner = part.index[part[field] == reference]
+        for point in part.index:
+            if len(partner) and point != partner[0]:
+                yield int(point), int(partner[0])

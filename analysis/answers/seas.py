@@ -1,0 +1,178 @@
+"""Every policy on many seas: all together, by family, by number of nodes and of UAVs.
+
+    results = load_results("results/seas")      # of a study whose design is a set of seas
+    quality(results, "family")                  # means, a row per policy and family
+    gains(results, "greedy", "family")          # paired differences
+    shares(results, "planner", "family")        # the product as a share of that of a policy
+
+The seas are the sampling units: what a policy reaches on a sea is its mean over the missions there.
+"""
+
+import numpy as np
+import pandas as pd
+
+from analysis import numbers
+from analysis.answers import comparison
+from analysis.answers.comparison import Times
+from analysis.names import BOUND, PRODUCT, SUCCESS
+from analysis.results.tables import Results
+from analysis.stats.differences import column_tests, relative_change
+from analysis.stats.intervals import column_intervals
+from dess import InputError
+from dess.scenario import SEA
+
+# Groups of seas by their number of nodes: the largest number of each but the last.
+_NODES = (15, 30, 60)
+_NODES_IN_WORDS = ("1 to 15", "16 to 30", "31 to 60", "61 and more")
+ALL = "all"
+REFERENCES = ("planner", "planner-long")  # the slow policies that others are compared with
+GROUPS = {"family": "Family", "nodes": "Nodes", "uavs": "UAVs"}
+
+
+def missions(results: Results) -> pd.DataFrame:
+    """The missions with the columns ``sea``, ``family``, ``nodes`` (a group in words) and ``all``.
+
+    Raises:
+        InputError: If the design of the study is not a set of seas.
+    """
+    names = [str(values.get(SEA, "")) for values in results.store.manifest.values]
+    if not all(":" in name for name in names):
+        raise InputError(f"{results.store.folder}: no study of seas; allowed: one whose design is")
+    counts = np.array([len(space.nodes) for space in results.store.manifest.scenarios])
+    point = results.missions["point"].to_numpy()
+    sea = pd.Series(names, dtype=str)[point].to_numpy()
+    group = np.searchsorted(_NODES, counts)[point]
+    return results.missions.assign(
+        sea=sea, family=[name.partition(":")[0] for name in sea], all=ALL,
+        nodes=np.array(_NODES_IN_WORDS)[group],
+    )  # fmt: skip
+
+
+def quality(results: Results, by: str = ALL, metric: str = PRODUCT) -> pd.DataFrame:
+    """The means of every policy over seas.
+
+    Args:
+        results: The study.
+        by: ``all``, ``family``, ``nodes`` or ``uavs``.
+        metric: The metric.
+
+    Returns:
+        A row per group and policy: ``by``, ``policy``, ``metric``, ``mean``, ``low``, ``high`` and
+        ``n`` seas.
+    """
+    tables = []
+    for group, values in _by_sea(results, by, metric):
+        means = column_intervals(values).reset_index(names="policy")
+        tables.append(means.assign(**{by: group}, metric=metric))
+    return pd.concat(tables, ignore_index=True)[
+        [by, "policy", "metric", "mean", "low", "high", "n"]
+    ]
+
+
+def gains(results: Results, baseline: str, by: str = ALL) -> pd.DataFrame:
+    """Paired differences of the product between every other policy and a baseline.
+
+    Returns:
+        A row per group and policy: ``by``, ``policy``, ``difference`` with ``low``, ``high`` and
+        ``p``, and ``n`` seas.
+    """
+    tables = []
+    for group, values in _by_sea(results, by, PRODUCT):
+        others = values.drop(columns=baseline)
+        tests = column_tests(others, values[baseline]).reset_index(names="policy")
+        tables.append(tests.assign(**{by: group}))
+    return pd.concat(tables, ignore_index=True)
+
+
+def shares(results: Results, reference: str, by: str = ALL) -> pd.DataFrame:
+    """The product of every policy as a share of that of a reference.
+
+    Returns:
+        A row per group and policy: ``by``, ``policy``, ``mean``, ``low``, ``high`` and ``n`` seas.
+    """
+    rows = []
+    for group, values in _by_sea(results, by, PRODUCT):
+        known = values[reference].to_numpy()
+        for policy in values:
+            ends = 1 + np.array(relative_change(values[policy].to_numpy(), known))
+            rows.append((group, policy, *ends, len(values)))
+    return pd.DataFrame(rows, columns=[by, "policy", "mean", "low", "high", "n"])
+
+
+def front(results: Results, times: Times) -> pd.DataFrame:
+    """The product over all seas and the time of a decision of every policy that was timed.
+
+    Returns:
+        A row per policy, the fastest first: ``policy``, ``mean``, ``low``, ``high``, ``n``,
+        ``seconds`` (of a decision for a UAV, in batches), and ``on_front``.
+    """
+    seconds = {cost.policy: cost.batch for cost in times.costs}
+    return comparison.front(quality(results), seconds)
+
+
+def summary(results: Results, times: Times) -> pd.DataFrame:
+    """Every policy over all seas, as a table of text: quality, as a share of others, and time.
+
+    The bound counts in the missions in which it is below 100 %, if the study has bounds.
+    """
+    means = {m: quality(results, metric=m).set_index("policy")["mean"] for m in (SUCCESS, PRODUCT)}
+    columns = {"Success": means[SUCCESS], "Product": means[PRODUCT]}
+    for reference in REFERENCES:
+        if reference in results.policies:
+            share = shares(results, reference).set_index("policy")["mean"]
+            columns[f"Of {reference}"] = share
+    if BOUND in results.missions:
+        says = results.missions[results.missions[BOUND] < 1.0].groupby("policy")
+        columns["Of the bound"] = says[PRODUCT].sum() / says[BOUND].sum()
+    table = pd.DataFrame(columns).loc[results.policies].map(numbers.percent)
+    seconds = {cost.policy: numbers.seconds(cost.batch) for cost in times.costs if cost.batch}
+    return table.assign(Decision=table.index.map(seconds)).fillna("").reset_index(names="Policy")
+
+
+def worst(results: Results, policy: str, reference: str, count: int = 8) -> pd.DataFrame:
+    """The seas on which a policy is the farthest behind another one, as a table of text."""
+    ((_, values),) = _by_sea(results, ALL, PRODUCT)
+    behind = (values[policy] - values[reference]).nsmallest(count)
+    spaces = dict(zip(_names(results), results.store.manifest.scenarios, strict=True))
+    return pd.DataFrame(
+        {
+            "Sea": sea,
+            "Nodes": len(spaces[sea].nodes),
+            "UAVs": numbers.span(spaces[sea].uavs),
+            policy: numbers.percent(values.loc[sea, policy]),
+            reference: numbers.percent(values.loc[sea, reference]),
+            "Points": numbers.difference(points, 0),
+        }
+        for sea, points in behind.items()
+    )
+
+
+def answer(results: Results, times: Times, policy: str, reference: str, baseline: str) -> str:
+    """What a policy reaches on unseen seas, beside a slow reference and a fast baseline."""
+    share = shares(results, reference).set_index("policy").loc[policy]
+    gain = gains(results, baseline).set_index("policy").loc[policy]
+    seconds = {cost.policy: cost.batch for cost in times.costs}
+    slow, fast = seconds.get(reference), seconds.get(policy)
+    faster = f" in 1/{slow / fast:,.0f} of its time" if slow and fast else ""
+    reached = numbers.interval(*share[["mean", "low", "high"]])
+    more = numbers.points(*gain[["difference", "low", "high"]])
+    return (
+        f"On {share['n']} unseen seas, {policy} reaches {reached} of the product of "
+        f"{reference}{faster}, and {more} points more than {baseline}."
+    )
+
+
+def _names(results: Results) -> list[str]:
+    return [str(values[SEA]) for values in results.store.manifest.values]
+
+
+def _by_sea(results: Results, by: str, metric: str) -> list[tuple[object, pd.DataFrame]]:
+    """For each group: a row per sea and a column per policy, the means over its missions."""
+    table = missions(results)
+    means = table.groupby([by, "policy", "sea"], sort=False)[metric].mean().reset_index()
+    groups = [*means[by].unique()]
+    if by in ("uavs", "nodes"):  # by the first number
+        groups.sort(key=lambda group: int(str(group).partition(" ")[0]))
+    wide = [means[means[by] == group].pivot(index="sea", columns="policy", values=metric)
+            for group in groups]  # fmt: skip
+    return [(g, w[results.policies]) for g, w in zip(groups, wide, strict=True)]

@@ -1,0 +1,471 @@
+"""The means of a study's policies, what the numbers say in words, and Sobol indices."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from analysis import numbers
+from analysis.answers import costs
+from analysis.names import (
+    LESS_IS_BETTER,
+    MEANS,
+    METRICS,
+    PRODUCT,
+    RATIO,
+    SHARES,
+    SUCCESS,
+    parameter,
+    value_text,
+)
+from analysis.results.chunks import parts_of
+from analysis.results.provenance import study_of
+from analysis.results.tables import Results
+from analysis.stats.choices import may_be_best
+from analysis.stats.differences import compare, for_choice
+from analysis.stats.distribution import distribution
+from analysis.stats.intervals import LEVEL, by_replication, summary, values_within
+from analysis.stats.learners import compare_learners
+from analysis.stats.verdict import MARKS, position
+from analysis.study.cheapest import Cheapest
+from analysis.study.design import NOISE, Saltelli
+from dess import InputError
+
+ANALYSED = (*SHARES, *MEANS)
+RESAMPLES = 1000  # bootstrap resamples of the blocks of the design; every metric has the same
+
+
+def sensitivity(
+    design: Saltelli, missions: pd.DataFrame, metrics: Sequence[str] = ANALYSED
+) -> pd.DataFrame:
+    """First-order and total Sobol indices of each metric to each parameter and to the noise.
+
+    A metric of a mission is a function of the parameters, each uniform on its range, and of the
+    replication; an index is a share of its variance over the design.
+
+    For a parameter, ``first`` is the share of the variance that disappears, on average, when the
+    parameter is fixed. It measures how strongly the parameter alone changes the mean, so parameters
+    with a large ``first`` should be set with care. ``total`` is the share that remains when all
+    other factors, the replication included, are fixed. If it is near 0, the parameter changes no
+    mission and can have any value in its range. A ``total`` above ``first`` means interaction with
+    other parameters or with the noise. A parameter with a high ``total`` and a ``first`` of 0
+    changes which missions go well, but not how many, unless other parameters are set with it.
+
+    For the noise, ``total`` is the share that remains when all parameters are fixed. On average
+    over the settings, no setting can remove it; only more missions reduce its effect on a mean. The
+    rest of the variance is what all parameters explain together. ``first`` is the noise that all
+    settings share, which common random numbers remove from comparisons. ``total`` above ``first``
+    is noise that depends on the setting. Parameters that the scenario draws from ranges, and that
+    are not in the design, belong to the noise.
+
+    Args:
+        design: The design of the missions.
+        missions: The missions of one policy, a row per design point in order: columns ``point``,
+            ``replication`` and the metrics.
+        metrics: Columns to analyse.
+
+    Returns:
+        A row per metric and parameter, the noise last: ``metric``, ``parameter``, ``first``,
+        ``first_low``, ``first_high``, ``total``, ``total_low``, ``total_high`` and ``n``, the
+        number of missions. Intervals are normal 95 % intervals with the standard error of the
+        bootstrap. Their coverage is right where the noise dominates. Where the parameters dominate
+        they are too wide, because the design covers the space more evenly than the resamples.
+        Estimates are not limited to [0, 1]; that of a small index may be negative. If a metric has
+        the same value in all missions of A and B, its indices are nan.
+
+    Raises:
+        InputError: If the missions are not one per point of the design, in order.
+    """
+    expected = [(number, point.replication) for number, point in enumerate(design.points)]
+    if [*missions[["point", "replication"]].itertuples(index=False, name=None)] != expected:
+        raise InputError(
+            f"missions: {len(missions)} that are not those of the design; "
+            f"allowed: one for each of its {len(expected)} points, in order, of one policy"
+        )
+    tables = {metric: _indices(design, missions[metric].to_numpy(float)) for metric in metrics}
+    return pd.concat(tables, names=["metric"]).reset_index("metric").reset_index(drop=True)
+
+
+def index_table(indices: pd.DataFrame) -> pd.DataFrame:
+    """Sobol indices as text, with their intervals.
+
+    Args:
+        indices: Rows of ``answers.summary.sensitivities``.
+    """
+    rows = indices
+    columns = {
+        "Policy": rows["policy"],
+        "Metric": rows["metric"].map(METRICS),
+        "Parameter": rows["parameter"].map(lambda p: "noise" if p == NOISE else parameter(p).name),
+        "Alone": numbers.estimates(rows, "first"),
+        "With all interactions": numbers.estimates(rows, "total"),
+    }
+    return pd.DataFrame(columns)
+
+
+def ranges_in_words(ranges: Mapping[str, Sequence[float]]) -> str:
+    """``number of UAVs 1–3 and initial data per node 5–20``."""
+    return numbers.words(
+        [f"{parameter(field).within} {value_text(ends)}" for field, ends in ranges.items()]
+    )
+
+
+def _indices(design: Saltelli, values: np.ndarray) -> pd.DataFrame:
+    """A row per parameter: first-order and total indices, each with the ends of its interval.
+
+    The estimators are those of SALib (Saltelli and others 2010), for all resamples at once.
+    """
+    rows = (values - values.mean()).reshape(design.base, -1)
+    a, b, mixed = rows[:, :1], rows[:, -1:], rows[:, 1:-1]  # A, B, and A with a column of B
+    drawn = np.random.default_rng(0).integers(design.base, size=(design.base, RESAMPLES))
+    counts = [np.bincount(blocks, minlength=design.base) for blocks in drawn.T]
+    weights = np.array([np.ones(design.base), *counts]) / design.base  # the design itself first
+    variance = weights @ (a**2 + b**2) / 2 - (weights @ (a + b) / 2) ** 2
+    varies = np.ptp([a, b]) > np.finfo(float).eps * np.ptp(values)
+    variance[variance <= 0] = np.inf  # of a resample in which nothing varies: its indices are 0
+    table = pd.DataFrame({"parameter": design.problem["names"]})
+    half = stats.norm.ppf(0.5 + LEVEL / 2)
+    for name, share in (("first", b * (mixed - a)), ("total", (a - mixed) ** 2 / 2)):
+        indices = weights @ share / variance if varies else np.full((3, len(table)), np.nan)
+        table[name], error = indices[0], half * indices[1:].std(axis=0, ddof=1)
+        table[f"{name}_low"], table[f"{name}_high"] = table[name] - error, table[name] + error
+    return table.assign(n=len(values))
+
+
+BEST, TIED, WORSE, ONLY = "best", "tied", "worse", "only"  # verdicts on a policy at a design point
+
+
+def means(results: Results) -> pd.DataFrame:
+    """Means with intervals of every policy at every design point.
+
+    Returns:
+        A row per policy, design point and metric, as ``analysis.summary`` returns it.
+    """
+    return summary(results.missions, by=["policy", "point"])
+
+
+def meeting(means: pd.DataFrame, targets: Mapping[str, float]) -> pd.DataFrame:
+    """The rows of ``means`` of the settings that meet all targets.
+
+    A setting is a policy at a design point. It meets a target if the whole interval of the mean
+    does, so that chance alone seldom lets a setting pass that does not meet it.
+
+    Args:
+        means: Rows of ``means``.
+        targets: Metric -> the least mean, or the largest of a metric of which less is better.
+    """
+    for metric, end in targets.items():
+        met = means["high"] <= end if metric in LESS_IS_BETTER else means["low"] >= end
+        passed = means[(means["metric"] == metric) & met]
+        means = means.merge(passed[["policy", "point"]])
+    return means
+
+
+def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
+    """Rows of ``means`` with a column ``verdict``: how the policy compares with the others there.
+
+    Compared are the policies of the table at the same design point, by each metric, on the
+    replications that they have in common, by ``stats.screening.may_be_best``: at every design point
+    by itself, the truly best policy is ``BEST`` or ``TIED`` with a probability of 95 %.
+
+    Args:
+        results: The study.
+        means: Rows of ``means``.
+
+    Returns:
+        The rows, with ``BEST`` if the policy is significantly better than the others, ``TIED`` if
+        it is one of several that may be the best, ``WORSE`` if another one is significantly better,
+        ``ONLY`` if there is no other one.
+    """
+    verdicts = pd.Series(ONLY, means.index, dtype=object)
+    for (metric, point), rows in means.groupby(["metric", "point"], sort=False):
+        if len(rows) > 1:
+            missions = results.missions[results.missions["point"] == point]
+            wide = by_replication(missions, str(metric), "policy")
+            may_be = may_be_best(wide[rows["policy"]].to_numpy(float), str(metric))
+            best = TIED if may_be.sum() > 1 else BEST
+            verdicts[rows.index] = np.where(may_be, best, WORSE)
+    return means.assign(verdict=verdicts)
+
+
+def by_fleet(missions: pd.DataFrame) -> pd.DataFrame:
+    """Means with intervals of every policy by number of UAVs.
+
+    Returns:
+        Rows of ``analysis.summary`` by ``policy`` (in order of appearance) and ``uavs`` (sorted).
+    """
+    policies = missions.groupby("policy", sort=False)
+    tables = [summary(part.sort_values("uavs"), by=["policy", "uavs"]) for _, part in policies]
+    return pd.concat(tables, ignore_index=True)
+
+
+def beside_paper(
+    estimates: pd.DataFrame, printed: Mapping[Any, Mapping[str, float]]
+) -> pd.DataFrame:
+    """The metrics of every policy, with marks relative to the numbers that the paper prints.
+
+    Args:
+        estimates: Rows of ``analysis.summary`` by ``policy``, and by ``uavs`` if needed.
+        printed: The printed numbers by number of UAVs (None for all missions), then by metric.
+
+    Returns:
+        A row of the printed numbers and a row per policy, with a column of text per metric and
+        number of UAVs, see ``with_mark``.
+    """
+    columns = {("", "Policy"): ["paper", *estimates["policy"].unique()]}
+    for metric in next(iter(printed.values())):
+        of_metric = estimates[estimates["metric"] == metric]
+        for uavs, figures in printed.items():
+            rows = of_metric if uavs is None else of_metric[of_metric["uavs"] == uavs]
+            texts = [with_mark(row, figures[metric]) for row in rows.itertuples()]
+            head = "" if uavs is None else f"I = {uavs}"
+            columns[METRICS[metric], head] = [numbers.percent(figures[metric]), *texts]
+    return pd.DataFrame(columns)
+
+
+def with_mark(estimate: Any, printed: float) -> str:
+    """An estimate and its difference from a printed number: ``97.3 % [96.1, 98.1] +7.4 ▲``.
+
+    The mark tells where the whole interval lies relative to the printed number.
+    """
+    text = numbers.interval(estimate.mean, estimate.low, estimate.high)
+    mark = MARKS[position(estimate, printed)]
+    return f"{text} {numbers.difference(estimate.mean, printed)} {mark}"
+
+
+def of_policy(means: pd.DataFrame, policy: str) -> pd.Series:
+    """The means of a policy by metric, as text with their intervals.
+
+    Args:
+        means: Rows of ``analysis.summary`` by policy.
+        policy: The policy.
+    """
+    rows = means[means["policy"] == policy].set_index("metric")
+    return rows.loc[[*METRICS]].apply(numbers.estimate, axis=1)
+
+
+def against_paper(means: pd.DataFrame, policy: str, printed: Mapping[str, float]) -> str:
+    """The success and the product of a policy, beside the paper's product, in a sentence.
+
+    Args:
+        means: Rows of ``analysis.summary`` by policy.
+        policy: The policy.
+        printed: The paper's numbers by metric.
+    """
+    texts, n, count = of_policy(means, policy), means["n"].min(), means["policy"].nunique()
+    return (
+        f"The best of {count} policies, {policy}, succeeds in {texts[SUCCESS]} of {n:,} missions "
+        f"with a product of {texts[PRODUCT]}; the paper prints "
+        f"{numbers.percent(printed[SUCCESS])} and {numbers.percent(printed[PRODUCT])}."
+    )
+
+
+def guard_in_words(means: pd.DataFrame) -> str:
+    """Why even a random policy succeeds: the return guard, and what success is without it.
+
+    Args:
+        means: Rows of ``analysis.summary`` by policy.
+    """
+    text = "All policies but `random-unguarded` act under the return guard, so nearly all succeed."
+    known = {*means["policy"]}
+    for policy, guarded in (("random", "under"), ("random-unguarded", "without")):
+        if policy in known:
+            share = of_policy(means, policy)[SUCCESS]
+            text += f" Random moves {guarded} the guard have a success of {share}."
+    return text
+
+
+def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:
+    """The policies by their mean product, the best one first.
+
+    Every design point has the same weight. Of policies with equal means, the one that appears first
+    is ranked first.
+
+    Args:
+        missions: A row per mission.
+        among: The policies to rank; by default all.
+    """
+    among = missions["policy"].unique() if among is None else [*among]
+    cell = ["policy", "point"]
+    values = missions[cell].assign(value=values_within(missions, PRODUCT, cell))
+    at_points = values.groupby(cell, sort=False)["value"].mean()
+    means = at_points.groupby("policy", sort=False).mean()
+    ranked = means.sort_values(ascending=False, kind="stable").index
+    return [str(policy) for policy in ranked if policy in among]
+
+
+def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> str:
+    """The policy with the highest mean product."""
+    return ranked_policies(missions, among)[0]
+
+
+def settings(results: Results) -> list[str]:
+    """Every design point in words: the fields that the design sets, with their values."""
+    return [
+        ", ".join(
+            f"{field} {value_text(value).replace('–', '..')}"
+            for field, value in point.values.items()
+        )
+        for point in results.store.manifest.points
+    ]
+
+
+def worst(
+    results: Results,
+    policy: str,
+    missions: int = 5,
+    point: int | None = None,
+    folder: str | Path | None = None,
+) -> pd.DataFrame:
+    """The missions of a policy with the lowest product.
+
+    Args:
+        results: The study.
+        policy: The policy.
+        missions: Number of missions.
+        point: The design point; by default all.
+        folder: The results folder that the commands name; ``results/NAME`` by default.
+
+    Returns:
+        A row per mission, the worst first (among equal ones, the one with the lower collection
+        ratio): ``policy``, ``point``, ``replication``, the metrics, and ``command``, which
+        simulates the mission again.
+    """
+    of_policy = results.missions[results.missions["policy"] == policy]
+    if point is not None:
+        of_policy = of_policy[of_policy["point"] == point]
+    table = of_policy.sort_values([PRODUCT, RATIO], kind="stable", ignore_index=True)[:missions]
+    table = table[["policy", "point", "replication", *SHARES, *MEANS]]
+    keys = zip(table["point"], table["replication"], strict=True)
+    folder = folder or results.usual_folder
+    return table.assign(command=[results.command(policy, *key, folder) for key in keys])
+
+
+def comparisons(results: Results) -> pd.DataFrame:
+    """Every policy compared with the best one on the same missions, over all design points.
+
+    Returns:
+        A row per policy and metric, as ``analysis.compare`` returns it; ``p_adjusted`` also
+        corrects for the choice of the best policy. Empty if there is only one policy, or if a
+        stopping rule gave the policies different missions.
+    """
+    if len(results.policies) < 2 or not _same_missions(results):
+        return pd.DataFrame()
+    table = compare(results.missions, best_policy(results.missions), [*METRICS])
+    return for_choice(table, len(results.policies))
+
+
+def learners(results: Results) -> dict[str, list[str]]:
+    """The trained policies by learner; those of one learner differ in the seed of their training.
+
+    Returns:
+        For the name of each learner its policies, in the order of the study.
+    """
+    policies: dict[str, list[str]] = {}
+    for team in results.store.manifest.policies:
+        if len(team.members) == 1 and (learner := team.members[0].learner):
+            policies.setdefault(learner, []).append(team.policy)
+    names = [learner.rpartition(" ")[0] for learner in policies]  # without the hash
+    unique = len({*names}) == len(names)
+    return dict(zip(names, policies.values(), strict=True)) if unique else policies
+
+
+def learned_against_heuristic(results: Results) -> pd.DataFrame:
+    """Every learner compared with the best policy that is not learned, on the same missions.
+
+    Returns:
+        A row per learner and metric, as ``analysis.compare_learners`` returns it: about the learner
+        if it has several trainings, otherwise about this one checkpoint. ``p_adjusted`` also
+        corrects for the choice of the best policy. Empty if there is nothing to compare, or if a
+        stopping rule gave the policies different missions.
+    """
+    trained = learners(results)
+    learned = {policy for checkpoints in trained.values() for policy in checkpoints}
+    heuristics = [policy for policy in results.policies if policy not in learned]
+    if not trained or not heuristics or not _same_missions(results):
+        return pd.DataFrame()
+    baseline = best_policy(results.missions, heuristics)
+    table = compare_learners(results.missions, trained, baseline, [*METRICS])
+    return for_choice(table, len(heuristics))
+
+
+def _same_missions(results: Results) -> bool:
+    counts = results.store.manifest.missions
+    return len({n for of_team in counts for n in of_team}) == 1
+
+
+def distributions(results: Results) -> pd.DataFrame:
+    """The distribution of product over the missions of every policy.
+
+    Returns:
+        A row per policy and view, as ``analysis.distribution`` returns it. Empty if there are
+        several design points, whose missions have different distributions.
+    """
+    if len(results.store.manifest.points) > 1:
+        return pd.DataFrame()
+    generator = np.random.default_rng(results.store.manifest.seed)
+    return distribution(results.missions, PRODUCT, generator)
+
+
+def precisions(results: Results) -> pd.DataFrame:
+    """How narrow the intervals are, for a study with targets.
+
+    Returns:
+        A row per policy, design point and metric: ``policy``, and the fields of
+        ``analysis.study.stopping.Reached``. Empty if the study has no targets.
+    """
+    manifest = results.store.manifest
+    if (rule := study_of(manifest.study).precision) is None:
+        return pd.DataFrame()
+    tables = {
+        policy: pd.DataFrame(rule.reached(results.store.samples(parts_of(manifest, team))))
+        for team, policy in enumerate(results.policies)
+    }
+    return _by_policy(tables)
+
+
+def sensitivities(results: Results) -> pd.DataFrame:
+    """The Sobol indices of each metric of each policy for each parameter and for the noise.
+
+    Returns:
+        A row per policy, metric and parameter: ``policy``, and the columns of
+        ``answers.summary``. Empty if the design is not of the kind ``saltelli``.
+    """
+    design = study_of(results.manifest["study"]).design
+    if not isinstance(design, Saltelli):
+        return pd.DataFrame()
+    missions = results.missions.groupby("policy", sort=False)
+    return _by_policy({name: sensitivity(design, rows, [*METRICS]) for name, rows in missions})
+
+
+def _by_policy(tables: Mapping[Any, pd.DataFrame]) -> pd.DataFrame:
+    """The rows of all policies, with the column ``policy``."""
+    return pd.concat(tables, names=["policy"]).reset_index("policy").reset_index(drop=True)
+
+
+def selections(results: Results) -> pd.DataFrame:
+    """The design point that was selected for every policy, and its guarantee.
+
+    Returns:
+        A row per policy: ``policy``, ``point``, ``setting`` in words, number of ``missions``,
+        ``left`` (number of points not ruled out), ``guaranteed``, and ``guarantee`` in words. Empty
+        if the study selects nothing. For a study that selects the cheapest setting, the rows of
+        ``costs.selections``.
+    """
+    if isinstance(results.store.manifest.selection, Cheapest):
+        return costs.selections(results)
+    words, rows = settings(results), []
+    for policy in results.policies:
+        if (c := results.choice(policy)) is not None:
+            found = (policy, c.best, words[c.best], c.missions, len(c.survivors))
+            rows.append((*found, c.guaranteed, c.guarantee))
+    columns = ["policy", "point", "setting", "missions", "left", "guaranteed", "guarantee"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def checks(results: Results) -> pd.DataFrame:
+    """Means with intervals of the selected points, over missions not used for the selection."""
+    return summary(results.checks, by=["policy", "point"])

@@ -1,1 +1,0 @@
-"""Questions about results, answered by functions that return tidy tables."""

@@ -1,1 +1,0 @@
-"""Questions about how far policies are from the best possible, and about planners."""

@@ -1,1 +1,0 @@
-"""What-if questions: the effect of a variation of a scenario."""

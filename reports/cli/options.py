@@ -1,0 +1,288 @@
+"""The options and arguments that commands share, and their completion by the shell."""
+
+import math
+import re
+from collections.abc import Callable, Iterable
+from decimal import Decimal, InvalidOperation
+from inspect import getdoc
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+
+import typer
+
+from dess.errors import InputError, one_of, shown
+from dess.files.parsing import parse_toml
+
+
+def policies(start: str) -> list[str]:
+    """Names of policies; of a team ``P,P,...`` the last one."""
+    from policies import names
+
+    before, comma, last = start.rpartition(",")
+    return [f"{before}{comma}{name}" for name in _beginning(names(), last)]
+
+
+def scenarios(start: str) -> list[str]:
+    """Names of shipped scenarios, and of families of generated ones up to the seed."""
+    from dess.scenario import scenario_families, scenario_names
+
+    families = [name.removesuffix("SEED") for name in scenario_families()]
+    return _beginning([*scenario_names(), *families], start)
+
+
+def studies(start: str) -> list[str]:
+    """Names of shipped studies."""
+    from analysis import study_names
+
+    return _beginning(study_names(), start)
+
+
+def configs(start: str) -> list[str]:
+    """Names of shipped configs of trainings."""
+    from policies.ddqn.config import config_names
+
+    return _beginning(config_names(), start)
+
+
+def fields(start: str) -> list[str]:
+    """Fields of a scenario, as ``--set`` takes them."""
+    from dess.scenario import ScenarioSpace, fields_of
+
+    return [f"{name}=" for name in _beginning(fields_of(ScenarioSpace), start)]
+
+
+def _beginning(names: Iterable[str], start: str) -> list[str]:
+    return [name for name in names if name.startswith(start)]
+
+
+if TYPE_CHECKING:
+    from dess import ScenarioSpace
+
+SET = "--set"
+RESULTS, PAGES = Path("results"), Path("build/reports")
+FIELD = "a field of the scenario and a value in TOML syntax, e.g. uavs=2 or initial_data=[5, 20]"
+PARAMETER = (
+    "a parameter of the notebooks and a value in TOML syntax, e.g. missions=500, "
+    """or text in quotes: 'scenario="bay"'"""
+)
+
+ScenarioOption = Annotated[
+    str,
+    typer.Option(
+        "--scenario",
+        metavar="NAME|FILE",
+        autocompletion=scenarios,
+        help="A shipped scenario, a generated one such as coast:7, or a TOML file.",
+    ),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        SET,
+        metavar="KEY=VALUE",
+        autocompletion=fields,
+        help="Set a field of the scenario to a value in TOML syntax; repeatable.",
+    ),
+]
+SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random draws.")]
+WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="Number of processes.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
+
+
+def command(app: typer.Typer, name: str | None = None) -> Callable[[Callable], Callable]:
+    """Make a command of a function; the part ``Args`` of its docstring describes the options."""
+
+    def register(function: Callable) -> Callable:
+        summary, _, described = (getdoc(function) or "").partition("\n\nArgs:\n")
+        hints = get_type_hints(function, include_extras=True)
+        for parameter, text in re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", described, re.M):
+            if not hasattr(hints[parameter], "__metadata__"):
+                hints[parameter] = Annotated[hints[parameter], typer.Option()]
+            hints[parameter].__metadata__[0].help = re.sub(r"\n {8}", " ", text)
+        function.__annotations__ = hints
+        return app.command(name, help=summary)(function)
+
+    return register
+
+
+def load_space(name: str, settings: list[str] | None) -> "ScenarioSpace":
+    """A scenario by name or file, with the fields that ``--set`` sets.
+
+    Raises:
+        InputError: If there is no such scenario, or a setting is not valid.
+    """
+    from dess import load_scenario
+
+    return load_scenario(name, **dict(setting(text) for text in settings or []))
+
+
+def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, Any]:
+    """Parse ``KEY=VALUE``.
+
+    Args:
+        text: The argument.
+        option: The option it was given to, for the message.
+        allowed: What the option accepts, for the message.
+
+    Raises:
+        InputError: If the text has another form.
+    """
+    key, equals, value = text.partition("=")
+    try:
+        parsed = parse_toml(f"value = {value}", option)
+    except InputError:
+        parsed = {}
+    if not equals or parsed.keys() != {"value"} or not _is_plain(parsed["value"]):
+        if option == SET and value.strip() in choices(key.strip()):
+            return key.strip(), value.strip()
+        if option == SET and value.strip():
+            check_words(key.strip(), value.strip())
+        raise InputError(f"{option}: {shown(text)} is not KEY=VALUE; allowed: {allowed}")
+    return key.strip(), parsed["value"]
+
+
+def choices(field: str) -> list[str]:
+    """The words that a field of a scenario may be, which need no quotes; empty for all others."""
+    from dess.errors import choices_of
+    from dess.scenario import ScenarioSpace, fields_of
+
+    known = fields_of(ScenarioSpace).get(field)
+    return choices_of(known) if known is not None else []
+
+
+def check_words(field: str, value: str) -> None:
+    """Refuse a value that is no TOML, such as ``lots``, in the words of the field of a scenario.
+
+    Raises:
+        InputError: If the scenario has such a field, and if it has not.
+    """
+    from dess.errors import form_of, kind_of
+    from dess.scenario import ScenarioSpace, fields_of
+
+    fields = fields_of(ScenarioSpace)
+    if field not in fields:
+        raise InputError(f"{SET}: {field}: unknown key{one_of(field, fields)}")
+    known = fields[field]
+    if words := choices(field):
+        raise InputError(f"{SET}: {field}: {shown(value)} is unknown{one_of(value, words)}")
+    problem = f"is not {kind_of(known)}" if kind_of(known) else "has the wrong form"
+    raise InputError(f"{SET}: {field}: {shown(value)} {problem}; allowed: {form_of(known)}")
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether fields and parameters can have a value: dates and nan are not allowed."""
+    if isinstance(value, list | dict):
+        return all(map(_is_plain, value.values() if isinstance(value, dict) else value))
+    return isinstance(value, str | int) or (isinstance(value, float) and math.isfinite(value))
+
+
+ALLOWED = (
+    "a field of the scenario and its values: 2..5, 0.01..0.05:5 (five values), or 1,2,4 in TOML "
+    "syntax"
+)
+_RANGE = re.compile(r"(?P<low>[^\[\]'\",]*?)\.\.(?P<high>[^\[\]'\",:]*)(:(?P<count>.*))?")
+
+
+def all_values(texts: Iterable[str]) -> dict[str, tuple[Any, ...]]:
+    """The values of all fields.
+
+    Raises:
+        InputError: If a text has another form, or a field is set twice.
+    """
+    return _once("--set", map(values_of, texts))
+
+
+def all_settings(texts: Iterable[str], option: str, allowed: str) -> dict[str, Any]:
+    """The keys and values of an option such as ``--price uav=20000``.
+
+    Raises:
+        InputError: If a text has another form, or a key is set twice.
+    """
+    return _once(option, (setting(text, option, allowed) for text in texts))
+
+
+def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
+    """A field and its values: one is fixed, several are swept.
+
+    Raises:
+        InputError: If the text has another form, or a range is none.
+    """
+    from analysis.ask import sweep
+    from dess.scenario import ScenarioSpace, fields_of
+
+    field, equals, values = text.partition("=")
+    field = field.strip()
+    fields = fields_of(ScenarioSpace)
+    if equals and field not in fields:
+        raise InputError(f"--set: {field}: unknown key{one_of(field, fields)}")
+    if found := _RANGE.fullmatch(values.strip()):
+        return field, sweep.listed(field, _range(field, text, **found.groupdict()))
+    try:
+        listed = setting(f"{field}=[{values}]" if equals else text)[1]
+    except InputError:
+        listed = [word.strip() for word in values.split(",")]
+        if unknown := [word for word in listed if word not in choices(field)]:
+            for word in filter(str.isidentifier, unknown):
+                check_words(field, word)
+            raise _refused(text, "is not KEY=VALUES", ALLOWED) from None
+    return field, sweep.listed(field, listed)
+
+
+def _range(field: str, text: str, low: str, high: str, count: str | None) -> Any:
+    """The values of ``low..high`` or ``low..high:count``."""
+    from analysis.study.design import INTEGERS
+
+    first, last = _number(text, low), _number(text, high)
+    if first > last:
+        number = "" if count is None else f":{count}"
+        turned = f"{field}={high.strip()}..{low.strip()}{number}"
+        raise _refused(text, "begins with the larger number", turned)
+    if count is not None:
+        return _spaced(text, first, last, count, field in INTEGERS)
+    if field not in INTEGERS:
+        raise _refused(text, "has no number of values", f"{text}:5, for five of them")
+    if not _is_whole(first) or not _is_whole(last):
+        raise _refused(text, "has an end that is not an integer", f"integers, as {field} has")
+    return range(int(first), int(last) + 1)
+
+
+def _spaced(text: str, first: Decimal, last: Decimal, count: str, is_integer: bool) -> list[Any]:
+    """Evenly spaced numbers, both ends included."""
+    from analysis.study.design import MAX_SIZE
+
+    number = int(count) if count.strip().isdecimal() else 0
+    if not 2 <= number <= MAX_SIZE:
+        raise _refused(text, "has no number of values", f"2 to {MAX_SIZE:,} after the colon")
+    values = [first + (last - first) * place / (number - 1) for place in range(number)]
+    if is_integer:
+        if not all(map(_is_whole, values)):
+            raise _refused(text, f"has {number} values that are not integers", "another number")
+        return [int(value) for value in values]
+    return [float(value) for value in values]
+
+
+def _is_whole(number: Decimal) -> bool:
+    return number == number.to_integral_value()  # unlike %, also where it has very many digits
+
+
+def _number(text: str, end: str) -> Decimal:
+    try:
+        number = Decimal(end.strip())
+        if abs(number) <= Decimal("1e300"):
+            return number
+    except InvalidOperation:
+        pass
+    raise _refused(text, f"has an end {end.strip()!r} that is not a number", ALLOWED)
+
+
+def _refused(text: str, problem: str, allowed: str) -> InputError:
+    return InputError(f"--set: {text!r} {problem}; allowed: {allowed}")
+
+
+def _once(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise InputError(f"{option}: {key} is given twice; allowed: once")
+        found[key] = value
+    return found

@@ -1,0 +1,342 @@
+"""``dess study``: run a study into a results folder; show, compare and bundle results."""
+
+import json
+from collections.abc import Iterable
+from datetime import date
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dess.code.libraries import needs
+from dess.errors import InputError, one_of
+from reports.cli import console, options
+from reports.cli.console import YesOption, complete
+from reports.cli.options import PAGES, RESULTS, JsonOption, WorkersOption, all_settings, command
+from reports.cli.report import rendering
+from reports.folders import PREFIX, check_pages
+
+if TYPE_CHECKING:
+    from analysis.execution.effort import Planned
+    from analysis.study.study import Study
+
+
+def run(
+    names: Annotated[
+        list[str], typer.Argument(metavar="NAME|FILE...", autocompletion=options.studies)
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Results folder; of several studies, the folder of their results folders.  "
+            f"[default: {RESULTS}/NAME]",
+        ),
+    ] = None,
+    workers: WorkersOption = 1,
+    scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS")] = None,
+    missions: Annotated[int | None, typer.Option(min=1)] = None,
+    policy: Annotated[
+        list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.policies)
+    ] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run")] = False,
+    accept_code: Annotated[bool, typer.Option("--accept-code")] = False,
+    page: Annotated[
+        bool, typer.Option("--report", help=f"Also render the page of the study into {PAGES}.")
+    ] = False,
+    yes: YesOption = False,
+) -> None:
+    """Run a study into a results folder; run it again to resume it or to add missions.
+
+    Args:
+        names: The names of shipped studies, or TOML files.
+        scheduler: Run on the cluster of this dask.distributed scheduler.
+        missions: Missions per design point and policy.
+        policy: Policies in place of those of the study; repeatable.
+        dry_run: Only print the plan and the range of its time.
+        accept_code: Keep missions that other code has simulated; the results say so.
+    """
+    from analysis.execution.effort import check_run, plan_study
+    from analysis.study.study import load_study
+
+    changes = {"missions": missions, "policies": policy}
+    given = {key: value for key, value in changes.items() if value is not None}
+    studies = [load_study(name, **given) for name in names]
+    if out and len(studies) == 1:
+        folders = [out]
+    else:
+        folders = [(out or RESULTS) / study.name for study in studies]
+    runs = [*zip(studies, folders, strict=True)]
+    if dry_run:
+        for study, folder in runs:
+            plan = plan_study(study, folder, workers, accept_code)
+            print_plan(plan, study, folder, workers)
+        return
+    if page:
+        needs("reports", "--report")
+        check_pages(PAGES, *(f"{PREFIX}{study.name}" for study in studies))
+    with console.compile_notice():
+        for study, folder in runs:
+            check_run(study, folder, workers, accept_code=accept_code, yes=yes)
+    for study, folder in runs:
+        _run(study, folder, workers, scheduler, accept_code)
+    if page:
+        from reports.pages.render import render_study
+
+        with rendering() as progress:
+            for folder in folders:
+                console.say(render_study(folder, PAGES, progress))
+
+
+def _run(study: "Study", out: Path, workers: int, scheduler: str | None, accept: bool) -> None:
+    """Run a study, and print its summary."""
+    from analysis.execution.runner import run_study
+    from reports.cli.tables import print_summary
+
+    results = complete(
+        study.name,
+        lambda progress, announce: run_study(
+            study, out, workers, scheduler, progress, announce, accept
+        ),
+    )
+    print_summary(results, out, short=True)
+    console.say(f"more: dess study show {out}")
+
+
+def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
+    """Print the missions that a run would simulate, and the range of its time."""
+    from analysis.execution.effort import budget, total
+
+    rows = [[p.policy, f"{p.missions:,}", f"{p.present:,}", str(p.seconds)] for p in plan]
+    console.print_table(["policy", "missions", "present", "time on one core"], rows)
+    per_cell = f"{study.first} replications"
+    if study.rule:
+        rule = "selection" if study.selection else "precision"
+        per_cell += f" and more, up to {budget(study):,} missions, as {rule} asks"
+    missions = sum(p.missions for p in plan[: len(study.policies)])
+    console.say(
+        f"{out}: {missions:,} missions of study {study.name} ({len(study.policies)} policies "
+        f"x {study.size:,} design points x {per_cell})"
+    )
+    console.say(
+        f"{total(plan, workers)} with {workers} at work, by the usual speed of such missions; "
+        "compiling, on the first run, takes a few minutes more"
+    )
+
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from analysis.results.tables import Results
+
+TARGET = "a metric and its least mean, such as success=0.99, or its largest, such as age=40"
+
+
+def show(
+    folder: Annotated[Path, typer.Argument(metavar="DIR")],
+    policy: Annotated[str | None, typer.Option(metavar="P[,P...]")] = None,
+    worst: Annotated[int, typer.Option(min=0)] = 5,
+    target: Annotated[list[str] | None, typer.Option(metavar="METRIC=SHARE")] = None,
+    everything: Annotated[bool, typer.Option("--all")] = False,
+    as_csv: Annotated[bool, typer.Option("--csv")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Show the results of a study: means, comparisons, selections, the worst missions.
+
+    Args:
+        folder: A results folder.
+        policy: Policy of the worst missions.  [default: the best policy]
+        worst: How many of the worst missions.
+        target: Show the policies and design points whose mean of a metric (success, ratio,
+            product) is at least this, by the lower end of its interval; repeatable.
+        everything: Show the tables of all metrics, not of the product alone.
+        as_csv: Print the means as CSV: a row per policy, design point and metric.
+    """
+    from analysis import numbers
+    from analysis.answers import summary
+    from analysis.results.tables import load_results
+    from reports.cli import tables as printed
+
+    if as_csv and as_json:
+        raise InputError("--csv: not with --json; allowed: one of them")
+    targets = _targets(target or [])
+    results = load_results(folder)
+    if policy is not None and policy not in results.policies:
+        raise InputError(
+            f"--policy: {policy!r} is not in the study{one_of(policy, results.policies)}"
+        )
+    means = summary.meeting(summary.means(results), targets)
+    means = summary.with_verdicts(results, means)
+    if as_csv:
+        console.say(numbers.csv(_with_values(results, means)).rstrip())
+    elif as_json:
+        tables = _tables(results, means, policy, worst, folder)
+        print(json.dumps(_document(results, tables, targets), indent=2))
+    else:
+        if targets:
+            printed.print_meeting(results, means, targets)
+            return
+        printed.print_summary(results, folder, short=False)
+        shown = _tables(results, means, policy, worst, folder)
+        printed.print_details(results, shown, everything)
+
+
+def _targets(texts: Iterable[str]) -> dict[str, float]:
+    """Metric -> the least mean, or the largest of a metric of which less is better."""
+    from analysis.names import ALIASES, MEASURES, METRICS
+
+    targets = {}
+    for name, share in all_settings(texts, "--target", TARGET).items():
+        if (metric := ALIASES.get(name, name)) not in METRICS | MEASURES:
+            known = one_of(name, [*METRICS, *ALIASES, *MEASURES])
+            raise InputError(f"--target: {name!r} is unknown{known}")
+        is_number = isinstance(share, int | float) and not isinstance(share, bool)
+        if metric in MEASURES and not (is_number and share >= 0):
+            raise InputError(f"--target: {name}: {share!r} is not allowed; allowed: 0 or more")
+        if metric in METRICS and not (is_number and 0 <= share <= 1):
+            raise InputError(f"--target: {name}: {share!r} is not a share; allowed: 0..1")
+        if metric in targets:
+            raise InputError(f"--target: {metric} is given twice; allowed: once")
+        targets[metric] = float(share)
+    return targets
+
+
+def _tables(
+    results: "Results", means: "pd.DataFrame", policy: str | None, worst: int, folder: Path
+) -> "dict[str, pd.DataFrame]":
+    """All tables, by their names in the JSON."""
+    import pandas as pd
+
+    from analysis.answers import costs, optimality, summary
+
+    policy = policy or summary.best_policy(results.missions)
+    return {
+        "means": means,
+        "distributions": summary.distributions(results),
+        "precisions": summary.precisions(results),
+        "comparisons": summary.comparisons(results),
+        "learned_against_heuristic": summary.learned_against_heuristic(results),
+        "sensitivities": summary.sensitivities(results),
+        "costs": costs.front(results) if results.store.manifest.costs else pd.DataFrame(),
+        "selected": summary.selections(results),
+        "gaps": optimality.by_fleet(results),
+        "checks": summary.checks(results),
+        "worst": summary.worst(results, policy, worst, folder=folder),
+    }
+
+
+def _document(
+    results: "Results", tables: "dict[str, pd.DataFrame]", targets: dict[str, float]
+) -> dict[str, Any]:
+    """All tables as plain data; rows on a design point have the values of its fields as well."""
+    rows = {name: json.loads(table.to_json(orient="records")) for name, table in tables.items()}
+    values = results.store.manifest.values
+    for row in (row for of_table in rows.values() for row in of_table if "point" in row):
+        row |= {field: value for field, value in values[row["point"]].items() if field not in row}
+    about = {
+        "study": results.manifest["study"]["name"],
+        "accepted": results.manifest["accepted"],
+    }
+    return about | ({"targets": targets} if targets else {}) | rows
+
+
+def _with_values(results: "Results", means: "pd.DataFrame") -> "pd.DataFrame":
+    """Means with a column per field that the design sets; a list of values is JSON."""
+    table = means.copy()
+    for place, field in enumerate(results.store.manifest.values[0], 2):
+        column = [of_point[field] for of_point in results.store.manifest.values]
+        texts = [json.dumps(v) if isinstance(v, list | bool) else v for v in column]
+        table.insert(place, field, table["point"].map(dict(enumerate(texts))))
+    return table
+
+
+if TYPE_CHECKING:
+    from analysis.answers.diff import Diff
+
+
+def diff(
+    a: Annotated[Path, typer.Argument(metavar="A")],
+    b: Annotated[Path, typer.Argument(metavar="B")],
+    most: Annotated[int, typer.Option(min=0)] = 5,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare two results folders mission by mission, with the same random draws.
+
+    Args:
+        a: A results folder.
+        b: Another results folder.
+        most: Number of most changed missions to show.
+    """
+    from analysis.answers import diff
+    from analysis.results.tables import load_results
+    from reports.cli.tables import print_diff
+
+    found = diff.diff(load_results(a), load_results(b))
+    if as_json:
+        print(json.dumps(_diff_document(found, most), indent=2))
+    else:
+        print_diff(found, most)
+
+
+def _diff_document(found: "Diff", most: int) -> dict:
+    """All that is found, as plain data."""
+    from analysis.answers import diff
+
+    identity = ["policy_a", "policy_b", "point_a", "point_b", "replication", "fields"]
+    tables = {
+        "alone": found.alone,
+        "policies": diff.effects(found),
+        "points": diff.effects(found, ["policy_a", "point_a"]),
+        "changed": found.changed[identity],
+        "most_changed": diff.most_changed(found, most)[[*identity, "command_a", "command_b"]],
+    }
+    return {
+        "a": str(found.a.store.folder),
+        "b": str(found.b.store.folder),
+        "identical": found.identical,
+        "missions": len(found.missions),
+        "differ": len(found.changed),
+        "origins": diff.origins(found),
+        **{name: json.loads(table.to_json(orient="records")) for name, table in tables.items()},
+    }
+
+
+def export(
+    folder: Annotated[Path, typer.Argument(metavar="DIR")],
+    crate: Annotated[Path, typer.Option(metavar="FILE.zip")],
+    page: Annotated[Path | None, typer.Option(metavar="FILE")] = None,
+    licence: Annotated[str, typer.Option("--license", metavar="ID")] = "MIT",
+) -> None:
+    """Write results, page, study and scenario into one file, a research object (RO-Crate).
+
+    Args:
+        folder: A results folder.
+        crate: The RO-Crate to write; - for standard output.
+        page: The page of the results.  [default: it is rendered for the crate]
+        licence: Licence of the results, by its SPDX identifier.
+    """
+    from analysis.results.tables import load_results
+    from reports.crate import check_page, licence_of, write_crate
+    from reports.pages.render import render_study
+
+    results, licence = load_results(folder), licence_of(licence)
+    if page:
+        check_page(page, results)
+    with console.outputs([crate]) as (temporary,), TemporaryDirectory() as pages:
+        if page is None:
+            with rendering() as progress:
+                page = render_study(folder, pages, progress)
+        write_crate(results, page, temporary, date.today(), licence)
+    if not console.is_stdout(crate):
+        missions = f"{len(results.missions):,} missions"
+        console.say(f"{crate}: {missions} with {page.name}, licence {licence}")
+
+
+app = typer.Typer(
+    help="Run studies (policies x design points x replications), show and compare results."
+)
+command(app, "run")(run)
+command(app, "show")(show)
+command(app, "diff")(diff)
+command(app, "export")(export)

@@ -1,0 +1,308 @@
+"""Tables of the results of a study in the terminal."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pandas as pd
+
+from analysis import numbers
+from analysis.answers import costs, diff, optimality, summary
+from analysis.answers.summary import index_table, settings
+from analysis.names import (
+    LESS_IS_BETTER,
+    MEASURES,
+    METRICS,
+    PRODUCT,
+    RATIO,
+    SHORT_METRICS,
+    SUCCESS,
+    measured_in,
+    metric_label,
+    metric_name,
+)
+from analysis.paper import values
+from analysis.results.tables import Results
+from reports import tables
+from reports.cli import console
+
+_SHORT = {METRICS[metric]: name for metric, name in SHORT_METRICS.items()}
+_QUANTILES = (0.05, 0.5, 0.95)
+MANY_POINTS = 40  # more design points are not listed
+
+
+def print_summary(results: Results, folder: Path, short: bool) -> None:
+    """Print the means at the only design point, or the selected points and their check."""
+    study = results.manifest["study"]
+    console.say(f"{folder}: {len(results.missions):,} missions of study {study['name']}")
+    for change in results.store.manifest.accepted:
+        console.say(f" accepted: {change.text}")
+    printed = values.PRINTED.get(study["name"], {})
+    if study["selection"]:
+        selected = summary.selections(results)
+        _print_selections(selected)
+        if results.store.manifest.costs and "condition" in selected:
+            for text in costs.sentences(results):
+                console.say(f" {text.translate(str.maketrans('', '', '*`'))}")
+        if len(results.checks):
+            means, checks = summary.checks(results), study["selection"]["check"]
+            if "condition" in selected:
+                words = [
+                    f"{row.policy} {settings(results)[row.point]}" for row in means.itertuples()
+                ]
+                means = means.assign(policy=words)
+            _print_means(means, f"{checks} further missions", printed)
+    elif len(settings(results)) == 1:
+        _print_means(summary.means(results), "mean, 95 % interval", printed)
+    elif short:
+        points = settings(results)
+        means = summary.means(results) if len(points) <= MANY_POINTS else pd.DataFrame()
+        _print_by_point(points, means, [PRODUCT])
+
+
+def print_details(
+    results: Results, frames: Mapping[str, pd.DataFrame], everything: bool = False
+) -> None:
+    """Print the tables of ``dess study show``, by their names in its JSON; none that is empty.
+
+    Args:
+        results: The study.
+        frames: The tables.
+        everything: Whether the means of all metrics are printed, not of the product alone.
+    """
+    points, measured = settings(results), measured_in({*frames["means"]["metric"]})
+    metrics = [*SHORT_METRICS, *measured] if everything else [PRODUCT]
+    printers = {
+        "sensitivities": lambda table: _print_titled(
+            "shares of the collection ratio's variance:",
+            index_table(table[table["metric"] == RATIO]).drop(columns="Metric"),
+        ),
+        "costs": lambda table: _print_costs(table, results.manifest["study"]["costs"]["currency"]),
+        "means": lambda means: _print_by_point(points, means, metrics),
+        "distributions": _print_distributions,
+        "precisions": lambda table: _print_titled(
+            "precision:",
+            tables.precisions(table).assign(Point=table["point"].map(points.__getitem__)),
+        ),
+        "comparisons": _print_comparisons,
+        "gaps": lambda table: print_frame(
+            "optimality gap", optimality.listed(table).set_index("Policy")
+        ),
+        "learned_against_heuristic": _print_learners,
+        "worst": _print_worst,
+    }
+    for name, print_rows in printers.items():
+        if not frames[name].empty:
+            print_rows(frames[name])
+
+
+def print_frame(title: str, cells: pd.DataFrame) -> None:
+    """Print a table of text under its title; the index is its first column."""
+    rows = [[str(name), *map(str, row)] for name, *row in cells.itertuples(name=None)]
+    console.print_table([title, *(_SHORT.get(head, head) for head in map(str, cells))], rows)
+
+
+def _print_titled(title: str, cells: pd.DataFrame) -> None:
+    """Print a table of text below its title."""
+    console.say(title)
+    print_frame(str(cells.columns[0]), cells.set_index(cells.columns[0]))
+
+
+def _print_selections(selected: pd.DataFrame) -> None:
+    """The selected point of every policy, and the guarantee of the procedure."""
+    heads = ["condition"] if "condition" in selected and any(selected["condition"]) else []
+    cells = selected.set_index("policy")[[*heads, "setting", "missions", "left"]]
+    cells["missions"] = cells["missions"].map("{:,}".format)
+    print_frame("selected for", cells)
+    for guarantee in dict.fromkeys(selected["guarantee"]):
+        console.say(f" {guarantee}")
+
+
+def _print_costs(table: pd.DataFrame, currency: str) -> None:
+    """The settings, the cheapest first, with success, and the probability to be on the front."""
+    if len(table) > MANY_POINTS:
+        console.say(f"the costs of {len(table)} settings are too many to list; --json has them")
+        return
+    cells = tables.priced(table, [SUCCESS])
+    cells["On the front"] = table["probability"].map(numbers.percent)
+    _print_titled(f"cost [{currency}] against success:", cells)
+
+
+def _print_means(means: pd.DataFrame, title: str, printed: Mapping[str, float]) -> None:
+    """A row per policy, and one with the values that the paper prints; a column per metric."""
+    cells = tables.means(means).drop(columns="Missions").set_index("Policy")
+    if printed:
+        names = {name: metric for metric, name in METRICS.items()}
+        cells.loc["paper"] = [numbers.percent(printed[names[head]]) for head in cells.columns]
+    print_frame(title, cells)
+    measured = means[means["metric"].isin(MEASURES)]
+    if not measured.empty:
+        cells = numbers.wide(measured, "metric", "policy", numbers.quantities).fillna("")
+        print_frame(title, cells.rename(index=metric_label))
+
+
+def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) -> None:
+    """A table per metric, a row per design point, if there are several and not too many."""
+    if len(points) == 1:
+        return
+    if len(points) > MANY_POINTS:
+        console.say(f"{len(points)} design points are too many to list; --json has them")
+        return
+    for metric in metrics:
+        rows = means[means["metric"] == metric]
+        cells = numbers.wide(rows, "point", "policy", numbers.written(metric)).fillna("")
+        if metric == PRODUCT and "verdict" in rows and len(cells.columns) > 1:
+            cells["best"] = _best(rows)
+        title = SHORT_METRICS.get(metric) or metric_label(metric)
+        print_frame(title, cells.rename(index=dict(enumerate(points))))
+        if "best" in cells:
+            console.say(
+                " best: significantly better than the others on common replications (95 %, at "
+                "each design point by itself); ≈: these may all be the best"
+            )
+
+
+def _best(rows: pd.DataFrame) -> pd.Series:
+    """The policy that is the best at each design point, or those that may be, the first first."""
+    may_be = rows[rows["verdict"] != summary.WORSE].sort_values("mean", ascending=False)
+    return may_be.groupby("point")["policy"].agg(" ≈ ".join)
+
+
+def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, float]) -> None:
+    """Print the settings that meet targets.
+
+    Args:
+        results: The study.
+        means: Rows of ``summary.with_verdicts`` of these settings.
+        targets: Metric -> the least mean.
+    """
+    points, policies = settings(results), len(results.policies)
+    asked = [
+        f"{SHORT_METRICS.get(metric) or metric_name(metric).lower()} of {end:g} or "
+        + ("less" if metric in LESS_IS_BETTER else "more")
+        for metric, end in targets.items()
+    ]
+    product = means[means["metric"] == PRODUCT].set_index(["policy", "point"])
+    count = f"{len(product):,} of {len(points) * policies:,}"
+    meet = "meets" if len(product) == 1 else "meet"
+    console.say(f"{count} settings {meet} {numbers.words(asked)}, by the whole interval")
+    if product.empty:
+        return
+    cells = numbers.wide(means[means["metric"].isin(SHORT_METRICS)], ["policy", "point"])
+    cells = cells.rename(columns=SHORT_METRICS).assign(**{"of these policies": product["verdict"]})
+    names = [f"{policy} {points[point]}".rstrip() for policy, point in cells.index]
+    print_frame("setting", cells.set_axis(names, axis="index")[:MANY_POINTS])
+    if len(cells) > MANY_POINTS:
+        console.say(f" {len(cells) - MANY_POINTS:,} more settings; --csv has them")
+
+
+def _print_distributions(table: pd.DataFrame) -> None:
+    """Quantiles of the product over the missions, and the mean of the worst ones."""
+    rows = table[(table["view"] != "quantile") | table["share"].isin(_QUANTILES)]
+    print_frame("spread of the product", tables.spread(rows, PRODUCT).set_index("Policy"))
+
+
+def _print_comparisons(table: pd.DataFrame) -> None:
+    """Differences of the other policies from the best one."""
+    cells, product = differences(table, "policy")
+    # How many times as many missions the comparison needs without common random numbers.
+    gains = product["variance_reduction"].map(lambda v: f"{1 / (1 - v):.1f} x" if v < 1 else "")
+    cells["pairing saves"] = gains
+    print_frame(f"against {table['baseline'].iloc[0]} [points]", cells)
+
+
+def _print_learners(table: pd.DataFrame) -> None:
+    """Differences of the learners from the best heuristic."""
+    cells, product = differences(table, "learner")
+    cells = cells.assign(about=product["about"])
+    print_frame(f"learned against {table['baseline'].iloc[0]} [points]", cells)
+
+
+def differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """``tables.compared`` by what is compared, and the rows of the product."""
+    cells = tables.compared(table, who).set_index(who.capitalize())
+    return cells, table[table["metric"] == PRODUCT].set_index(who)
+
+
+def _print_worst(table: pd.DataFrame) -> None:
+    """The worst missions of a policy, with the commands that simulate them again."""
+    policy = table["policy"].iloc[0]
+    console.say(f" worst missions of {policy}, by product:")
+    for row in table.itertuples():
+        outcome = "" if row.success else ", no success"
+        console.say(f"   {numbers.percent(row.collection_ratio)} collected{outcome}:")
+        console.say(f"     {row.command}")
+
+
+MANY, FIELDS = 10, 4  # rows on differences, and fields of a mission, that are printed
+
+
+def print_diff(found: diff.Diff, most: int) -> None:
+    """Print how many missions of two results differ, by how much, and the most changed ones."""
+    missions, differ = len(found.missions), len(found.changed)
+    if found.identical:
+        console.say(f"identical: {missions:,} missions")
+    elif not differ:
+        console.say(f"identical: the {missions:,} missions that both have")
+    else:
+        console.say(f"{differ:,} of {missions:,} missions differ")
+    for origin in diff.origins(found):
+        console.say(f" {origin}")
+    _print_alone(found.alone)
+    if differ:
+        _print_effects(found)
+        _print_most_changed(found, most)
+
+
+def _print_alone(alone: pd.DataFrame) -> None:
+    """What only one of the folders has."""
+    for side, rows in alone.groupby("only_in"):
+        for row in rows[:MANY].itertuples():
+            console.say(f" only in {side}: {row.what} ({row.missions:,} missions)")
+        if len(rows) > MANY:
+            console.say(
+                f" only in {side}: {len(rows) - MANY:,} more groups of missions; --json has them"
+            )
+
+
+def _print_effects(found: diff.Diff) -> None:
+    """Differences by policy, and by policy and design point if there are several."""
+    table = diff.effects(found)
+    _print_differences(table.assign(who=table["policy_a"]))
+    if len(points := settings(found.a)) > 1:
+        table = diff.effects(found, ["policy_a", "point_a"])
+        words = table["point_a"].map(dict(enumerate(points)))
+        _print_differences(table.assign(who=table["policy_a"] + " " + words))
+
+
+def _print_differences(table: pd.DataFrame) -> None:
+    """A row for everything whose missions differ: how many do, and B - A in every metric."""
+    rows = table[table["differ"] > 0]
+    names = rows["who"].drop_duplicates()
+    cells, product = differences(rows[rows["who"].isin(names[:MANY])], "who")
+    counts = product["differ"].map("{:,}".format) + " of " + product["missions"].map("{:,}".format)
+    cells.insert(0, "missions that differ", counts)
+    print_frame("B - A [points]", cells)
+    if (more := len(names) - MANY) > 0:
+        console.say(f" {more:,} more rows; --json has them")
+    if same := table["who"].nunique() - len(names):
+        console.say(f" {same:,} more without any difference")
+
+
+def _print_most_changed(found: diff.Diff, most: int) -> None:
+    """The most changed missions, with the commands that simulate them again."""
+    points = settings(found.a)
+    for side, results in (("A", found.a), ("B", found.b)):
+        console.say(f" {side}, {results.store.folder}: {diff.at_hand(results)}")
+    console.say(" most changed missions:")
+    for row in diff.most_changed(found, most).itertuples():
+        where = f"{row.policy_a} {points[row.point_a]}".strip()
+        console.say(
+            f"   {where}, replication {row.replication}: {_shortened(row.fields.split(', '))}"
+        )
+        console.say(f"     A: {row.command_a}\n     B: {row.command_b}")
+
+
+def _shortened(fields: list[str]) -> str:
+    """The first of the fields that differ, and how many more there are."""
+    more = f", and {len(fields) - FIELDS} more" if len(fields) > FIELDS else ""
+    return ", ".join(fields[:FIELDS]) + more

@@ -1,0 +1,166 @@
+"""Run notebooks, each in a process of its own, after the missions that only its page needs."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import TemporaryFile, gettempdir
+from typing import IO, Any
+
+import matplotlib as mpl
+from nbformat import from_dict
+
+from analysis.answers import comparison
+from analysis.answers.missions import keep_logs
+from analysis.results.tables import load_results
+from analysis.verification import measurements
+from dess import InputError
+from dess.files.locks import temporary_folder
+from reports.pages import cells
+from reports.pages.cells import kill
+from reports.pages.notebook import Report
+
+# Called after every cell, with the number of cells run so far and of all cells, and the report.
+Progress = Callable[[int, int, str], None]
+
+HOME = "dess-pages-"  # beginning of the name of the folder in which the notebooks run
+PACKAGES = Path(__file__).parents[3]  # the folder from which this package was imported
+
+
+def run(
+    reports: Sequence[Report], progress: Progress | None = None, shared: Sequence[Path] = ()
+) -> None:
+    """Run reports. If one fails, the error is stored in it and the others are still run.
+
+    Args:
+        reports: The reports, which get the outputs of their cells.
+        progress: Called after every cell.
+        shared: Results folders that several of them read, and that are loaded once.
+
+    Raises:
+        InputError: If a notebook refuses its parameters or results.
+    """
+    if not reports:
+        return
+    total = sum(len(report.cells) for report in reports)
+    codes = [[cell.source for cell in report.cells] for report in reports]
+    work = {"cells": codes, "folders": [str(folder.absolute()) for folder in shared]}
+    with temporary_folder(Path(gettempdir()), HOME) as home, TemporaryFile() as log:
+        with _process(home, log) as (asked, answers):
+            with suppress(BrokenPipeError):
+                asked.write(json.dumps(work).encode() + b"\n")
+                asked.flush()
+            for number, outputs, error in map(json.loads, answers):
+                report = reports[number]
+                report.cells[report.done].outputs = [from_dict(output) for output in outputs]
+                if error:
+                    _fail(report, *error)
+                    continue
+                report.done += 1
+                if progress:
+                    progress(sum(report.done for report in reports), total, report.name)
+        for report in reports:
+            if report.done < len(report.cells) and not report.failure:
+                log.seek(0)
+                last = log.read().decode("utf-8", "replace").strip().splitlines()[-1:]
+                report.failure = ": ".join([_cell(report), "its process ended", *last])
+
+
+def _fail(report: Report, kind: str, error: str, traceback: str) -> None:
+    """Store the error of a cell in its report, or raise it if the notebook refuses its input."""
+    if kind == InputError.__name__:
+        raise InputError(f"report {report.name}: {error}")
+    report.failure, report.traceback = f"{_cell(report)}: {kind}: {error}", traceback
+
+
+def _cell(report: Report) -> str:
+    """The cell that was begun last: its number among the cells with code, and its first line."""
+    first_line = report.cells[report.done].source.strip().partition("\n")[0]
+    return f"report {report.name}: cell {report.done + 1} of {len(report.cells)} ({first_line})"
+
+
+@contextmanager
+def _process(home: Path, log: IO[bytes]) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
+    """Input and output of the process that runs notebooks in a folder; it is killed at the end.
+
+    A session of its own keeps Ctrl-C from it and its children, and makes them a group to kill.
+    """
+    process = subprocess.Popen(
+        [sys.executable, "-m", cells.__name__],
+        cwd=home,
+        env=_environment(home),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=log,
+        start_new_session=True,
+    )
+    assert process.stdin
+    assert process.stdout
+    try:
+        yield process.stdin, process.stdout
+    finally:
+        kill(process.pid)
+        process.kill()
+        process.wait()
+        for stream in (process.stdin, process.stdout):
+            with suppress(BrokenPipeError):
+                stream.close()
+
+
+def _environment(home: Path) -> dict[str, str]:
+    """The environment of a process that writes to ``home`` only.
+
+    An empty entry of the path means the working directory of this process, where anything may lie.
+    """
+    path = [*(os.path.abspath(entry) for entry in sys.path if entry), str(PACKAGES)]
+    return {
+        **os.environ,
+        "IPYTHONDIR": str(home),
+        "PYTHONPATH": os.pathsep.join(path),
+        "PYTHONSAFEPATH": "1",  # do not put the working directory in front of it
+        "OMP_NUM_THREADS": "1",
+        "TQDM_DISABLE": "1",  # a page shows no progress bar
+        "MPLBACKEND": "agg",
+        "MPLCONFIGDIR": mpl.get_cachedir(),
+    }
+
+
+COMPARISON, VERIFICATION = "comparison", "verification"  # names of the pages and of their studies
+# The pages that show times of decisions, and their studies.
+TIMED = {COMPARISON: COMPARISON, "planner": "gap", "seas": "seas"}
+
+
+def make(
+    pages: Collection[str],
+    results: Path,
+    parameters: Mapping[str, Any],
+    progress: Progress | None = None,
+) -> None:
+    """Simulate the missions that are missing.
+
+    Args:
+        pages: Names of reports; those that need no missions are ignored.
+        results: The folder that contains a results folder per study.
+        parameters: Values for the parameters of the notebooks.
+        progress: Called after every mission.
+
+    Raises:
+        InputError: If results are damaged, a parameter is refused or nothing can be written.
+    """
+
+    def show(done: int, total: int) -> None:
+        if progress:
+            progress(done, total, "missions")
+
+    if COMPARISON in pages:
+        study = load_results(results / COMPARISON)
+        pair = comparison.pair_of(study, parameters.get("learned"), parameters.get("heuristic"))
+        drawn = comparison.drawn(comparison.duels(study, pair), pair)
+        keep_logs(study, drawn, results, show)
+    for page in TIMED.keys() & {*pages}:
+        comparison.make(results, load_results(results / TIMED[page]), show)
+    if VERIFICATION in pages:
+        measurements.make(results, load_results(results / VERIFICATION), show)

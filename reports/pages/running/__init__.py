@@ -1,1 +1,0 @@
-"""What runs for a page: missions that it needs beside results, and its notebook."""

@@ -1,1 +1,0 @@
-"""The page of any study: its sections, sentences, tables and figures."""

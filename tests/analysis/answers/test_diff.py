@@ -1,0 +1,292 @@
+"""Two results folders are compared mission by mission; what differs is named exactly."""
+
+import importlib
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from scipy import stats
+
+from analysis import load_results, run_study
+from analysis.answers.diff import at_hand, diff, effects, most_changed, origins
+from analysis.results import provenance
+from analysis.results.resimulate import recorded
+from analysis.results.tables import Results
+from dess import InputError
+from dess.code import sources
+from tests.analysis.small import environment, grid, small_study
+
+ROOT = Path(__file__).parents[3]
+# A policy of another package: UAVs hover from a certain replication on, before it they go east.
+PLUGIN = """
+import numpy as np
+
+LATE = {late}
+
+
+class Steady:
+    name = "steady"
+
+    def act(self, view):
+        return np.where(view.constants["replication"] >= LATE, 4, 1)
+
+
+class Other(Steady):
+    name = "other"
+    LATE = 0
+"""
+ENTRY_POINTS = "[dess.policies]\nsteady = steady_plugin:Steady\nother = steady_plugin:Other\n"
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """Installs the plug-in with one value of its constant, in the place of what was there."""
+    info = tmp_path / "plugin" / "steady-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: steady\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+    monkeypatch.syspath_prepend(info.parent)
+
+    def install(late: int) -> None:
+        (info.parent / "steady_plugin.py").write_text(PLUGIN.format(late=late))
+        shutil.rmtree(info.parent / "__pycache__", ignore_errors=True)
+        importlib.invalidate_caches()
+        monkeypatch.delitem(sys.modules, "steady_plugin", raising=False)
+        forget_code()
+
+    yield install
+    forget_code()
+
+
+def forget_code() -> None:
+    """Let modules be read again, which a process does once."""
+    sources.read.cache_clear()
+    provenance._code.cache_clear()
+
+
+def results_of(folder: Path, name: str, **changes) -> Results:
+    """The results of the small study."""
+    run_study(small_study(folder, **changes), folder / name)
+    return load_results(folder / name)
+
+
+@pytest.fixture
+def results(tmp_path):
+    """Two policies at two design points."""
+    return results_of(tmp_path, "out", design=grid(quota=[20, 60]))
+
+
+def test_results_are_identical_with_themselves(results):
+    found = diff(results, load_results(results.store.folder))
+    assert found.identical
+    assert len(found.missions) == 40
+    assert found.changed.empty
+    assert found.alone.empty
+    assert origins(found) == []
+    assert at_hand(results) == "made by the code, weights and libraries that are here"
+
+
+def test_after_a_constant_has_changed_the_missions_that_differ_are_named(tmp_path, installed):
+    policies = ["greedy", "steady"]
+    installed(5)
+    a = results_of(tmp_path, "a", policies=policies)
+    installed(8)
+    b = results_of(tmp_path, "b", policies=policies)
+    found = diff(a, b)
+    assert not found.identical
+    assert {*found.changed["policy_a"]} == {"steady"}
+    assert {*found.changed["replication"]} == {5, 6, 7}
+    assert origins(found) == ["code: steady_plugin"]
+    assert at_hand(a) == "made by other code of steady_plugin"
+    assert at_hand(b) == "made by the code, weights and libraries that are here"
+    counts = effects(found).drop_duplicates("policy_a").set_index("policy_a")
+    assert counts["differ"].to_dict() == {"steady": 3, "greedy": 0}
+    assert counts["missions"].to_dict() == {"steady": 10, "greedy": 10}
+
+
+def test_the_effects_are_paired_differences_b_minus_a(results):
+    better = results.missions.copy()
+    chosen = (better["policy"] == "random") & (better["point"] == 1)
+    better.loc[chosen, "collection_ratio"] -= 0.25
+    found = diff(results, replace(results, missions=better))
+    assert {*found.changed["fields"]} == {"collection_ratio"}
+    table = effects(found, ["policy_a", "point_a"])
+    first = table.iloc[0]
+    assert (first["policy_a"], first["point_a"], first["differ"]) == ("random", 1, 10)
+    ratios = table[table["metric"] == "collection_ratio"]
+    assert ratios["difference"].tolist() == pytest.approx([-0.25, 0, 0, 0])
+    # a mission in which B alone does well is added, and one in which A alone does
+    a = results.missions.loc[chosen, "collection_ratio"].mean()
+    rare = [max(a - 0.25, 1 - a), -max(a, 1.25 - a)]
+    p = stats.ttest_1samp([-0.25] * 10 + rare, 0).pvalue
+    assert ratios["p"].tolist() == pytest.approx([p, 1, 1, 1])
+    assert ratios["p_adjusted"].tolist() == pytest.approx([min(12 * p, 1), 1, 1, 1])
+    overall = effects(found)
+    overall = overall[overall["metric"] == "collection_ratio"].set_index("policy_a")
+    assert overall["difference"].to_dict() == pytest.approx({"random": -0.125, "greedy": 0})
+
+
+def test_the_most_changed_missions_come_first_with_their_commands(results):
+    missions = results.missions.copy()
+    for row, change in {3: 0.1, 17: -0.4, 30: 0.2}.items():
+        missions.loc[row, "collection_ratio_and_communication"] += change
+    missions.loc[8, "reward"] += 1000
+    found = diff(results, replace(results, missions=missions))
+    rows = most_changed(found, 3)
+    named = [(r.policy_a, r.point_a, r.replication) for r in rows.itertuples()]
+    assert named == [("greedy", 1, 7), ("random", 1, 0), ("greedy", 0, 3)]
+    again = "dess simulate --of {} --point {} --policy {} --replication {}"
+    folder = results.store.folder
+    assert rows["command_a"].tolist() == [again.format(folder, p, n, r) for n, p, r in named]
+    assert rows["command_b"].tolist() == rows["command_a"].tolist()
+    assert found.changed.iloc[3][["fields", "replication"]].tolist() == ["reward", 8]
+
+
+@pytest.mark.parametrize("field, value", [("slots_waiting", 99), ("reward", -0.0), ("end", "x")])
+def test_a_record_of_a_uav_that_differs_is_found(field, value, results):
+    uavs = results.uavs.copy()
+    row = uavs.index[(uavs["policy"] == "random") & (uavs["replication"] == 6)][-1]
+    uavs.loc[row, "reward"] = 0.0
+    changed = uavs.copy()
+    changed.loc[row, field] = value
+    found = diff(replace(results, uavs=uavs), replace(results, uavs=changed))
+    (mission,) = found.changed.itertuples()
+    assert (mission.policy_a, mission.point_a, mission.replication) == ("random", 1, 6)
+    assert mission.fields == f"uav {field}"
+
+
+def test_a_uav_that_is_missing_is_a_difference(results):
+    found = diff(results, replace(results, uavs=results.uavs[:-1]))
+    (mission,) = found.changed.itertuples()
+    assert (mission.policy_a, mission.point_a, mission.replication) == ("random", 1, 9)
+
+
+def test_design_points_are_matched_by_their_scenarios(results, tmp_path):
+    """Whatever their numbers, and which of their fields the design sets."""
+    other = results_of(tmp_path, "other", design=grid(quota=[60, 40]), missions=6)
+    found = diff(results, other)
+    assert {*zip(found.missions["point_a"], found.missions["point_b"], strict=True)} == {(1, 0)}
+    assert len(found.missions) == 12
+    assert found.changed.empty
+    assert not found.identical
+    assert [*found.alone.itertuples(index=False, name=None)] == [
+        ("A", "quota 20", 20),
+        ("A", "policy greedy at quota 60, replications 6 to 9", 4),
+        ("A", "policy random at quota 60, replications 6 to 9", 4),
+        ("B", "quota 40", 12),
+    ]
+
+
+def test_policies_that_only_one_has_are_listed(tmp_path):
+    a = results_of(tmp_path, "a", policies=["greedy", "random"])
+    b = results_of(tmp_path, "b", policies=["nearest", "random"])
+    found = diff(a, b)
+    assert {*found.missions["policy_a"]} == {"random"}
+    assert found.alone["what"].tolist() == ["policy greedy", "policy nearest"]
+
+
+def test_single_policies_are_compared_whatever_their_names(tmp_path, installed):
+    """Two trainings, say."""
+    installed(5)
+    a = results_of(tmp_path, "a", policies=["steady"])
+    b = results_of(tmp_path, "b", policies=["other"])
+    assert diff(a, b).identical
+    c = results_of(tmp_path, "c", policies=["greedy"])
+    found = diff(a, c)
+    assert len(found.changed) == 10
+    row = most_changed(found, 1).iloc[0]
+    assert "--policy steady" in row["command_a"]
+    assert "--policy greedy" in row["command_b"]
+
+
+def test_equal_design_points_count_once(results, tmp_path):
+    """Those of a Latin hypercube may fall together."""
+    design = {"kind": "latin-hypercube", "size": 8, "seed": 1, "ranges": {"quota": [20, 22]}}
+    twice = results_of(tmp_path, "twice", design=design)
+    found = diff(twice, twice)
+    assert found.identical
+    assert len(found.missions) == 2 * 10 * len({p.quota for p in twice.store.manifest.scenarios})
+    assert len(found.missions) < len(twice.missions)
+
+
+def test_the_missions_that_check_a_selection_are_compared(tmp_path):
+    rule = {
+        "procedure": "kn",
+        "metric": "collection_ratio",
+        "first": 8,
+        "indifference": 0.05,
+        "budget": 900,
+        "check": 9,
+    }
+    results = results_of(tmp_path, "out", selection=rule, design=grid(quota=[20, 60]))
+    found = diff(results, results)
+    assert found.identical
+    assert len(found.missions) == len(results.missions) + 2 * 9
+    checks = results.checks.copy()
+    checks.loc[4, "slots"] += 1
+    assert len(diff(results, replace(results, checks=checks)).changed) == 1
+
+
+def test_other_seeds_have_nothing_in_common(results, tmp_path):
+    other = results_of(tmp_path, "other", seed=8)
+    with pytest.raises(InputError, match="their seeds 7 and 8 give different random draws"):
+        diff(results, other)
+
+
+def test_folders_without_a_common_mission_are_refused(results, tmp_path):
+    late = results.missions["replication"] >= 5
+    early, others = (replace(results, missions=results.missions[rows]) for rows in (~late, late))
+    with pytest.raises(
+        InputError, match="no mission is in both: only A has policy greedy at quota"
+    ):
+        diff(early, others)
+    other = results_of(tmp_path, "other", policies=["nearest", "tour"])
+    with pytest.raises(InputError, match="only A has policy greedy, only B has policy nearest"):
+        diff(results, other)
+
+
+def test_libraries_and_accepted_changes_that_differ_are_told(results):
+    manifest = results.store.manifest
+    libraries = manifest.libraries | {"numpy": "1.0"}
+    accepted = [provenance.Acceptance(modules={"dess.rules": ("a" * 64, "b" * 64)}, missions=7)]
+    other = replace(
+        results,
+        store=type(results.store)(
+            results.store.folder,
+            manifest.model_copy(update={"libraries": libraries, "accepted": accepted}),
+        ),
+    )
+    assert origins(diff(results, other)) == [
+        f"libraries: numpy {manifest.libraries['numpy']} and 1.0",
+        "accepted in B: other code of dess.rules after 7 missions",
+    ]
+    assert at_hand(other) == "made with other versions of numpy"
+
+
+@pytest.mark.slow
+def test_a_changed_constant_of_the_model_is_found(tmp_path):
+    """The engine of a copy of the source tree, which takes a minute to compile."""
+    tree = tmp_path / "tree"
+    for package in ("dess", "policies", "analysis", "reports", "tests"):
+        ignored = shutil.ignore_patterns("__pycache__", "*.nbi", "*.nbc")
+        shutil.copytree(ROOT / package, tree / package, ignore=ignored)
+    rules = tree / "dess" / "rules.py"
+    constant = "min(u.battery + mission.charge_rate, mission.charge_complete)"
+    assert constant in rules.read_text()
+    rules.write_text(rules.read_text().replace(constant, constant.replace("rate", "rate + 1")))
+    a = results_of(tmp_path, "a")
+    command = [sys.executable, "-m", "reports", "study", "run", "trial.toml", "--out", "b"]
+    paths = {"PYTHONPATH": str(tree)}
+    subprocess.run(command, cwd=tmp_path, check=True, env=environment() | paths)
+    b = load_results(tmp_path / "b")
+    found = diff(a, b)
+    assert origins(found) == ["code: dess.rules"]
+    changed = {*zip(found.changed["policy_a"], found.changed["replication"], strict=True)}
+    missions = [(policy, r) for policy in a.policies for r in range(10)]
+    others = {(p, r) for p, r in missions if recorded(a, p, 0, r) != recorded(b, p, 0, r)}
+    assert changed == others
+    charged = a.uavs[a.uavs["slots_charging"] > 0]
+    assert set() < changed <= {*zip(charged["policy"], charged["replication"], strict=True)}

@@ -1,0 +1,370 @@
+"""Trainings: curves, comparisons of variants, and the files of trained policies."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from analysis import load_results, marl_eval_data, rliable_scores, run_study
+from analysis.answers import learning
+from analysis.answers.learning import (
+    CURVE,
+    CURVES,
+    ablation,
+    ablation_table,
+    answer,
+    difference,
+    ladder,
+    of_equal_budget,
+    read_curve,
+    read_curves,
+)
+from analysis.results.tables import Results
+from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
+from dess import InputError
+from policies.registry import TRAINED
+from tests.analysis.small import grid, small_study
+from tests.policies.ddqn.tiny import tiny, tiny_on_seas
+
+
+def test_the_difference_of_means_is_welchs():
+    a, b = [1.0, 2.0, 4.0], [3.0, 3.5]
+    ends, p = difference(a, b)
+    test = stats.ttest_ind(a, b, equal_var=False)
+    assert ends.mean == pytest.approx(np.mean(a) - np.mean(b))
+    assert (ends.low, ends.high) == pytest.approx(tuple(test.confidence_interval(0.95)))
+    assert p == pytest.approx(test.pvalue)
+
+
+def test_a_single_training_is_held_against_the_spread_of_the_others():
+    """By hand: the prediction interval of one more, mean +- t s sqrt(1 + 1/n)."""
+    others = np.array([1.0, 2.0, 3.0])
+    ends, p = difference([5.0], others)
+    half = stats.t.ppf(0.975, 2) * 1.0 * np.sqrt(1 + 1 / 3)
+    assert (ends.low, ends.high) == pytest.approx((3.0 - half, 3.0 + half))
+    assert p == pytest.approx(2 * stats.t.sf(3.0 / np.sqrt(4 / 3), 2))
+
+
+@pytest.fixture
+def last() -> pd.DataFrame:
+    """Final metrics of three variants: one is worse than the baseline, one was trained once."""
+    products = {"base": [0.7, 0.72, 0.74], "worse": [0.1, 0.11, 0.12], "once": [0.73]}
+    rows = [
+        (variant, seed, value, 1.0, value + 0.1)
+        for variant, values in products.items()
+        for seed, value in enumerate(values)
+    ]
+    metrics = [
+        "final_collection_ratio_and_communication",
+        "final_success",
+        "final_collection_ratio",
+    ]
+    return pd.DataFrame(rows, columns=["variant", "seed", *metrics])
+
+
+def test_the_table_of_text_has_a_row_per_variant(last: pd.DataFrame) -> None:
+    table = ablation(last, "final_collection_ratio_and_communication", "base")
+    rows = ablation_table(table, last, "base").fillna("").set_index("Variant")
+    assert rows.index.tolist() == ["once", "base", "worse"]  # by their means
+    # by hand: 0.02 t(0.975, 2) / sqrt(3) = 0.0497
+    # and 0.02 t(0.975, 2) sqrt(1 + 1/3) = 0.0994 of one new training
+    base = [3, "72.0 % [67.0, 77.0]", "[62.1, 81.9]", "", "", "100.0 %", "82.0 %"]
+    assert rows.loc["base"].tolist() == base
+    assert rows.loc["once", "One new training"] == ""
+    assert rows.loc["once", "Product"] == "73.0 %"
+    assert rows.loc["worse", "Difference from base [points]"].startswith("−61.0 [")
+    assert [cell[-1:] for cell in rows["Difference from base [points]"]] == ["≈", "", "▼"]
+    assert rows.loc["worse", "p (Holm)"] == "< 0.001"
+
+
+def test_intervals_of_shares_end_where_these_do(last: pd.DataFrame) -> None:
+    far = last.assign(final_success=last["seed"].map({0: 1.0, 1: 0.9, 2: 0.2}))
+    table = ablation(far, "final_success", "base").set_index("variant").loc["base"]
+    assert (table["low"], table["high"]) == (0.0, 1.0)
+    assert (table["new_low"], table["new_high"]) == (0.0, 1.0)
+
+
+def test_the_ladder_goes_from_the_paper_to_the_shipped_policy_and_counts_who_learns() -> None:
+    rows = [
+        ("ddqn", 1, 90, 0.9, 0.99),
+        ("quick", 1, 10, 0.7, 0.98),
+        ("other", 1, 10, 0.3, 1.0),
+        ("none of the three", 1, 10, 0.0, 0.0),
+        ("none of the three", 2, 10, 0.2, 0.6),
+    ]
+    product, success = "final_collection_ratio_and_communication", "final_success"
+    last = pd.DataFrame(rows, columns=["variant", "seed", "updates", product, success])
+    rungs = ladder(last)
+    assert [*rungs["variant"].unique()] == [
+        "the paper's methods",
+        "and early returns (quick)",
+        "ddqn, trained longer",
+    ]
+    assert answer(rungs) == (
+        "The product rises from 10.0 % (the paper's methods) to 90.0 % (ddqn, trained longer); "
+        "the largest step: and early returns (quick). Trainings that learn to charge: 1 of 2 "
+        "(the paper's methods), 1 of 1 (and early returns (quick)) and 1 of 1 (ddqn, trained "
+        "longer)."
+    )
+    assert {*of_equal_budget(last, "quick")["variant"]} == {"quick", "other", "none of the three"}
+
+
+METRIC = "evaluation_reward"
+STEPS = [1000, 2000, 3000, 4000]
+
+
+def training(variant, seed, values, before=0):
+    """A curve with a number of evaluations before the last phase."""
+    phases = ["harvest"] * before + ["battery"] * (len(values) - before)
+    steps = STEPS[: len(values)]
+    columns = {"phase": phases, "updates": steps, METRIC: values, "final_product": values[-1]}
+    same = {"variant": variant, "seed": seed}
+    return pd.DataFrame(same | columns).assign(uav_slots=500 * np.array(steps))
+
+
+def several(variant, ends, level=0.0, before=0):
+    """Trainings that rise from a level to their ends."""
+    return pd.concat(
+        training(variant, seed, np.linspace(level, end, len(STEPS)), before)
+        for seed, end in enumerate(ends)
+    )
+
+
+def compared(using, without, **options):
+    both = pd.concat([several("with", using, **options), several("without", without)])
+    return learning.transfer(learning.smoothed(both, METRIC), "with", "without", STEPS[-1])
+
+
+def test_an_average_weighs_the_newest_and_begins_anew_with_every_phase():
+    table = learning.smoothed(training("one", 1, [4.0, 0.0, 8.0, 16.0], before=2), METRIC)
+    a = learning.ALPHA
+    assert table["value"].tolist() == [4.0, 4.0 * (1 - a), 8.0, 8.0 * (1 - a) + 16.0 * a]
+    assert table["updates"].tolist() == STEPS
+
+
+def test_transfer_is_judged_in_the_last_phase_alone():
+    result = compared([9.0, 9.1, 9.2], [5.0, 5.1, 5.2], level=1.0, before=2)
+    assert result.throughout and result.since == STEPS[2]
+
+
+def test_a_curve_has_settled_where_it_stays_near_its_end():
+    averages = pd.Series([0.2, 0.55, 0.725])
+    assert [learning.settled(averages, margin) for margin in (1.0, 0.2, 0.0)] == [0, 1, 2]
+
+
+def test_pairs_need_trainings_of_both_variants():
+    curves = pd.concat(
+        [several("quick", [1.0]), several("no transfer", [1.0]), several("no guard", [1.0])]
+    )
+    assert learning.pairs_in(curves) == {"all methods of this project": ("quick", "no transfer")}
+    (key,) = learning.transfers(curves, [METRIC], shortest=STEPS[-1])
+    assert key == ("all methods of this project", METRIC)
+
+
+@pytest.mark.parametrize(
+    ("using", "without", "level", "verdict", "since"),
+    [
+        ([9.0, 9.01, 9.02], [5.0, 5.01, 5.02], -1.0, HOLDS, STEPS[2]),  # behind at first
+        ([4.0, 9.0], [3.0, 8.0], 1.0, INCONCLUSIVE, STEPS[0]),  # the interval contains 0
+        ([3.0, 8.0], [4.0, 9.0], 0.0, INCONCLUSIVE, None),  # ends below
+        ([9.0], [5.0], 0.0, INCONCLUSIVE, STEPS[1]),  # two single trainings, equal at first
+        ([2.0, 2.1, 2.2], [9.0, 9.1, 9.2], 1.0, REFUTED, None),  # ahead at first
+    ],
+)
+def test_transfer_is_judged_by_the_interval_of_the_end(using, without, level, verdict, since):
+    result = compared(using, without, level=level)
+    assert (result.verdict, result.since) == (verdict, since)
+    assert result.throughout == (since == STEPS[0])
+    both = pd.concat([several("with", using), several("without", without)])
+    averages = learning.smoothed(both, METRIC)
+    short = learning.transfer(averages, "with", "without", shortest=STEPS[-1] + 1)
+    assert (short.verdict, short.length) == (INCONCLUSIVE, STEPS[-1])
+
+
+def test_comparisons_are_rows_of_text():
+    ends = {"all means": ([900.0, 910.0], [500.0, 510.0]), "equal": ([0.5, 0.5], [0.5, 0.5])}
+    keys = [("all means", learning.LEARNED_REWARD), ("equal", learning.LEARNED_PRODUCT)]
+    table = learning.transfer_table(
+        {key: compared(*ends[key[0]]) for key in keys}, dict.fromkeys(keys, HOLDS)
+    )
+    first, second = table.to_numpy().tolist()
+    # of four even steps the last average is 17 / 24 on the way: 400 x 17 / 24
+    assert first.pop().startswith("+283 [")
+    assert first == ["All means", "2 and 2", "Reward", HOLDS, "is above from step 2,000 on"]
+    assert second[2:] == [
+        "Product",
+        HOLDS,
+        "ends below, or level",
+        "0.0, the same in all trainings",
+    ]
+
+
+Change = Callable[[pd.DataFrame], Any]
+
+
+@pytest.mark.parametrize(
+    ("path", "read", "columns"),
+    [("curves.parquet", read_curves, CURVES), ("ddqn/training.parquet", read_curve, CURVE)],
+)
+def test_shipped_curves_are_read_as_they_are(path: str, read: Any, columns: Any) -> None:
+    kept = pd.read_parquet(TRAINED / path)[columns.names]
+    pd.testing.assert_frame_equal(read(TRAINED / path), kept, check_dtype=False)
+
+
+# What a forger makes of sound curves, and what the line names.
+FORGED: dict[str, Change] = {
+    "has no sound column variant": lambda curves: curves.drop(columns="variant"),
+    "has no sound column final_success": lambda curves: curves.drop(columns="final_success"),
+    "has no sound column seed": lambda curves: curves.assign(seed="one"),
+    "has no sound column evaluation_reward": lambda c: c.assign(evaluation_reward=float("inf")),
+    "has no sound column uav_slots": lambda c: c.assign(uav_slots=c["tick"].where(c.index > 0)),
+    "has no sound column phase": lambda curves: curves[:0],
+    "updates: are there twice": lambda curves: curves.assign(updates=1),
+    "variant: has no pair of trainings": lambda curves: curves[curves["variant"] == "quick"],
+    "variant: has no pair": lambda c: c.assign(updates=c["updates"] + (c["variant"] == "quick")),
+}
+
+
+@pytest.mark.parametrize("problem", FORGED)
+def test_forged_curves_are_a_line(problem: str, tmp_path: Path) -> None:
+    path = tmp_path / "curves.parquet"
+    FORGED[problem](pd.read_parquet(TRAINED / "curves.parquet")).to_parquet(path)
+    with pytest.raises(InputError, match=f"^{path}: {problem}"):
+        read_curves(path)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"is_best": False}, {"updates": lambda curve: curve["updates"].to_numpy()[::-1]}]
+)
+def test_a_forged_curve_is_a_line(wrong: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / "training.parquet"
+    pd.read_parquet(TRAINED / "ddqn" / "training.parquet").assign(**wrong).to_parquet(path)
+    with pytest.raises(InputError, match=f"^{path}: {next(iter(wrong))}: .*; allowed: "):
+        read_curve(path)
+
+
+POLICIES, OF_RUNS = ["greedy", "random", "tour"], "collection_ratio"
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """Three policies at two design points, 21 missions each."""
+    folder = tmp_path_factory.mktemp("runs")
+    design = grid(quota=[30, 60])
+    run_study(small_study(folder, policies=POLICIES, missions=21, design=design), folder / "out")
+    return load_results(folder / "out")
+
+
+def block(results: Results, policy: str, point: int, missions: range) -> float:
+    """The mean of a metric over some missions."""
+    rows = results.missions.query("policy == @policy and point == @point")
+    return float(rows[rows["replication"].isin([*missions])][OF_RUNS].mean())
+
+
+def test_a_run_of_a_policy_without_trainings_is_a_block_of_missions(results: Results) -> None:
+    scores = rliable_scores(results, OF_RUNS)
+    assert [*scores] == POLICIES
+    for policy, rows in scores.items():
+        assert rows.shape == (10, 2)
+        for point in range(2):
+            blocks = [block(results, policy, point, range(2 * r, 2 * r + 2)) for r in range(10)]
+            np.testing.assert_allclose(rows[:, point], blocks)
+
+
+def test_a_run_of_a_learner_is_a_training_on_its_own_missions(results, monkeypatch) -> None:
+    monkeypatch.setattr(learning, "learners", lambda _: {"learner": ["random", "tour"]})
+    scores = rliable_scores(results, OF_RUNS)
+    assert [*scores] == ["learner", "greedy"]
+    halves = range(10), range(10, 20)
+    for name, flown in {"learner": ["random", "tour"], "greedy": ["greedy"] * 2}.items():
+        expected = [
+            [block(results, policy, point, half) for point in range(2)]
+            for policy, half in zip(flown, halves, strict=True)
+        ]
+        np.testing.assert_allclose(scores[name], expected)
+
+
+def test_marl_eval_has_the_same_scores_at_every_level(results, monkeypatch) -> None:
+    monkeypatch.setattr(learning, "learners", lambda _: {"a,b": ["random", "tour"]})
+    data = json.loads(json.dumps(marl_eval_data(results, ["success", OF_RUNS])))
+    scores = rliable_scores(results, OF_RUNS)
+    [[study, tasks]] = data.items()
+    assert (study, [*tasks]) == ("trial", ["quota 30", "quota 60"])
+    for task, algorithms in enumerate(tasks.values()):
+        assert [*algorithms] == ["a+b", "greedy"]
+        for name, of_runs in algorithms.items():
+            assert [*of_runs] == ["run_1", "run_2"]
+            for run, steps in enumerate(of_runs.values()):
+                values = steps["absolute_metrics"]
+                assert steps == {"step_1": {"step_count": 0} | values, "absolute_metrics": values}
+                assert values[OF_RUNS] == [scores[name.replace("+", ",")][run, task]]
+                assert [*values] == ["success", OF_RUNS]
+
+
+def test_what_has_no_scores_is_refused(results, tmp_path, monkeypatch) -> None:
+    with pytest.raises(InputError, match="metric: 'sucess' is unknown"):
+        rliable_scores(results, "sucess")
+    few = run_study(small_study(tmp_path, missions=9), tmp_path / "out")
+    with pytest.raises(InputError, match="missions: 9 for 10 runs"):
+        rliable_scores(few)
+    unequal = {"a": ["greedy"] * 2, "b": ["tour"] * 3}
+    monkeypatch.setattr(learning, "learners", lambda _: unequal)
+    with pytest.raises(InputError, match=r"trainings: \[2, 3\]"):
+        rliable_scores(results)
+
+
+SHIPPED = json.loads((TRAINED / "ddqn" / "config.json").read_text("utf-8"))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two trainings of one learner, one of another, one on many seas, and one without a curve."""
+    for name, config in {
+        "one": tiny(seed=1),
+        "two": tiny(seed=2),
+        "other": tiny(seed=1, discount=0.9),
+        "seas": tiny_on_seas(),
+        "bare": tiny(),
+    }.items():
+        (tmp_path / name).mkdir()
+        training = config.model_dump(mode="json")
+        description = json.dumps(SHIPPED | {"training": training})
+        (tmp_path / name / "config.json").write_text(description, "utf-8")
+        if name == "bare":
+            continue
+        product = [0.0, 0.8, 0.5, 0.5]
+        curve = {
+            "phase": "battery",
+            "updates": [250, 500, 750, 1000],
+            "seconds": [60, 120, 180, 240],
+        }
+        curve |= {"uav_slots": [1e6, 2e6, 3e6, 4e6], learning.PRODUCT: product, "is_best": True}
+        same = dict.fromkeys({*CURVE.names} - curve.keys(), 1)
+        pd.DataFrame(curve | same).to_parquet(tmp_path / name / "training.parquet")
+    return tmp_path
+
+
+def test_trainings_that_differ_in_their_seed_are_of_one_learner(folder: Path) -> None:
+    policies = learning.trained_policies(folder)
+    assert [policy.name for policy in policies] == ["one", "other", "two"]
+    sizes = learning.curves_by_learner(policies).groupby(["variant", "seed"]).size()
+    assert sizes.to_dict() == {("one and two", 1): 4, ("one and two", 2): 4, ("other", 1): 4}
+
+
+def test_the_course_of_a_training(folder: Path) -> None:
+    first = learning.trained_policies(folder)[0]
+    # averages 0, 0.4, 0.45 and 0.475: within 0.05 from the third evaluation on
+    assert learning.course_in_words(first, 0.05) == (
+        "- **one**: 47.5 % after 1,000 updates (4.0 million UAV-slots, 4 minutes); within 5 points "
+        "of it from update 750 on (3 minutes)."
+    )
+
+
+def test_every_training_has_its_command(folder: Path) -> None:
+    policies = learning.trained_policies(folder)
+    assert learning.commands(policies)[-1] == "dess train tiny --seed 2 --out runs/two"

@@ -1,0 +1,141 @@
+"""Main effects compare values of a parameter on the same missions."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import run_study
+from analysis.answers import main_effects
+from analysis.answers.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
+from analysis.names import PRODUCT, SUCCESS
+from analysis.stats.differences import adjust, paired
+from analysis.stats.intervals import by_replication, interval_of, post_stratified
+from dess import InputError
+from tests.analysis.small import grid, small_study
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    values = {"uavs": [1, 2], "initial_data": [[5, 7.5], 10, [2, 20]]}
+    design = {"kind": "one-at-a-time", "values": values}
+    return run_study(small_study(folder, design=design, missions=20), folder / "out")
+
+
+@pytest.fixture(scope="module")
+def table(results):
+    return main_effects.effects(results)
+
+
+def pairs_of(steps, sure=True, half=0.001, widened=2):
+    """All pairs of values with these steps between neighbours, all of them sure, or none."""
+    level = np.concatenate([[0.0], np.cumsum(steps)])
+    rows = [
+        (i, j, level[j] - level[i]) for i in range(len(level)) for j in range(i + 1, len(level))
+    ]
+    table = pd.DataFrame(rows, columns=["first", "second", "difference"])
+    p = np.where(sure & (table["difference"].abs() > half), 0.001, 1.0)
+    gap = table["difference"]
+    wide = widened * half
+    ends = {"low": gap - half, "high": gap + half, "wide_low": gap - wide, "wide_high": gap + wide}
+    return table.assign(**ends, p_adjusted=p)
+
+
+def test_effects_are_the_means_by_value(results, table):
+    named = table.drop_duplicates(["field", "position"])[["field", "position", "value"]]
+    assert named.to_numpy().tolist() == [
+        ["uavs", 0, "1"],
+        ["uavs", 1, "2"],
+        ["initial_data", 0, "5–7.5"],
+        ["initial_data", 1, "10"],
+        ["initial_data", 2, "2–20"],
+    ]
+    row = table.query("field == 'initial_data' and position == 2 and policy == 'random'")
+    missions = results.missions.query("point == 4 and policy == 'random'")
+    ends = row.set_index("metric").loc["reward", ["mean", "low", "high"]]
+    values = post_stratified(missions["reward"].to_numpy(), missions["uavs"].to_numpy())
+    assert tuple(ends) == interval_of("reward", values)
+
+
+def test_success_is_compared_where_the_number_of_uavs_is_drawn(results, table):
+    """Its post-stratified values lie outside [0, 1]."""
+    missions = results.missions.assign(success=results.missions["replication"] % 2)
+    found = replace(results, missions=missions)
+    pairs = main_effects.changes(found, table, "random", "initial_data", SUCCESS)
+    assert (pairs["difference"] == 0).all() and (pairs["low"] < 0).all()
+
+
+def test_a_design_of_several_fields_is_refused(tmp_path):
+    study = small_study(tmp_path, design=grid(uavs=[1, 2], quota=[20, 30]), missions=2)
+    with pytest.raises(InputError, match="point 0: sets uavs, quota; allowed: one field"):
+        main_effects.effects(run_study(study, tmp_path / "out"))
+
+
+@pytest.mark.parametrize(
+    ("steps", "words", "peaks"),
+    [
+        ([0, 0, 0], LEVELS, (0, 1, 2, 3)),
+        ([1, 0, 1], RISES, (3,)),
+        ([1, 0, 0], RISES, (1, 2, 3)),
+        ([0, -1, -1], FALLS, (0, 1)),
+        ([1, 1, -1], PEAK, (2,)),
+        ([1, 0, -1], PEAK, (1, 2)),
+        ([-1, -1, 1], VALLEY, ()),
+        ([1, -1, 1], IRREGULAR, ()),
+    ],
+)
+def test_shapes(steps, words, peaks):
+    assert main_effects.shape(pairs_of(steps)) == main_effects.Shape(words, peaks)
+    assert main_effects.shape(pairs_of(steps, sure=False)).words == LEVELS
+
+
+def test_the_best_policies_are_shown_unless_others_are_asked_for(results):
+    means = results.missions.groupby("policy")[PRODUCT].mean()
+    assert main_effects.leading_policies(results) == [means.idxmax()]
+    named = main_effects.leading_policies(results, means.idxmax(), means.idxmin())
+    assert named == [means.idxmax(), means.idxmin()]
+    with pytest.raises(InputError, match="policy: 'learned' is not in the study"):
+        main_effects.leading_policies(results, "learned", means.idxmin())
+
+
+def test_changes_are_paired_by_replication(results, table):
+    """Intervals that hold for all three pairs at once are wider, by Bonferroni."""
+    pairs = main_effects.changes(results, table, "greedy", "initial_data", "collection_ratio")
+    assert pairs[["first", "second"]].to_numpy().tolist() == [[0, 1], [0, 2], [1, 2]]
+    missions = results.missions.query("policy == 'greedy'")
+    values = by_replication(missions, "collection_ratio", "point")
+    sides = values[4].to_numpy(), values[3].to_numpy()
+    one, all_three = (paired(*sides, level, "collection_ratio") for level in (0.95, 1 - 0.05 / 3))
+    expected = [*one[:3], *all_three[1:3]]
+    columns = ["difference", "low", "high", "wide_low", "wide_high"]
+    assert pairs.loc[2, columns].tolist() == pytest.approx(expected)
+    assert pairs["p_adjusted"].tolist() == adjust(pairs["p"].to_numpy(), "holm").tolist()
+    assert set(pairs["n"]) == {20}
+
+
+def test_the_table_has_a_row_per_parameter_and_policy():
+    policies = {"mine": [0.1, 0.2, 0.2, 0.1], "other": [0.1, 0.3, 0.3, 0.4]}
+    rows = [
+        ("uavs", str(n + 1), n, policy, PRODUCT, mean)
+        for policy, means in policies.items()
+        for n, mean in enumerate(means)
+    ]
+    columns = ["field", "value", "position", "policy", "metric", "mean"]
+    changes = {"uavs": {policy: pairs_of(np.diff(means)) for policy, means in policies.items()}}
+    ratios = {"uavs": dict.fromkeys(policies, pairs_of([0.2, 0.1, -0.1]))}
+    table = main_effects.listed(pd.DataFrame(rows, columns=columns), changes, ratios)
+    mine = [
+        PEAK,
+        "10.0 % at 1",
+        "10.0 % at 4",
+        "0.0 [−0.1, +0.1]",
+        "+20.0 [+19.9, +20.1]",
+        "2 or 3",
+    ]
+    other = [RISES, "10.0 % at 1", "40.0 % at 4", "+30.0 [+29.9, +30.1]", mine[4], ""]
+    assert table.to_numpy().tolist() == [
+        ["Number of UAVs", "mine", *mine],
+        ["Number of UAVs", "other", *other],
+    ]

@@ -1,0 +1,170 @@
+"""How a team shares out the nodes, on layouts worked by hand."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from analysis import run_study
+from analysis.answers import missions
+from analysis.results.tables import Results
+from dess import load_scenario, simulate
+from policies import load_team
+from tests.analysis.small import grid, small_study
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    folder = tmp_path_factory.mktemp("study")
+    study = small_study(folder, design=grid(uavs=[1, 3]), logged=2, missions=6)
+    return run_study(study, folder / "out")
+
+
+@pytest.fixture(scope="module")
+def shown(results: Results) -> list[missions.LoggedMission]:
+    return [missions.logged_mission(results, "greedy", point, 1) for point in (0, 1)]
+
+
+# --- missions simulated again ---
+
+WANTED = [("greedy", 1), ("random", 0)]
+
+
+def test_kept_logs_are_those_that_the_study_keeps(results: Results, tmp_path: Path) -> None:
+    """They are kept: a second call writes nothing, but in place of a damaged file."""
+    assert missions.kept_missions(results, WANTED, tmp_path) == []
+    steps: list[tuple[int, int]] = []
+    missions.keep_logs(results, WANTED, tmp_path, lambda *step: steps.append(step))
+    assert steps == [(1, 2), (2, 2)]
+    kept = missions.kept_missions(results, WANTED, tmp_path)
+    for (policy, replication), mission in zip(WANTED, kept, strict=True):
+        same = missions.logged_mission(results, policy, 0, replication)
+        pd.testing.assert_frame_equal(mission.log, same.log)
+        assert mission.row.equals(same.row) and mission.scenario == same.scenario
+    files = {path: path.read_bytes() for path in (tmp_path / missions.FOLDER).iterdir()}
+    damaged = min(files)
+    damaged.write_bytes(b"damaged")
+    before = max(files).stat().st_mtime_ns
+    missions.keep_logs(results, WANTED, tmp_path, print)
+    assert {path: path.read_bytes() for path in files} == files
+    assert max(files).stat().st_mtime_ns == before
+
+
+def test_logs_of_other_results_and_of_other_records_are_not_shown(
+    results: Results, tmp_path: Path
+) -> None:
+    missions.keep_logs(results, WANTED, tmp_path, print)
+    other = run_study(small_study(tmp_path, seed=8, missions=2), tmp_path / "other")
+    assert missions.kept_missions(other, WANTED[:1], tmp_path) == []
+    other.missions["slots"] += 1  # as of other code
+    missions.keep_logs(other, WANTED[:1], tmp_path, print)
+    assert missions.kept_missions(other, WANTED[:1], tmp_path) == []
+
+
+def test_a_caption_says_what_ended_a_mission(shown: list[missions.LoggedMission]) -> None:
+    mission = shown[1]
+    filled = mission.log.assign(event=mission.log["event"].replace("battery_empty", "quota_filled"))
+    assert ": All UAVs filled their quota. " in replace(mission, log=filled).caption
+    end = (filled["event"] == "quota_filled") & (filled["uav"] == 2)
+    failed = filled.assign(event=filled["event"].mask(end, "battery_empty"))
+    assert ": UAV 3 ran empty after " in replace(mission, log=failed).caption
+    assert f". {mission.collected} in {mission.row['slots']} mission slots." in mission.caption
+
+
+def test_outcomes_are_those_of_the_record(shown: list[missions.LoggedMission]) -> None:
+    table = missions.outcome_table(shown)
+    for row, mission in zip(table.to_dict("records"), shown, strict=True):
+        log = mission.log
+        ends = log[(log["event"] == "mission_end") & (log["node"] >= 0)].set_index("node")["value"]
+        never = [
+            k
+            for k in ends.index
+            if not (log["event"].eq("communication") & log["node"].eq(k)).any()
+        ]
+        assert row["Nodes never served"] == f"{len(never)} of 3"
+        collected, total = map(float, row["Data collected"].split(" of "))
+        assert float(row["Data left"]) == pytest.approx(total - collected)  # as they are printed
+        assert float(row["Data left"]) == pytest.approx(ends.sum(), abs=0.1)
+        assert row["Fullest node left"].startswith(f"{ends.max():.1f} at (")
+        x, y = mission.scenario.nodes[int(ends.idxmax())]
+        assert row["Fullest node left"].endswith(f"({x}, {y})")
+        assert row["Success"] == ("yes" if mission.row["success"] else "no")
+
+
+SQUARE = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
+PAPER = np.array([(x, y) for y in (6, 11, 16, 21, 26) for x in (3, 8, 13, 18, 23)])
+
+EVENTS = {
+    "event": ["mission_start", "mission_start", "mission_start", "communication", "arrival"]
+    + ["communication", "communication"],
+    "uav": [0, -1, -1, 0, -1, 1, 1],
+    "node": [-1, 0, 1, 0, 1, 0, 1],
+    "value": [80.0, 6.0, 4.0, 2.0, 1.0, 1.5, 1.0],
+}
+
+
+def test_what_is_collected_and_held() -> None:
+    """The battery at the start is no data."""
+    assert missions.collected(EVENTS, 2, 2).tolist() == [[2.0, 0.0], [1.5, 1.0]]
+    assert missions.held(EVENTS, 2).tolist() == [6.0, 5.0]
+    assert missions.left_behind(EVENTS, 2).tolist() == [False, True]  # 3.5 of 6, 1 of 5
+
+
+def test_a_mission_is_accounted_for() -> None:
+    scenario = load_scenario("fig4").scenario_at(
+        uavs=2, flying_time=80, charge_start=30, charge_complete=80
+    )
+    record = simulate(scenario, load_team("greedy"), 1, 0, events=True)
+    assert record.events is not None
+    log = record.events.columns()
+    data, nodes = missions.collected(log, 2, 25), len(scenario.nodes)
+    assert data.sum(axis=1) == pytest.approx(record.uavs["collected"])
+    assert missions.held(log, nodes).sum() == pytest.approx(record.initial + record.arrived)
+
+
+def test_the_far_edges_of_the_paper() -> None:
+    far = missions.far_edges(PAPER)
+    assert sorted(map(tuple, PAPER[far])) == sorted(
+        {(3, y) for y in (6, 11, 16, 21, 26)} | {(x, 26) for x in (3, 8, 13, 18, 23)}
+    )
+
+
+def test_division() -> None:
+    assert missions.division(np.array([[3, 0], [0, 5]])) == 1
+    assert missions.division(np.array([[3, 5], [3, 5]])) == 0.5
+    assert missions.division(np.array([[4, 1], [0, 3]])) == 7 / 8
+    assert np.isnan(missions.division(np.zeros((2, 2))))
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "share"),
+    [
+        ([1, 0, 1, 0], [0, 1, 0, 1], 1.0),  # left and right
+        ([1, 1, 0, 0], [0, 0, 1, 1], 1.0),  # top and bottom
+        ([1, 0, 0, 0], [0, 1, 1, 1], 1.0),  # a corner
+        ([1, 0, 0, 1], [0, 1, 1, 0], 0.75),  # crosswise: a line leaves one on the wrong side
+        ([4, 0, 0, 1], [0, 3, 2, 0], 0.9),  # that one is the least
+        ([1, 1, 1, 1], [1, 1, 1, 1], 0.5),
+        ([5, 1, 0, 0], [0, 0, 0, 0], 1.0),  # all on one side
+    ],
+)
+def test_sectors(first: list[int], second: list[int], share: float) -> None:
+    assert missions.sectors(np.array([first, second]), SQUARE) == pytest.approx(share)
+    assert missions.sectors(np.array([second, first]), SQUARE) == pytest.approx(share)
+
+
+def test_sectors_of_no_data_and_of_one_node() -> None:
+    assert np.isnan(missions.sectors(np.zeros((2, 4)), SQUARE))
+    assert missions.sectors(np.array([[3.0], [1.0]]), SQUARE[:1]) == 0.75
+
+
+@given(st.floats(0, 2 * np.pi), st.floats(-12, 12))
+def test_any_straight_line_makes_sectors(angle: float, offset: float) -> None:
+    """Whatever way it runs, also beside the rows and columns of the paper's grid."""
+    one = (PAPER - (13, 16)) @ (np.cos(angle), np.sin(angle)) < offset
+    data = np.array([one, ~one], float)
+    assert missions.sectors(data, PAPER) == pytest.approx(1)

@@ -1,0 +1,132 @@
+"""Changes from a reference value, and the answers that are made of them, on planted values."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import run_study
+from analysis.answers import operations
+from analysis.names import AGE, PRODUCT
+from analysis.stats.differences import relative_change
+from dess import InputError
+from tests.analysis.small import grid, small_study
+
+
+def planted(results, metric, value):
+    """The results with the values that a function gives to every row of missions."""
+    values = results.missions.apply(value, axis="columns")
+    return replace(results, missions=results.missions.assign(**{metric: values}))
+
+
+@pytest.fixture(scope="module")
+def pads(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pads")
+    study = small_study(folder, policies=["greedy"], missions=40,
+                        design=grid(uavs=[2, 4], pads=[1, 2, 3, 4]))  # fmt: skip
+    return run_study(study, folder / "out")
+
+
+def test_a_change_is_the_paired_difference_from_the_same_setting(pads):
+    shifted = planted(pads, PRODUCT, lambda row: 0.5 + 0.001 * row["replication"]
+                      - 0.1 * (row["pads"] == 1) - 0.2 * (row["uavs"] == 4))  # fmt: skip
+    table = operations.changes(shifted, "pads", 4, PRODUCT).set_index(["uavs", "pads"])
+    assert len(table) == 6  # the reference has no row
+    for uavs in (2, 4):
+        assert table.loc[(uavs, 1), "mean"] == pytest.approx(-0.1)
+        assert table.loc[(uavs, 3), "mean"] == 0
+        assert table.loc[(uavs, 1), "n"] == 40
+    with pytest.raises(InputError, match="pads: is never 9"):
+        operations.changes(pads, "pads", 9, PRODUCT)
+
+
+def test_the_fewest_pads_with_which_and_above_which_little_is_lost(pads):
+    def value(row):
+        # Two UAVs need two pads. Four need four: three are worse, although two seem to be enough.
+        short = row["pads"] < 2 if row["uavs"] == 2 else row["pads"] in (1, 3)
+        return 0.9 - 0.3 * short
+
+    found = operations.enough_pads(planted(pads, PRODUCT, value), 0.1)
+    assert found[["uavs", "pads"]].to_numpy().tolist() == [[2, 2], [4, 4]]
+    assert found["too_few"].tolist() == [1, 3]
+    text = operations.pads(planted(pads, PRODUCT, value), 0.1)
+    assert text.startswith(
+        "Of charging pads, 2 are enough for 2 UAVs, 1 is too few; 4 are enough for 4 UAVs, 3 are"
+    )
+
+
+def test_the_lower_end_decides_and_one_pad_may_be_enough(pads):
+    def value(row):  # one pad costs 0.07 on average, and at least 0.05 or so
+        return 0.8 - (row["pads"] == 1) * (0.14 * (row["replication"] % 2))
+
+    unsure = operations.enough_pads(planted(pads, PRODUCT, value), 0.08)
+    assert unsure["pads"].tolist() == [2, 2]
+    assert unsure["open"].tolist() == [[1], [1]]
+    # Lack of proof is not need: a loss that may not matter leaves the number of pads open.
+    noisy = planted(
+        pads, PRODUCT, lambda row: 0.5 + (row["pads"] < 3) * (row["replication"] % 2 - 0.55) / 2
+    )
+    assert operations.enough_pads(noisy, 0.1)["open"].tolist() == [[1, 2], [1, 2]]
+    assert "3 are enough for 2 UAVs, 1 and 2 open" in operations.pads(noisy, 0.1)
+    found = operations.enough_pads(planted(pads, PRODUCT, lambda row: 0.9), 0.1)
+    assert found["pads"].tolist() == [1, 1]
+    assert found["too_few"].tolist() == [0, 0]
+
+
+def test_a_relative_change_is_that_of_the_means():
+    reference = np.array([100.0, 110.0, 90.0, 100.0])
+    assert relative_change(0.5 * reference, reference) == pytest.approx((-0.5, -0.5, -0.5))
+    values = np.array([60.0, 50.0, 45.0, 45.0])
+    change = relative_change(values, reference)
+    assert change.mean == pytest.approx(-0.5)
+    # By hand: residuals 10, -5, 0, -5, so their deviation is sqrt(50); t has 3 degrees of freedom.
+    half = 3.182446 * np.sqrt(50) / 2 / 100
+    assert (change.mean - change.low, change.high - change.mean) == pytest.approx((half, half))
+
+
+def test_the_age_is_compared_with_the_published_effect(tmp_path):
+    study = small_study(tmp_path, policies=["greedy"], missions=5, set={"age.measured": True},
+                        design=grid(uavs=[1, 2, 3], arrival_rate=[0.1, 0.5]))  # fmt: skip
+    results = run_study(study, tmp_path / "out")
+    halved = planted(results, AGE, lambda row: (80 + row["replication"]) / row["uavs"])
+    table = operations.age_changes(halved)
+    assert table["mean"].tolist() == pytest.approx([-1 / 2, -2 / 3, -1 / 2, -2 / 3])
+    assert table["published"].dropna().tolist() == [-0.46, -0.46]
+    text = operations.age(halved)
+    # By hand: 80 to 84 in five missions, so half a width of t * sqrt(2.5 / 5) with t = 2.776.
+    assert "From 1 to 3 UAVs the mean age of the data falls from 82.0 [80.0, 84.0] to" in text
+    assert "to 27.3 [26.7, 28.0] slots at an arrival rate of 0.5" in text
+
+
+def test_failures_are_compared_with_none(tmp_path):
+    fields = {"uavs": [2, 3], "failures.uav_rate": [0.0, 0.01], "failures.uav_repair": [0.0, 5.0]}
+    study = small_study(tmp_path, policies=["greedy"], missions=5, design=grid(**fields))
+    results = run_study(study, tmp_path / "out")
+
+    def value(row):
+        lost = 30 * row["failures.uav_rate"] / (1 + row["failures.uav_repair"])
+        return 0.5 + 0.001 * row["replication"] - lost
+
+    fallen = planted(results, PRODUCT, value)
+    text = operations.failures(fallen)
+    assert "with probability 0.01, the product of 2 UAVs changes by −30.0 [" in text
+    assert "points if it is lost and by −5.0 [" in text
+    assert "points if it is repaired in 5 slots" in text
+
+
+def test_a_uav_waits_from_its_request_until_it_charges_gives_up_or_ends():
+    events = [
+        (0, "mission_start", 0),
+        (1, "charge_request", 0),
+        (2, "charge_request", 1),
+        (3, "charge_start", 0),
+        (5, "charge_withdrawal", 1),
+        (6, "charge_request", 0),
+        (7, "battery_empty", 0),
+        (8, "mission_end", 1),
+        (8, "mission_end", -1),
+    ]
+    log = pd.DataFrame(events, columns=["time", "event", "uav"])
+    waiting = operations.waiting(log).tolist()
+    assert waiting == [0, 1, 2, 1, 1, 0, 1, 0]

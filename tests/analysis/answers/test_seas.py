@@ -1,0 +1,93 @@
+"""What policies reach on many seas, where a sea counts once."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis import load_results, numbers, run_study
+from analysis.answers import seas
+from analysis.answers.comparison import Cost, Times
+from analysis.names import BOUND, PRODUCT, SUCCESS
+from analysis.results.tables import Results
+from dess import InputError
+from tests.analysis.small import small_study
+
+SEAS = ("scattered:2", "scattered:5", "coast:2", "dense:2")
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    folder = tmp_path_factory.mktemp("seas")
+    design = {"kind": "grid", "values": {"scenario": [*SEAS]}}
+    study = small_study(folder, design=design, policies=["greedy", "nearest"], missions=4)
+    run_study(study, folder / "trial")
+    return load_results(folder / "trial")
+
+
+def of_sea(results: Results, policy: str, metric: str = PRODUCT) -> np.ndarray:
+    rows = results.missions[results.missions["policy"] == policy]
+    return np.array([rows.loc[rows["point"] == point, metric].mean() for point in range(len(SEAS))])
+
+
+def test_a_sea_counts_once(results: Results) -> None:
+    means = of_sea(results, "greedy")
+    table = seas.quality(results).set_index("policy")
+    assert table.loc["greedy", ["mean", "n"]].tolist() == pytest.approx([means.mean(), 4])
+    families = seas.quality(results, "family", SUCCESS).set_index(["family", "policy"])
+    assert families.loc[("scattered", "nearest"), "n"] == 2
+    known = of_sea(results, "nearest", SUCCESS)[:2].mean()
+    assert families.loc[("scattered", "nearest"), "mean"] == pytest.approx(known)
+    assert {*seas.quality(results, "nodes")["nodes"]} >= {"61 and more"}
+    assert {*seas.quality(results, "uavs")["uavs"]} <= {5, 6}  # seed 2 has five or six
+
+
+def test_gains_and_shares_are_paired_by_sea(results: Results) -> None:
+    greedy, nearest = of_sea(results, "greedy"), of_sea(results, "nearest")
+    (gain,) = seas.gains(results, "greedy").to_dict("records")
+    assert gain["policy"] == "nearest"
+    assert gain["difference"] == pytest.approx((nearest - greedy).mean())
+    share = seas.shares(results, "greedy").set_index("policy")
+    assert share.loc["greedy", ["mean", "low", "high"]].tolist() == pytest.approx([1, 1, 1])
+    assert share.loc["nearest", "mean"] == pytest.approx(nearest.mean() / greedy.mean())
+
+
+def test_the_worst_seas_come_first(results: Results) -> None:
+    behind = of_sea(results, "nearest") - of_sea(results, "greedy")
+    table = seas.worst(results, "nearest", "greedy", count=2)
+    assert [*table["Sea"]] == [SEAS[place] for place in np.argsort(behind)[:2]]
+
+
+def test_the_answer_names_share_time_and_gain(results: Results) -> None:
+    costs = [
+        Cost(policy="greedy", calls=1, median=1, slow=1, batch=2.0),
+        Cost(policy="nearest", calls=1, median=1, slow=1, batch=0.5),
+    ]
+    times = Times(processor="x", costs=costs)
+    text = seas.answer(results, times, "nearest", "greedy", "greedy")
+    assert "On 4 unseen seas, nearest reaches" in text
+    assert "in 1/4 of its time" in text
+    assert [*seas.front(results, times)["policy"]] == ["nearest", "greedy"]
+
+
+def test_the_summary_has_shares_of_references_and_of_bounds_below_one(
+    results: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a mission whose bound is 100 %, a share of it would say nothing."""
+    monkeypatch.setattr(seas, "REFERENCES", ("nearest", "planner"))
+    costs = [Cost(policy="greedy", calls=1, median=1, slow=1, batch=2.0)]
+    bounded = np.where(results.missions["point"] == 1, 0.9, 1.0)
+    with_bounds = replace(results, missions=results.missions.assign(**{BOUND: bounded}))
+    table = seas.summary(with_bounds, Times(processor="x", costs=costs)).set_index("Policy")
+    known = of_sea(results, "greedy")[1] / 0.9
+    assert table.loc["greedy", "Of the bound"] == numbers.percent(known)
+    assert table.loc["nearest", "Of nearest"] == numbers.percent(1.0)
+    assert table["Decision"].tolist() == [numbers.seconds(2.0), ""]
+    assert "Of planner" not in table
+
+
+def test_a_study_of_one_sea_is_refused(tmp_path: Path) -> None:
+    study = run_study(small_study(tmp_path, missions=2), tmp_path / "trial")
+    with pytest.raises(InputError, match="no study of seas"):
+        seas.quality(study)

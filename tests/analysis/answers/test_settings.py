@@ -1,0 +1,191 @@
+"""Settings are ranked, averaged and compared on the replications that they share."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis import compare, run_study, summary
+from analysis.answers import settings
+from analysis.names import METRICS, PRODUCT
+from analysis.stats.intervals import bounded_interval
+from dess import InputError
+from tests.analysis.small import grid, small_study
+
+
+def run(folder, **changes):
+    return run_study(small_study(folder, **changes), folder / "out")
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """A grid of two fields, one of ranges, and a third that is the same everywhere."""
+    values = {"uavs": [3, 1, 2], "initial_data": [[5, 7.5], [10, 20]], "quota": [60]}
+    return run(tmp_path_factory.mktemp("grid"), design=grid(**values), missions=12)
+
+
+def planted(results, metric):
+    """The results with a metric of our own: ``metric`` of (policy, point, replication) arrays."""
+    missions = results.missions
+    number = missions["policy"].map({name: k for k, name in enumerate(results.policies)})
+    values = metric(number.to_numpy(), missions["point"].to_numpy(), missions["replication"])
+    return replace(results, missions=missions.assign(**{PRODUCT: np.asarray(values, float)}))
+
+
+# --- fields ---
+
+
+def test_long_and_unset_values_are_short_texts(tmp_path):
+    rows = [
+        {"pads": 2},
+        {"zone": [0, 0, 2, 2]},
+        {"nodes": [[1, 1], [2, 2]]},
+        {"nodes": [[1, 1], [3, 2]], "forbid_swaps": True},
+        {"nodes": [[1, 1], [2, 2]], "initial_data": [4, 4]},
+    ]
+    table = settings.points(run(tmp_path, design={"kind": "table", "rows": rows}, missions=2))
+    assert table["pads"].tolist() == [2, 4, 6, 6, 6]  # without a number, as many as the zone has
+    assert table["zone"].tolist() == [
+        "3 x 2 at (5, 0)",
+        "2 x 2 at (0, 0)",
+        *["3 x 2 at (5, 0)"] * 3,
+    ]
+    maps = ["3 cells (map 1)", "2 cells (map 2)", "2 cells (map 3)"]
+    assert table["nodes"].tolist() == [maps[0], *maps, maps[1]]
+    assert table["forbid_swaps"].tolist() == ["no", "no", "no", "yes", "no"]
+    assert table["initial_data"].tolist() == [*["5–20"] * 4, "4"]
+
+
+# --- ranks ---
+
+
+def test_ranked_settings_have_the_estimates_of_the_summary(results):
+    table = settings.ranked(results).set_index(["policy", "point"])
+    rows = summary(results.missions, by=["policy", "point"])
+    assert len(table) == 2 * 6
+    for row in rows.itertuples():
+        ours = table.loc[(row.policy, row.point)]
+        found = ours[[row.metric, f"{row.metric}_low", f"{row.metric}_high", "n"]].tolist()
+        assert found == pytest.approx([row.mean, row.low, row.high, row.n], abs=1e-12)
+
+
+def test_a_planted_best_is_found_and_those_that_equal_it_are_tied(results):
+    """Policy 1 at point 2 leads, its twin at point 4 equals it, all else is behind by 0.5."""
+
+    def metric(policy, point, replication):
+        luck = 0.4 * np.random.default_rng(0).random(100)[replication]
+        noise = np.random.default_rng(1).normal(size=len(point)) * 1e-3
+        lead = (policy == 1) & np.isin(point, (2, 4))
+        return luck + 0.5 * lead + noise * ~lead
+
+    table = settings.ranked(planted(results, metric))
+    tied = table[table["tied"]]
+    assert {*zip(tied["policy"], tied["point"], strict=True)} == {("random", 2), ("random", 4)}
+    assert table.head(2)["tied"].all()
+    own = settings.ranked(planted(results, metric), policy="greedy")
+    assert {*own["policy"]} == {"greedy"} and own["tied"].iloc[0]
+
+
+def test_of_costs_the_lowest_is_the_best(results):
+    missions = results.missions
+    priced = replace(results, missions=missions.assign(cost=100.0 + missions["point"]))
+    table = settings.ranked(priced, "cost")
+    assert table["cost"].is_monotonic_increasing
+    assert table[table["tied"]]["point"].tolist() == [0, 0]
+    assert settings.averaged(priced, ["uavs"], "cost").query("tied")["uavs"].tolist() == [3, 3]
+
+
+# --- averages ---
+
+
+def test_the_partial_dependence_of_an_additive_metric_is_exact(results):
+    points = settings.points(results)
+    uavs, data = points["uavs"].to_numpy(), (points["initial_data"] == "10–20").to_numpy()
+
+    def metric(policy, point, replication):
+        return 0.1 * uavs[point] ** 2 + 0.03 * data[point] + 0.001 * np.asarray(replication)
+
+    effects = settings.main_effects(planted(results, metric), policy="greedy")
+    of_uavs, of_data = (part for _, part in effects.groupby("field", sort=False))
+    common = 0.001 * np.arange(12).mean()
+    expected = 0.1 * np.array([1, 4, 9]) + 0.015 + common
+    assert of_uavs.sort_values("position")["mean"].tolist() == pytest.approx(expected)
+    assert of_uavs["value"].tolist() == ["1", "2", "3"] and {*of_uavs["points"]} == {2}
+    expected = 0.1 * np.mean([1, 4, 9]) + np.array([0, 0.03]) + common
+    assert of_data["mean"].tolist() == pytest.approx(expected)
+    assert settings.by_influence(effects) == ["uavs", "initial_data"]
+    interval = bounded_interval(0.001 * np.arange(12) + 0.115)
+    assert of_uavs.iloc[0][["mean", "low", "high"]].tolist() == pytest.approx([*interval])
+
+
+def test_cells_count_the_replications_that_all_their_points_have(results):
+    missions = results.missions
+    shorter = missions[(missions["point"] != 1) | (missions["replication"] < 5)]
+    table = settings.averaged(replace(results, missions=shorter), ["uavs"])
+    assert table[table["uavs"] == 3]["n"].tolist() == [5, 5]
+    assert table[table["uavs"] == 1]["n"].tolist() == [12, 12]
+
+
+def test_many_numbers_are_cut_into_bins(tmp_path):
+    design = {"kind": "latin-hypercube", "size": 20, "ranges": {"arrival_rate": [0.0, 0.1]}}
+    results = run(tmp_path, design=design, missions=3)
+    effects = settings.main_effects(results, policy="greedy")
+    assert effects["position"].tolist() == [*range(settings.BINS)]
+    assert effects["points"].tolist() == [4] * settings.BINS
+    values = np.sort(settings.points(results)["arrival_rate"])
+    assert effects["value"].iloc[0] == f"{values[0]:.3g}–{values[3]:.3g}"
+    assert {*effects["n"]} == {3}
+
+
+def test_of_a_saltelli_design_the_independent_missions_count(tmp_path):
+    design = {"kind": "saltelli", "base": 8, "ranges": {"uavs": [1, 3], "charge_start": [10, 15]}}
+    results = run(tmp_path, design=design, missions=1)
+    effects = settings.main_effects(results, policy="greedy")
+    first_and_last = results.missions.query("policy == 'greedy' and point % 5 in (0, 4)")
+    for row in effects[effects["field"] == "uavs"].itertuples():
+        values = first_and_last[first_and_last["uavs"] == int(row.value)][PRODUCT]
+        assert (row.mean, row.n) == (pytest.approx(values.mean()), len(values))
+
+
+# --- a baseline ---
+
+
+def test_differences_to_a_baseline_are_those_of_compare(results):
+    table = settings.against(results, 2)
+    assert len(table) == len(METRICS) * 2 * 5
+    assert 2 not in {*table["point"]}
+    for policy in results.policies:
+        missions = results.missions[results.missions["policy"] == policy]
+        expected = compare(missions, 2, [*METRICS], of="point").set_index(["metric", "point"])
+        for row in table[table["policy"] == policy].itertuples():
+            theirs = expected.loc[(row.metric, row.point)]
+            found = [row.difference, row.low, row.high, row.p, row.n]
+            assert found == pytest.approx(theirs[["difference", "low", "high", "p", "n"]].tolist())
+    for _, rows in table.groupby("metric"):
+        assert (rows["p_adjusted"] >= rows["p"]).all()
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda r: settings.against(r, 6), "baseline: 6 is not a design point; allowed: 0..5"),
+        (lambda r: settings.ranked(r, "speed"), "metric: 'speed' is unknown; allowed: success, "),
+        (
+            lambda r: settings.ranked(r, policy="tour"),
+            "policy: 'tour' is not in the study; allowed",
+        ),
+        (lambda r: settings.averaged(r, ["quota"]), "quota: has not several values in the study"),
+    ],
+)
+def test_what_the_study_has_not_is_refused(results, ask, message):
+    with pytest.raises(InputError, match=message):
+        ask(results)
+
+
+def test_varied_fields_have_their_values_in_order(results, tmp_path):
+    assert settings.varied(results) == {"uavs": [1, 2, 3], "initial_data": ["5–7.5", "10–20"]}
+    assert settings.points(results).iloc[1].tolist() == [3, "10–20"]
+    assert settings.in_words(results)[1] == "3 UAVs, initial data per node 10–20"
+    single = run(tmp_path)
+    assert settings.varied(single) == {} and settings.main_effects(single).empty
+    assert settings.in_words(single) == [settings.AS_IT_IS]

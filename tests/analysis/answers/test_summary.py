@@ -1,0 +1,332 @@
+"""The summary of a study: tables of means, comparisons, selections and the worst missions."""
+
+import json
+import shlex
+import warnings
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import compare, run_study
+from analysis.answers import summary
+from analysis.answers.summary import index_table, sensitivity
+from analysis.figures.settings import sensitivity as figure
+from analysis.names import PRODUCT, RATIO
+from analysis.numbers import why_nan
+from analysis.study.design import Saltelli
+from dess import InputError
+from policies import load
+from policies.ddqn.trained import save_policy
+from policies.ddqn.training import Training
+from reports import cli
+from tests.analysis.small import grid, small_study, write_scenario
+from tests.policies.ddqn.tiny import CPU, PHASES, tiny
+
+FIELDS = ("edge_snr", "arrival_rate", "path_loss_exponent")  # names only: nothing is simulated
+INDICES = ["first", "first_low", "first_high", "total", "total_low", "total_high"]
+
+
+def noise_of(replication):
+    """A number in [0, 1) of a replication, as good as random (splitmix64)."""
+    z = np.asarray(replication, np.uint64) + np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return ((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+
+
+def unit(number, base, seed=0):
+    """A design of so many fields, each on [0, 1]."""
+    return Saltelli(ranges={field: [0, 1] for field in FIELDS[:number]}, base=base, seed=seed)
+
+
+def evaluated(design, **functions):
+    """A mission per point: its metrics are functions of the fields and of the noise."""
+    replication = [point.replication for point in design.points]
+    x = np.array([list(point.values.values()) for point in design.points]).T
+    metrics = {name: metric(*x, noise_of(replication)) for name, metric in functions.items()}
+    return pd.DataFrame({"point": range(len(replication)), "replication": replication} | metrics)
+
+
+def ishigami(x, y, z, noise):
+    return np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
+
+
+# x, y and the noise e are uniform on [0, 1]: each has variance 1/12.
+KNOWN = {
+    # Variances 1 : 4. Nothing interacts, so total = first.
+    "additive": (lambda x, e: x + 2 * e, [1 / 5, 4 / 5], [1 / 5, 4 / 5]),
+    "two fields": (
+        lambda x, y, e: x + 2 * y + 3 * e,
+        [1 / 14, 4 / 14, 9 / 14],
+        [1 / 14, 4 / 14, 9 / 14],
+    ),
+    # Variance E[x^2] / 12 = 1/36. The mean does not depend on x: its first is 0.
+    # E[. | e] = (e - 1/2) / 2 has variance 1/48, 3/4 of it; all of it is gone once e is known.
+    "spread": (lambda x, e: x * (e - 1 / 2), [0, 3 / 4], [1 / 4, 1]),
+    # A success with probability x: variance 1/4, of which E[. | x] = x explains 1/12, as does
+    # E[. | e] = 1 - e.
+    "success": (lambda x, e: (e < x).astype(int), [1 / 3, 1 / 3], [2 / 3, 2 / 3]),
+}
+
+
+@pytest.mark.parametrize("case", KNOWN)
+def test_known_shares_of_parameters_and_noise(case):
+    function, first, total = KNOWN[case]
+    design = unit(len(first) - 1, base=2048)
+    table = sensitivity(design, evaluated(design, y=function), ["y"])
+    for index, truth in (("first", first), ("total", total)):
+        low, high = table[f"{index}_low"], table[f"{index}_high"]
+        room = (high - low) / 2  # some of so many intervals of 95 % miss
+        assert ((low - room <= truth) & (truth <= high + room)).all()
+        assert (high - low < 0.25).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", KNOWN)
+def test_intervals_cover_what_they_claim(case):
+    function, *truths = KNOWN[case]
+    level, runs = 0.95, 300
+    hits = np.zeros((2, len(truths[0])))
+    for seed in range(runs):
+        design = unit(len(truths[0]) - 1, base=256, seed=seed)
+        missions = evaluated(design, y=function)
+        table = sensitivity(design, missions, ["y"])
+        for row, (index, truth) in enumerate(zip(("first", "total"), truths, strict=True)):
+            hits[row] += (table[f"{index}_low"] <= truth) & (truth <= table[f"{index}_high"])
+    # Four standard errors of the binomial. Intervals of smooth parameters are wider than need be:
+    # the design is more even than the resamples know. The noise has no such help.
+    error = 4 * np.sqrt(level * (1 - level) / runs)
+    assert (hits / runs > level - error).all()
+    assert hits[0, -1] / runs < level + error
+
+
+def test_a_metric_without_variance_has_no_shares():
+    design = unit(2, base=16)
+    missions = evaluated(
+        design,
+        always=lambda x, y, e: np.ones(x.size),
+        tenth=lambda x, y, e: np.full(x.size, 0.1),
+        # Only outside of A and B, which measure the variance.
+        elsewhere=lambda x, y, e: np.arange(x.size) % 5 == 1,
+        y=lambda x, y, e: x + e,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        table = sensitivity(design, missions, ["always", "tenth", "elsewhere", "y"])
+    assert table.loc[table["metric"] != "y", INDICES].isna().all(axis=None)
+    assert table.loc[table["metric"] == "y", INDICES].notna().all(axis=None)
+
+
+WRONG = {
+    "too few": lambda missions: missions.iloc[:-1],
+    "two policies": lambda missions: pd.concat([missions, missions]),
+    "another order": lambda missions: missions.iloc[::-1],
+    "another design": lambda missions: missions.assign(replication=missions["replication"] + 1),
+    "none": lambda missions: missions.iloc[:0],
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_missions_must_be_those_of_the_design(wrong):
+    design = unit(1, base=4)
+    missions = WRONG[wrong](evaluated(design, y=lambda x, e: x + e))
+    with pytest.raises(InputError, match="one for each of its 16 points") as error:
+        sensitivity(design, missions, ["y"])
+    assert "\n" not in str(error.value)
+
+
+def test_intervals_are_symmetric_and_depend_on_nothing_else():
+    design = unit(1, base=64)
+    missions = evaluated(design, other=lambda x, e: x * e, y=lambda x, e: x + e)
+    np.random.seed(1)
+    alone = sensitivity(design, missions, ["y"])
+    np.random.seed(2)
+    both = sensitivity(design, missions, ["other", "y"])
+    pd.testing.assert_frame_equal(alone, both.iloc[2:].reset_index(drop=True))
+    for index in ("first", "total"):
+        half = alone[f"{index}_high"] - alone[index]
+        assert (half > 0).all()
+        assert half.to_numpy() == pytest.approx((alone[index] - alone[f"{index}_low"]).to_numpy())
+
+
+def test_the_indices_of_a_constant_metric_are_nan_in_its_table_and_its_figure():
+    design = unit(1, 4)
+    missions = evaluated(design, **{RATIO: lambda x, noise: np.full_like(x, 0.5)})
+    table = sensitivity(design, missions, [RATIO]).assign(policy="tour")
+    shown = index_table(table)
+    assert len(shown) == 2
+    assert {*shown["Alone"]} == {"nan % [nan, nan]"}
+    assert why_nan(shown.to_numpy().flat).startswith("nan: ")
+    assert figure(table, "tour").axes
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    study = small_study(folder, design=grid(uavs=[1, 2], quota=[20, 60]), missions=20)
+    return run_study(study, folder / "out")
+
+
+def stub(**policies):
+    """Results of one design point: the products of every policy in the same replications."""
+    tables = [
+        pd.DataFrame(
+            {"policy": name, "point": 0, "replication": range(len(values)), PRODUCT: values}
+        )
+        for name, values in policies.items()
+    ]
+    results = SimpleNamespace(missions=pd.concat(tables, ignore_index=True))
+    rows = [(name, 0, PRODUCT, np.mean(values), 0.0) for name, values in policies.items()]
+    return results, pd.DataFrame(rows, columns=["policy", "point", "metric", "mean", "low"])
+
+
+def test_policies_are_compared_on_common_replications():
+    """A lead in every replication is significant, if rare failures could not make up for it."""
+    spread = np.linspace(0.3, 0.8, 30)
+    jitter = np.tile([0.19, 0.2], 15)
+    results, means = stub(a=spread + jitter, b=spread, c=spread[::-1] - 0.3)
+    verdicts = summary.with_verdicts(results, means)["verdict"].tolist()
+    assert verdicts == [summary.BEST, summary.WORSE, summary.WORSE]
+    results, means = stub(a=spread + 0.01, b=spread)
+    assert summary.with_verdicts(results, means)["verdict"].tolist() == [summary.TIED] * 2
+    results, means = stub(a=spread, b=spread[::-1])
+    assert summary.with_verdicts(results, means)["verdict"].tolist() == [summary.TIED] * 2
+    assert summary.with_verdicts(results, means[1:])["verdict"].tolist() == [summary.ONLY]
+
+
+def test_targets_are_met_by_the_lower_end():
+    rows = [("a", 0, 0.9), ("a", 1, 0.89), ("b", 0, 0.95)]
+    means = pd.DataFrame(rows, columns=["policy", "point", "low"]).assign(metric=PRODUCT)
+    product = means.assign(metric="success", low=[0.5, 0.9, 0.9])
+    table = pd.concat([means, product], ignore_index=True)
+    left = summary.meeting(table, {PRODUCT: 0.9})
+    assert [*zip(left["policy"], left["point"], strict=True)] == [("a", 0), ("b", 0)] * 2
+    assert summary.meeting(table, {PRODUCT: 0.9, "success": 0.6})["policy"].tolist() == ["b"] * 2
+    assert summary.meeting(table, {}).equals(table)
+
+
+def test_the_command_of_a_mission_gives_its_row(results, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    worst = summary.worst(results, "random", 1, folder=results.store.folder).iloc[0]
+    assert cli.main([*shlex.split(worst["command"])[1:], "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["collection_ratio"] == worst["collection_ratio"]
+
+
+def test_policies_are_ranked_by_the_mean_over_design_points():
+    rows = [
+        ("a", 0, 0.9),
+        ("a", 0, 0.9),
+        ("a", 1, 0.1),
+        ("b", 0, 0.6),
+        ("b", 1, 0.6),
+        ("c", 0, 0.6),
+    ]
+    missions = pd.DataFrame(rows, columns=["policy", "point", PRODUCT])
+    assert summary.ranked_policies(missions) == ["b", "c", "a"]  # a: (0.9 + 0.1) / 2
+    assert summary.best_policy(missions) == "b"
+    assert summary.best_policy(missions, among=["a", "c"]) == "c"
+
+
+def test_the_best_policy_is_compared_with_the_others(results):
+    best = summary.best_policy(results.missions)
+    table = summary.comparisons(results).set_index("metric")
+    assert set(table["baseline"]) == {best} == {"greedy"}
+    assert (table["policy"] == "random").all()
+    missions = results.missions.groupby("policy")[PRODUCT].mean()
+    expected = missions["random"] - missions["greedy"]
+    assert table.loc[PRODUCT, "difference"] == pytest.approx(expected)
+    assert table.loc[PRODUCT, "n"] == 20  # replications: points share their realisation
+    alone = compare(results.missions, "greedy", table.index.tolist())
+    either = np.minimum(1, 2 * alone["p_adjusted"])  # random might have been the best
+    assert table["p_adjusted"].tolist() == pytest.approx(either.tolist())
+
+
+@pytest.fixture
+def trained_twice(tmp_path):
+    """Folders of two trainings that differ in their seed, and of one that does not learn alike."""
+    scenario, folders = str(write_scenario(tmp_path)), []
+    for seed, discount in ((1, 0.99), (2, 0.99), (1, 0.9)):
+        phases = [PHASES[1] | {"ticks": 3}]
+        config = tiny(
+            scenario=scenario, seed=seed, discount=discount, learning_starts=5, phases=phases
+        )
+        training = Training(config, CPU)
+        training.run(2)
+        folders.append(str(tmp_path / f"{seed}-{discount}"))
+        weights = training.learner.online.state_dict()
+        save_policy(Path(folders[-1]), weights, config, training.space)
+    return folders
+
+
+def test_checkpoints_of_one_learner_are_one_learner(tmp_path, trained_twice):
+    first, second, other = trained_twice
+    assert load(first).learner == load(second).learner != load(other).learner
+    policies = ["greedy", "random", first, second]
+    results = run_study(small_study(tmp_path, policies=policies), tmp_path / "out")
+    assert summary.learners(results) == {"tiny": [first, second]}
+    policies = ["greedy", first, other, f"{first},greedy"]
+    mixed = run_study(small_study(tmp_path, policies=policies), tmp_path / "mixed")
+    assert sorted(summary.learners(mixed).values()) == sorted([[first], [other]])
+    table = summary.learned_against_heuristic(results)
+    assert set(table["about"]) == {"the learner"}
+    assert set(table["trainings"]) == {2}
+    alone = run_study(small_study(tmp_path, policies=["greedy", first]), tmp_path / "alone")
+    assert set(summary.learned_against_heuristic(alone)["about"]) == {"this checkpoint"}
+
+
+def test_the_selected_point_and_its_check(tmp_path):
+    rule = {
+        "procedure": "kn",
+        "metric": "collection_ratio",
+        "first": 8,
+        "indifference": 0.02,
+        "budget": 2000,
+        "check": 9,
+    }
+    study = small_study(tmp_path, selection=rule, design=grid(quota=[20, 40, 80]))
+    results = run_study(study, tmp_path / "out")
+    table = summary.selections(results)
+    assert table["policy"].tolist() == ["greedy", "random"]
+    for row in table.itertuples():
+        assert row.setting == f"quota {study.points[row.point].values['quota']}"
+        counts = results.missions.query("policy == @row.policy").groupby("point").size()
+        assert row.missions == counts.sum()
+    checks = summary.checks(results).set_index(["policy", "metric"])
+    assert set(checks["n"]) == {9}
+    rewards = results.checks.query("policy == 'greedy'")["reward"]
+    assert checks.loc[("greedy", "reward"), "mean"] == pytest.approx(np.mean(rewards))
+    assert summary.comparisons(results).empty  # each policy has missions of its own
+
+
+def test_estimates_stand_beside_the_papers_numbers():
+    rows = [
+        ("tour", 1, "success", 0.95, 0.94, 0.96),
+        ("tour", 1, "collection_ratio", 0.7, 0.65, 0.75),
+        ("greedy", 1, "success", 0.9, 0.85, 0.92),
+        ("greedy", 1, "collection_ratio", 0.8, 0.79, 0.81),
+    ]
+    table = pd.DataFrame(rows, columns=["policy", "uavs", "metric", "mean", "low", "high"])
+    printed = {"success": 0.93, "collection_ratio": 0.7}
+    assert summary.beside_paper(table, {None: printed}).to_numpy().tolist() == [
+        ["paper", "93.0 %", "70.0 %"],
+        ["tour", "95.0 % [94.0, 96.0] +2.0 ▲", "70.0 % [65.0, 75.0] 0.0 ≈"],
+        ["greedy", "90.0 % [85.0, 92.0] −3.0 ▼", "80.0 % [79.0, 81.0] +10.0 ▲"],
+    ]
+    both = pd.concat([table, table.assign(uavs=2, mean=table["mean"] + 0.01)])
+    fleets = summary.beside_paper(both, {1: printed, 2: {"success": 0.5, "collection_ratio": 1}})
+    assert [fleet for _, fleet in fleets.columns[1:]] == ["I = 1", "I = 2"] * 2
+    assert fleets.iloc[1, 2] == "96.0 % [94.0, 96.0] +46.0 ▲"
+
+
+def test_with_one_policy_there_is_no_comparison(tmp_path):
+    design = grid(initial_data=[5, [5, 7.5]])
+    study = small_study(tmp_path, policies=["greedy"], missions=1, design=design)
+    results = run_study(study, tmp_path / "out")
+    assert summary.comparisons(results).empty
+    assert summary.learned_against_heuristic(results).empty
+    assert summary.selections(results).empty
+    assert summary.settings(results) == ["initial_data 5", "initial_data 5..7.5"]

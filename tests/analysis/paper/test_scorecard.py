@@ -1,0 +1,365 @@
+"""The scorecard follows from the results, complete or not: claims, verdicts and figures."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import load_study, run_study
+from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
+from analysis.paper import values as paper
+from analysis.paper.measures import (
+    EXCEEDS,
+    FALLS_SHORT,
+    MATCHES,
+    NO_RESULTS,
+    NOT_APPLICABLE,
+    VERDICTS,
+)
+from analysis.paper.scorecard import (
+    NULLS,
+    PAPERS_NETWORK,
+    SECTIONS,
+    VARIANTS,
+    Finding,
+    Row,
+    departures,
+    scorecard,
+)
+from analysis.results.tables import Results
+from analysis.stats.differences import paired
+from analysis.stats.intervals import interval_of, post_stratified
+from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED, position
+from dess import InputError
+from policies.ddqn.description import read_description
+from policies.registry import TRAINED
+from tests.analysis.small import grid, small_study
+
+NOTEBOOKS = Path(__file__).parents[3] / "reports" / "notebooks"
+TABLE_4, FIG_3, FIG_5 = (SECTIONS[name] for name in ("table-4", "fig-3", "fig-5"))
+POLICIES = ["greedy", "random", "random-unguarded", "ddqn"]
+RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.02, "budget": 40, "check": 12}
+NONE = pd.DataFrame()
+
+
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Results]:
+    """Tiny results of all studies that are read."""
+    folder = tmp_path_factory.mktemp("results")
+    corners = grid(uavs=[1, 3], initial_data=[[5, 7.5], 10])
+    changes: dict[str, dict[str, Any]] = {
+        "table4": {"missions": 30},
+        "fig4": {"missions": 4, "logged": 2},
+        "fig5": {"missions": 3},
+        "sweet-spot": {"selection": RULE, "design": corners},
+    }
+    return {
+        name: run_study(load_study(name, policies=POLICIES, **fields), folder / name)
+        for name, fields in changes.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def trainings() -> pd.DataFrame:
+    """Learning with transfer surely wins, in trainings as long as the paper's."""
+    return trained({VARIANTS[0]: (0.8, 0.8), VARIANTS[1]: (0.4, 0.4)})
+
+
+def trained(tops: dict[str, tuple[float, float]], length: int = 2 * paper.CROSSING) -> pd.DataFrame:
+    """Three trainings of each variant, from one level to another."""
+    rows = [
+        {
+            "variant": variant,
+            "seed": seed,
+            "phase": "battery",
+            "updates": length * step // 8,
+            "evaluation_reward": np.interp(step, (1, 8), ends) + seed / 1000,
+            f"evaluation_{PRODUCT}": np.interp(step, (1, 8), ends) + seed / 1000,
+        }
+        for variant, ends in tops.items()
+        for seed in (1, 2, 3)
+        for step in range(1, 9)
+    ]
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture(scope="module")
+def rows(studies: dict[str, Results], trainings: pd.DataFrame) -> list[Row]:
+    return scorecard(studies, trainings)
+
+
+def row_of(rows: list[Row], words: str) -> Row:
+    (row,) = (row for row in rows if words in row.claim.text)
+    return row
+
+
+def learned(rows: list[Row], words: str) -> Finding:
+    """The finding by the best learned policy on the claim with these words."""
+    return row_of(rows, words).findings[0]
+
+
+def changed(results: Results, **values: object) -> Results:
+    """The same missions of ddqn with other figures."""
+    of_policy = results.missions["policy"] == "ddqn"
+    missions = results.missions.copy()
+    for column, value in values.items():
+        missions[column] = missions[column].mask(of_policy, value).astype(float)
+    return replace(results, missions=missions)
+
+
+def test_every_claim_has_a_section_with_its_evidence_and_a_rule(rows: list[Row]) -> None:
+    assert len(rows) >= 25
+    assert len({row.claim.text for row in rows}) == len(rows)
+    for row in rows:
+        assert row.section.heading and row.claim.place and "olds if" in row.rule
+        page, _, section = row.section.page.partition(".html#")
+        assert f'<a id="{section}"></a>' in (NOTEBOOKS / f"{page}.py").read_text()
+        assert {finding.verdict for finding in row.findings} <= {*VERDICTS}
+
+
+def test_every_claim_is_judged_by_the_learned_policy_alone(rows: list[Row]) -> None:
+    for row in rows:
+        ours, papers, *nulls = row.findings
+        assert ours.verdict != NO_RESULTS and ours.quantities, ours.note
+        assert ours.policy == ("" if row.section is FIG_3 else "ddqn")
+        lacks = "trainings of this policy" if row.section is FIG_3 else "has no policy ddqn-paper"
+        assert papers.verdict == NO_RESULTS and lacks in papers.note
+        assert [null.policy for null in nulls] == ([""] * 3 if row.section is FIG_3 else [*NULLS])
+
+
+@pytest.mark.parametrize("null", [NULLS[0], pytest.param(NULLS[1], marks=pytest.mark.slow)])
+def test_in_the_place_of_the_learned_policy_a_null_passes_no_diagnostic_claim(
+    null: str, studies: dict[str, Results]
+) -> None:
+    posing = {}
+    for name in ("table4", "fig5"):
+        missions = studies[name].missions
+        others = missions[missions["policy"] != "ddqn"]
+        copied = missions[missions["policy"] == null].assign(policy="ddqn")
+        together = pd.concat([others, copied], ignore_index=True)
+        posing[name] = replace(studies[name], missions=together)
+    found = [row for row in scorecard(posing, NONE) if row.is_diagnostic]
+    assert found and sum(row.findings[0].holds for row in found) <= 2
+
+
+def test_what_holds_above_the_papers_number_exceeds_it() -> None:
+    outcomes = {
+        Finding(HOLDS, against=ABOVE): EXCEEDS,
+        Finding(HOLDS, against=INCONCLUSIVE): MATCHES,
+        Finding(IN_PART, against=BELOW): FALLS_SHORT,
+        Finding(REFUTED): FALLS_SHORT,
+        Finding(IN_PART): INCONCLUSIVE,
+        Finding(NO_RESULTS): NOT_APPLICABLE,
+    }
+    assert all(finding.outcome == outcome for finding, outcome in outcomes.items())
+
+
+def test_without_results_there_are_no_verdicts(rows: list[Row]) -> None:
+    empty = scorecard({}, NONE)
+    assert [row.claim for row in empty] == [row.claim for row in rows]
+    for row in empty:
+        for finding in row.findings:
+            assert finding.verdict == NO_RESULTS and finding.note
+
+
+def test_the_margin_is_that_of_the_sweet_spot(rows: list[Row]) -> None:
+    assert "2 points" in row_of(rows, "All values of C_C").rule
+    assert "within 1 point;" in row_of(scorecard({}, NONE), "All values of C_C").rule
+
+
+def test_means_beside_printed_figures_are_those_of_the_parquet(
+    rows: list[Row], studies: dict[str, Results]
+) -> None:
+    missions = pd.read_parquet(studies["table4"].store.folder / "missions")
+    missions = missions[missions["policy"] == "ddqn"]
+    for metric, name in METRICS.items():
+        values = post_stratified(missions[metric].to_numpy(), missions["uavs"].to_numpy())
+        row, expected = row_of(rows, f"{name} over random"), interval_of(metric, values)
+        (quantity,), printed = row.findings[0].quantities, row.claim.printed
+        assert quantity[:4] == pytest.approx((*expected, len(missions)))
+        assert printed and printed.value == paper.TABLE_IV[metric]
+        assert (printed.low is not None) == (metric == SUCCESS)  # a share of missions
+        assert row.findings[0].against == position(expected, printed.value)
+
+
+def test_what_a_uav_changes_is_that_of_the_parquet(
+    rows: list[Row], studies: dict[str, Results]
+) -> None:
+    """Mission by mission."""
+    missions = pd.read_parquet(studies["fig4"].store.folder / "missions")
+    by_uavs = missions[missions["policy"] == "ddqn"].pivot(
+        index="replication", columns="uavs", values=RATIO
+    )
+    for words, uavs in (("dramatically", 2), ("further", 3)):
+        change = by_uavs[uavs] - by_uavs[uavs - 1]
+        sides = (by_uavs[n].to_numpy() for n in (uavs, uavs - 1))
+        low, high = paired(*sides, metric=RATIO)[1:3]
+        (quantity,) = learned(rows, words).quantities
+        assert quantity[:4] == pytest.approx((change.mean(), low, high, len(change)))
+        printed, gain = row_of(rows, words).claim.printed, paper.FIG_4[uavs][RATIO]
+        assert printed and printed.value == gain - paper.FIG_4[uavs - 1][RATIO]
+    verdict = HOLDS if low > 0 else REFUTED if high < 0 else INCONCLUSIVE
+    assert learned(rows, "further").verdict == verdict
+
+
+def test_a_single_mission_tells_nothing(studies: dict[str, Results]) -> None:
+    alone = studies["table4"].missions.query("replication == 0")
+    for row in scorecard({"table4": replace(studies["table4"], missions=alone)}, NONE):
+        assert row.findings[0].verdict == (INCONCLUSIVE if row.section is TABLE_4 else NO_RESULTS)
+
+
+def test_missions_that_collect_everything(studies: dict[str, Results]) -> None:
+    all_of_it = changed(studies["table4"], collection_ratio=1)
+    row = row_of(scorecard({"table4": all_of_it}, NONE), "below 100 %")
+    assert row.findings[0].verdict == REFUTED
+
+
+def test_a_policy_that_is_not_in_the_study_is_not_judged(studies: dict[str, Results]) -> None:
+    for ask in (studies["sweet-spot"].choice, studies["sweet-spot"].cheapest):
+        with pytest.raises(InputError, match="policy: 'absent' is not in the study"):
+            ask("absent")
+
+
+def test_the_lead_of_a_value_is_over_the_next(rows: list[Row], studies: dict[str, Results]) -> None:
+    means = studies["fig5"].missions.query("policy == 'ddqn'").groupby("point")
+    product, ratio = means[PRODUCT].mean()[:3], means["collection_ratio"].mean()[:3]  # 1, 2, 3 UAVs
+    ahead = learned(rows, "best, and the sweet spot").quantities[0]
+    assert ahead.value == pytest.approx(product[2] - max(product[:2]))
+    along = learned(rows, "The more UAVs").quantities[0]
+    assert along.value == pytest.approx(ratio[2] - ratio[0])
+
+
+def test_a_large_quota_is_judged_by_missions_of_several_uavs(
+    rows: list[Row], studies: dict[str, Results]
+) -> None:
+    points = enumerate(studies["fig5"].store.manifest.points)
+    by_quota = {point.values["quota"]: n for n, point in points if "quota" in point.values}
+    several = studies["fig5"].missions.query("policy == 'ddqn' and uavs > 1")
+    success = several.pivot(index="replication", columns="point", values="success").astype(float)
+    change = (success[by_quota[600]] - success[by_quota[440]]).dropna()
+    quantity = learned(rows, "With several UAVs, a large quota").quantities[0]
+    assert (quantity.value, quantity.n) == (pytest.approx(change.mean()), len(change))
+    assert 0 < len(change) < 3  # of three missions, some have one UAV
+
+
+def test_the_papers_network_has_studies_of_its_own(studies: dict[str, Results]) -> None:
+    smaller = scorecard({"fig5-paper": studies["fig5"]}, NONE)
+    notes = {row.findings[1].note for row in smaller if row.section is FIG_5}
+    assert notes == {"the study fig5-paper has no policy ddqn-paper"}
+
+
+def test_the_sweet_spot_is_judged_by_its_check(
+    rows: list[Row], studies: dict[str, Results]
+) -> None:
+    sweet = studies["sweet-spot"]
+    checks = sweet.checks.query("policy == 'ddqn'")
+    row = row_of(rows, "Collection ratio with every parameter")
+    assert row.findings[0].quantities[0].value == checks["collection_ratio"].mean()
+    assert row.findings[0].quantities[0].n == RULE["check"]
+    choice = sweet.choice("ddqn")
+    assert choice is not None
+    chosen = learned(rows, "sweet spot is one of").quantities[0]
+    assert chosen.value == sweet.store.manifest.points[choice.best].values["uavs"]
+    unchecked = replace(sweet, checks=sweet.checks[:0])
+    unjudged = learned(scorecard({"sweet-spot": unchecked}, NONE), "Collection ratio with every")
+    assert unjudged.verdict == NO_RESULTS
+
+
+def test_claims_on_where_uavs_fly_are_counted_from_the_event_logs(
+    rows: list[Row], studies: dict[str, Results]
+) -> None:
+    """Anew from the logs: points 0 and 1 have one and two UAVs, two missions of each are logged."""
+    fig4 = studies["fig4"]
+    logs = [[fig4.events("ddqn", point, number) for number in (0, 1)] for point in (0, 1)]
+    nodes = pd.DataFrame(fig4.scenario(0).nodes, columns=["x", "y"])
+    far = (nodes["x"] == nodes["x"].min()) | (nodes["y"] == nodes["y"].max())
+
+    def ignored(log: pd.DataFrame) -> pd.Series:
+        given = log[log["event"].isin(["mission_start", "arrival"]) & (log["node"] >= 0)]
+        taken = log[log["event"] == "communication"]
+        share = taken.groupby("node")["value"].sum() / given.groupby("node")["value"].sum()
+        return share.reindex(nodes.index).fillna(0) < 0.5
+
+    def values(words: str) -> list[float]:
+        return [quantity.value for quantity in learned(rows, words).quantities]
+
+    charges = [(log["event"] == "charge_start").sum() == 1 for log in logs[0]]
+    assert values("charges once") == [np.mean(charges)]
+    alone, together = (pd.concat(map(ignored, of_uavs), axis=1).mean(axis=1) for of_uavs in logs)
+    expected = [alone[far].mean(), alone[~far].mean()]
+    assert values("ignores the leftmost") == pytest.approx(expected)
+    expected = [(alone - together)[far].mean(), 1 - together[far].mean()]
+    assert values("reach the nodes far") == pytest.approx(expected)
+    own_side, chance, most = values("two sectors")
+    taken = [log[log["event"] == "communication"] for log in logs[1]]
+    by_node = [log.pivot_table("value", "uav", "node", "sum", 0.0) for log in taken]
+    assert most == pytest.approx(np.mean([data.max().sum() / data.sum().sum() for data in by_node]))
+    assert 0.5 < chance < own_side <= 1
+
+
+def test_a_study_without_event_logs_does_not_say_where_uavs_fly(tmp_path: Path) -> None:
+    study = load_study("fig4", policies=["ddqn"], missions=2, logged=0)
+    row = row_of(scorecard({"fig4": run_study(study, tmp_path / "fig4")}, NONE), "two sectors")
+    assert row.findings[0].verdict == NO_RESULTS
+    assert row.findings[0].note == "the study fig4 stores no event logs"
+
+
+def test_learning_is_judged_by_the_curves(rows: list[Row]) -> None:
+    higher, passes, levels = (row for row in rows if row.section is FIG_3)
+    assert (
+        higher.findings[0].verdict
+        == passes.findings[0].verdict
+        == levels.findings[0].verdict
+        == HOLDS
+    )
+    assert passes.findings[0].quantities[0].value == pytest.approx(0.4)
+    assert higher.findings[0].note == "trainings quick and no transfer: is above in all of phase II"
+
+
+def test_learning_that_fails_is_told() -> None:
+    """It ends below, and what it should beat levels off, but not low."""
+    using, without = VARIANTS
+    curves = trained({using: (0.1, 0.5), without: (0.9, 0.9)})
+    *both, levels = (row for row in scorecard({}, curves) if row.section is FIG_3)
+    assert [row.findings[0].verdict for row in both] == [REFUTED, REFUTED]
+    assert levels.findings[0].verdict == IN_PART
+
+
+def test_the_best_learned_policy_is_judged(tmp_path: Path) -> None:
+    """Of several learners that with the higher product, never a heuristic."""
+    study = load_study("table4", policies=["greedy", "ddqn", "ddqn-paper"], missions=2)
+    table4 = run_study(study, tmp_path / "table4")
+    row = row_of(scorecard({"table4": table4}, NONE), "Collection ratio over")
+    assert (row.findings[0].policy, row.findings[1].policy) == ("ddqn", "ddqn-paper")
+    poor = changed(table4, **{PRODUCT: 0.0})
+    row = row_of(scorecard({"table4": poor}, NONE), "Collection ratio over")
+    assert row.findings[0] == row.findings[1] and row.findings[0].policy == "ddqn-paper"
+
+
+def test_studies_of_another_kind_never_break_it(tmp_path: Path) -> None:
+    """One number of UAVs, two fields at a time, a single mission."""
+    designs = {"fig4": grid(uavs=[2], flying_time=[70, 80]), "fig5": grid(uavs=[2])}
+    changes = {"policies": ["ddqn"], "missions": 1, "logged": 1}
+    others = {
+        name: run_study(load_study(name, design=design, **changes), tmp_path / name)
+        for name, design in designs.items()
+    }
+    judged = scorecard(others, NONE)
+    assert learned(judged, "dramatically").verdict == NO_RESULTS
+    assert learned(judged, "best, and the sweet spot").verdict == NO_RESULTS
+    assert learned(judged, "two sectors").verdict in VERDICTS
+    small = run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "small")
+    assert all(row.findings[0].verdict == NO_RESULTS for row in scorecard({"fig4": small}, NONE))
+
+
+def test_what_of_the_paper_s_network_is_ours() -> None:
+    training = read_description(TRAINED / PAPERS_NETWORK).training
+    words = ", ".join(departures(training))
+    assert "return guard" in words and f"{training.n_step}-step returns" in words
+    assert f"{training.num_envs} missions" in words and "early returns" not in words
+    papers = {"guard": False, "n_step": 1, "num_envs": 1, "average_rate": 1.0, "loss": "mse"}
+    softmax = tuple(p.model_copy(update={"temperature": 0.1}) for p in training.phases)
+    assert departures(training.model_copy(update=papers | {"phases": softmax})) == []

@@ -1,0 +1,198 @@
+"""Paired comparisons: worked by hand, equal differences, and tables of matched missions."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from pandas.testing import assert_frame_equal
+from scipy import stats
+
+from analysis.names import PRODUCT, REWARD, SUCCESS
+from analysis.stats.differences import Paired, adjust, compare, for_choice, paired
+from dess import InputError
+from tests.analysis.stats.matched_missions import METRIC, STUDY, ratios
+
+
+def test_adjusted_by_hand():
+    p = np.array([0.01, 0.04, 0.03, 0.005])
+    # Holm: 0.005 x 4, 0.01 x 3, 0.03 x 2, 0.04 x 1, never falling
+    assert adjust(p, "holm") == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    # Benjamini and Hochberg: 0.005 x 4 / 1, 0.01 x 4 / 2, 0.03 x 4 / 3, 0.04
+    assert adjust(p, "fdr") == pytest.approx([0.02, 0.04, 0.04, 0.02])
+    assert adjust(p, None) == pytest.approx(p)
+    assert adjust(np.array([0.4, 0.9]), "holm") == pytest.approx([0.8, 0.9])
+    assert adjust(np.array([0.7, 0.9]), "holm") == pytest.approx([1.0, 1.0])
+
+
+def test_a_chosen_baseline_multiplies_p_values_by_the_number_of_candidates():
+    table = pd.DataFrame({"p_adjusted": [0.01, 0.4]})
+    assert for_choice(table, 3)["p_adjusted"].tolist() == pytest.approx([0.03, 1.0])
+
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+def of_lists(a, b, **arguments):
+    return paired(np.array(a), np.array(b), **arguments)
+
+
+def test_pairs_by_hand():
+    # differences 2, 1, 3, 1: mean 1.75, s = 0.957427, t(0.975, 3) = 3.182446
+    result = of_lists([3, 5, 7, 9], [1, 4, 4, 8])
+    assert result[:3] == pytest.approx((1.75, 0.22652, 3.27348), abs=1e-5)
+    # variances 5, 6.1875 and, of the differences, 0.6875
+    assert result.variance_reduction == pytest.approx(1 - 0.6875 / 11.1875)
+    assert result.correlation == pytest.approx(np.corrcoef([3, 5, 7, 9], [1, 4, 4, 8])[0, 1])
+    assert result.p == pytest.approx(stats.ttest_rel([3, 5, 7, 9], [1, 4, 4, 8]).pvalue)
+    assert result.n == 4
+
+
+def test_shares_by_hand():
+    a, b = [1] * 5 + [0] + [1] * 4, [0] * 5 + [1] + [1] * 4
+    result = of_lists(a, b, metric=SUCCESS)
+    # 5 gains, 1 loss: 2 (1 + 6) / 2^6; one more of each: mean 1 / 3, squares 8 - 12 / 9,
+    # t(0.975, 11) = 2.200985: 1 / 3 -+ 2.200985 sqrt(6.66667 / 11 / 12)
+    assert result.p == pytest.approx(14 / 64)
+    assert result[:3] == pytest.approx((0.4, -0.16130, 0.82797), abs=1e-5)
+    assert of_lists(b, a, metric=SUCCESS)[:3] == pytest.approx((-0.4, -0.82797, 0.16130), abs=1e-5)
+
+
+def test_means_of_outcomes_are_shares():
+    halves = of_lists([1.0, 0.5, 1.0], [0.5, 0.5, 1.0], metric=SUCCESS)
+    smooth = of_lists([1.0, 0.5, 1.0, 1.0, 0.0], [0.5, 0.5, 1.0, 0.0, 1.0])
+    assert (halves.low, halves.high, halves.p) == (smooth.low, min(smooth.high, 1), smooth.p)
+    assert halves.difference == pytest.approx(1 / 6)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "difference", "p"),
+    [
+        ([0.1 + 0.2] * 3, [0.3] * 3, 0.0, 1.0),  # rounding is no difference
+        ([1.1, 1.2, 1.4], [1.0, 1.1, 1.3], 0.1, 2 / 8),
+        ([1.0, 1.1, 1.3], [1.1, 1.2, 1.4], -0.1, 2 / 8),
+    ],
+)
+def test_equal_differences_have_a_degenerate_interval_and_the_p_of_the_signs(a, b, difference, p):
+    result = of_lists(a, b)
+    assert result[:3] == pytest.approx((difference,) * 3)
+    assert (result.low, result.p) == (result.high, p)
+
+
+@pytest.mark.parametrize("metric", ["", REWARD, "age"])
+def test_a_single_pair_without_bounds_has_no_interval(metric):
+    result = of_lists([5.0], [3.0], metric=metric)
+    assert (result.difference, result.p, result.n) == (2.0, 1.0, 1)
+    assert np.isnan([result.low, result.high]).all()
+
+
+def test_a_constant_has_no_correlation():
+    assert of_lists([1.0, 2.0, 4.0], [1.0] * 3)[4:6] == pytest.approx((0.0, 0.0))
+    assert of_lists([0.1] * 3, [0.7] * 3)[4:6] == pytest.approx((0.0, 0.0))
+    assert of_lists([0.1, 0.2, 0.4], [0.1, 0.2, 0.4])[4:6] == pytest.approx((1.0, 1.0))
+
+
+@pytest.mark.parametrize(("a", "b"), [([1, 1], [1, 1]), ([1], [0]), ([1, 1, 1], [0, 0, 0])])
+def test_shares_without_spread_have_an_interval(a, b):
+    result = of_lists(a, b, metric=SUCCESS)
+    assert -1 <= result.low < result.difference <= result.high <= 1
+    assert result.high - result.low > 0.5
+    assert result.p == min(1, 2 * 0.5 ** sum(np.not_equal(a, b)))
+
+
+@pytest.mark.parametrize(("a", "b"), [([], []), ([1.0, 2.0], [1.0])])
+def test_samples_that_are_no_pairs_are_refused(a, b):
+    with pytest.raises(ValueError, match="paired: "):
+        of_lists(a, b)
+
+
+def compared(missions=STUDY, baseline="tour", metrics=(METRIC,), **arguments):
+    return compare(missions, baseline, metrics, **arguments)
+
+
+def test_a_row_per_policy_group_and_metric():
+    table = compared(metrics=["success", METRIC], by=["point", "uavs"])
+    columns = ["policy", "baseline", "point", "uavs", "metric", "difference"]
+    assert list(table.columns[:6]) == columns
+    assert table["policy"].unique().tolist() == ["greedy", "ddqn", "ddqn-2"]
+    assert table["n"].tolist() == [4] * (3 * 2 * 3 * 2)
+    assert not table.isna().any(axis=None)
+
+
+def test_pairs_are_the_missions_of_a_replication():
+    row = compared(by=["point"]).set_index(["policy", "point"]).loc[("ddqn", 1)]
+    fields = [*Paired._fields]
+    assert tuple(row[fields]) == paired(ratios("ddqn", 1), ratios("tour", 1), metric=METRIC)
+    assert row["difference"] == pytest.approx(0.02, abs=0.01)
+    assert row["variance_reduction"] > 0.9  # the noise is common
+    successes = [STUDY[STUDY.policy == policy].success.to_numpy() for policy in ("ddqn", "tour")]
+    shares = compared(metrics=[SUCCESS]).set_index("policy").loc["ddqn"]
+    halves = [values.reshape(2, 12).mean(axis=0) for values in successes]
+    assert shares[["low", "high"]].tolist() == [*paired(*halves, metric=SUCCESS)[1:3]]
+
+
+def test_points_of_one_replication_are_averaged():
+    alone = STUDY[STUDY["point"] == 0]
+    pooled = compared(pd.concat([alone, alone.assign(point=1)]))
+    assert_frame_equal(pooled, compared(alone))
+    assert set(pooled["n"]) == {12}
+
+
+def test_points_are_compared_as_policies_are():
+    table = compared(baseline=0, of="point", by=["policy"]).set_index("policy")
+    assert list(table.columns[:2]) == ["point", "baseline"]
+    assert set(table["point"]) == {1}
+    ends = paired(ratios("ddqn", 1), ratios("ddqn", 0), metric=METRIC)[1:3]
+    assert table.loc["ddqn", ["low", "high"]].tolist() == pytest.approx([*ends])
+    assert table["difference"].tolist() == pytest.approx([0.2] * 4, abs=0.02)
+
+
+def test_p_values_are_corrected_over_all_rows():
+    for correction in ("holm", "fdr", None):
+        table = compared(metrics=[METRIC, "reward"], by=["point"], correction=correction)
+        assert table["p_adjusted"].tolist() == adjust(table["p"].to_numpy(), correction).tolist()
+
+
+def test_missions_without_point_and_seed_are_paired_by_replication():
+    alone = STUDY[STUDY["point"] == 0]
+    assert_frame_equal(compared(alone.drop(columns=["point", "seed"])), compared(alone))
+
+
+OF_DDQN = STUDY.index[STUDY.policy == "ddqn"]
+
+
+@pytest.mark.parametrize(
+    ("missions", "arguments", "line"),
+    [
+        (STUDY.drop(index=[3, 13]), {}, "tour: lacks 2 of the missions of greedy, the first at "),
+        (STUDY.drop(index=OF_DDQN[4:6]), {}, "ddqn: lacks 2 .*point 0, seed 7, replication 4; "),
+        (pd.concat([STUDY, STUDY.iloc[[2]]]), {}, "missions: policy tour, .* 2 is there twice"),
+        (STUDY, {"baseline": "random"}, "policy: random has no missions; allowed: tour, greedy"),
+        (STUDY[STUDY.policy == "tour"], {}, "policy: nothing to compare with tour"),
+        (STUDY, {"metrics": ["sped"]}, "sped: no such column .did you mean seed"),
+        (STUDY.assign(collection_ratio=np.nan), {}, "collection_ratio: no number in 96 missions"),
+        (STUDY, {"by": ["policy"]}, "by: policy is what is compared; allowed: other columns"),
+        (STUDY, {"of": "seed"}, "of: 'seed'; allowed: policy, point"),
+        (STUDY, {"level": 95}, "level: 95; allowed: between 0 and 1"),
+        (STUDY, {"correction": "sidak"}, "correction: 'sidak'; allowed: holm, fdr, or none"),
+    ],
+)
+def test_missions_that_do_not_match_are_refused_in_a_line(missions, arguments, line):
+    with pytest.raises(InputError, match=f"^{line}"):
+        compared(missions, **arguments)
+
+
+def test_differences_of_shares_end_where_these_do():
+    far = of_lists([1.0, 0.0], [0.0, 1.0], metric=PRODUCT)
+    assert (far.low, far.high) == (-1.0, 1.0)  # Student's t goes beyond
+    free = of_lists([1.0, 1.0, 0.0], [0.0, 0.0, 1.0])
+    assert free.low < -1 and free.high > 1
+
+
+@pytest.mark.parametrize("difference", [0.0, 0.25])
+def test_equal_differences_of_bounded_values_have_an_interval_and_its_p_value(difference):
+    a = np.full(20, 0.5 + difference)
+    result = paired(a, np.full(20, 0.5), metric=PRODUCT)
+    # A falls to 0, or B does, while the other one is as it was: that is the least it may be.
+    expected = stats.ttest_1samp([difference] * 20 + [0.5 + difference, -0.5], 0)
+    assert result.low < result.difference == difference < result.high
+    assert result[1:3] == pytest.approx([*expected.confidence_interval()])
+    assert result.p == pytest.approx(expected.pvalue)

@@ -1,0 +1,150 @@
+"""Records agree with logs and with the other engine; whatever is changed in them is noticed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+
+from analysis.results.tables import Results
+from analysis.verification import balances, draws, measurements
+from analysis.verification.measurements import CrossCheck, Log
+from dess.mission import simulate
+from dess.scenario import ScenarioSpace
+from dess.state import sample_scenario
+from tests.analysis.verification.changes import altered, with_records
+from tests.analysis.verification.verdicts import fails
+from tests.drawn import extended_spaces, policies, replications, seeds
+
+
+@pytest.mark.parametrize("by", [1, -1])
+def test_a_battery_that_is_off_by_one_is_noticed(logs: list[Log], by: int) -> None:
+    assert fails(balances.battery_check(altered(logs, "move", 3, value=lambda value: value + by)))
+
+
+@given(extended_spaces(), policies, seeds, replications)
+def test_the_batteries_of_every_scenario_follow_the_rules(
+    space: ScenarioSpace, policy: object, seed: int, replication: int
+) -> None:
+    """With wind, fleets, shared power and failures; a battery that is off by one is noticed."""
+    record = simulate(space, policy, seed, replication, events=True)
+    assert record.events is not None
+    events = pd.DataFrame(record.events.columns())
+    log = Log("", sample_scenario(space, seed, replication), pd.Series(), pd.DataFrame(), events)
+    assert not balances.battery_errors(log).any()
+    (changed,) = altered([log], "move", -1, value=lambda value: value + 1)
+    assert balances.battery_errors(changed).any()
+
+
+def charging(logs: list[Log]) -> list[Log]:
+    """The logs of missions with whole charging sessions, first."""
+    return sorted(logs, key=lambda log: -(log.events["event"] == "charge_end").sum())
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("charge_start", 0), ("zone", (0, 6, 2, 2)), ("charge_complete", 100)],
+    ids=["begins too early", "outside the zone", "ends too early"],
+)
+def test_charging_that_breaks_a_rule_is_noticed(logs: list[Log], field: str, value: object) -> None:
+    first, *rest = charging(logs)
+    changed = replace(first, scenario=first.scenario.model_copy(update={field: value}))
+    assert not fails(balances.battery_check([first, *rest]))
+    assert fails(balances.battery_check([changed, *rest]))
+
+
+def test_data_that_are_recorded_as_lost_are_no_imbalance(results: Results) -> None:
+    lost = results.missions["collected"].where(results.missions.index == 3, 0.0) / 2
+    missions = results.missions.assign(lost=lost)
+    missions["collected"] -= lost
+    assert not fails(balances.conservation_check({"trial": replace(results, missions=missions)}))
+    missions["lost"] = 0.0
+    assert fails(balances.conservation_check({"trial": replace(results, missions=missions)}))
+
+
+@pytest.mark.parametrize("name", ["collected", "residual", "initial", "arrived"])
+def test_data_that_come_from_nowhere_are_noticed(results: Results, name: str) -> None:
+    changed = with_records(results, 3, **{name: lambda value: value + 1e-9})
+    assert fails(balances.conservation_check({"trial": changed}))
+    assert fails(balances.conservation_check({"sound": results, "trial": changed}))
+    assert not fails(balances.conservation_check({"sound": results}))
+
+
+def test_rounding_of_a_single_sum_is_not_taken_for_a_loss(results: Results) -> None:
+    changed = with_records(results, 3, collected=lambda value: np.nextafter(value, 2 * value))
+    assert not fails(balances.conservation_check({"trial": changed}))
+
+
+def test_what_the_simulator_leaves_passes(
+    results: Results, logs: list[Log], again: CrossCheck
+) -> None:
+    seed = results.manifest["seed"]
+    checks = [
+        *draws.communication_checks(logs, seed),
+        balances.conservation_check({"trial": results}),
+        balances.balance_check(logs),
+        balances.battery_check(logs),
+        balances.record_check(logs),
+        *balances.realisation_checks(results, logs),
+        balances.engine_check(results, again),
+    ]
+    assert not any(map(fails, checks))
+    assert all(check.n > 0 for check in checks)
+
+
+def test_an_arrival_that_is_lost_is_noticed(results: Results, logs: list[Log]) -> None:
+    longest = measurements.longest(logs)
+    log = next(log for log in logs if log not in longest and log.arrivals.any())
+    row = log.events.index[log.events["event"] == "arrival"][0]
+    lossy = replace(log, events=log.events.drop(index=row))
+    changed = [lossy if other is log else other for other in logs]
+    assert fails(balances.balance_check(changed))
+    assert fails(balances.record_check(changed))
+    assert fails(balances.realisation_checks(results, changed)[1])
+
+
+OF_MISSION = ["slots", "uav_slots", "arrived", "initial", "collected"]
+
+
+@pytest.mark.parametrize("name", [*OF_MISSION, "quota", "battery", "slots_charging"])
+def test_a_record_that_its_log_does_not_add_up_to_is_noticed(logs: list[Log], name: str) -> None:
+    first, *rest = logs
+    changed = replace(first, uavs=first.uavs.assign(**{name: first.uavs.get(name, 0) + 1}))
+    if name in OF_MISSION:
+        changed = replace(first, mission=first.mission.copy())
+        changed.mission[name] += 1
+    assert fails(balances.record_check([changed, *rest]))
+
+
+@pytest.mark.parametrize("name", ["initial", "flying_time"])
+def test_policies_that_meet_different_missions_are_noticed(
+    results: Results, logs: list[Log], name: str
+) -> None:
+    parameters, arrivals = balances.realisation_checks(
+        with_records(results, 0, **{name: lambda value: value + 1}), logs
+    )
+    assert fails(parameters) and not fails(arrivals)
+
+
+def test_a_uav_that_starts_elsewhere_is_noticed(results: Results, logs: list[Log]) -> None:
+    changed = altered(logs, "mission_start", 0, x=lambda x: x - 1)
+    assert fails(balances.realisation_checks(results, changed)[1])
+
+
+@pytest.mark.parametrize("name", ["collected", "reward", "residual"])
+def test_a_record_that_is_off_by_its_last_bit_is_noticed(
+    results: Results, again: CrossCheck, name: str
+) -> None:
+    changed = with_records(results, 0, **{name: lambda value: np.nextafter(value, np.inf)})
+    check = balances.engine_check(changed, again)
+    assert (check.n, check.error) == (6, 1)
+    assert check.seen == "5 of 6 missions"
+
+
+def test_a_uav_that_the_other_engine_does_not_leave_is_noticed(
+    results: Results, again: CrossCheck
+) -> None:
+    uavs = results.uavs.copy()
+    uavs.loc[0, "battery"] += 1
+    assert balances.engine_check(replace(results, uavs=uavs), again).error == 1
