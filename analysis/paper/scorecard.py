@@ -38,7 +38,7 @@ from policies.ddqn.config import TrainingConfig
 
 TRAININGS = "trainings"  # in place of the name of a study, for claims about learning curves
 
-_FILE = Path(__file__).with_suffix(".toml")
+_FILE = Path(__file__).with_name("claims.toml")
 _NAMED = {
     "near": numbers.margin(NEAR),
     "near_share": f"{100 * NEAR:g} %",

@@ -66,6 +66,7 @@ TERMS = {
 }
 _TERM = re.compile(rf"\b({'|'.join(TERMS)})\b")
 _EXPLAINED = ("p", "li", "figcaption")  # elements in whose text terms are explained
+_PLAIN = ("code", "a", "button", "script")  # but not within these
 # What nbconvert puts around the cells of a notebook and around their outputs.
 _WRAPPERS = 'div.cell, div.inner_cell, div.text_cell_render, div[class^="output"]'
 _INDEX = re.compile(r"\bC_([SC])\b")  # as in C_S, a threshold of charging
@@ -109,9 +110,9 @@ class Body:
         answer = found.extract() if found else soup.new_tag("p")
         for scrolling in soup.find_all("pre"):
             scrolling["tabindex"] = "0"
-        for found in [*soup.find_all(string=_INDEX)]:
-            if not found.find_parent(["code", "pre", "script", "style"]):
-                found.replace_with(*_with_indices(soup, found))
+        for string in [*soup.find_all(string=_INDEX)]:
+            if not string.find_parent(["code", "pre", "script", "style"]):
+                string.replace_with(*_with_indices(soup, string))
         sections = {str(section["id"]): title for section, title in _sections(soup)}
         number = str(answer.get("data-number", ""))
         return cls(Markup(answer.decode_contents()), number, sections, soup.decode().strip())
@@ -130,13 +131,13 @@ def _number(soup: BeautifulSoup, figure: Tag, number: int) -> None:
 def _explain(soup: BeautifulSoup) -> None:
     """Explain every term where it stands first."""
     left = {*TERMS}
-    for found in [*soup.find_all(string=_TERM)]:
-        if not found.find_parent(_EXPLAINED) or found.find_parent(
+    for string in [*soup.find_all(string=_TERM)]:
+        if not string.find_parent(_EXPLAINED) or string.find_parent(
             ["code", "a", "button", "script"]
         ):
             continue
         parts: list[str | Tag] = []
-        for part in _TERM.split(found):
+        for part in _TERM.split(string):
             if part in left:
                 left.remove(part)
                 term = soup.new_tag("abbr", title=TERMS[part])
@@ -144,7 +145,7 @@ def _explain(soup: BeautifulSoup) -> None:
                 parts.append(term)
             else:
                 parts.append(part)
-        found.replace_with(*parts)
+        string.replace_with(*parts)
 
 
 def _with_indices(soup: BeautifulSoup, text: NavigableString) -> list[str | Tag]:

@@ -27,7 +27,7 @@ from reports.pages.notebook import Report
 Progress = Callable[[int, int, str], None]
 
 HOME = "dess-pages-"  # beginning of the name of the folder in which the notebooks run
-PACKAGES = Path(__file__).parents[3]  # the folder from which this package was imported
+PACKAGES = Path(__file__).parents[2]  # the folder from which this package was imported
 
 
 def run(
