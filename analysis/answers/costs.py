@@ -21,7 +21,7 @@ from pandas.api.types import is_numeric_dtype
 from analysis import numbers
 from analysis.answers.settings import edge, ends, points, ranked, value_in_words
 from analysis.names import COST, DECISIONS, METRICS, SUCCESS
-from analysis.results.tables import Results
+from analysis.results.tables import Results, once
 from analysis.stats.choices import membership, on_front
 from analysis.study.cheapest import PARTS, Answer, Cheapest, CheapestChoice, Costs
 from dess import InputError
@@ -39,6 +39,7 @@ _WHY_NOT = {
 }
 
 
+@once
 def priced(results: Results) -> pd.DataFrame:
     """The settings with their costs: condition by condition, the cheapest first.
 
@@ -102,6 +103,7 @@ def front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
+@once
 def judged(results: Results) -> pd.DataFrame:
     """Which settings meet the requirements, and the cheapest of these under each condition.
 
@@ -195,6 +197,7 @@ def answer(results: Results) -> str:
     )
 
 
+@once
 def best_policy(results: Results) -> str:
     """The policy whose fleet is the cheapest that meets the requirements under every condition."""
     costs = priced(results).set_index(["policy", "point"])[COST]
@@ -225,6 +228,7 @@ def cheapest_fleet(results: Results) -> str:
     return str(found[found["policy"] == best_policy(results)]["setting"].iloc[-1])
 
 
+@once
 def selections(results: Results) -> pd.DataFrame:
     """What was selected by a study that searches for the cheapest settings.
 
@@ -353,6 +357,7 @@ def _samples(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:
     return wide.reindex(columns=keys).to_numpy(float).T
 
 
+@once
 def _fleets(results: Results) -> list[str]:
     """The fleet of every design point in words: all that has a price or varies."""
     prices, table, fleets = _prices(results), points(results), []
@@ -368,6 +373,7 @@ def _fleets(results: Results) -> list[str]:
     return fleets
 
 
+@once
 def _conditions(results: Results) -> list[str]:
     """The condition of every design point in words."""
     return [", ".join(row) for row in _words(results, False)]

@@ -17,7 +17,7 @@ from pandas.api.types import is_numeric_dtype
 
 from analysis import numbers
 from analysis.names import COST, LESS_IS_BETTER, METRICS, PRODUCT, metrics_in, parameter, value_text
-from analysis.results.tables import Results
+from analysis.results.tables import Results, once
 from analysis.stats.choices import may_be_best
 from analysis.stats.differences import column_tests, with_adjusted
 from analysis.stats.intervals import by_replication, column_intervals, stratified
@@ -41,6 +41,7 @@ def varied(results: Results) -> dict[str, list[Any]]:
     return {str(field): _ordered(table[field]) for field in table}
 
 
+@once
 def points(results: Results) -> pd.DataFrame:
     """The values of the varied fields at every design point.
 
@@ -139,6 +140,7 @@ def value_in_words(field: str, value: Any) -> str:
     return f"{parameter(field).within} {text}"
 
 
+@once
 def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -> pd.DataFrame:
     """The settings by the mean of a metric, the best first.
 
@@ -173,6 +175,7 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
     return table
 
 
+@once
 def averaged(
     results: Results, by: Sequence[str], metric: str = PRODUCT, policy: str | None = None
 ) -> pd.DataFrame:
@@ -205,6 +208,7 @@ def averaged(
     return _averaged(results, table[[*by]], metric, policy)
 
 
+@once
 def main_effects(
     results: Results, metric: str = PRODUCT, policy: str | None = None
 ) -> pd.DataFrame:

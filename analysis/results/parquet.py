@@ -9,6 +9,7 @@ import json
 import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -321,27 +322,37 @@ def files_in(folder: Path) -> list[Path]:
     return [path for path in paths if path.is_file() and not path.is_symlink()]
 
 
-def tables_in(folder: Path, kind: str) -> tuple[dict[str, pa.Table], list[Path]]:
+Found = tuple[dict[str, pa.Table], list[Path]]
+
+
+def tables_in(folder: Path, kind: str) -> Found:
     """The tables in a folder, by the hash of their content, and the damaged files in it.
 
     A file is damaged if its content is not what its name says. Two files with different records of
     the same missions both count as damaged, since it is unknown which one is right.
     """
+    files = [(path, path.stat()) for path in files_in(folder)]
+    return _tables_of(tuple((p, s.st_ino, s.st_size, s.st_mtime_ns) for p, s in files), kind)
+
+
+@lru_cache(64)
+def _tables_of(files: tuple[tuple[Path, int, int, int], ...], kind: str) -> Found:
+    """The tables in files, which are read again if one has another number, size or time."""
     damaged = []
     sound: dict[str, dict[Path, pa.Table]] = defaultdict(dict)
-    for path in files_in(folder):
+    for path, *_ in files:
         table = read(path, kind)
         if table is not None and _name_in(table) == content_hash(path):
             sound[content_hash(path)][path] = table
         else:
             damaged.append(path)
     tables = {}
-    for name, files in sound.items():
-        first, *others = files.values()
+    for name, same in sound.items():
+        first, *others = same.values()
         if all(_are_equal(other, first) for other in others):
             tables[name] = first
         else:
-            damaged += files
+            damaged += same
     return tables, damaged
 
 

@@ -2,11 +2,11 @@
 
 import json
 import shlex
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -74,6 +74,28 @@ def _as_toml(value: Any) -> str:
     return json.dumps(value)
 
 
+Given, Found = ParamSpec("Given"), TypeVar("Found")
+
+
+def once(
+    ask: Callable[Concatenate["Results", Given], Found],
+) -> Callable[Concatenate["Results", Given], Found]:
+    """Let a function of results compute its answer once for the same results and arguments.
+
+    A table is returned as a copy, which the caller may change.
+    """
+
+    @wraps(ask)
+    def known(results: "Results", *args: Given.args, **named: Given.kwargs) -> Found:
+        key = ask, repr(args), repr(named)
+        if key not in results.answers:
+            results.answers[key] = ask(results, *args, **named)
+        answer = results.answers[key]
+        return answer.copy() if isinstance(answer, pd.DataFrame) else answer
+
+    return known
+
+
 @dataclass(frozen=True, eq=False)
 class Results:
     """The results of a study.
@@ -92,6 +114,7 @@ class Results:
             selection was not based on them. Empty if the study selects nothing.
         bounds: The upper bound of every mission by design point and replication, the same for all
             policies. Empty if the study has no bounds.
+        answers: What functions of these results have computed, see ``once``.
     """
 
     store: Store
@@ -99,6 +122,7 @@ class Results:
     uavs: pd.DataFrame
     checks: pd.DataFrame
     bounds: dict[Place, Bound]
+    answers: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def manifest(self) -> dict[str, Any]:
@@ -170,6 +194,7 @@ class Results:
         """The cheapest settings of a policy that meet the requirements of the study."""
         return self._chosen(policy, Cheapest)
 
+    @once
     def _chosen(self, policy: str, kind: type) -> Any:
         """What a rule of this kind has selected for a policy; None if the study has another."""
         self.check_policy(policy)
@@ -266,8 +291,8 @@ def _labelled(manifest: Manifest, missions: Mapping[str, pd.DataFrame]) -> pd.Da
     """The missions of all policies, with the fields that the design sets and no record has."""
     table = _of_policies(missions)
     table = table.drop(columns=[m for m in measured_in(table) if table[m].isna().all()])
-    for position, (field, values) in enumerate(_swept(manifest).items(), 2):
-        table.insert(position, field, table["point"].map(dict(enumerate(values))))
+    for position, (name, values) in enumerate(_swept(manifest).items(), 2):
+        table.insert(position, name, table["point"].map(dict(enumerate(values))))
     return table
 
 
@@ -277,10 +302,10 @@ def _swept(manifest: Manifest) -> dict[str, list[Any]]:
     Values are JSON text where some of them are lists, and None where a point does not set a field.
     """
     designs = [point.values for point in manifest.points]
-    fields = dict.fromkeys(field for design in designs for field in design)
+    names = dict.fromkeys(name for design in designs for name in design)
     swept = {}
-    for field in [field for field in fields if field not in (MISSION_RECORD.names or ())]:
-        values = [design.get(field) for design in designs]
+    for name in [name for name in names if name not in (MISSION_RECORD.names or ())]:
+        values = [design.get(name) for design in designs]
         listed = any(isinstance(value, list) for value in values)
-        swept[field] = [json.dumps(v) if listed and v is not None else v for v in values]
+        swept[name] = [json.dumps(v) if listed and v is not None else v for v in values]
     return swept
