@@ -4,9 +4,11 @@ with Interrupts() as interrupts:
     ...                     # a signal raises KeyboardInterrupt here
 """
 
+import os
 import signal
 import sys
 import threading
+import time
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -14,6 +16,9 @@ NUMBERS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
 AGAIN = 0.25  # seconds until an interrupt that something has swallowed is raised again
+UNNOTICED = 1.0  # seconds until a signal that the main thread does not notice ends the process
+EXIT_CODE = 130  # after a signal, as shells and typer have it: 128 + SIGINT
+LINE = "interrupted: run the same command again to complete it"
 
 
 class Interrupts(AbstractContextManager["Interrupts"]):
@@ -22,6 +27,10 @@ class Interrupts(AbstractContextManager["Interrupts"]):
     A finalizer, a callback or a library may swallow the interrupt. So it is raised again and again
     until the block ends, but not while it is handled: a cleanup is left in peace, also by a second
     signal. A signal that was ignored before, as SIGHUP under ``nohup``, stays ignored.
+
+    While functions are compiled, and in other code that is not Python, the main thread notices no
+    signal for seconds. If the process is to end after the block, it ends then without a cleanup, as
+    after a kill, which results and pages survive.
 
     Attributes:
         received: Whether there was a signal.
@@ -44,6 +53,11 @@ class Interrupts(AbstractContextManager["Interrupts"]):
             for number in NUMBERS:
                 if signal.getsignal(number) not in (signal.SIG_IGN, None):
                     self._handlers[number] = signal.signal(number, self._receive)
+            if self.is_last and os.name == "posix":
+                seen, told = os.pipe()
+                os.set_blocking(told, False)
+                signal.set_wakeup_fd(told, warn_on_full_buffer=False)
+                threading.Thread(target=self._watch, args=(seen,), daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -62,6 +76,14 @@ class Interrupts(AbstractContextManager["Interrupts"]):
         self.received = True
         if not _is_handled():
             raise KeyboardInterrupt
+
+    def _watch(self, seen: int) -> None:
+        """End the process if the main thread does not notice a signal."""
+        while number := os.read(seen, 1):
+            time.sleep(UNNOTICED)
+            if not self.received and signal.getsignal(number[0]) == self._receive:
+                os.write(2, f"{LINE}\n".encode())
+                os._exit(EXIT_CODE)
 
     def _unraisable(self, error: Any) -> None:
         """Say nothing of an interrupt that came in a finalizer or callback: it comes again."""

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from reports.interrupts import Interrupts
+from reports.interrupts import EXIT_CODE, LINE, Interrupts
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _check_text(words)
             code = app(words, prog_name="dess", standalone_mode=False) or 0
             sys.stdout.flush()  # an error of the output is an error of the command
-            if code != console.INTERRUPTED:  # as typer ends a command after a Ctrl-C
+            if code != EXIT_CODE:  # as typer ends a command after a Ctrl-C
                 return code
             raise KeyboardInterrupt
         except BaseException as error:
@@ -78,10 +78,9 @@ def _failed(error: BaseException, words: Sequence[str], is_interrupted: bool) ->
     from reports.cli import console
 
     if isinstance(error, console.Interruption):
-        return console.fail(str(error), console.INTERRUPTED)
+        return console.fail(str(error), EXIT_CODE)
     if is_interrupted or isinstance(error, KeyboardInterrupt):
-        line = "interrupted: run the same command again to complete it"
-        return console.fail(line, console.INTERRUPTED)
+        return console.fail(LINE, EXIT_CODE)
     if isinstance(error, TyperException):
         context = getattr(error, "ctx", None)
         hint = f" (see {context.command_path} --help)" if context else ""

@@ -20,7 +20,6 @@ from dess.files.writing import replacing_all
 LARGEST = 2**32  # bytes of a file for standard output
 MESSAGE = 300  # the longest line that says why a command fails
 _STREAMS = {"stdout": "standard output", "stderr": "standard error"}
-INTERRUPTED = 130  # the exit code after Ctrl-C, as shells and typer have it: 128 + SIGINT
 
 
 class Interruption(Exception):  # noqa: N818 - nothing went wrong

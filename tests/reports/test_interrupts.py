@@ -133,3 +133,27 @@ def test_a_signal_during_the_imports_ends_the_command(tmp_path):
     )
     assert (done.returncode, done.stdout, done.stderr) == (130, "", LINE)
     assert files_of(tmp_path) == before
+
+
+BUSY = """
+import hashlib, sys
+import dess.mission
+from reports.cli import main
+
+def busy(*_, **__):
+    print("busy", flush=True)
+    hashlib.pbkdf2_hmac("md5", b"", b"", 2**31 - 1)
+
+dess.mission.simulate, sys.argv = busy, ["dess", "simulate"]
+sys.exit(main())
+"""
+
+
+def test_a_signal_ends_a_command_that_is_in_code_that_notices_none():
+    """As the compiler of functions: the main thread runs no Python for a long time."""
+    words, pipe = [sys.executable, "-c", BUSY], subprocess.PIPE
+    with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True) as child:
+        assert child.stdout.readline() == "busy\n"
+        child.send_signal(signal.SIGTERM)
+        assert child.communicate() == ("", LINE)
+    assert child.returncode == 130
