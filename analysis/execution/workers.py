@@ -1,33 +1,19 @@
-"""Processes of this machine that run jobs, and end with the process that started them."""
+"""Pools that run jobs: the base class, and pools on this machine.
+
+A job that raises an error has a ``Problem`` as its result. A worker that is killed is replaced, and
+its job is run again; a job that kills its worker every time also has a ``Problem``.
+"""
 
 import os
 import signal
-import sys
-import time
 import warnings
 from abc import abstractmethod
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from threading import Thread
 from typing import Any
 
 from analysis.execution.jobs import Job, Problem, Progress, attempt, first_failing
-
-
-def live_and_die_with(parent: int) -> None:
-    """Ignore interrupts, which the parent process handles, and end when the parent is killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # joblib replaces a worker that has grown by 300 MB, which a learned policy takes.
-    if loky := sys.modules.get("joblib.externals.loky.process_executor"):
-        loky._MAX_MEMORY_LEAK_SIZE = 2**31  # type: ignore[attr-defined]
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.2)
-        os._exit(1)
-
-    Thread(target=watch, daemon=True).start()
-
+from analysis.execution.orphans import live_and_die_with
 
 Finished = Generator[tuple[int, Any], None, None]  # numbers and results of jobs
 

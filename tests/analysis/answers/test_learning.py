@@ -343,7 +343,11 @@ def folder(tmp_path: Path) -> Path:
             "updates": [250, 500, 750, 1000],
             "seconds": [60, 120, 180, 240],
         }
-        curve |= {"uav_slots": [1e6, 2e6, 3e6, 4e6], learning.PRODUCT: product, "is_best": True}
+        curve |= {
+            "uav_slots": [1e6, 2e6, 3e6, 4e6],
+            learning.LEARNED_PRODUCT: product,
+            "is_best": True,
+        }
         same = dict.fromkeys({*CURVE.names} - curve.keys(), 1)
         pd.DataFrame(curve | same).to_parquet(tmp_path / name / "training.parquet")
     return tmp_path
