@@ -10,6 +10,7 @@ from scipy import stats
 
 from analysis import numbers
 from analysis.answers import costs
+from analysis.answers.settings import edge, ends
 from analysis.names import (
     LESS_IS_BETTER,
     MEANS,
@@ -451,9 +452,9 @@ def selections(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per policy: ``policy``, ``point``, ``setting`` in words, number of ``missions``,
-        ``left`` (number of points not ruled out), ``guaranteed``, and ``guarantee`` in words. Empty
-        if the study selects nothing. For a study that selects the cheapest setting, the rows of
-        ``costs.selections``.
+        ``left`` (number of points not ruled out), ``guaranteed``, and ``guarantee`` in words, with
+        the ends of the values at which the point lies. Empty if the study selects nothing. For a
+        study that selects the cheapest setting, the rows of ``costs.selections``.
     """
     if isinstance(results.store.manifest.selection, Cheapest):
         return costs.selections(results)
@@ -461,7 +462,8 @@ def selections(results: Results) -> pd.DataFrame:
     for policy in results.policies:
         if (c := results.choice(policy)) is not None:
             found = (policy, c.best, words[c.best], c.missions, len(c.survivors))
-            rows.append((*found, c.guaranteed, c.guarantee))
+            lies = edge(results, c.best, ends(results, c.best))
+            rows.append((*found, c.guaranteed, f"{c.guarantee}.{lies}" if lies else c.guarantee))
     columns = ["policy", "point", "setting", "missions", "left", "guaranteed", "guarantee"]
     return pd.DataFrame(rows, columns=columns)
 

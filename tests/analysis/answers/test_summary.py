@@ -295,6 +295,10 @@ def test_the_selected_point_and_its_check(tmp_path):
         assert row.setting == f"quota {study.points[row.point].values['quota']}"
         counts = results.missions.query("policy == @row.policy").groupby("point").size()
         assert row.missions == counts.sum()
+        value = study.points[row.point].values["quota"]
+        end = {20: "least", 80: "largest"}.get(value, "")
+        at_end = f"quota {value} is the {end}; a better one may lie beyond."
+        assert row.guarantee.endswith(at_end) == bool(end)
     checks = summary.checks(results).set_index(["policy", "metric"])
     assert set(checks["n"]) == {9}
     rewards = results.checks.query("policy == 'greedy'")["reward"]
