@@ -180,5 +180,5 @@ def test_reports_that_are_killed_equal_an_undisturbed_one(number, results, tmp_p
     whole = files_of(undisturbed.out)
     commands = (a_page(tmp_path / f"killed-{n}", results) for n in count())
     generator = seeded("report", number)
-    for killed in kill(commands, number, KILLS, renderings, 0.6 * longest, generator):
+    for killed in kill(commands, number, KILLS // 2, renderings, 0.6 * longest, generator):
         assert files_of(killed.out) == whole
