@@ -16,7 +16,7 @@ NUMBERS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
 AGAIN = 0.25  # seconds until an interrupt that something has swallowed is raised again
-UNNOTICED = 1.0  # seconds until a signal that the main thread does not notice ends the process
+UNNOTICED = 1.0  # seconds of CPU time until a signal that is not noticed ends the process
 EXIT_CODE = 130  # after a signal, as shells and typer have it: 128 + SIGINT
 LINE = "interrupted: run the same command again to complete it"
 
@@ -80,7 +80,9 @@ class Interrupts(AbstractContextManager["Interrupts"]):
     def _watch(self, seen: int) -> None:
         """End the process if the main thread does not notice a signal."""
         while number := os.read(seen, 1):
-            time.sleep(UNNOTICED)
+            end = time.process_time() + UNNOTICED
+            while time.process_time() < end and not self.received:
+                time.sleep(0.05)
             if not self.received and signal.getsignal(number[0]) == self._receive:
                 os.write(2, f"{LINE}\n".encode())
                 os._exit(EXIT_CODE)

@@ -3,6 +3,7 @@
 import atexit
 import os
 import resource
+import signal
 import sys
 import tempfile
 import threading
@@ -25,6 +26,7 @@ def run(case: Case, box: Path, command: Callable[[], int]) -> None:
     if "tests.fuzz.preload" not in sys.modules:  # multiprocessing does not say why
         raise RuntimeError("tests.fuzz.preload was not loaded: import it to see why")
     os.setsid()
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup it is ignored
     os.chdir(box / CWD)
     os.environ |= {"HOME": str(box / HOME), "TMPDIR": str(box / TEMPORARY)}
     os.environ["MPLCONFIGDIR"] = matplotlib.get_cachedir()  # fonts are not listed again
