@@ -145,7 +145,7 @@ def _table(columns: Columns, schema: pa.Schema, chunk: Chunk) -> pa.Table:
 
 
 def check(tables: Sequence[pa.Table], rows: Sequence[Row]) -> None:
-    """Check that every table has the missions of some parts, in their order.
+    """Check that every table has the missions of some parts, in their order, with all UAVs.
 
     What a record says of its mission is not checked: ``dess verify`` simulates missions again.
 
@@ -169,6 +169,11 @@ def check(tables: Sequence[pa.Table], rows: Sequence[Row]) -> None:
             and np.array_equal(found["cell"].to_numpy(object), cells)
         ):
             raise ValueError("the records are not those of the requested missions")
+    for missions, uavs in [tables] if len(tables) > 1 else []:
+        fleet = missions["uavs"].to_numpy()
+        first = np.repeat(np.cumsum(fleet) - fleet, fleet)
+        if not np.array_equal(uavs["uav"], np.arange(len(first)) - first):
+            raise ValueError("the records are not those of all UAVs")
 
 
 def parts_in(table: pa.Table) -> list[Row]:
