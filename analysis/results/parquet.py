@@ -169,11 +169,16 @@ def check(tables: Sequence[pa.Table], rows: Sequence[Row]) -> None:
             and np.array_equal(found["cell"].to_numpy(object), cells)
         ):
             raise ValueError("the records are not those of the requested missions")
-    for missions, uavs in [tables] if len(tables) > 1 else []:
-        fleet = missions["uavs"].to_numpy()
-        first = np.repeat(np.cumsum(fleet) - fleet, fleet)
-        if not np.array_equal(uavs["uav"], np.arange(len(first)) - first):
-            raise ValueError("the records are not those of all UAVs")
+    if len(tables) > 1:
+        _check_uavs(*tables)
+
+
+def _check_uavs(missions: pa.Table, uavs: pa.Table) -> None:
+    """Check that there is a record of every UAV of the missions, in their order."""
+    fleet = missions["uavs"].to_numpy()
+    first = np.repeat(np.cumsum(fleet) - fleet, fleet)
+    if not np.array_equal(uavs["uav"], np.arange(len(first)) - first):
+        raise ValueError("the records are not those of all UAVs")
 
 
 def parts_in(table: pa.Table) -> list[Row]:
