@@ -5,11 +5,10 @@ from collections.abc import Callable, Iterable, Mapping
 from itertools import product
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from pydantic import Field
 from scipy import stats
 from threadpoolctl import threadpool_limits
 
@@ -17,7 +16,6 @@ from analysis import numbers
 from analysis.answers.missions import FOLDER
 from analysis.answers.summary import learners, ranked_policies
 from analysis.names import METRICS, PARAMETERS, PRODUCT, RATIO, SUCCESS, parameter, value_text
-from analysis.results.provenance import Count, Finite
 from analysis.results.tables import Results
 from analysis.stats.choices import on_front
 from analysis.stats.differences import compare, for_choice, paired, with_adjusted
@@ -360,7 +358,6 @@ CALLS = 60  # calls of every policy that are timed at least: those of about one 
 POINTS, SIDE_BY_SIDE = 20, 16
 SLOW = 0.95  # the quantile that is reported for slow calls
 
-Seconds = Annotated[Finite, Field(gt=0, le=1e6)]
 Clock = Callable[[], float]
 # Called with the number of policies done and of all policies.
 Progress = Callable[[int, int], None]
@@ -379,17 +376,17 @@ class Cost(Document):
     """
 
     policy: Text
-    calls: Count
-    median: Seconds
-    slow: Seconds
-    batch: Seconds | None = None
+    calls: int
+    median: float
+    slow: float
+    batch: float | None = None
 
 
 class Times(Document):
     """The measured times of a study's policies, and the processor on which they were measured."""
 
     processor: Text
-    costs: list[Cost] = Field(max_length=10_000)
+    costs: list[Cost]
 
 
 def make(folder: str | Path, results: Results, progress: Progress | None = None) -> None:

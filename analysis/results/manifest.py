@@ -22,12 +22,11 @@ from analysis.results.provenance import (
     study_of,
     team_of,
 )
-from analysis.study.cheapest import AnySelection, Cheapest, Costs, Setting
+from analysis.study.cheapest import AnySelection, Costs, Setting
 from analysis.study.design import DesignPoint
-from analysis.study.study import CHECK, Point, Study, StudyData
+from analysis.study.study import CHECK, Point, Study
 from dess import InputError
 from dess.scenario import SEA, ScenarioSpace, load_scenario
-from dess.streams import MAX_REPLICATION
 
 SCHEMA_VERSION = 3
 NO_TEAM = -1  # the team of the cells of bounds, which hold for every policy
@@ -79,35 +78,17 @@ class Manifest(Origin):
         shape = [len(self.points)] * len(names)
         if [*map(len, self.missions)] != shape or len(self.selected) != len(names):
             raise ValueError("missions, selected: not one for every policy and design point")
-        counts = [count for of_team in self.missions for count in of_team]
-        if min(counts) < study.first or max(counts) > study.most:
-            raise ValueError("missions: are fewer or more than those of the study")
         teams = range(len(names))
         if not {p for team in teams for p in self.selected_points(team)} <= {*range(*shape[:1])}:
             raise ValueError("selected: is not a design point")
-        if any(not _suits(of_team, study, self.complete) for of_team in self.selected):
-            raise ValueError("selected: does not belong to the selection of the study")
+        if study.selection is None and any(of is not None for of in self.selected):
+            raise ValueError("selected: the study selects nothing")
         if study.bounds != bool(self.bound_code):
             raise ValueError("bound_code: does not belong to the bounds of the study")
-        self._check_points(study)
-        return self
-
-    def _check_points(self, study: StudyData) -> None:
-        """Check that the design points have valid scenarios, and are those of the design.
-
-        The values of a sample are not drawn again, since other libraries may draw other ones.
-        """
-        ranges = getattr(study.design, "ranges", None)
         if study.size != len(self.points):
-            is_design = False
-        elif ranges:
-            is_design = all(point.values.keys() == ranges.keys() for point in self.points)
-        else:
-            rows = study.design.points if study.design else [DesignPoint({})]
-            is_design = [_as_json(row) for row in rows] == self.points
-        if not is_design or not all(0 <= p.replication <= MAX_REPLICATION for p in self.points):
             raise ValueError("points: are not those of the design")
         self.scenarios  # noqa: B018 - they are checked when they are made
+        return self
 
     def selected_points(self, team: int) -> list[int]:
         """The design points that were selected for a team; none, if the study selects nothing."""
@@ -292,13 +273,6 @@ class Manifest(Origin):
 def _as_json(point: Point | DesignPoint) -> DesignPoint:
     """A design point with its values as a JSON document has them."""
     return DesignPoint(json.loads(json.dumps(point.values)), point.replication)
-
-
-def _suits(selected: Selected, study: StudyData, complete: bool) -> bool:
-    """Whether what is selected for a team is what the rule of the study selects, if anything."""
-    if selected is None or study.selection is None:
-        return selected is None and not (study.selection and complete)
-    return isinstance(selected, list) == isinstance(study.selection, Cheapest)
 
 
 _ALLOWED = "another --out or name, or remove the folder"

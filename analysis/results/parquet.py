@@ -16,11 +16,11 @@ from typing import Annotated, Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pyarrow.compute import list_value_length
 from pydantic import Field, TypeAdapter
 
 from analysis.bound import Bound
 from analysis.results.chunks import Chunk, name_of, short_hash
-from analysis.results.provenance import Key, Replication
 from dess import InputError
 from dess.files.reading import paths_in, read_bytes
 from dess.files.tables import LIMIT, check_size, parquet_of
@@ -34,7 +34,8 @@ NAME = re.compile(r"[0-9a-f]{16}(-\d+)?-[0-9a-f]{16}\.parquet")
 PARTS = b"dess.parts"  # key of the metadata that lists the parts in a file, in their order
 KEY = pa.dictionary(pa.int32(), pa.string())
 Columns = Mapping[str, Any]  # the values of every column of a table
-Row = tuple[Key, Replication, Annotated[int, Field(ge=1, le=MAX_REPLICATION + 1)]]
+Number = Annotated[int, Field(ge=0, le=MAX_REPLICATION + 1)]
+Row = tuple[str, Number, Number]  # the key of a cell, with the start and stop of its replications
 _ROWS = TypeAdapter(Annotated[list[Row], Field(min_length=1)])
 MEASURED = OPERATIONS.names or ()  # nan where a mission lacks it
 # The columns of words, and the words.
@@ -76,22 +77,19 @@ SCHEMAS = {
     "bounds": [BOUNDS],
     "events": [EVENTS, pa.schema([EVENTS.field(name) for name in EVENTS.names[:7]])],
 }
-# The least and the largest value of columns; both ends are numbers, so that no value is nan or inf.
-_MOST = float(np.finfo(float).max)
-_REWARD = {"reward": (-_MOST, _MOST)}
-_NUMBERS = [name for name in (*EXTENDED_MISSIONS.names, *UAVS.names) if name not in ("cell", "end")]
-RECORD_LIMITS = dict.fromkeys(_NUMBERS, (0, _MOST)) | _REWARD
-BOUND_LIMITS = {"ratio": (0, 1), "iterations": (0, _MOST)}
-EVENT_LIMITS = {
+# The least and the largest value of the columns that are used as indices and as sizes.
+INDICES = {
     "time": (0, MOST_SLOTS),
+    "uavs": (1, MOST_UAVS),
     "uav": (-1, MOST_UAVS - 1),
+    "other": (-1, MOST_UAVS - 1),
     "node": (-1, MOST_NODES - 1),
-    "value": (-_MOST, _MOST),
     "x": (-1, MOST_CELLS),
     "y": (-1, MOST_CELLS),
-    "battery": (-1, 100),
-    "other": (-1, MOST_UAVS - 1),
 }
+_MOST = float(np.finfo(float).max)
+# The columns of floats that may be nan; all others are finite.
+MAYBE = {*MEASURED, "snr", "generated"}
 
 
 def tables_of(chunk: Chunk, records: Records) -> list[pa.Table]:
@@ -146,86 +144,41 @@ def _table(columns: Columns, schema: pa.Schema, chunk: Chunk) -> pa.Table:
     return pa.table(arrays, schema=schema.with_metadata({PARTS: json.dumps(chunk.rows)}))
 
 
-def check(tables: Sequence[pa.Table], rows: Sequence[Row], seed: int) -> None:
-    """Check that tables have the records of some parts, and nothing that no mission can have.
+def check(tables: Sequence[pa.Table], rows: Sequence[Row]) -> None:
+    """Check that every table has the missions of some parts, in their order, with all UAVs.
+
+    What a record says of its mission is not checked: ``dess verify`` simulates missions again.
 
     Args:
-        tables: The records of missions, and those of their UAVs, such as those of a worker or of a
-            file that anybody may have written.
+        tables: The records of missions and those of their UAVs, or the bounds of missions.
         rows: The key, start and stop of every part, in the order of the records.
-        seed: The seed of the missions.
 
     Raises:
-        ValueError: If the records are those of other missions, or a value is out of range.
+        ValueError: If the records are those of other missions.
     """
-    missions, uavs = tables
-    _check_values(missions, RECORD_LIMITS)
-    _check_values(uavs, RECORD_LIMITS)
-    _check_missions(missions, rows)
-    if (missions["seed"].to_numpy() != seed).any():
-        raise ValueError(f"the records are not of seed {seed}")
-    fleet = missions["uavs"].to_numpy()
-    if fleet.min() < 1 or fleet.max() > MOST_UAVS or fleet.sum() != len(uavs):
-        raise ValueError("the records are not those of all UAVs")
-    _check_missions(uavs, rows, fleet)
-    first = np.repeat(np.cumsum(fleet) - fleet, fleet)
-    if not np.array_equal(uavs["uav"], np.arange(len(uavs)) - first):
-        raise ValueError("the records are not those of all UAVs")
-
-
-def check_bounds(table: pa.Table, rows: Sequence[Row], nodes: Mapping[str, int]) -> None:
-    """Check that a table has the bounds of some parts, and no value that no bound can have.
-
-    Args:
-        table: The bounds, such as those of a file that anybody may have written.
-        rows: The key, start and stop of every part, in the order of the bounds.
-        nodes: The number of nodes of the scenario of a cell, by the key of the cell. Cells that
-            are not among them belong to no design point.
-
-    Raises:
-        ValueError: If the bounds are those of other missions, or a value is out of range.
-    """
-    _check_values(table, BOUND_LIMITS)
-    _check_missions(table, rows)
-    for row in table.to_pylist():
-        cuts, prices = np.array(row["cuts"], np.int64), np.array(row["prices"], float)
-        if not len(cuts) or (np.diff(cuts, prepend=-1) <= 0).any():
-            raise ValueError("the bounds have cuts that do not follow each other")
-        if len(prices) != len(cuts) * nodes.get(row["cell"], len(prices) // len(cuts)):
-            raise ValueError("the bounds do not have a price for every cut and node")
-        if not (np.isfinite(prices) & (prices >= 0)).all():  # a missing value is nan here
-            raise ValueError("the bounds have a price that is not a number from 0 on")
-
-
-def _check_values(table: pa.Table, limits: Mapping[str, tuple[float, float]]) -> None:
-    """Check that no value is missing, and those of some columns are within limits.
-
-    What extended scenarios measure may be nan.
-    """
-    for name, column in zip(table.column_names, table.columns, strict=True):
-        if column.null_count:
-            raise ValueError(f"the records have no {name}")
-        if name in limits:
-            (low, high), values = limits[name], column.to_numpy()
-            within = (values >= low) & (values <= high)
-            if not (within | np.isnan(values) if name in MEASURED else within).all():
-                raise ValueError(f"the records have a {name} that is out of range")
-
-
-def _check_missions(table: pa.Table, rows: Sequence[Row], counts: Any = 1) -> None:
-    """Check that a table has the missions of some parts in their order, each in ``counts`` rows."""
     keys, starts, stops = zip(*rows, strict=True)
-    cells = np.repeat(np.array(keys, object), np.subtract(stops, starts))
+    lengths = np.subtract(stops, starts)
+    if lengths.sum() != len(tables[0]):  # before memory is taken for them
+        raise ValueError("the records are not as many as the requested missions")
+    cells = np.repeat(np.array(keys, object), lengths)
     replications = np.concatenate([*map(np.arange, starts, stops)])
-    found = [
-        np.array(chunk.dictionary.to_pylist(), object)[chunk.indices]
-        for chunk in table["cell"].chunks  # texts are not repeated: a long one may be in every row
-    ]
-    if not (
-        np.array_equal(table["replication"], np.repeat(replications, counts))
-        and np.array_equal(np.concatenate(found), np.repeat(cells, counts))
-    ):
-        raise ValueError("the records are not those of the requested missions")
+    for table in tables:
+        found = table.select(["cell", "replication"]).to_pandas().drop_duplicates()
+        if not (
+            np.array_equal(found["replication"], replications)
+            and np.array_equal(found["cell"].to_numpy(object), cells)
+        ):
+            raise ValueError("the records are not those of the requested missions")
+    if len(tables) > 1:
+        _check_uavs(*tables)
+
+
+def _check_uavs(missions: pa.Table, uavs: pa.Table) -> None:
+    """Check that there is a record of every UAV of the missions, in their order."""
+    fleet = missions["uavs"].to_numpy()
+    first = np.repeat(np.cumsum(fleet) - fleet, fleet)
+    if not np.array_equal(uavs["uav"], np.arange(len(first)) - first):
+        raise ValueError("the records are not those of all UAVs")
 
 
 def parts_in(table: pa.Table) -> list[Row]:
@@ -262,7 +215,7 @@ def read(path: Path, kind: str = "events") -> pa.Table | None:
 
     Args:
         path: The file.
-        kind: One of ``SCHEMAS``; by default an event log, whose values are checked as well.
+        kind: One of ``SCHEMAS``; by default an event log.
 
     Raises:
         InputError: If it cannot be read, or takes more memory than there is.
@@ -283,8 +236,7 @@ def read(path: Path, kind: str = "events") -> pa.Table | None:
             table = table.set_column(*_spelled(table, name))
         if not any(map(table.schema.equals, schemas)):
             return None
-        if kind == "events":
-            _check_log(table)
+        _check_values(table)
     except InputError:
         raise
     except (OSError, KeyError, ValueError, pa.ArrowException):  # what pyarrow raises
@@ -305,15 +257,32 @@ def _spelled(table: pa.Table, name: str) -> tuple[int, str, pa.ChunkedArray]:
     return table.column_names.index(name), name, column.cast(pa.string())
 
 
-def _check_log(table: pa.Table) -> None:
-    """Check that a table may be the event log of a mission, with a time and cells that exist.
+def _check_values(table: pa.Table) -> None:
+    """Check that no value is missing, all numbers are finite, and no index is out of range.
 
     Raises:
-        ValueError: If it may not.
+        ValueError: If one is.
     """
-    _check_values(table, EVENT_LIMITS)
-    if "mission_end" not in table["event"].to_pylist():
-        raise ValueError("event: has no end of the mission")
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        if column.null_count:
+            raise ValueError(f"{name}: a value is missing")
+        if limits := _limits(name, column.type):
+            (low, high), values = limits, column.to_numpy()
+            if not ((values >= low) & (values <= high)).all():
+                raise ValueError(f"{name}: a value is not finite, or out of range")
+    if "cuts" in table.column_names:
+        cuts, prices = (list_value_length(table[name]).to_numpy() for name in ("cuts", "prices"))
+        if (cuts == 0).any() or (prices % cuts).any():
+            raise ValueError("prices: are not as many for every cut")
+    if "event" in table.column_names and "mission_end" not in table["event"].to_pylist():
+        raise ValueError("event: the log has no end of the mission")
+
+
+def _limits(name: str, kind: pa.DataType) -> tuple[float, float] | None:
+    """The least and the largest value of a column, if it has any."""
+    if name in INDICES:
+        return INDICES[name]
+    return (-_MOST, _MOST) if pa.types.is_floating(kind) and name not in MAYBE else None
 
 
 def files_in(folder: Path) -> list[Path]:

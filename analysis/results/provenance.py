@@ -26,7 +26,6 @@ from dess.code.sources import OURS, code_of, combined
 from dess.errors import validation_line
 from dess.files.documents import Document
 from dess.scenario import SEA, ScenarioSpace, fields_of, merged, scenario_at
-from dess.streams import MAX_REPLICATION, MAX_SEED
 from policies.base import Policy
 from policies.registry import TypedByUser, confirmed, load_team
 
@@ -41,12 +40,6 @@ Class = Annotated[str, Field(pattern=r"^[\w.]+:[\w.<>]+$", max_length=1000)]
 Library = Annotated[str, Field(pattern=r"^[\w.-]+$", max_length=100)]
 Version = Annotated[str, Field(pattern=r"^[\w.+!-]+$", max_length=100)]
 Commit = Annotated[str, Field(pattern=r"^[0-9a-f]{40,64}$")]
-# What the key of a study and of a cell is: the beginning of a hash.
-Key = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
-Seed = Annotated[int, Field(ge=0, le=MAX_SEED)]
-Replication = Annotated[int, Field(ge=0, le=MAX_REPLICATION)]
-Count = Annotated[int, Field(ge=0, le=2**53)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Member(Document):
@@ -83,7 +76,7 @@ class Acceptance(Document):
     """
 
     modules: dict[Module, tuple[Hash, Hash | Literal[""]]]
-    missions: Count
+    missions: int
 
     @property
     def text(self) -> str:
@@ -114,7 +107,7 @@ class Origin(Document):
     accepted: list[Acceptance]
     commit: Commit | None
     libraries: dict[Library, Version]
-    seed: Seed
+    seed: int
     scenario: dict[str, Any]
     policies: list[Team] = Field(min_length=1)
     study: dict[str, Any]
@@ -138,8 +131,6 @@ class Origin(Document):
             raise ValueError("study.scenario, study.set: are not a scenario and its fields")
         if [team.policy for team in self.policies] != [*study["policies"]]:
             raise ValueError("policies: are not those of the study")
-        if self.libraries.keys() - {"python", *LIBRARIES}:
-            raise ValueError("libraries: are not those that records depend on")
         if study["seed"] != self.seed:
             raise ValueError("seed: is not that of the study")
         return self

@@ -11,7 +11,7 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from analysis.names import measured_in
-from analysis.results.provenance import Count, Finite, Key, Origin, Replication
+from analysis.results.provenance import Origin
 from analysis.results.tables import Results
 from analysis.study.stopping import Text
 from dess import InputError, simulate
@@ -125,8 +125,8 @@ class Mission(Document):
 
     policy: Text
     values: dict[str, Any]
-    replication: Replication
-    record: dict[Text, int | Finite | Text]
+    replication: int
+    record: dict[Text, int | float | Text]
 
 
 class Evidence(Origin):
@@ -139,9 +139,9 @@ class Evidence(Origin):
         sample: The sample of missions with their records.
     """
 
-    key: Key
-    points: Count
-    missions: tuple[Count, Count]
+    key: Text
+    points: int
+    missions: tuple[int, int]
     sample: list[Mission] = Field(min_length=1)
 
     @model_validator(mode="after")

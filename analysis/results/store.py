@@ -14,7 +14,6 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
-from functools import cached_property
 from itertools import groupby
 from pathlib import Path
 from typing import Any, Self
@@ -173,30 +172,13 @@ class Store:
         """Keep the tables of a chunk, or count its files as damaged, if they are no records."""
         try:
             rows = parquet.parts_in(tables[0])
-            self._check(kind, tables, rows)
+            parquet.check(tables, rows)
         except ValueError:
             for folder, _ in self._places(kind, team):
                 paths = parquet.files_in(folder)
                 self.damaged += [path for path in paths if parquet.content_hash(path) == name]
         else:
             self._enter(kind, rows, tables)
-
-    def _check(self, kind: str, tables: Sequence[pa.Table], rows: Sequence[parquet.Row]) -> None:
-        """Check that tables are those of some parts.
-
-        Raises:
-            ValueError: If they are not.
-        """
-        if kind == "bounds":
-            parquet.check_bounds(tables[0], rows, self._nodes)
-        else:
-            parquet.check(tables, rows, self.manifest.seed)
-
-    @cached_property
-    def _nodes(self) -> dict[str, int]:
-        """The number of nodes at every cell of bounds, by its key."""
-        cells = zip(self.manifest.bound_cells, self.manifest.scenarios, strict=False)
-        return {cell.key: len(space.nodes) for cell, space in cells}
 
     def _enter(self, kind: str, rows: Sequence[parquet.Row], tables: Sequence[pa.Table]) -> None:
         for key, start, stop in rows:
@@ -247,7 +229,7 @@ class Store:
         Raises:
             ValueError: If they are not those of the chunk.
         """
-        self._check(kind, tables, chunk.rows)
+        parquet.check(tables, chunk.rows)
         places = self._places(kind, chunk.team)
         for (folder, _), table in [*zip(places, tables, strict=True)][::-1]:
             parquet.write(folder, chunk.name, table)

@@ -74,7 +74,8 @@ def _as_toml(value: Any) -> str:
     return json.dumps(value)
 
 
-Given, Found = ParamSpec("Given"), TypeVar("Found")
+Given = ParamSpec("Given")
+Found = TypeVar("Found")
 
 
 def once(

@@ -349,7 +349,7 @@ class Cheapest(StrictTable):
             settings: The design points.
 
         Raises:
-            ValueError: If there is no design point, or one has fewer than ``first`` missions.
+            InputError: If there is no design point, or one has fewer than ``first`` missions.
         """
         check_begun(samples, self.first)
         search = _Search(self, samples, settings)

@@ -113,10 +113,10 @@ def check_begun(samples: Samples, first: int) -> None:
     """Refuse samples without the missions of the first round.
 
     Raises:
-        ValueError: If there is no design point, or one has fewer than ``first`` missions.
+        InputError: If there is no design point, or one has fewer than ``first`` missions.
     """
     if not samples or min(map(missions_of, samples)) < first:
-        raise ValueError(f"choice: needs points, with {first} or more missions each")
+        raise InputError(f"choice: a point lacks missions; allowed: {first} or more of each")
 
 
 class Selection(StrictTable):
@@ -181,7 +181,7 @@ class Selection(StrictTable):
             settings: As for ``wanted``.
 
         Raises:
-            ValueError: If there is no design point, or one has fewer than ``first`` missions.
+            InputError: If there is no design point, or one has fewer than ``first`` missions.
         """
         check_begun(samples, self.first)
         race = _Race(self, self._values(samples))

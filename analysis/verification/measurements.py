@@ -17,15 +17,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from pydantic import Field, create_model
+from pydantic import create_model
 
 from analysis.answers.missions import FOLDER
 from analysis.results import event_log
-from analysis.results.provenance import Key
 from analysis.results.tables import Results
 from analysis.study.stopping import Text
 from analysis.verification import closed_forms
@@ -253,15 +252,13 @@ def _fields(record: np.dtype) -> dict[str, Any]:
     """The fields of a record, as those of a model."""
     assert record.fields is not None
     kinds = {name: kind for name, (kind, *_) in record.fields.items()}
-    return {name: (float if kind.kind == "f" else Whole, ...) for name, kind in kinds.items()}
+    return {name: (float if kind.kind == "f" else int, ...) for name, kind in kinds.items()}
 
 
-Whole = Annotated[int, Field(ge=-(2**63), lt=2**64)]
-Data = Annotated[float, Field(ge=0, le=1e9)]
 Mission: Any = create_model(
     "Mission", __base__=Document, policy=(Text, ...), **_fields(MISSION_RECORD)
 )
-_OF_UAV = {"policy": (Text, ...), "replication": (Whole, ...), "uav": (Whole, ...)}
+_OF_UAV = {"policy": (Text, ...), "replication": (int, ...), "uav": (int, ...)}
 Uav: Any = create_model(
     "Uav", __base__=Document, **_OF_UAV | _fields(UAV_RECORD) | {"end": (Text, ...)}
 )
@@ -278,11 +275,11 @@ class CrossCheck(Document):
         slots: The result of ``lone_uav.simulate_slots``.
     """
 
-    study: Key
+    study: str
     missions: list[Mission]
     uavs: list[Uav]
-    rates: list[Data]
-    slots: list[Data] = Field(min_length=2)
+    rates: list[float]
+    slots: list[float]
 
 
 def simulate_missions(

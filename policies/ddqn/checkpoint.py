@@ -1,9 +1,8 @@
 """Checkpoints: one file, ``checkpoint.safetensors``, from which a training continues exactly.
 
 The file has all arrays of the training and, in its header as JSON, everything else with a checksum
-of both. It may come from anybody: what it holds is compared with what the config allows before it
-is copied into the training: compiled code uses cells, actions and counters as indices and does not
-check them. Nothing is unpickled.
+of both. It may come from anybody: compiled code does not check its indices, such as cells and
+actions, so they are compared with what the scenario has. Nothing is unpickled.
 """
 
 import json
@@ -15,14 +14,13 @@ import numpy as np
 import torch
 from pydantic import Field, create_model
 
-from dess.env.stepper import MissionStepper
 from dess.errors import InputError
 from dess.files.documents import Document
 from dess.files.parsing import parse_json
 from dess.observations import states as column
 from dess.record import MISSION_RECORD
 from dess.scenario import SAMPLED, ScenarioSpace
-from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, ranges_of, types_of
+from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, types_of
 from policies.ddqn import tensors
 from policies.ddqn.config import CHECKPOINT, TrainingConfig
 from policies.ddqn.description import Name, Number, Sha256
@@ -37,8 +35,6 @@ HEADER_LIMIT = 10**8
 
 _WHOLE = "a checkpoint as dess train has written it"
 
-Amount = Annotated[float, Field(ge=0.0)]
-
 
 class Progress(Document):
     """What ``Training.progress`` returns."""
@@ -46,7 +42,7 @@ class Progress(Document):
     tick: Number
     updates: Number
     uav_slots: Number
-    seconds: Amount
+    seconds: float
     phase_index: Number
     phase_start: Number
     scores: list[float]
@@ -58,7 +54,7 @@ class _Row(Document):
     phase: Name
     uav_slots: Number
     updates: Number
-    seconds: Amount
+    seconds: float
     epsilon: float
     learning_rate: float
     moving_average: float
@@ -118,7 +114,7 @@ def save_training(path: Path, training: Training) -> None:
         "stepper": [
             n for sea in training.seas for n in (sea.stepper.seed, sea.stepper.replication)
         ],
-        "replay": _slots_held(training, [sea.replay.count for sea in training.seas]),
+        "replay": _slots_held(training),
         "curve": training.curve,
     }
     header["sha256"] = tensors.digest(header, values)
@@ -155,7 +151,7 @@ def load_training(
             "allowed: the one it began with"
         )
     require_version(header.observation_version, training.observation, path)
-    _check_progress(header, training, path)
+    _check_progress(header.progress, training, path)
     training.restore(raw["progress"])
     finished = len(values.get("finished", ())) // MISSION_RECORD.itemsize
     tensors.require_forms(values, _forms(training, finished), str(path))
@@ -173,33 +169,17 @@ def load_training(
     return training
 
 
-def _check_progress(header: Header, training: Training, path: Path) -> None:
-    """Refuse counters that a training of this config never has together."""
-    config, now = training.config, header.progress
-    starts = np.cumsum([0, *(phase.ticks for phase in config.phases)]).tolist()
-    index = min(now.phase_index, len(config.phases) - 1)
-    begun, end = starts[index], starts[index + 1]
-    evaluations = now.tick // config.evaluate_every - begun // config.evaluate_every
-    evaluations += now.tick == config.ticks and now.tick % config.evaluate_every > 0
-    slots = now.tick - begun + (config.learning_starts if now.tick > begun else 0)
-    right = {
-        "phase_index": now.phase_index == index,
-        "phase_start": now.phase_start == begun,
-        "tick": begun <= now.tick < end or now.tick == end == config.ticks,
-        "updates": now.updates == now.tick * config.updates,
-        "scores": len(now.scores) == min(evaluations, config.window),
-        "best_score": (now.best_score is None) == (evaluations == 0),
-        "curve": all(row.tick <= now.tick for row in header.curve)
-        and len(header.curve) >= evaluations,
-        "replay": header.replay == _slots_held(training, [slots]),
-        "stepper": len(header.stepper) == 2 * len(training.seas)
-        and all(
-            seed == sea.stepper.seed and replication < 2**32
-            for sea, (seed, replication) in zip(training.seas, [header.stepper], strict=False)
-        ),
-    }
-    for name in (name for name, is_right in right.items() if not is_right):
-        raise InputError(f"{path}: {name} does not fit the config; allowed: an undamaged file")
+def _check_progress(now: Progress, training: Training, path: Path) -> None:
+    """Refuse a phase that the config does not have, and a tick that is not in the phase."""
+    phases = training.config.phases
+    starts = np.cumsum([0, *(phase.ticks for phase in phases)]).tolist()
+    index = min(now.phase_index, len(phases) - 1)
+    is_phase = (now.phase_index, now.phase_start) == (index, starts[index])
+    if not is_phase or not starts[index] <= now.tick <= starts[index + 1]:
+        raise InputError(
+            f"{path}: its tick {now.tick} is not in a phase of the config; "
+            "allowed: an undamaged file"
+        )
 
 
 def _restore(training: Training, values: Tensors, header: dict[str, Any]) -> None:
@@ -222,16 +202,15 @@ def _restore(training: Training, values: Tensors, header: dict[str, Any]) -> Non
         stored_state = part(values, "stepper")
         for name, array in sea.stepper.state._asdict().items():
             array[...] = array_of(stored_state[name], array.dtype).reshape(array.shape)
-        _check_state(sea.stepper.state, sea.space, sea.stepper)
+        _check_state(sea.stepper.state, sea.space)
         if training.config.checkpoint_replay:
-            sea.replay.count = header["replay"]
+            sea.replay.count = int(header["replay"])
             stored_replay = part(values, "replay")
             for name, array in sea.replay.arrays.items():
                 array[...] = stored_replay[name].numpy()
             _check_replay(sea.replay.arrays, max(sea.space.size))
     if "finished" in values:
         training.finished = [array_of(values["finished"], MISSION_RECORD)]
-        _check_finite(training.finished[0])
     losses = {key: value.to(training.device) for key, value in part(values, "losses").items()}
     for row in zip(*losses.values(), strict=True):
         training.losses.append(dict(zip(losses, row, strict=True)))
@@ -282,9 +261,10 @@ def _arrays(training: Training) -> Tensors:
     return arrays
 
 
-def _slots_held(training: Training, slots: list[int]) -> int | None:
-    """What a header says of a replay memory to which so many slots were added."""
-    return slots[0] if training.seas and training.config.checkpoint_replay else None
+def _slots_held(training: Training) -> int | None:
+    """The slots that were added to the replay memory, if the checkpoint holds it."""
+    is_held = training.seas and training.config.checkpoint_replay
+    return training.replay.count if is_held else None
 
 
 def _networks(training: Training) -> dict[str, Tensors]:
@@ -295,73 +275,56 @@ def _networks(training: Training) -> dict[str, Tensors]:
 
 # What a mission has of its own; all other fields are constants of the scenario.
 _OF_MISSIONS = (
-    *("replication", "slot", "active", "initial", "arrived", "collected", "slot_collected", "lost"),
-    *("uav_failures", "slots_grounded", "pad_requests", "pads_out", "newest"),
+    *("seed", "replication", "slot", "active", "initial", "arrived", "collected", "lost"),
+    *("slot_collected", "uav_failures", "slots_grounded", "pad_requests", "pads_out", "newest"),
 )
 
 
-def _check_state(state: State, space: ScenarioSpace, stepper: MissionStepper) -> None:
-    """Refuse missions that cannot be missions of the scenario.
+def _check_state(state: State, space: ScenarioSpace) -> None:
+    """Refuse missions whose sizes and indices are not those of the scenario.
 
     Args:
         state: The missions.
         space: The scenario from which they were drawn.
-        stepper: The seed of the missions, and the next replication.
 
     Raises:
         ValueError: If a value is out of range.
     """
     missions, uavs = state.missions, state.uavs
-    constants = constants_of(space)
-    constants["seed"] = stepper.seed
+    constants, fleet = constants_of(space), uavs.shape[1]
     for name in sorted(set(constants.dtype.names or ()) - {*SAMPLED, *_OF_MISSIONS}):
         if (missions[name] != constants[name]).any():
             raise ValueError(f"missions: {name} is not that of the scenario")
-    edge, slots, fleet = max(space.size) - 1, space.max_slots, uavs.shape[1]
     is_there = np.arange(fleet) < missions["uavs"][:, None]
-    types = np.broadcast_to(types_of(space, fleet), uavs.shape)
-    for name in ("quota", "slots_per_cell", "rate"):
-        if (uavs[name] != types[name])[is_there].any():
-            raise ValueError(f"uavs: {name} is not that of the scenario")
+    edge, slots, kinds = max(space.size) - 1, space.max_slots, types_of(space, fleet)
     cells, actions = ("x", "y", "from_x", "from_y"), ("action", "executed")
-    counters = ("slots_flying", "slots_charging", "slots_waiting")
-    of_missions = dict(zip(SAMPLED, ranges_of(space).tolist(), strict=True)) | {
-        "replication": (0, stepper.replication - 1),
-        "slot": (0, slots),
-        "pads_out": (0, 1),
-    }
+    truths = dict.fromkeys(("active", "latch", "charging", "grounded", "overruled"), (0, 1))
     of_uavs = {
         **dict.fromkeys(cells, (-1, edge)),
         **dict.fromkeys(actions, (0, len(ACTION_NAMES) - 1)),
-        **dict.fromkeys(counters, (0, slots)),
-        "battery": (0, 100),
-        "communications": (0, int(types["quota"].max()) + space.communication_slots),
+        "slots_per_cell": (1, kinds["slots_per_cell"].max()),
         "slots_left": (0, uavs["slots_per_cell"] - 1),
         "end": (0, len(END_NAMES) - 1),
-        "pad_request": (-1, slots),
         "pad": (-1, space.charging_pads - 1),
         "zone": (-2, len(space.rectangles) - 1),
         "served": (-1, len(space.nodes) - 1),
     }
-    truths = dict.fromkeys(("active", "latch", "charging", "grounded", "overruled"), (0, 1))
-    allowed: list[tuple[np.ndarray, Any]] = [(missions, of_missions), (uavs, of_uavs | truths)]
-    allowed.append((uavs[is_there], dict.fromkeys(cells, (0, edge))))
+    allowed: list[tuple[np.ndarray, dict[str, tuple[int, Any]]]] = [
+        (missions, {"uavs": (1, fleet), "slot": (0, slots)}),
+        (uavs, of_uavs | truths),
+        (uavs[is_there], dict.fromkeys(cells, (0, edge))),
+        (state.sensors, {"newest": (0, missions["slot"][:, None])}),  # ages are indices of teeth
+    ]
     for records, ranges in allowed:
         for name, (low, high) in ranges.items():
             # A truth value of a file may be any byte.
             values = records[name].view(np.uint8) if name in truths else records[name]
-            if ((values < low) | (values > high)).any():
+            if not ((values >= low) & (values <= high)).all():
                 raise ValueError(f"{name} is out of range")
-    if (uavs["active"] & ~is_there).any() or (uavs["active"].sum(1) != missions["active"]).any():
-        raise ValueError("missions: active UAVs that are not there")
-    _check_finite(missions)
-    _check_finite(uavs)
-    if not (np.isfinite(state.residual) & (state.residual >= 0)).all():
-        raise ValueError("missions: residual data out of range")
 
 
 def _check_replay(arrays: Mapping[str, np.ndarray], grid: int) -> None:
-    """Refuse a replay memory whose cells, counters or actions are out of range.
+    """Refuse a replay memory whose cells or actions are out of range.
 
     Args:
         arrays: The arrays of the memory.
@@ -370,23 +333,7 @@ def _check_replay(arrays: Mapping[str, np.ndarray], grid: int) -> None:
     Raises:
         ValueError: If a value is out of range.
     """
-    most = np.ones(column.UAV_COLUMNS, np.int64)  # truth values, but for:
-    most[[column.X, column.Y]] = grid - 1
-    most[column.BATTERY] = 100
-    most[[column.NEEDED, column.HOME]] = np.iinfo(np.int16).max
-    most[column.MASK] = 2 ** len(ACTION_NAMES) - 1
-    highest_of = {"missions": 100, "uavs": most, "action": len(ACTION_NAMES) - 1}
-    for name, highest in highest_of.items():
-        if (arrays[name] < 0).any() or (arrays[name] > highest).any():
-            raise ValueError(f"replay memory: {name} out of range")
-
-
-def _check_finite(records: np.ndarray) -> None:
-    """Refuse records with a number that is not finite.
-
-    Raises:
-        ValueError: If there is one.
-    """
-    for name in records.dtype.names or ():
-        if records[name].dtype.kind == "f" and not np.isfinite(records[name]).all():
-            raise ValueError(f"{name} is not finite")
+    cells, actions = arrays["uavs"][..., [column.X, column.Y]], arrays["action"]
+    for values, count in ((cells, grid), (actions, len(ACTION_NAMES))):
+        if (values < 0).any() or (values >= count).any():
+            raise ValueError("replay memory: a cell or an action is out of range")

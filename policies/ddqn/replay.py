@@ -92,13 +92,16 @@ class ReplayMemory:
             generator: Random generator of the draw.
 
         Raises:
-            ValueError: If fewer than ``n_step + 1`` slots have been added.
-            InputError: If hardly any of them holds a transition.
+            InputError: If fewer than ``n_step + 1`` slots have been added, or hardly any of them
+                holds a transition.
         """
         newest = self.count - 1
         oldest = max(0, self.count - self.capacity)
         if newest - oldest < n_step:
-            raise ValueError(f"{self.count} slots in memory: too few for {n_step}-step returns")
+            raise InputError(
+                f"replay: {self.count} slots in memory are too few for {n_step}-step returns; "
+                "allowed: more than n_step"
+            )
         rows: list[np.ndarray] = []
         uavs: list[np.ndarray] = []
         missing = size

@@ -232,7 +232,8 @@ def _document(
     """All tables as plain data; rows on a design point have the values of its fields as well."""
     rows = {name: json.loads(table.to_json(orient="records")) for name, table in tables.items()}
     values = results.store.manifest.values
-    for row in (row for of_table in rows.values() for row in of_table if "point" in row):
+    placed = (row for of_table in rows.values() for row in of_table if row.get("point") is not None)
+    for row in placed:
         row |= {field: value for field, value in values[row["point"]].items() if field not in row}
     about = {
         "study": results.manifest["study"]["name"],

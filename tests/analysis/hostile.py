@@ -23,8 +23,8 @@ def hostile_folder(sound: Path, into: Path, text: str) -> Path:
 
     The text enters every string that is free: the names of policies, of their members, weights and
     learners, the description, the scenario and the currency of the study. All other strings, such
-    as hashes and versions, have a form that reading checks: ``with_text`` puts the text there. The
-    names of the policies end in their numbers, since they have to differ.
+    as hashes and versions, have a form that reading checks. The names of the policies end in their
+    numbers, since they have to differ.
 
     Args:
         sound: The results folder; it is not changed.
@@ -55,23 +55,6 @@ def hostile_folder(sound: Path, into: Path, text: str) -> Path:
     (into / "manifest.json").write_text(manifest.text, "utf-8")
     _add_files(into, text)
     return into
-
-
-def with_text(document: Any, text: str) -> list[Any]:
-    """Copies of a JSON document, each with the text in place of one of its strings.
-
-    The keys of objects count as strings, except where they are names of fields.
-    """
-    copies = []
-    for path in _strings(document):
-        copy = json.loads(json.dumps(document))
-        *above, last = path
-        place = copy
-        for key in above:
-            place = place[key]
-        place[last] = text
-        copies.append(copy)
-    return copies
 
 
 def _changed(manifest: Manifest, text: str) -> dict[str, Any]:
@@ -115,15 +98,3 @@ def _add_files(folder: Path, text: str) -> None:
         (parent / f"{name}.json").write_text(json.dumps(text))
         (parent / f"policy={name}").mkdir(exist_ok=True)
         (parent / f"policy={name}" / f"{name}.parquet").write_bytes(b"PAR1")
-
-
-def _strings(document: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """The paths of all strings in a JSON document."""
-    if isinstance(document, str):
-        return [path]
-    items: Any = ()
-    if isinstance(document, dict):
-        items = document.items()
-    elif isinstance(document, list):
-        items = enumerate(document)
-    return [found for key, value in items for found in _strings(value, (*path, key))]

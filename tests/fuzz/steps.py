@@ -18,8 +18,10 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pyarrow.types import is_floating
 
 from analysis.results.chunks import name_of, short_hash
+from analysis.results.parquet import INDICES
 from policies.ddqn import tensors
 from policies.ddqn.session import CHECKPOINT
 from reports.pages.verify import sealed
@@ -195,8 +197,11 @@ def _changed(table: pa.Table, position: int, change: str, text: str) -> pa.Table
     if change == "schema":
         return table.cast(pa.schema([(name, pa.string()) for name in table.schema.names]))
     if change == "values":
-        field = table.schema.field(at)
-        bad = float("nan") if pa.types.is_floating(field.type) else -(position % 2**31)
+        # Indices and floats: any other value of a file whose checksum fits is believed.
+        checked = [f.name for f in table.schema if f.name in INDICES or is_floating(f.type)]
+        name = (checked or table.schema.names)[position % len(checked or table.schema.names)]
+        at, field = table.schema.get_field_index(name), table.schema.field(name)
+        bad = float("nan") if is_floating(field.type) else -2 - position % 2**31
         with suppress(pa.ArrowException, OverflowError):
             return table.set_column(at, field, pa.array([bad] * len(table), field.type))
     return table.remove_column(at)

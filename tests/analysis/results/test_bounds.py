@@ -11,8 +11,7 @@ from analysis import load_results, run_study
 from analysis.bound import Bound
 from analysis.execution import jobs, runner
 from analysis.results.chunks import Chunk, Part
-from analysis.results.manifest import Cell
-from analysis.results.parquet import check_bounds, table_of_bounds, write
+from analysis.results.parquet import table_of_bounds, write
 from analysis.results.store import Store
 from dess import InputError
 from tests.analysis.small import files_of, small_study
@@ -160,27 +159,14 @@ def test_two_files_with_different_bounds_of_a_mission_are_refused(out, tmp_path)
         load_results(out)
 
 
-CELL = Cell(-1, 0, "0123456789abcdef", 0)
-CHUNK = Chunk(-1, (Part(CELL, range(1)),))
-WRONG = {
-    "above 1": ({"ratio": 1.01}, "a ratio that is out of range"),
-    "nan": ({"ratio": float("nan")}, "a ratio that is out of range"),
-    "iterations": ({"iterations": -1}, "iterations that is out of range"),
-    "no cut": ({"cuts": np.zeros(0, int), "prices": np.zeros((0, 3))}, "cuts that do not follow"),
-    "cuts": ({"cuts": np.array([7, 7])}, "cuts that do not follow"),
-    "a price too few": ({"prices": np.ones((2, 2))}, "a price for every cut and node"),
-    "a price below 0": ({"prices": -np.ones((2, 3))}, "a number from 0 on"),
-    "an infinite price": ({"prices": np.full((2, 3), np.inf)}, "a number from 0 on"),
-}
-
-
-@pytest.mark.parametrize("case", WRONG)
-def test_what_no_bound_can_have_is_refused(case):
-    right = {"ratio": 1.0, "prices": np.ones((2, 3)), "cuts": np.array([3, 7]), "iterations": 4}
-    check_bounds(table_of_bounds(CHUNK, [Bound(**right)]), CHUNK.rows, {CELL.key: 3})
-    changes, line = WRONG[case]
-    with pytest.raises(ValueError, match=line):
-        check_bounds(table_of_bounds(CHUNK, [Bound(**right | changes)]), CHUNK.rows, {CELL.key: 3})
+@pytest.mark.parametrize("prices", [np.ones((2, 2)), np.zeros((0, 3))])
+def test_prices_that_are_not_as_many_for_every_cut_are_damaged(out, prices):
+    manifest = Store.read(out).manifest
+    chunk = Chunk(-1, (Part(manifest.bound_cells[0], range(20, 21)),))
+    cuts = np.arange(3 if len(prices) else 0)
+    table = table_of_bounds(chunk, [Bound(1.0, prices, cuts, 4)])
+    path = write(out / "bounds", chunk.name, table)
+    assert Store.read(out).damaged == [path]
 
 
 def test_results_of_before_have_no_bounds(tmp_path):

@@ -54,6 +54,7 @@ def _rewrite(out, **changes):
 
 FOREIGN = {
     "binary": (lambda out: (out / "manifest.json").write_bytes(b"\xff\xfe"), "it is not text"),
+    "no JSON": (lambda out: (out / "manifest.json").write_text("{"), "not valid JSON"),
     "a list": (lambda out: (out / "manifest.json").write_text("[]"), "manifest.json"),
     "other version": (
         lambda out: _rewrite(out, version="0.0.9"),

@@ -228,7 +228,7 @@ def test_a_choice_needs_the_missions_of_round_one():
     data = normal(10, [0.0, 1.0])
     assert rule().wanted(samples_of(data, [10, 0])) == [10, 10]
     for samples in ([], samples_of(data, [10, 9])):
-        with pytest.raises(ValueError, match="10 or more missions each"):
+        with pytest.raises(ValueError, match="allowed: 10 or more of each"):
             rule().choice(samples)
 
 

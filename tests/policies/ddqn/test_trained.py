@@ -127,63 +127,30 @@ def test_other_weights_are_refused(
 
 CONTENTS: dict[str, str] = {
     "{": "not valid JSON: ",
-    "[" * 100_000: "not valid JSON: it is nested too deeply",
-    '{"format": ' + "9" * 5000 + "}": "not valid JSON: a number has too many digits",
-    '{"name": "\\ud800"}': "not valid JSON: it is not text in UTF-8",
     "[]": "is not an object; allowed: an object of JSON",
-    "3": "is not an object; allowed: an object of JSON",
-    "{}": "format: is missing; allowed: 1 (version of the file)",
     '{"format": 1}': "name: is missing; allowed: text in quotes of length 1..100 (name of",
     '{"format": 2}': "has format 2, not 1; allowed: 1",
-    '{"format": "1"}': "has format '1', not 1; allowed: 1",
-    '{"format": true}': "has format True, not 1; allowed: 1",
 }
 
 
-@pytest.mark.parametrize("content", CONTENTS, ids=lambda content: content[:20])
+@pytest.mark.parametrize("content", CONTENTS)
 def test_a_damaged_description_is_refused(content: str, folder: Path) -> None:
     (folder / CONFIG).write_text(content, "utf-8")
     assert _refusal(folder).startswith(f"{folder / CONFIG}: {CONTENTS[content]}")
 
 
-# Where a value of the description is changed, to what, and what the line says.
-WRONG: list[tuple[list[str], Any, str]] = [
-    (["layout", "grid"], "wide", "layout.grid: "),
-    (["layout", "grid"], 10**9, "grid: 1000000000 is out of range"),
-    (["layout", "grid"], 16, "zone: [26, 2, 4, 4] does not lie on the 16 x 16 grid"),
-    (["layout", "nodes"], [[1, 2, 3]], "layout.nodes"),
-    (["layout", "nodes"], [[1, 1]] * 10_000, "layout.nodes"),
-    (["layout", "uavs"], 3, "layout.uavs: unknown key"),
-    (["layout"], [], "layout: "),
-    (["training", "hidden"], "wide", "hidden: "),
-    (
-        ["training", "hidden"],
-        [50_000, 50_000],
-        "training.hidden.0: 50000 is out of range",
-    ),
-    (["training", "speed"], 3, "speed: unknown key"),
-    (["training", "discount"], "0.99", "training.discount: "),
-    (["name"], "a\nb\x1b[2J", "has control characters; allowed: printable characters"),
-    (["name"], "x" * 10_000, "name: "),
-    (["observation_version"], 2, "observation version 2; allowed: 1"),
-    (["run", "ticks"], "many", "run.ticks: 'many' is not an integer"),
-    (["run", "seconds"], float("inf"), "run.seconds: "),
-    (["model_sha256"], "0" * 64, "model_sha256: "),
-    (["model_sha256"], ["0" * 64], "damaged: it has not the checksum in config.json"),
-    (["model_sha512"], ["0" * 64], "model_sha512: unknown key"),
-]
+WRONG: dict[str, tuple[Any, str]] = {
+    "layout": ({"grid": 16, "zone": [26, 2, 4, 4], "nodes": [[1, 1]]}, "does not lie on the 16 x"),
+    "observation_version": (2, "observation version 2; allowed: 1"),
+    "model_sha256": (["0" * 64], "damaged: it has not the checksum in config.json"),
+    "model_sha512": (["0" * 64], "model_sha512: unknown key"),
+}
 
 
-@pytest.mark.parametrize(("keys", "value", "complaint"), WRONG, ids=lambda part: str(part)[:40])
-def test_a_wrong_description_is_refused(
-    keys: list[str], value: Any, complaint: str, folder: Path
-) -> None:
-    content = json.loads((folder / CONFIG).read_text("utf-8"))
-    table = content
-    for key in keys[:-1]:
-        table = table[key]
-    table[keys[-1]] = value
-    (folder / CONFIG).write_text(json.dumps(content), "utf-8")
+@pytest.mark.parametrize("key", WRONG)
+def test_a_wrong_description_is_refused(key: str, folder: Path) -> None:
+    value, complaint = WRONG[key]
+    _described(folder, **{key: value})
     line = _refusal(folder)
     assert line.startswith(f"{folder}/")
     assert complaint in line
@@ -223,23 +190,6 @@ def test_a_network_takes_no_memory_before_its_weights_are_there(
     (folder / CONFIG).write_text(json.dumps(content), "utf-8")
     monkeypatch.setattr(torch.nn.Module, "to_empty", lambda *_: pytest.fail("memory is taken"))
     assert "hidden.0.weight is float32 [16, 242]; allowed: float32 [4096, 242]" in _refusal(folder)
-
-
-@pytest.mark.parametrize("name", [CONFIG, MODEL])
-@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "large"])
-def test_only_regular_files_are_read(name: str, kind: str, folder: Path) -> None:
-    path = folder / name
-    path.unlink()
-    if kind == "pipe":
-        os.mkfifo(path)
-    elif kind == "device":
-        path.symlink_to("/dev/zero")
-    elif kind == "folder":
-        path.mkdir()
-    else:
-        with path.open("wb") as file:
-            file.truncate(2**32)
-    assert _refusal(folder).startswith(f"{path}: ")
 
 
 class _Killed(BaseException):

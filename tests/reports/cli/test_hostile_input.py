@@ -6,58 +6,15 @@ import pytest
 
 from tests.analysis.small import files_of
 
-LONG = "x" * 256
-DIGITS = "9" * 5000
 RAW = "\\u001b[31m\\u202e"  # as TOML has it
 SCENARIOS = {
-    "digits": f"quota = {DIGITS}",
-    "hex digits": f"quota = 0x{'f' * 5000}",
-    "deep": "nodes = " + "[" * 5000,
-    "deep and closed": "nodes = " + "[" * 300 + "]" * 300,
-    "dots": ".".join(["a"] * 20_000) + " = 1",
+    "deep": "nodes = " + "[" * 300 + "]" * 300,
     "a long key of control characters": f'"{RAW}{"x" * 10**5}" = 1',
-    "a long value of control characters": f'quota = "{RAW}{"x" * 10**5}"',
-    "many keys": "\n".join(f"key{number} = 1" for number in range(5000)),
     "nodes in a pipe": 'nodes = "pipe.csv"',
-    "nodes without end": 'nodes = "zero.csv"',
-    "a null character": 'nodes = "a\\u0000.csv"',
-    "a long name": f'nodes = "{LONG}.csv"',
     "too large": "#" * (4 * 2**20 + 1),
-    **{
-        f"{field} = {value}": f"{field} = {value}"
-        for field in ("cell_size", "altitude", "slot_length", "path_loss_exponent")
-        for value in ("1e-320", "1e308")
-    },
-    "initial_data": "initial_data = [0, 1e308]",
-    "reward_step": "reward_step = -1e308",
 }
-STUDIES = {
-    "digits": f"seed = {DIGITS}",
-    "a scenario in a pipe": 'scenario = "pipe.toml"',
-    "a scenario without end": 'scenario = "zero.toml"',
-    "a null character": 'scenario = "a\\u0000"',
-    "a long name": f'scenario = "{LONG}"',
-    "control characters": f'policies = ["{RAW}"]',
-    "selection": "selection = {procedure = 'kn-bounded', indifference = 1e-320}",
-    "cheapest": "selection = {procedure = 'cheapest', requirements = {success = 0.5}, "
-    "indifference = 1e-320}\ncosts.uav = 1",
-    "tolerance": "selection = {procedure = 'cheapest', requirements = {success = 0.5}, "
-    "indifference = 1, tolerance = 1e-320}\ncosts.uav = 1",
-    "precision": "precision.targets.success.absolute = 1e-320",
-    "costs": "costs.uav = 1e308",
-    "an hour": "costs = {hour = 1, slot_seconds = 1e-320}",
-}
-NAMES = [
-    "pipe.toml",
-    "zero.toml",
-    "loop.toml",
-    LONG,
-    "x/" * 3000,
-    "\udcff",
-    "\x1b[31m",
-    "/dev/zero",
-]
-VALUES = [DIGITS, f"0x{'f' * 5000}", "[" * 5000, "[" * 300 + "]" * 300, "'\udcff'", "x" * 10**6]
+NAMES = ["pipe.toml", "zero.toml", "loop.toml", "x" * 256, "x/" * 3000, "\udcff", "\x1b[31m"]
+VALUES = ["9" * 5000, "[" * 5000, "'\udcff'", "x" * 10**6]
 
 
 @pytest.fixture
@@ -89,13 +46,6 @@ def test_a_hostile_scenario_is_a_line(refused, tmp_path, case):
     assert "bad.toml: " in line or ".csv: " in line
 
 
-@pytest.mark.parametrize("case", STUDIES)
-def test_a_hostile_study_is_a_line(refused, tmp_path, case):
-    policies = "" if "policies" in STUDIES[case] else "policies = ['greedy']\n"
-    (tmp_path / "bad.toml").write_text(policies + STUDIES[case])
-    assert "bad.toml: " in refused("studies", "show", "bad.toml")
-
-
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("command", [("scenarios", "show"), ("studies", "show")])
 def test_a_hostile_name_is_a_line(refused, command, name):
@@ -103,7 +53,7 @@ def test_a_hostile_name_is_a_line(refused, command, name):
 
 
 @pytest.mark.parametrize("value", VALUES, ids=range(len(VALUES)))
-@pytest.mark.parametrize("field", ["quota", "nodes", "initial_data", "\x1b[31m", "x" * 5000])
+@pytest.mark.parametrize("field", ["quota", "\x1b[31m", "x" * 5000])
 def test_a_hostile_setting_is_a_line(refused, field, value):
     refused("scenarios", "show", "paper", "--set", f"{field}={value}")
 

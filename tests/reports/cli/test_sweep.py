@@ -76,6 +76,10 @@ def test_the_cheapest_fleet_is_named(dess, unrendered):
     assert [row["selected"] for row in data["table"] if row["uavs"] == 1] == [True, True]
     assert len(data["answers"]) == 3
     assert Path(data["study_file"]).exists()
+    (manifest,) = Path("results").rglob("manifest.json")
+    shown = json.loads(dess("study", "show", manifest.parent, "--json")[1])
+    points = [row["point"] for row in shown["selected"]]
+    assert points == [0, 1, None]  # all conditions together have several
 
 
 def test_an_interruption_names_the_command_that_goes_on(dess, unrendered, monkeypatch):
