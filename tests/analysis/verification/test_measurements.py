@@ -9,10 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis import run_study
 from analysis.results.tables import Results
 from analysis.verification import balances, draws, measurements
-from analysis.verification.measurements import FILE, CrossCheck, Log
+from analysis.verification.measurements import FILE, STUDY, CrossCheck, Log
+from analysis.verification.suite import Suite
 from dess import InputError, load_scenario
+from tests.analysis.small import small_study
 from tests.analysis.verification.verdicts import failing
 
 
@@ -110,18 +113,10 @@ def test_missions_are_simulated_only_if_they_are_missing_or_of_other_results(
     assert measurements.read(tmp_path, results) == again
 
 
-def _without(key: str) -> Callable[[dict[str, Any]], object]:
-    return lambda document: document["missions"][0].pop(key)
-
-
-# What a forger changes in the document of the right study, and the key that the line names.
+# What a forger changes in the document of the right study, and the key that the line names; what
+# the types refuse is in tests/test_messages.py.
 FORGED: dict[str, Callable[[dict[str, Any]], object]] = {
-    "missions.0.seed": _without("seed"),
-    "missions.0.policy": _without("policy"),
     "missions.0.reward": lambda d: d["missions"][0].update(reward="much"),
-    "missions.0.slots": lambda d: d["missions"][0].update(slots=1.5),
-    "uavs.0.uav": lambda d: d["uavs"][0].pop("uav"),
-    "uavs.0.odd": lambda d: d["uavs"][0].update(odd=1),
     "rates": lambda d: d["rates"].pop(),
     "slots": lambda d: d.update(slots=[]),
 }
@@ -141,3 +136,10 @@ def test_forged_missions_of_the_study_are_a_line_that_names_the_key(
             use(tmp_path, results)
         assert "\n" not in str(error.value)
     assert json.loads(path.read_text()) == document
+
+
+def test_a_study_with_failures_is_refused(tmp_path: Path) -> None:
+    study = small_study(tmp_path, set={"failures.node_rate": 0.1})
+    run_study(study, tmp_path / STUDY)
+    with pytest.raises(InputError, match="verification: its scenario has failures.*; allowed: "):
+        Suite.load(tmp_path)
