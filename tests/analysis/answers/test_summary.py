@@ -50,10 +50,6 @@ def evaluated(design, **functions):
     return pd.DataFrame({"point": range(len(replication)), "replication": replication} | metrics)
 
 
-def ishigami(x, y, z, noise):
-    return np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
-
-
 # x, y and the noise e are uniform on [0, 1]: each has variance 1/12.
 KNOWN = {
     # Variances 1 : 4. Nothing interacts, so total = first.
@@ -300,26 +296,6 @@ def test_the_selected_point_and_its_check(tmp_path):
     rewards = results.checks.query("policy == 'greedy'")["reward"]
     assert checks.loc[("greedy", "reward"), "mean"] == pytest.approx(np.mean(rewards))
     assert summary.comparisons(results).empty  # each policy has missions of its own
-
-
-def test_estimates_stand_beside_the_papers_numbers():
-    rows = [
-        ("tour", 1, "success", 0.95, 0.94, 0.96),
-        ("tour", 1, "collection_ratio", 0.7, 0.65, 0.75),
-        ("greedy", 1, "success", 0.9, 0.85, 0.92),
-        ("greedy", 1, "collection_ratio", 0.8, 0.79, 0.81),
-    ]
-    table = pd.DataFrame(rows, columns=["policy", "uavs", "metric", "mean", "low", "high"])
-    printed = {"success": 0.93, "collection_ratio": 0.7}
-    assert summary.beside_paper(table, {None: printed}).to_numpy().tolist() == [
-        ["paper", "93.0 %", "70.0 %"],
-        ["tour", "95.0 % [94.0, 96.0] +2.0 ▲", "70.0 % [65.0, 75.0] 0.0 ≈"],
-        ["greedy", "90.0 % [85.0, 92.0] −3.0 ▼", "80.0 % [79.0, 81.0] +10.0 ▲"],
-    ]
-    both = pd.concat([table, table.assign(uavs=2, mean=table["mean"] + 0.01)])
-    fleets = summary.beside_paper(both, {1: printed, 2: {"success": 0.5, "collection_ratio": 1}})
-    assert [fleet for _, fleet in fleets.columns[1:]] == ["I = 1", "I = 2"] * 2
-    assert fleets.iloc[1, 2] == "96.0 % [94.0, 96.0] +46.0 ▲"
 
 
 def test_with_one_policy_there_is_no_comparison(tmp_path):
