@@ -117,6 +117,11 @@ def test_policies_that_meet_different_missions_are_noticed(
     assert fails(parameters) and not fails(arrivals)
 
 
+def test_a_uav_that_starts_elsewhere_is_noticed(results: Results, logs: list[Log]) -> None:
+    changed = altered(logs, "mission_start", 0, x=lambda x: x - 1)
+    assert fails(balances.realisation_checks(results, changed)[1])
+
+
 @pytest.mark.parametrize("name", ["collected", "reward", "residual"])
 def test_a_record_that_is_off_by_its_last_bit_is_noticed(
     results: Results, again: CrossCheck, name: str
