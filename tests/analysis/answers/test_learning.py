@@ -25,6 +25,7 @@ from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess import InputError
 from policies.registry import TRAINED
 from tests.analysis.small import grid, small_study
+from tests.policies.ddqn.tiny import tiny
 
 
 def test_the_difference_of_means_is_welchs():
@@ -271,3 +272,11 @@ def test_what_has_no_scores_is_refused(results, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(learning, "learners", lambda _: unequal)
     with pytest.raises(InputError, match=r"trainings: \[2, 3\]"):
         rliable_scores(results)
+
+
+def test_trainings_that_differ_in_their_seed_are_of_one_learner():
+    configs = {"one": tiny(seed=1), "two": tiny(seed=2), "other": tiny(seed=1, discount=0.9)}
+    curve = pd.DataFrame({"updates": [250, 500]})
+    trained = [learning.Trained(name, config, curve) for name, config in configs.items()]
+    sizes = learning.curves_by_learner(trained).groupby(["variant", "seed"]).size()
+    assert sizes.to_dict() == {("one and two", 1): 2, ("one and two", 2): 2, ("other", 1): 2}
