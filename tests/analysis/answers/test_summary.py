@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import compare, run_study
+from analysis import run_study
 from analysis.answers import summary
 from analysis.answers.summary import index_table, sensitivity
 from analysis.figures.settings import sensitivity as figure
@@ -227,20 +227,6 @@ def test_policies_are_ranked_by_the_mean_over_design_points():
     assert summary.best_policy(missions, among=["a", "c"]) == "c"
 
 
-def test_the_best_policy_is_compared_with_the_others(results):
-    best = summary.best_policy(results.missions)
-    table = summary.comparisons(results).set_index("metric")
-    assert set(table["baseline"]) == {best} == {"greedy"}
-    assert (table["policy"] == "random").all()
-    missions = results.missions.groupby("policy")[PRODUCT].mean()
-    expected = missions["random"] - missions["greedy"]
-    assert table.loc[PRODUCT, "difference"] == pytest.approx(expected)
-    assert table.loc[PRODUCT, "n"] == 20  # replications: points share their realisation
-    alone = compare(results.missions, "greedy", table.index.tolist())
-    either = np.minimum(1, 2 * alone["p_adjusted"])  # random might have been the best
-    assert table["p_adjusted"].tolist() == pytest.approx(either.tolist())
-
-
 @pytest.fixture
 def trained_twice(tmp_path):
     """Folders of two trainings that differ in their seed, and of one that does not learn alike."""
@@ -272,30 +258,6 @@ def test_checkpoints_of_one_learner_are_one_learner(tmp_path, trained_twice):
     assert set(table["trainings"]) == {2}
     alone = run_study(small_study(tmp_path, policies=["greedy", first]), tmp_path / "alone")
     assert set(summary.learned_against_heuristic(alone)["about"]) == {"this checkpoint"}
-
-
-def test_the_selected_point_and_its_check(tmp_path):
-    rule = {
-        "procedure": "kn",
-        "metric": "collection_ratio",
-        "first": 8,
-        "indifference": 0.02,
-        "budget": 2000,
-        "check": 9,
-    }
-    study = small_study(tmp_path, selection=rule, design=grid(quota=[20, 40, 80]))
-    results = run_study(study, tmp_path / "out")
-    table = summary.selections(results)
-    assert table["policy"].tolist() == ["greedy", "random"]
-    for row in table.itertuples():
-        assert row.setting == f"quota {study.points[row.point].values['quota']}"
-        counts = results.missions.query("policy == @row.policy").groupby("point").size()
-        assert row.missions == counts.sum()
-    checks = summary.checks(results).set_index(["policy", "metric"])
-    assert set(checks["n"]) == {9}
-    rewards = results.checks.query("policy == 'greedy'")["reward"]
-    assert checks.loc[("greedy", "reward"), "mean"] == pytest.approx(np.mean(rewards))
-    assert summary.comparisons(results).empty  # each policy has missions of its own
 
 
 def test_with_one_policy_there_is_no_comparison(tmp_path):
