@@ -36,7 +36,7 @@ INTEGRATIONS = "dess.integrations"
 FOREIGN = {"agilerl", "benchmarl", "pufferlib", "ray", "rliable", "sb3_contrib"}
 FOREIGN |= {"stable_baselines3", "supersuit", "tensordict", "torchrl"}
 # What a plain `dess --help` must not wait for.
-HEAVY = {"torch", "numba", "pandas", "scipy", "matplotlib"}
+HEAVY = {"torch", "numba", "numpy", "pandas", "pyarrow", "pydantic", "scipy", "matplotlib"}
 # What runs without the learner.
 LIGHT = (
     "import dess, policies, analysis; from reports.cli import main",
@@ -257,15 +257,11 @@ def test_nothing_imports_integrations() -> None:
 
 
 def test_the_command_line_loads_nothing_heavy() -> None:
-    assert not HEAVY & loaded_by("import reports.cli")
+    assert not HEAVY & loaded_by("from reports.cli import main; main(['--help'])")
 
 
 def test_torch_is_loaded_only_for_the_learner() -> None:
     assert not LEARNING & loaded_by("; ".join(LIGHT))
-
-
-def test_the_learner_is_seen_to_load_torch() -> None:
-    assert loaded_by(f"import {LEARNER}.checkpoint") >= LEARNING
 
 
 @pytest.mark.parametrize("package", ["dess", "analysis"])

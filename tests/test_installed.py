@@ -48,21 +48,6 @@ def test_the_sdist_builds_the_same_wheel(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_plain_wheel_simulates_in_an_empty_environment(tmp_path: Path) -> None:
-    commands = install_wheel(tmp_path)
-    dess = commands / "dess"
-    listed = run(commands / "python", "-c", PACKAGES, folder=tmp_path).split()
-    assert not {"torch", "matplotlib", "jupyterlab", "hatchling"} & set(listed)
-    assert "success" in run(dess, "simulate", "--events", "log.parquet", folder=tmp_path)
-    assert "greedy" in run(dess, "evaluate", "--policy", "greedy", folder=tmp_path)
-    refused = [dess, "simulate", "--policy", "ddqn"]
-    variables = environment(tmp_path)
-    done = subprocess.run(refused, cwd=tmp_path, env=variables, capture_output=True, text=True)
-    assert done.returncode == 2
-    assert done.stderr.endswith("pip install 'dess[learning]'\n")
-
-
-@pytest.mark.slow
 def test_a_wheel_with_everything_runs_in_an_empty_environment(tmp_path: Path) -> None:
     dess, folder = install_wheel(tmp_path, "[all]") / "dess", tmp_path
     check_commands(dess, folder)
@@ -72,9 +57,6 @@ def test_a_wheel_with_everything_runs_in_an_empty_environment(tmp_path: Path) ->
     run(dess, "report", "what-if", *asked, folder=folder)
     assert "ddqn" in run(dess, "policies", folder=folder)
     assert "success" in run(dess, "simulate", "--policy", "ddqn", folder=folder)
-
-
-PACKAGES = "from importlib.metadata import distributions; print(*(d.name for d in distributions()))"
 
 
 def install_wheel(folder: Path, extras: str = "") -> Path:

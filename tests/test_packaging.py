@@ -1,4 +1,4 @@
-"""The distribution: what a wheel holds, what it asks for, and the versions that are pinned."""
+"""The distribution: what a wheel holds, what it asks for, pinned versions, and what CI runs."""
 
 import ast
 import re
@@ -117,3 +117,10 @@ def test_the_changelog_has_an_entry_for_this_version() -> None:
     entries = re.findall(r"^## \[(.+?)\]", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
     assert entries[0] == "Unreleased"
     assert entries[1] == PROJECT["version"]
+
+
+def test_ci_runs_every_nox_session() -> None:
+    defined = re.findall(r"^@nox\.session.*\ndef (\w+)", (ROOT / "noxfile.py").read_text(), re.M)
+    lines = re.findall(r"^\S*nox .*-s ([\w ]+?)(?: --|$)", (ROOT / ".ci/run").read_text(), re.M)
+    assert {"tests", "verify", "fuzz"} <= set(defined)
+    assert sorted(" ".join(lines).split()) == sorted(defined)

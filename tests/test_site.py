@@ -3,13 +3,15 @@
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser
 
-from tests.reports.browser import ARGUMENTS, CHROMIUM, Visit
+from tests.reports.browser import Visit
+from tests.reports.conftest import chromium
+
+__all__ = ["chromium"]  # a fixture
 
 ROOT = Path(__file__).parents[1]
 WIDTHS = (1280, 390)
@@ -42,20 +44,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """A headless Chromium."""
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
-
-
-def test_pages_ask_nothing_from_elsewhere_and_fit_the_window(site: Path, browser: Browser) -> None:
+def test_pages_ask_nothing_from_elsewhere_and_fit_the_window(site: Path, chromium: Browser) -> None:
     pages = sorted({*site.rglob("*.html")} - {site / "404.html"})  # which only a server shows
     assert len(pages) > 40
     for path in pages:
-        visit = Visit(browser, path, WIDTHS[0])
+        visit = Visit(chromium, path, WIDTHS[0])
         for width in WIDTHS:
             visit.resize(width)
             assert visit.page.evaluate("document.documentElement.scrollWidth") == width, path
@@ -65,8 +58,8 @@ def test_pages_ask_nothing_from_elsewhere_and_fit_the_window(site: Path, browser
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_the_search_finds_charging_pads(site: Path, browser: Browser, width: int) -> None:
-    visit = Visit(browser, site / "index.html", width)
+def test_the_search_finds_charging_pads(site: Path, chromium: Browser, width: int) -> None:
+    visit = Visit(chromium, site / "index.html", width)
     visit.page.keyboard.press("f")
     visit.page.keyboard.type("charging pad")
     found = visit.page.locator(".md-search-result__item a").first

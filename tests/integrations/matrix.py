@@ -16,9 +16,7 @@ CHECKS = {
     "test_step": "step",
     "test_mask_is_respected": "mask respected",
     "test_agents_that_end": "agents that end",
-    "test_smaller_fleets": "smaller fleets",
     "test_training_step": "training step",
-    "test_seeds_repeat_episodes": "seeds",
 }
 PAGE = Path("docs/environments.md")
 BEGIN, END = "<!-- matrix: begin -->", "<!-- matrix: end -->"

@@ -13,7 +13,6 @@ from dess.state import HOVER
 
 sb3_contrib = pytest.importorskip("sb3_contrib")
 masking = pytest.importorskip("sb3_contrib.common.maskable.utils")
-evaluation = pytest.importorskip("sb3_contrib.common.maskable.evaluation")
 sb3 = pytest.importorskip("dess.integrations.sb3")
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "sb3_maskable_ppo.py"
@@ -80,18 +79,6 @@ def test_agents_that_end() -> None:
     assert waits
 
 
-def test_smaller_fleets() -> None:
-    story = flown(harvest(), 60)
-    fleets = story[0][1].reshape(MISSIONS, -1).sum(1)
-    drawn = dess.simulate_batch(QUICK, policies.load("random"), 1, MISSIONS).missions["uavs"]
-    assert np.array_equal(fleets, drawn) and len(set(drawn)) > 1
-    for scenario in (QUICK, FLEET):
-        env = harvest(scenario)
-        model = sb3_contrib.MaskablePPO("MlpPolicy", env, n_steps=8, batch_size=8)
-        rewards, _ = evaluation.evaluate_policy(model, env, 12, return_episode_rewards=True)
-        assert len(rewards) == 12
-
-
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory):
     """The example after one update, and the folder with its file."""
@@ -116,10 +103,3 @@ def test_training_step(trained, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("maskable_ppo.zip").unlink()
     with pytest.raises(InputError, match="cannot be loaded: FileNotFoundError"):
         policies.load(f"{EXAMPLE}:MaskablePPOPolicy")
-
-
-def test_seeds_repeat_episodes() -> None:
-    first, again, other = (flown(harvest(), 40, seed) for seed in (7, 7, 8))
-    for step, same in zip(first, again, strict=True):
-        assert all(map(np.array_equal, step[:6], same[:6]))
-    assert not np.array_equal(first[0][3], other[0][3])

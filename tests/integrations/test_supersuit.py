@@ -123,23 +123,6 @@ def test_agents_that_end(fleet: str) -> None:
     assert waited and ended
 
 
-def test_smaller_fleets() -> None:
-    env, plain = vectors("drawn"), team("drawn")
-    fleets = set()
-    for seed in range(6):
-        observations, infos = env.reset(seed=seed)
-        plain.reset(seed)
-        flying = [info["active"] for info in infos[: ROWS // COPIES]]
-        assert sum(flying) == len(plain.record().uavs)
-        assert [row.any() for row in observations[: ROWS // COPIES]] == flying
-        fleets.add(sum(flying))
-    assert fleets == {1, 2, 3}
-    leaving = supersuit.pettingzoo_env_to_vec_env_v1(team("drawn", ended="leave"))
-    with pytest.raises(AssertionError, match="agent death"):  # why UAVs must stay
-        for seed in range(6):
-            leaving.reset(seed=seed)
-
-
 @every_fleet
 def test_training_step(fleet: str) -> None:
     sb3 = pytest.importorskip("stable_baselines3")
@@ -151,24 +134,3 @@ def test_training_step(fleet: str) -> None:
     assert model.num_timesteps == 16 * ROWS
     after = model.policy.parameters()
     assert any(not a.equal(b) for a, b in zip(before, after, strict=True))
-
-
-@every_fleet
-def test_seeds_repeat_episodes(fleet: str) -> None:
-    env, singles = vectors(fleet), [team(fleet) for _ in range(COPIES)]
-    stories = []
-    for seed in (7, 7, 8):
-        generator = np.random.default_rng(0)
-        observations, infos = env.reset(seed=seed)
-        story = [observations.copy()]
-        # Copy k plays the episodes of seed + k.
-        expected = [single.reset(seed + k)[0] for k, single in enumerate(singles)]
-        rows = [own for observed in expected for own in observed.values()]
-        assert np.array_equal(observations, rows)
-        for _ in range(80):
-            observations, *_, infos = env.step(legal(infos, generator))
-            story.append(observations.copy())
-        stories.append(story)
-    first, again, other = stories
-    assert np.array_equal(first, again)
-    assert not np.array_equal(first[0], other[0])

@@ -91,18 +91,6 @@ def test_agents_that_end(make):
     assert (after["done"] == over.unsqueeze(-1)).all()  # all UAVs are done at once
 
 
-def test_smaller_fleets(make):
-    env, sizes = make(SHORT), set()
-    for _ in range(8):
-        first = env.reset()["uav"]
-        fleet = len(env._env.record().uavs)
-        assert first["info", "active"].tolist() == [1.0] * fleet + [0.0] * (3 - fleet)
-        assert first["observation"].any(-1).tolist() == [True] * fleet + [False] * (3 - fleet)
-        assert first.shape == (3,)
-        sizes.add(fleet)
-    assert sizes == {1, 2, 3}
-
-
 def test_training_step(tmp_path):
     example = runpy.run_path(str(EXAMPLE))
     short, long = (example["train"](SHORT, slots, per_batch=60) for slots in (60, 120))
@@ -112,37 +100,3 @@ def test_training_step(tmp_path):
     policy = example["Mappo"](tmp_path / "mappo.pt")
     missions = dess.simulate_batch(SHORT, policy, 3, 4).missions
     assert np.array_equal(missions, dess.simulate_batch(SHORT, policy, 3, 4).missions)
-
-
-def follow_vector_env(env):
-    """Check that whole missions are those of a ``vector_env`` with the same seed and actions."""
-    flight = env.rollout(
-        200, auto_reset=False, tensordict=env.reset(seed=7), break_when_any_done=False
-    )
-    rows = dess.vector_env(DRAWN, 4)
-    seen, _ = rows.reset(seed=7)
-    for slot in flight.unbind(1):
-        assert np.array_equal(slot["observation"], seen)
-        seen, rewards, terminated, truncated, info = rows.step(slot["action"].numpy())
-        last = seen.copy()
-        if "final_obs" in info:
-            last[info["_final_obs"]] = np.stack(info["final_obs"][info["_final_obs"]])
-        assert np.array_equal(slot["next", "observation"], last)
-        assert np.array_equal(slot["next", "done"][:, 0], terminated | truncated)
-        assert np.array_equal(slot["next", "reward"][:, 0], rewards.astype(np.float32))
-    assert flight["next", "done"].any()
-
-
-def test_seeds_repeat_episodes(make):
-    mission, again, other = (flown(make(SHORT, seed), missions=3) for seed in (1, 1, 2))
-    assert (mission == again).all()
-    assert not torch.equal(mission["uav", "observation"], other["uav", "observation"])
-    env = make(SHORT)
-    first, _ = dess.parallel_env(SHORT, mask="info", ended="stay").reset(seed=7)
-    rows = torch.from_numpy(np.stack([*first.values()]))
-    assert torch.equal(env.reset(seed=7)["uav", "observation"], rows)
-    follow_vector_env(rows_of(DRAWN))
-    env.set_seed(5)
-    mission = env.rollout(3)["uav", "observation"][0]
-    env.set_seed(5)
-    assert torch.equal(env.rollout(3)["uav", "observation"][0], mission)

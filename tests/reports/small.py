@@ -147,8 +147,8 @@ def words(html: str) -> str:
     return unescape(re.sub(r"\s+", " ", bare)).replace("**", "")
 
 
-def shown_by(source: str | Report, cells: int | None = None, **parameters: Any) -> str:
-    """What the first cells of a notebook show, or all; run here, and nothing drawn.
+def shown_by(source: str | Report, **parameters: Any) -> str:
+    """What a notebook shows, which is run here, and nothing drawn.
 
     The notebook is a report, or that of a name.
 
@@ -159,7 +159,7 @@ def shown_by(source: str | Report, cells: int | None = None, **parameters: Any) 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(IPython.display, "display", lambda *pieces: shown.extend(pieces))
         patch.setattr(html, "svg", lambda drawing: b"")
-        for cell in report.cells[:cells]:
+        for cell in report.cells:
             tree = ast.parse(cell.source)
             last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
             exec(compile(tree, report.name, "exec"), scope)
@@ -168,6 +168,6 @@ def shown_by(source: str | Report, cells: int | None = None, **parameters: Any) 
     return "\n".join(piece.data for piece in shown if piece is not None)
 
 
-def said_by(source: str | Report, cells: int | None = None, **parameters: Any) -> str:
+def said_by(source: str | Report, **parameters: Any) -> str:
     """The words of what a notebook shows."""
-    return words(shown_by(source, cells, **parameters))
+    return words(shown_by(source, **parameters))

@@ -15,7 +15,6 @@ import dess
 import policies
 from analysis.figures import style
 from analysis.results.event_log import residual_data, uav_slots
-from dess import InputError
 from dess.scenario import Scenario
 from dess.state import sample_scenario
 from reports.player.animation import (
@@ -74,15 +73,6 @@ def test_a_gif_has_a_frame_per_slot_and_holds_the_last(
     end = int(mission[0]["time"].max())
     assert sum(times) == 1000 * (end + 1) / SLOTS_PER_SECOND + 1000 * LAST_SECONDS
     assert times[-1] > 1000 * LAST_SECONDS
-
-
-def test_a_video_without_ffmpeg_is_refused(
-    mission: tuple[pd.DataFrame, Scenario], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
-    with pytest.raises(InputError, match="needs the program ffmpeg, which is not installed"):
-        write_animation(*mission, tmp_path / "mission.mp4", MP4)
-    assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason="no ffmpeg on this machine")

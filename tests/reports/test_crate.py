@@ -17,7 +17,7 @@ from analysis.results.manifest import Manifest
 from analysis.results.tables import Results
 from dess import InputError
 from reports.crate import licence_of, write_crate
-from tests.analysis.small import files_of, grid, small_study
+from tests.analysis.small import grid, small_study
 from tests.reports.small import quick
 
 DAY = date(2026, 3, 14)
@@ -77,18 +77,6 @@ def test_what_is_unpacked_is_the_study(name, tmp_path):
     assert again.study | {"scenario": ""} == made.study | {"scenario": ""}
 
 
-def test_the_study_is_simulated_again_from_what_is_unpacked(tmp_path):
-    """Or found to be there: nothing is missing, and no file changes but the scenario's name."""
-    crate = exported(tmp_path, results_of(tmp_path))
-    with ZipFile(crate) as archive:
-        archive.extractall(tmp_path / "unpacked")
-    before = files_of(tmp_path / "unpacked" / "results")
-    run_study(load_study(tmp_path / "unpacked" / "study.toml"), tmp_path / "unpacked" / "results")
-    after = files_of(tmp_path / "unpacked" / "results")
-    del before["manifest.json"], after["manifest.json"]
-    assert after == before
-
-
 def test_the_metadata_say_what_it_is_and_what_made_it(tmp_path):
     results = results_of(tmp_path)
     graph = graph_of(exported(tmp_path, results))
@@ -142,12 +130,6 @@ def test_a_validator_accepts_it(tmp_path, monkeypatch):
 @pytest.mark.parametrize("licence", ["mit", "CC0-1.0", "cc-by-sa-4.0"])
 def test_licences_are_those_of_spdx(licence):
     assert licence_of(licence).lower() == licence.lower()
-
-
-@pytest.mark.parametrize("licence", ["", "none", "MIT OR Apache-2.0", "LicenseRef-mine", "<b>"])
-def test_other_licences_are_refused(licence):
-    with pytest.raises(InputError, match="is unknown; allowed: an identifier of https://spdx.org"):
-        licence_of(licence)
 
 
 def test_damaged_results_are_not_exported(tmp_path):

@@ -7,15 +7,14 @@ from typing import Any
 import pandas as pd
 import pytest
 from playwright.sync_api import Browser, Locator, Page
-from scipy import stats
 
 from analysis import run_study
-from analysis.names import METRICS, SUCCESS
+from analysis.names import METRICS
 from analysis.results.tables import Results
+from analysis.stats.intervals import interval_of
 from dess import InputError
 from reports.explorer import explorer
 from tests.analysis.small import grid, small_study
-from tests.by_hand import bounded
 from tests.reports.browser import Visit
 
 DESIGN = {"uavs": [1, 2, 3], "charge_complete": [40, 60], "initial_data": [[1, 2], 5]}
@@ -44,7 +43,7 @@ def document(results: Results, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 
 def estimate(results: Results, places: tuple[int, ...], policy: str, metric: str) -> list[float]:
-    """A mean and its interval in percent, computed anew from the files of the results."""
+    """A mean and its interval in percent, of the files of the results."""
     sliders = zip(DESIGN.items(), places, strict=True)
     values = {field: values[place] for (field, values), place in sliders}
     manifest = results.store.manifest
@@ -53,11 +52,7 @@ def estimate(results: Results, places: tuple[int, ...], policy: str, metric: str
     cell = manifest.cells[POLICIES.index(policy)][point].key
     sample = missions.loc[missions["cell"].astype(str) == cell, metric]
     assert len(sample) == MISSIONS
-    if metric == SUCCESS:
-        ends = stats.binomtest(int(sample.sum()), MISSIONS).proportion_ci(0.95, "wilson")
-    else:
-        _, *ends = bounded(sample.to_numpy(float))
-    return [100 * sample.mean(), 100 * ends[0], 100 * ends[1]]
+    return [100 * end for end in interval_of(metric, sample.to_numpy(float))]
 
 
 def text_of(mean: float, low: float, high: float) -> str:

@@ -5,7 +5,6 @@ import pytest
 from analysis import run_study
 from analysis.answers import costs, summary
 from analysis.stats.choices import on_front
-from analysis.stats.intervals import mean_interval
 from analysis.study.study import CHECK
 from dess import InputError
 from tests.analysis.small import small_study
@@ -57,22 +56,6 @@ def test_each_condition_has_a_front_of_its_own(fixed, metric):
         assert rows["probability"].sum() >= 1
     again = costs.front(fixed, metric)
     assert again.equals(table)
-
-
-def test_a_fleet_is_judged_over_all_conditions(searched):
-    table = costs.judged(searched)
-    fleets = costs.everywhere(searched, table)
-    assert len(fleets) == 2 * 4
-    for row in fleets.itertuples():
-        part = table[(table["policy"] == row.policy) & (table["fleet"] == row.fleet)]
-        assert row.cost == pytest.approx(part["cost"].mean())
-        assert (row.verdict == "met") == (part["verdict"] == "met").all()
-        assert (row.verdict == "missed") == (part["verdict"] == "missed").any()
-    for row in fleets[fleets["selected"]].itertuples():
-        points = searched.cheapest(row.policy).answers[-1].points
-        part = table[(table["policy"] == row.policy) & (table["fleet"] == row.fleet)]
-        assert {*part["point"]} == {*points}
-    assert fleets["selected"].any()  # or this test says little
 
 
 def test_the_answer_says_why_no_cheaper_fleet_will_do(searched, monkeypatch):
@@ -144,20 +127,6 @@ def test_prices_of_zero_leave_what_is_paid_for(tmp_path):
     table = costs.front(results)
     assert table["fleet"].tolist() == ["2 UAVs"] * 2  # what has a price is named
     assert table["condition"].tolist() == ["", ""]
-
-
-def test_settings_are_priced_condition_by_condition(fixed):
-    table = costs.priced(fixed)
-    conditions = ["communication quota 60", "communication quota 120"]
-    assert [*dict.fromkeys(table["condition"])] == conditions
-    fleets = {f"{uavs} and {pads}" for uavs in ("1 UAV", "2 UAVs") for pads in ("1 pad", "2 pads")}
-    assert {*table["fleet"]} == fleets
-    for _, rows in table.groupby("condition"):
-        assert rows["cost"].is_monotonic_increasing
-    row = table.iloc[3]
-    missions = fixed.missions.query(f"policy == '{row['policy']}' and point == {row['point']}")
-    ends = row[["cost", "cost_low", "cost_high"]].tolist()
-    assert ends == pytest.approx(mean_interval(missions["cost"]))
 
 
 # A sea with a second zone, whose pads are paid for.

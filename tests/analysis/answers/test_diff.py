@@ -2,7 +2,6 @@
 
 import importlib
 import shutil
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -13,13 +12,11 @@ from scipy import stats
 from analysis import load_results, run_study
 from analysis.answers.diff import at_hand, diff, effects, most_changed, origins
 from analysis.results import provenance
-from analysis.results.resimulate import recorded
 from analysis.results.tables import Results
 from dess import InputError
 from dess.code import sources
-from tests.analysis.small import environment, grid, small_study
+from tests.analysis.small import grid, small_study
 
-ROOT = Path(__file__).parents[3]
 # A policy of another package: UAVs hover from a certain replication on, before it they go east.
 PLUGIN = """
 import numpy as np
@@ -264,29 +261,3 @@ def test_libraries_and_accepted_changes_that_differ_are_told(results):
         "accepted in B: other code of dess.rules after 7 missions",
     ]
     assert at_hand(other) == "made with other versions of numpy"
-
-
-@pytest.mark.slow
-def test_a_changed_constant_of_the_model_is_found(tmp_path):
-    """The engine of a copy of the source tree, which takes a minute to compile."""
-    tree = tmp_path / "tree"
-    for package in ("dess", "policies", "analysis", "reports", "tests"):
-        ignored = shutil.ignore_patterns("__pycache__", "*.nbi", "*.nbc")
-        shutil.copytree(ROOT / package, tree / package, ignore=ignored)
-    rules = tree / "dess" / "rules.py"
-    constant = "min(u.battery + mission.charge_rate, mission.charge_complete)"
-    assert constant in rules.read_text()
-    rules.write_text(rules.read_text().replace(constant, constant.replace("rate", "rate + 1")))
-    a = results_of(tmp_path, "a")
-    command = [sys.executable, "-m", "reports", "study", "run", "trial.toml", "--out", "b"]
-    paths = {"PYTHONPATH": str(tree)}
-    subprocess.run(command, cwd=tmp_path, check=True, env=environment() | paths)
-    b = load_results(tmp_path / "b")
-    found = diff(a, b)
-    assert origins(found) == ["code: dess.rules"]
-    changed = {*zip(found.changed["policy_a"], found.changed["replication"], strict=True)}
-    missions = [(policy, r) for policy in a.policies for r in range(10)]
-    others = {(p, r) for p, r in missions if recorded(a, p, 0, r) != recorded(b, p, 0, r)}
-    assert changed == others
-    charged = a.uavs[a.uavs["slots_charging"] > 0]
-    assert set() < changed <= {*zip(charged["policy"], charged["replication"], strict=True)}

@@ -11,7 +11,7 @@ from analysis.answers import main_effects
 from analysis.answers.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
 from analysis.names import PRODUCT, SUCCESS
 from analysis.stats.differences import adjust, paired
-from analysis.stats.intervals import by_replication, interval_of, post_stratified
+from analysis.stats.intervals import by_replication
 from dess import InputError
 from tests.analysis.small import grid, small_study
 
@@ -41,22 +41,6 @@ def pairs_of(steps, sure=True, half=0.001, widened=2):
     wide = widened * half
     ends = {"low": gap - half, "high": gap + half, "wide_low": gap - wide, "wide_high": gap + wide}
     return table.assign(**ends, p_adjusted=p)
-
-
-def test_effects_are_the_means_by_value(results, table):
-    named = table.drop_duplicates(["field", "position"])[["field", "position", "value"]]
-    assert named.to_numpy().tolist() == [
-        ["uavs", 0, "1"],
-        ["uavs", 1, "2"],
-        ["initial_data", 0, "5–7.5"],
-        ["initial_data", 1, "10"],
-        ["initial_data", 2, "2–20"],
-    ]
-    row = table.query("field == 'initial_data' and position == 2 and policy == 'random'")
-    missions = results.missions.query("point == 4 and policy == 'random'")
-    ends = row.set_index("metric").loc["reward", ["mean", "low", "high"]]
-    values = post_stratified(missions["reward"].to_numpy(), missions["uavs"].to_numpy())
-    assert tuple(ends) == interval_of("reward", values)
 
 
 def test_success_is_compared_where_the_number_of_uavs_is_drawn(results, table):
@@ -113,29 +97,3 @@ def test_changes_are_paired_by_replication(results, table):
     assert pairs.loc[2, columns].tolist() == pytest.approx(expected)
     assert pairs["p_adjusted"].tolist() == adjust(pairs["p"].to_numpy(), "holm").tolist()
     assert set(pairs["n"]) == {20}
-
-
-def test_the_table_has_a_row_per_parameter_and_policy():
-    policies = {"mine": [0.1, 0.2, 0.2, 0.1], "other": [0.1, 0.3, 0.3, 0.4]}
-    rows = [
-        ("uavs", str(n + 1), n, policy, PRODUCT, mean)
-        for policy, means in policies.items()
-        for n, mean in enumerate(means)
-    ]
-    columns = ["field", "value", "position", "policy", "metric", "mean"]
-    changes = {"uavs": {policy: pairs_of(np.diff(means)) for policy, means in policies.items()}}
-    ratios = {"uavs": dict.fromkeys(policies, pairs_of([0.2, 0.1, -0.1]))}
-    table = main_effects.listed(pd.DataFrame(rows, columns=columns), changes, ratios)
-    mine = [
-        PEAK,
-        "10.0 % at 1",
-        "10.0 % at 4",
-        "0.0 [−0.1, +0.1]",
-        "+20.0 [+19.9, +20.1]",
-        "2 or 3",
-    ]
-    other = [RISES, "10.0 % at 1", "40.0 % at 4", "+30.0 [+29.9, +30.1]", mine[4], ""]
-    assert table.to_numpy().tolist() == [
-        ["Number of UAVs", "mine", *mine],
-        ["Number of UAVs", "other", *other],
-    ]

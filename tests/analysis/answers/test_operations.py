@@ -23,7 +23,8 @@ def planted(results, metric, value):
 @pytest.fixture(scope="module")
 def pads(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pads")
-    study = small_study(folder, policies=["greedy"], missions=40,
+    study = small_study(folder, policies=["greedy"], missions=40, logged=2,
+                        set={"charging.measured": True},
                         design=grid(uavs=[2, 4], pads=[1, 2, 3, 4]))  # fmt: skip
     return run_study(study, folder / "out")
 
@@ -130,3 +131,12 @@ def test_a_uav_waits_from_its_request_until_it_charges_gives_up_or_ends():
     log = pd.DataFrame(events, columns=["time", "event", "uav"])
     waiting = operations.waiting(log).tolist()
     assert waiting == [0, 1, 2, 1, 1, 0, 1, 0]
+
+
+def test_the_queue_of_the_logs_is_that_of_the_records(pads):
+    table = operations.queues(pads, "greedy", [4]).set_index("slot")  # four UAVs, one pad
+    missions = pads.missions.query("point == 4 and replication < 2")
+    assert len(table) == missions["slots"].max()
+    waited = (missions["queue"] * missions["slots"]).sum() / 2
+    assert table["mean"].sum() == pytest.approx(waited) and waited > 0
+    assert (table["low"] <= table["high"]).all()

@@ -59,18 +59,6 @@ def test_the_worst_seas_come_first(results: Results) -> None:
     assert [*table["Sea"]] == [SEAS[place] for place in np.argsort(behind)[:2]]
 
 
-def test_the_answer_names_share_time_and_gain(results: Results) -> None:
-    costs = [
-        Cost(policy="greedy", calls=1, median=1, slow=1, batch=2.0),
-        Cost(policy="nearest", calls=1, median=1, slow=1, batch=0.5),
-    ]
-    times = Times(processor="x", costs=costs)
-    text = seas.answer(results, times, "nearest", "greedy", "greedy")
-    assert "On 4 unseen seas, nearest reaches" in text
-    assert "in 1/4 of its time" in text
-    assert [*seas.front(results, times)["policy"]] == ["nearest", "greedy"]
-
-
 def test_the_summary_has_shares_of_references_and_of_bounds_below_one(
     results: Results, monkeypatch: pytest.MonkeyPatch
 ) -> None:

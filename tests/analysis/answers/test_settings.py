@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis import compare, run_study, summary
+from analysis import compare, run_study
 from analysis.answers import settings
 from analysis.names import METRICS, PRODUCT
 from analysis.stats.intervals import bounded_interval
@@ -57,16 +57,6 @@ def test_long_and_unset_values_are_short_texts(tmp_path):
 
 
 # --- ranks ---
-
-
-def test_ranked_settings_have_the_estimates_of_the_summary(results):
-    table = settings.ranked(results).set_index(["policy", "point"])
-    rows = summary(results.missions, by=["policy", "point"])
-    assert len(table) == 2 * 6
-    for row in rows.itertuples():
-        ours = table.loc[(row.policy, row.point)]
-        found = ours[[row.metric, f"{row.metric}_low", f"{row.metric}_high", "n"]].tolist()
-        assert found == pytest.approx([row.mean, row.low, row.high, row.n], abs=1e-12)
 
 
 def test_a_planted_best_is_found_and_those_that_equal_it_are_tied(results):

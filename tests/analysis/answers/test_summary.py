@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import compare, run_study
+from analysis import run_study
 from analysis.answers import summary
 from analysis.answers.summary import index_table, sensitivity
 from analysis.figures.settings import sensitivity as figure
@@ -48,10 +48,6 @@ def evaluated(design, **functions):
     x = np.array([list(point.values.values()) for point in design.points]).T
     metrics = {name: metric(*x, noise_of(replication)) for name, metric in functions.items()}
     return pd.DataFrame({"point": range(len(replication)), "replication": replication} | metrics)
-
-
-def ishigami(x, y, z, noise):
-    return np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
 
 
 # x, y and the noise e are uniform on [0, 1]: each has variance 1/12.
@@ -231,20 +227,6 @@ def test_policies_are_ranked_by_the_mean_over_design_points():
     assert summary.best_policy(missions, among=["a", "c"]) == "c"
 
 
-def test_the_best_policy_is_compared_with_the_others(results):
-    best = summary.best_policy(results.missions)
-    table = summary.comparisons(results).set_index("metric")
-    assert set(table["baseline"]) == {best} == {"greedy"}
-    assert (table["policy"] == "random").all()
-    missions = results.missions.groupby("policy")[PRODUCT].mean()
-    expected = missions["random"] - missions["greedy"]
-    assert table.loc[PRODUCT, "difference"] == pytest.approx(expected)
-    assert table.loc[PRODUCT, "n"] == 20  # replications: points share their realisation
-    alone = compare(results.missions, "greedy", table.index.tolist())
-    either = np.minimum(1, 2 * alone["p_adjusted"])  # random might have been the best
-    assert table["p_adjusted"].tolist() == pytest.approx(either.tolist())
-
-
 @pytest.fixture
 def trained_twice(tmp_path):
     """Folders of two trainings that differ in their seed, and of one that does not learn alike."""
@@ -304,26 +286,6 @@ def test_the_selected_point_and_its_check(tmp_path):
     rewards = results.checks.query("policy == 'greedy'")["reward"]
     assert checks.loc[("greedy", "reward"), "mean"] == pytest.approx(np.mean(rewards))
     assert summary.comparisons(results).empty  # each policy has missions of its own
-
-
-def test_estimates_stand_beside_the_papers_numbers():
-    rows = [
-        ("tour", 1, "success", 0.95, 0.94, 0.96),
-        ("tour", 1, "collection_ratio", 0.7, 0.65, 0.75),
-        ("greedy", 1, "success", 0.9, 0.85, 0.92),
-        ("greedy", 1, "collection_ratio", 0.8, 0.79, 0.81),
-    ]
-    table = pd.DataFrame(rows, columns=["policy", "uavs", "metric", "mean", "low", "high"])
-    printed = {"success": 0.93, "collection_ratio": 0.7}
-    assert summary.beside_paper(table, {None: printed}).to_numpy().tolist() == [
-        ["paper", "93.0 %", "70.0 %"],
-        ["tour", "95.0 % [94.0, 96.0] +2.0 ▲", "70.0 % [65.0, 75.0] 0.0 ≈"],
-        ["greedy", "90.0 % [85.0, 92.0] −3.0 ▼", "80.0 % [79.0, 81.0] +10.0 ▲"],
-    ]
-    both = pd.concat([table, table.assign(uavs=2, mean=table["mean"] + 0.01)])
-    fleets = summary.beside_paper(both, {1: printed, 2: {"success": 0.5, "collection_ratio": 1}})
-    assert [fleet for _, fleet in fleets.columns[1:]] == ["I = 1", "I = 2"] * 2
-    assert fleets.iloc[1, 2] == "96.0 % [94.0, 96.0] +46.0 ▲"
 
 
 def test_with_one_policy_there_is_no_comparison(tmp_path):

@@ -5,12 +5,10 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
 from analysis import what_if
 from analysis.ask import what_if as answer
 from analysis.ask.what_if import WhatIf
-from analysis.names import METRICS
 from dess import InputError
 from tests.analysis.small import files_of, write_scenario
 
@@ -46,11 +44,6 @@ def test_the_answer_has_the_difference_of_every_policy(asked: WhatIf) -> None:
         assert line.startswith(f"- **{policy}**: product is")
     assert "in the variation" in lines[-1]
     assert asked._repr_markdown_() == asked.answer()  # what Jupyter shows
-
-
-def test_figures_are_drawn(asked: WhatIf) -> None:
-    drawn = [asked.plot(), asked.plot_spread(), *map(asked.plot_means, METRICS)]
-    assert all(isinstance(figure, Figure) for figure in drawn)
 
 
 def test_examples_are_missions_of_the_best_policy_or_of_the_one_asked_for(

@@ -1,14 +1,20 @@
-"""A question is two design points in the same realisations, kept in a folder of its own."""
+"""Questions: two design points in the same realisations, and what their missions answer."""
 
 import shlex
 import tomllib
+from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from analysis import load_study
 from analysis.ask import what_if
 from analysis.ask.what_if import BASELINE, VARIATION
+from analysis.names import PRODUCT
+from analysis.stats.intervals import LEVEL
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE
 from dess import InputError, load_scenario
 from tests.analysis.small import asked, files_of, write_scenario
 
@@ -93,13 +99,6 @@ def test_what_is_no_question_is_refused_in_one_line(values, message):
     assert "\n" not in str(caught.value)
 
 
-def test_who_is_shown_must_be_asked_about():
-    study = what_if.question({"uavs": 5}, policies=["greedy"])
-    what_if.check_policy(study, "greedy")
-    with pytest.raises(InputError, match="shown: 'tour' is not asked about; allowed: greedy"):
-        what_if.check_policy(study, "tour")
-
-
 def test_a_policy_that_cannot_act_in_the_variation_leaves_nothing_behind(tmp_path):
     study = what_if.question({"zone": [0, 0, 4, 4]}, policies=["ddqn"], missions=2)
     with pytest.raises(InputError, match="policy ddqn: has learned zone_x 26, not 0; allowed: "):
@@ -144,24 +143,6 @@ def test_both_sides_meet_the_same_realisations(results):
     assert (sides["uavs", BASELINE] == 2).all() and (sides["uavs", VARIATION] == 6).all()
 
 
-def test_fields_that_change_come_before_those_of_both_sides(ask):
-    table = what_if.field_table(ask(missions=2, baseline={"uavs": 2, "quota": 50}))
-    sides = table.set_index("Field")[["Baseline", "Variation"]]
-    assert sides.index[:3].tolist() == ["uavs", "pads", "quota"]
-    assert sides.loc["uavs"].tolist() == ["2", "6"]
-    assert sides.loc["pads"].tolist() == ["6", "1"]  # the zone of the small scenario has six cells
-    assert sides.loc["quota"].tolist() == ["50", "50"]
-    assert sides.loc["flying_time"].tolist() == ["20 to 30", "20 to 30"]
-
-
-def test_values_in_words():
-    paper = load_scenario("paper")
-    words = {field: what_if.in_words(paper, field) for field in ("nodes", "zone", "forbid_swaps")}
-    assert words == {"nodes": "25 cells", "zone": "26, 2, 4, 4", "forbid_swaps": "no"}
-    assert what_if.in_words(paper, "arrival_rate") == "0.02"
-    assert what_if.in_words(load_scenario("paper", initial_data=12.5), "initial_data") == "12.5"
-
-
 def test_the_command_asks_the_same_question(results):
     words = shlex.split(what_if.command(results))
     assert words[:3] == ["dess", "report", "what-if"]
@@ -186,3 +167,123 @@ def test_the_question_is_a_study_file(results, tmp_path):
     study = load_study(tmp_path / "sweep.toml")
     assert [point.scenario for point in study.points] == [results.scenario(p) for p in (0, 1)]
     assert (study.policies, study.missions, study.seed) == (tuple(POLICIES), MISSIONS, 3)
+
+
+def row(difference, low, high, p=0.01, n=100):
+    """A row of an answer."""
+    return pd.Series({"difference": difference, "low": low, "high": high, "p": p, "n": n})
+
+
+def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(tmp_path):
+    changes = {"age.reward": -1.0, "failures.uav_rate": 0.2}
+    results = asked(tmp_path, 6, settings=changes, policies=["greedy"])
+    assert {"age", "failures"} <= {*what_if.measured(results)}
+    answers = what_if.answers(results).set_index("metric")
+    sides = results.missions.pivot(index="replication", columns="point", values="age")
+    change = (sides[VARIATION] - sides[BASELINE]).mean()
+    assert answers.loc["age", "difference"] == pytest.approx(change)
+    assert (answers.loc["failures", "before"], answers.loc["failures", "n"]) == (0, 6)
+    failed = results.missions.query("point == @VARIATION")["failures"].mean()
+    assert answers.loc["failures", "difference"] == pytest.approx(failed) and failed > 0
+    assert what_if.means(results).query("metric == 'age'")["mean"].tolist() == (
+        pytest.approx(answers.loc["age", ["before", "after"]].tolist())
+    )
+
+
+def test_what_one_side_measures_has_no_difference(tmp_path):
+    results = asked(tmp_path, 4, settings={"age.measured": True}, policies=["greedy"])
+    table = what_if.answers(results)
+    answers = table.set_index("metric")
+    assert np.isnan(answers.loc["age", ["before", "difference"]].astype(float)).all()
+    assert (answers.loc["age", "n"], answers.loc["success", "n"]) == (0, 4)
+    lines = what_if.answer_table(table, "greedy").set_index("Mean per mission")
+    line = lines.loc["Age of information [mission slots]"]
+    mean = results.missions["age"].mean()
+    assert line.tolist() == ["–", f"{mean:.2f}", ""]
+
+
+@pytest.mark.parametrize(
+    ("answer", "side"),
+    [
+        (row(0.2, 0.1, 0.3), ABOVE),
+        (row(-0.2, -0.3, -0.1), BELOW),
+        (row(0.1, -0.1, 0.3), INCONCLUSIVE),
+        (row(0.0, 0.0, 0.0, p=1.0), INCONCLUSIVE),
+        (row(0.5, 0.5, 0.5, p=0.5, n=2), INCONCLUSIVE),  # two equal differences prove nothing
+        (row(0.5, 0.5, 0.5, p=0.002, n=10), ABOVE),
+    ],
+)
+def test_the_whole_interval_decides(answer, side):
+    assert what_if.verdict(answer) == side
+
+
+def test_so_many_missions_show_the_difference_that_was_seen():
+    """So many normal differences of that mean and spread are significant with that power."""
+    n, gap, spread = 400, 0.05, 0.8
+    half = stats.t.isf((1 - LEVEL) / 2, n - 1) * spread / np.sqrt(n)
+    needed = what_if.missions_needed(row(gap, gap - half, gap + half, n=n))
+    edge = stats.t.isf((1 - LEVEL) / 2, needed - 1)
+    power = stats.nct.sf(edge, needed - 1, gap / spread * np.sqrt(needed))
+    assert power == pytest.approx(what_if.POWER, abs=0.02)
+    assert what_if.missions_needed(row(-gap, -gap - half, -gap + half, n=n)) == needed
+    for nothing in (row(0.0, -half, half), row(0.0, 0.0, 0.0), row(gap, gap, gap)):
+        assert what_if.missions_needed(nothing) == np.inf
+
+
+def with_missions(results, before, after, ratios):
+    """The results with other missions of a single policy."""
+    columns = {"replication": range(len(before)), "policy": "greedy"}
+    sides = [
+        pd.DataFrame({**columns, "point": p, PRODUCT: values, "collection_ratio": ratios})
+        for p, values in ((BASELINE, before), (VARIATION, after))
+    ]
+    return replace(results, missions=pd.concat(sides, ignore_index=True))
+
+
+def test_the_typical_mission_has_the_median_difference_and_the_worst_the_least_left(results):
+    before, after = [0.5, 0.5, 0.9, 0.1, 0.9], [0.6, 0.4, 0.0, 0.3, 0.0]
+    made = with_missions(results, before, after, [0.6, 0.4, 0.8, 0.3, 0.7])
+    # Differences: +0.1, -0.1, -0.9, +0.2, -0.9.
+    assert what_if.typical(made, "greedy") == 1
+    assert what_if.worst(made, "greedy") == 4
+    assert what_if.differences(made, "greedy").tolist() == pytest.approx(
+        [0.1, -0.1, -0.9, 0.2, -0.9]
+    )
+    even = with_missions(results, [0.0] * 4, [0.4, 0.1, 0.2, 0.2], [0.5] * 4)
+    assert what_if.typical(even, "greedy") == 2  # the lower middle, of those alike the first
+    assert what_if.worst(even, "greedy") == 1
+
+
+def test_the_best_policy_of_each_side_is_found(results):
+    table = what_if.means(results)
+    for point in (BASELINE, VARIATION):
+        side = table[(table["point"] == point) & (table["metric"] == PRODUCT)]
+        best = side.loc[side["mean"].idxmax(), "policy"]
+        assert what_if.best_policy(results, point) == best
+
+
+def answer_of(metric, difference, low, high, **more):
+    """A table of answers with a single row."""
+    values = {"policy": "greedy", "metric": metric, "before": 0.9, "after": 0.9 + difference}
+    values |= {"difference": difference, "low": low, "high": high, "p": 0.2, "n": 100}
+    return pd.DataFrame([values | more])
+
+
+@pytest.mark.parametrize(
+    ("ends", "words"),
+    [
+        ((0.05, 0.04, 0.06), "is **higher** in the variation, by +5.0 [+4.0, +6.0] points"),
+        ((-0.05, -0.06, -0.04), "is **lower** in the variation, by −5.0 [−6.0, −4.0] points"),
+        ((0.0, -0.01, 0.01), "is **inconclusive**, by 0.0 [−1.0, +1.0] points"),
+    ],
+)
+def test_a_conclusion_names_the_side_of_the_whole_interval(ends, words):
+    text = what_if.conclusions(answer_of(PRODUCT, *ends))
+    assert text.startswith(f"- **greedy**: product {words}: from 90.0 %")
+
+
+def test_an_inconclusive_answer_says_how_many_missions_it_takes():
+    few = what_if.conclusions(answer_of(PRODUCT, 0.01, -0.01, 0.03))
+    assert "about 820 missions (instead of 100) show it with a probability of 80 %" in few
+    none = what_if.conclusions(answer_of(PRODUCT, 0.0, 0.0, 0.0))
+    assert "These missions do not tell how many would show a difference." in none

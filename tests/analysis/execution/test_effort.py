@@ -84,7 +84,6 @@ def test_without_its_library_a_learned_policy_gives_way(
 
 
 PAPER = load_scenario("paper")
-CONTINUOUS = {"arrivals.process": "continuous"}
 # The ends of the ranges of what decides how long a mission takes.
 EXTREME = {
     "uavs": [1, 16],

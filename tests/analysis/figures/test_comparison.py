@@ -11,7 +11,7 @@ from analysis.figures import comparison
 from analysis.figures.comparison import COLOURS
 from analysis.names import BOUND, GAP, METRICS, PARAMETERS, PRODUCT
 from analysis.stats.verdict import INCONCLUSIVE
-from tests.analysis.answers.test_regions import missions_of
+from tests.analysis.answers.test_comparison import missions_of
 from tests.analysis.small import asked
 
 PAIR, POLICIES = Pair("ours", "theirs", 1), ["random", "greedy"]

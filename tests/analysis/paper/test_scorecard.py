@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from analysis import load_study, run_study
-from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
+from analysis.names import PRODUCT
 from analysis.paper import values as paper
 from analysis.paper.measures import (
     EXCEEDS,
@@ -30,9 +30,7 @@ from analysis.paper.scorecard import (
     scorecard,
 )
 from analysis.results.tables import Results
-from analysis.stats.differences import paired
-from analysis.stats.intervals import interval_of, post_stratified
-from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED, position
+from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from dess import InputError
 from policies.ddqn.description import read_description
 from policies.registry import TRAINED
@@ -170,41 +168,6 @@ def test_the_margin_is_that_of_the_sweet_spot(rows: list[Row]) -> None:
     assert "within 1 point;" in row_of(scorecard({}, NONE), "All values of C_C").rule
 
 
-def test_means_beside_printed_figures_are_those_of_the_parquet(
-    rows: list[Row], studies: dict[str, Results]
-) -> None:
-    missions = pd.read_parquet(studies["table4"].store.folder / "missions")
-    missions = missions[missions["policy"] == "ddqn"]
-    for metric, name in METRICS.items():
-        values = post_stratified(missions[metric].to_numpy(), missions["uavs"].to_numpy())
-        row, expected = row_of(rows, f"{name} over random"), interval_of(metric, values)
-        (quantity,), printed = row.findings[0].quantities, row.claim.printed
-        assert quantity[:4] == pytest.approx((*expected, len(missions)))
-        assert printed and printed.value == paper.TABLE_IV[metric]
-        assert (printed.low is not None) == (metric == SUCCESS)  # a share of missions
-        assert row.findings[0].against == position(expected, printed.value)
-
-
-def test_what_a_uav_changes_is_that_of_the_parquet(
-    rows: list[Row], studies: dict[str, Results]
-) -> None:
-    """Mission by mission."""
-    missions = pd.read_parquet(studies["fig4"].store.folder / "missions")
-    by_uavs = missions[missions["policy"] == "ddqn"].pivot(
-        index="replication", columns="uavs", values=RATIO
-    )
-    for words, uavs in (("dramatically", 2), ("further", 3)):
-        change = by_uavs[uavs] - by_uavs[uavs - 1]
-        sides = (by_uavs[n].to_numpy() for n in (uavs, uavs - 1))
-        low, high = paired(*sides, metric=RATIO)[1:3]
-        (quantity,) = learned(rows, words).quantities
-        assert quantity[:4] == pytest.approx((change.mean(), low, high, len(change)))
-        printed, gain = row_of(rows, words).claim.printed, paper.FIG_4[uavs][RATIO]
-        assert printed and printed.value == gain - paper.FIG_4[uavs - 1][RATIO]
-    verdict = HOLDS if low > 0 else REFUTED if high < 0 else INCONCLUSIVE
-    assert learned(rows, "further").verdict == verdict
-
-
 def test_a_single_mission_tells_nothing(studies: dict[str, Results]) -> None:
     alone = studies["table4"].missions.query("replication == 0")
     for row in scorecard({"table4": replace(studies["table4"], missions=alone)}, NONE):
@@ -223,81 +186,10 @@ def test_a_policy_that_is_not_in_the_study_is_not_judged(studies: dict[str, Resu
             ask("absent")
 
 
-def test_the_lead_of_a_value_is_over_the_next(rows: list[Row], studies: dict[str, Results]) -> None:
-    means = studies["fig5"].missions.query("policy == 'ddqn'").groupby("point")
-    product, ratio = means[PRODUCT].mean()[:3], means["collection_ratio"].mean()[:3]  # 1, 2, 3 UAVs
-    ahead = learned(rows, "best, and the sweet spot").quantities[0]
-    assert ahead.value == pytest.approx(product[2] - max(product[:2]))
-    along = learned(rows, "The more UAVs").quantities[0]
-    assert along.value == pytest.approx(ratio[2] - ratio[0])
-
-
-def test_a_large_quota_is_judged_by_missions_of_several_uavs(
-    rows: list[Row], studies: dict[str, Results]
-) -> None:
-    points = enumerate(studies["fig5"].store.manifest.points)
-    by_quota = {point.values["quota"]: n for n, point in points if "quota" in point.values}
-    several = studies["fig5"].missions.query("policy == 'ddqn' and uavs > 1")
-    success = several.pivot(index="replication", columns="point", values="success").astype(float)
-    change = (success[by_quota[600]] - success[by_quota[440]]).dropna()
-    quantity = learned(rows, "With several UAVs, a large quota").quantities[0]
-    assert (quantity.value, quantity.n) == (pytest.approx(change.mean()), len(change))
-    assert 0 < len(change) < 3  # of three missions, some have one UAV
-
-
 def test_the_papers_network_has_studies_of_its_own(studies: dict[str, Results]) -> None:
     smaller = scorecard({"fig5-paper": studies["fig5"]}, NONE)
     notes = {row.findings[1].note for row in smaller if row.section is FIG_5}
     assert notes == {"the study fig5-paper has no policy ddqn-paper"}
-
-
-def test_the_sweet_spot_is_judged_by_its_check(
-    rows: list[Row], studies: dict[str, Results]
-) -> None:
-    sweet = studies["sweet-spot"]
-    checks = sweet.checks.query("policy == 'ddqn'")
-    row = row_of(rows, "Collection ratio with every parameter")
-    assert row.findings[0].quantities[0].value == checks["collection_ratio"].mean()
-    assert row.findings[0].quantities[0].n == RULE["check"]
-    choice = sweet.choice("ddqn")
-    assert choice is not None
-    chosen = learned(rows, "sweet spot is one of").quantities[0]
-    assert chosen.value == sweet.store.manifest.points[choice.best].values["uavs"]
-    unchecked = replace(sweet, checks=sweet.checks[:0])
-    unjudged = learned(scorecard({"sweet-spot": unchecked}, NONE), "Collection ratio with every")
-    assert unjudged.verdict == NO_RESULTS
-
-
-def test_claims_on_where_uavs_fly_are_counted_from_the_event_logs(
-    rows: list[Row], studies: dict[str, Results]
-) -> None:
-    """Anew from the logs: points 0 and 1 have one and two UAVs, two missions of each are logged."""
-    fig4 = studies["fig4"]
-    logs = [[fig4.events("ddqn", point, number) for number in (0, 1)] for point in (0, 1)]
-    nodes = pd.DataFrame(fig4.scenario(0).nodes, columns=["x", "y"])
-    far = (nodes["x"] == nodes["x"].min()) | (nodes["y"] == nodes["y"].max())
-
-    def ignored(log: pd.DataFrame) -> pd.Series:
-        given = log[log["event"].isin(["mission_start", "arrival"]) & (log["node"] >= 0)]
-        taken = log[log["event"] == "communication"]
-        share = taken.groupby("node")["value"].sum() / given.groupby("node")["value"].sum()
-        return share.reindex(nodes.index).fillna(0) < 0.5
-
-    def values(words: str) -> list[float]:
-        return [quantity.value for quantity in learned(rows, words).quantities]
-
-    charges = [(log["event"] == "charge_start").sum() == 1 for log in logs[0]]
-    assert values("charges once") == [np.mean(charges)]
-    alone, together = (pd.concat(map(ignored, of_uavs), axis=1).mean(axis=1) for of_uavs in logs)
-    expected = [alone[far].mean(), alone[~far].mean()]
-    assert values("ignores the leftmost") == pytest.approx(expected)
-    expected = [(alone - together)[far].mean(), 1 - together[far].mean()]
-    assert values("reach the nodes far") == pytest.approx(expected)
-    own_side, chance, most = values("two sectors")
-    taken = [log[log["event"] == "communication"] for log in logs[1]]
-    by_node = [log.pivot_table("value", "uav", "node", "sum", 0.0) for log in taken]
-    assert most == pytest.approx(np.mean([data.max().sum() / data.sum().sum() for data in by_node]))
-    assert 0.5 < chance < own_side <= 1
 
 
 def test_a_study_without_event_logs_does_not_say_where_uavs_fly(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Bootstrap intervals: near Student's, reproducible, and defined where BCa is not."""
+"""Intervals of means and shares: by hand, over strata, and by the number of UAVs."""
 
 import numpy as np
 import pandas as pd
@@ -7,20 +7,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from analysis.answers.summary import best_policy
+from analysis.execution.evaluation import Asked, evaluate, means
 from analysis.names import PRODUCT, RATIO, REWARD, SUCCESS
 from analysis.stats import intervals
+from analysis.stats.differences import compare
 from analysis.stats.distribution import quantile_interval
 from analysis.stats.intervals import (
     bootstrap_interval,
     bounded_interval,
+    by_replication,
     column_intervals,
     expanded_level,
     interval_of,
     mean_interval,
+    post_stratified,
     stratified,
     summary,
     wilson,
 )
+from dess.scenario import ScenarioSpace
 
 SAMPLES = st.lists(st.floats(0, 1), min_size=1, max_size=60)
 
@@ -232,3 +238,82 @@ def test_few_values_need_a_higher_level():
     assert expanded_level(0.95, 5) == pytest.approx(0.998092, abs=1e-6)
     assert expanded_level(0.95, 10**6) == pytest.approx(0.95, abs=1e-6)
     assert expanded_level(0.95, 0.5) == expanded_level(0.95, 2) <= 1
+
+
+LEVELS = np.array([0.5, 0.8, 0.9])  # the product of one, two and three UAVs
+
+
+def missions_of(fleets, lead=0.0, seed=3):
+    """Missions of a policy: its product is that of the fleet, with a little noise."""
+    generator = np.random.default_rng((seed, len(fleets)))
+    product = LEVELS[fleets - 1] + generator.normal(0, 0.02, len(fleets)) + lead * (fleets == 1)
+    rows = {"point": 0, "seed": 7, "replication": range(len(fleets)), "uavs": fleets, SUCCESS: 1}
+    return pd.DataFrame(rows | {RATIO: product, PRODUCT: product, REWARD: 300 * product})
+
+
+FLEETS = np.repeat([1, 2, 3], [10, 30, 20])  # two UAVs are drawn too often
+
+
+def test_every_number_of_uavs_has_the_same_weight_by_hand():
+    values = np.array([1.0] * 5 + [2.0, 4.0] * 5)  # means 1 and 3, of 5 and 10 missions
+    linear = post_stratified(values, np.repeat([1, 2], [5, 10]))
+    assert linear.mean() == pytest.approx(2.0)
+    # the variance of the mean is (1 / 4) (0 / 5 + s^2 / 10), with s^2 = 10 / 9
+    assert linear.var(ddof=1) / 15 == pytest.approx(10 / 9 / 10 / 4)
+
+
+def test_means_differences_and_ranks_have_the_same_weights():
+    tour, greedy = missions_of(FLEETS), missions_of(FLEETS, lead=0.3, seed=4)
+    table = pd.concat([tour.assign(policy="tour"), greedy.assign(policy="greedy")])
+    of_fleets = table.groupby(["policy", "uavs"])[PRODUCT].mean().groupby("policy").mean()
+    found = summary(table).set_index(["metric", "policy"])["mean"][PRODUCT]
+    assert found.to_dict() == pytest.approx(of_fleets.to_dict())
+    assert by_replication(table, PRODUCT, "policy").mean().to_dict() == pytest.approx(
+        of_fleets.to_dict()
+    )
+    row = compare(table, "tour", [PRODUCT]).iloc[0]
+    assert row["difference"] == pytest.approx(of_fleets["greedy"] - of_fleets["tour"])
+    # By plain means, the first policy would be ahead: it has drawn fewer lone UAVs.
+    ahead = missions_of(FLEETS, lead=0.3).assign(policy="lone", **{"replication": range(60)})
+    ahead[PRODUCT] -= 0.06 * (ahead["uavs"] > 1)
+    both = pd.concat([tour.assign(policy="tour"), ahead])
+    assert ahead[PRODUCT].mean() < tour[PRODUCT].mean() + 0.01
+    assert best_policy(both) == "lone"
+
+
+def test_the_interval_covers_with_half_the_width():
+    generator, covered, lengths = np.random.default_rng(5), [], []
+    for seed in range(300):
+        table = missions_of(generator.integers(1, 4, 300), seed=seed)
+        row = summary(table, by=[]).set_index("metric").loc[PRODUCT]
+        covered.append(row["low"] <= LEVELS.mean() <= row["high"])
+        plain = interval_of(PRODUCT, table[PRODUCT].to_numpy())
+        lengths.append((row["high"] - row["low"]) / (plain.high - plain.low))
+    assert np.mean(covered) >= 0.95
+    assert np.mean(lengths) < 0.6
+
+
+@pytest.mark.parametrize("fleets", [[1, 1, 3, 3, 3], [1] * 9 + [3] * 9, [1] * 9 + [2] * 4, [2] * 9])
+def test_a_number_of_uavs_that_is_seldom_or_never_drawn_leaves_a_plain_mean(fleets):
+    table = missions_of(np.array(fleets))
+    row = summary(table, by=[]).set_index("metric").loc[PRODUCT]
+    assert tuple(row[["mean", "low", "high"]]) == interval_of(PRODUCT, table[PRODUCT].to_numpy())
+
+
+def test_what_some_missions_have_not_measured_has_a_plain_mean():
+    values = np.where(np.arange(60) % 4, np.arange(60.0), np.nan)
+    assert np.array_equal(post_stratified(values, FLEETS), values, equal_nan=True)
+
+
+@pytest.mark.parametrize(("missions", "uavs"), [(80, (1, 3)), (80, (1, 16)), (6, (1, 3))])
+def test_an_evaluation_has_the_means_of_the_table_and_knows_which_sizes_may_be_drawn(
+    missions, uavs
+):
+    space = ScenarioSpace.of(uavs=uavs, quota=20)
+    records = evaluate(space, "random", missions, seed=3).records.missions
+    table = pd.DataFrame(records).assign(policy="random")
+    found = means(Asked(space, "random", missions, seed=3)).moments
+    rows = summary(table).set_index("metric")
+    for metric in (SUCCESS, RATIO, PRODUCT, REWARD):
+        of_table = rows.loc[metric, ["mean", "low", "high"]].tolist()
+        assert found[metric].interval(metric) == pytest.approx(of_table, nan_ok=True)

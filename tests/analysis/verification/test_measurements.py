@@ -6,10 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis import run_study
 from analysis.results.tables import Results
 from analysis.verification import balances, draws, measurements
-from analysis.verification.measurements import FILE, CrossCheck, Log
+from analysis.verification.measurements import FILE, STUDY, CrossCheck, Log
+from analysis.verification.suite import Suite
 from dess import InputError, load_scenario
+from tests.analysis.small import small_study
 from tests.analysis.verification.verdicts import failing
 
 
@@ -105,3 +108,10 @@ def test_missions_are_simulated_only_if_they_are_missing_or_of_other_results(
     monkeypatch.setattr(measurements, "simulate_missions", lambda results, progress: again)
     measurements.make(tmp_path, results)
     assert measurements.read(tmp_path, results) == again
+
+
+def test_a_study_with_failures_is_refused(tmp_path: Path) -> None:
+    study = small_study(tmp_path, set={"failures.node_rate": 0.1})
+    run_study(study, tmp_path / STUDY)
+    with pytest.raises(InputError, match="verification: its scenario has failures.*; allowed: "):
+        Suite.load(tmp_path)

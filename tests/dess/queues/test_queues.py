@@ -166,3 +166,11 @@ def test_the_mean_of_skewed_values_is_refuted_as_often_as_the_level_says() -> No
     values = np.random.default_rng(1).exponential(1.0, (6000, 50))
     refuted = np.mean([p_value(row, 1.0) < 0.01 for row in values])
     assert refuted == pytest.approx(0.01, abs=0.004)  # three standard errors
+
+
+def test_a_node_has_its_own_rate() -> None:
+    rates = {"process": "continuous", "rates": [0.0, 5.0, *[0.1] * 23]}
+    world = _continuous(max_slots=1000, arrivals=rates)
+    assert len(arrivals_of(world, 0)) == 0
+    assert 0.01 < stats.poisson.cdf(len(arrivals_of(world, 1)), 5000) < 0.99
+    assert 0.01 < stats.poisson.cdf(len(arrivals_of(world, 2)), 100) < 0.99

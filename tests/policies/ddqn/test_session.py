@@ -15,7 +15,6 @@ import torch
 
 import policies
 from dess import InputError
-from dess.code import memory
 from policies.ddqn import session
 from policies.ddqn.checkpoint import load_training
 from policies.ddqn.config import CHECKPOINT
@@ -160,7 +159,7 @@ def _refusal(out: Path, **arguments: Any) -> str:
     """The line with which a folder is refused; it stays as it is."""
     before = files_of(out.parent)
     with pytest.raises(InputError) as error:
-        train(arguments.pop("config", SHORT), out, **arguments)
+        train(SHORT, out, **arguments)
     assert files_of(out.parent) == before
     assert "\n" not in str(error.value)
     return str(error.value)
@@ -170,13 +169,10 @@ def test_folders_are_not_overwritten(tmp_path: Path) -> None:
     out = tmp_path / "out"
     train(SHORT, out)
     assert _refusal(out) == f"{out}: holds a training; allowed: --resume, or another folder"
-    other = SHORT.model_copy(update={"seed": 5})
-    assert "another config (seed differ)" in _refusal(out, config=other, resume=True)
     (out / CHECKPOINT).unlink()
     assert _refusal(out) == f"{out}: holds a policy; allowed: another folder"
     line = f"{out / CHECKPOINT}: no such file; allowed: the folder of a training"
     assert _refusal(out, resume=True) == line
-    assert "no such file" in _refusal(tmp_path / "nothing", resume=True)
 
 
 @pytest.mark.parametrize("name", ["manifest.json", ".bashrc", "missions/a.parquet"])
@@ -271,23 +267,9 @@ def test_a_training_that_diverges_ends_and_keeps_the_best_policy(tmp_path: Path)
     train(SHORT, tmp_path, resume=True)
 
 
-def test_what_takes_more_memory_than_is_available_has_to_be_accepted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    out = tmp_path / "out"
-    monkeypatch.setattr(memory, "available_memory", lambda: 10**6)
-    line = _refusal(out)
-    assert line.startswith("training tiny: about 0.0 GiB of memory, of which 0.0 are available; ")
-    assert line.endswith(", or --yes")
-    assert not out.exists()
-    train(SHORT, out, accept_size=True)
-
-
 def test_without_cuda_there_is_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     assert device_of("auto") == CPU
-    with pytest.raises(InputError, match="no CUDA device here; allowed: auto, cpu"):
-        device_of("cuda")
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     assert device_of("auto").type == device_of("cuda").type == "cuda"
     assert device_of("cpu") == CPU

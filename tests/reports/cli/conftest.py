@@ -5,7 +5,11 @@ import json
 import pytest
 
 from reports import cli
-from tests.analysis.small import small_study
+from tests.analysis.small import files_of, small_study
+
+# What a command may tell before it refuses: steps on a busy machine, what a training will take,
+# and that numba compiles in a new clone.
+PROGRESS = ("step", "compiling the simulator", "replay memory: ", "curves: tensorboard")
 
 
 @pytest.fixture
@@ -29,5 +33,22 @@ def dess_json(dess):
         code, out, _ = dess(*arguments, "--json")
         assert code == 0
         return json.loads(out)
+
+    return run
+
+
+@pytest.fixture
+def refusal(dess, tmp_path):
+    """Runs a command that is refused and leaves all files as they are; the line on stderr."""
+
+    def run(*arguments):
+        before = files_of(tmp_path)
+        code, out, err = dess(*arguments)
+        assert (code, out) == (2, "")
+        *progress, line = err.splitlines()
+        assert line.startswith("dess: error: ")
+        assert all(any(part in told for part in PROGRESS) for told in filter(None, progress))
+        assert files_of(tmp_path) == before
+        return line
 
     return run

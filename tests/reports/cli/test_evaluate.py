@@ -2,36 +2,22 @@
 
 import pytest
 
-EVALUATE_KEYS = [
-    "policy",
-    "missions",
-    "seed",
-    "engine",
-    "uav_slots",
-    "seconds",
-    "success",
-    "collection_ratio",
-    "collection_ratio_and_communication",
-    "reward",
-]
+METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 
 
-def test_evaluate_prints_the_contract(dess_json):
+def test_both_engines_have_the_same_means_in_their_intervals(dess_json):
     arguments = ("--scenario", "small.toml", "--missions", 40, "--seed", 7)
     policies = ("--policy", "greedy", "--policy", "greedy,random")
     rows = dess_json("evaluate", *arguments, *policies)
     assert [row["policy"] for row in rows] == ["greedy", "greedy,random"]
     for row in rows:
-        assert list(row) == EVALUATE_KEYS
         assert (row["missions"], row["seed"], row["engine"]) == (40, 7, "batch")
-        assert row["uav_slots"] > 0
-        assert row["seconds"] > 0
-        for metric in EVALUATE_KEYS[6:]:
-            assert list(row[metric]) == ["mean", "low", "high"]
+        assert row["uav_slots"] > 0 and row["seconds"] > 0
+        for metric in METRICS:
             assert row[metric]["low"] <= row[metric]["mean"] <= row[metric]["high"]
     (events,) = dess_json("evaluate", *arguments, "--policy", "greedy", "--engine", "events")
     assert events["engine"] == "events"
-    for metric in ["uav_slots", *EVALUATE_KEYS[6:]]:
+    for metric in ("uav_slots", *METRICS):
         assert events[metric] == rows[0][metric]
 
 
@@ -41,7 +27,7 @@ def test_evaluate_is_the_mean_of_its_missions(dess_json):
     missions = [
         dess_json("simulate", *scenario, "--policy", "random", "--replication", r) for r in range(3)
     ]
-    for metric in ("success", "collection_ratio", "collection_ratio_and_communication"):
+    for metric in METRICS[:3]:
         mean = sum(mission[metric] for mission in missions) / 3
         assert row[metric]["mean"] == pytest.approx(mean)
 

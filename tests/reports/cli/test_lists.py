@@ -29,19 +29,6 @@ def test_names_are_listed(dess):
         assert [line.split()[0] for line in out.splitlines()] == names
 
 
-def test_the_help_imports_nothing_heavy():
-    script = (
-        "import sys; from reports.cli import main; code = main(['--help']); "
-        "heavy = {'numpy', 'numba', 'pandas', 'pyarrow', 'scipy', 'pydantic', 'matplotlib', "
-        "'torch'}; print(*heavy & set(sys.modules), end='', file=sys.stderr); sys.exit(code)"
-    )
-    command = [sys.executable, "-c", script]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment())
-    assert (done.returncode, done.stderr) == (0, "")
-    for command in ("simulate", "evaluate", "study", "report", "policies", "scenarios", "studies"):
-        assert f"  {command}" in done.stdout
-
-
 def test_a_scenario_is_shown_field_by_field(dess, dess_json):
     code, out, err = dess("scenarios", "show", "fig1", "--set", "uavs=2")
     assert (code, err) == (0, "")

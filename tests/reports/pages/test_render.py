@@ -1,7 +1,6 @@
 """Rendering, with tiny notebooks: complete pages that are the same whenever they are made, or an
 error in one line."""
 
-import json
 import os
 import re
 import shutil
@@ -9,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,15 +17,13 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
-from analysis import load_results, run_study
+from analysis import run_study
 from dess import InputError
 from reports.cli import main
 from reports.pages import kernels
-from reports.pages.html import STUDY, embedded
 from reports.pages.notebook import Report
 from reports.pages.render import ReportError, body_of, render
 from tests.analysis.small import environment, small_study
-from tests.reports.browser import Visit
 from tests.reports.small import Links, words_of
 
 MISSION = """
@@ -241,19 +238,6 @@ def test_the_index_has_a_card_per_page_and_every_page_a_bar(files: dict[str, str
         assert f'href="{name}.html" aria-current="page"' in bar
 
 
-def test_pages_carry_the_evidence_of_their_studies(files: dict[str, str], results: Path) -> None:
-    manifest = load_results(results / "trial").store.manifest
-    for name in ("mission.html", "index.html"):
-        (evidence,) = (json.loads(text) for text in embedded(STUDY, files[name]))
-        assert (evidence["study"]["name"], evidence["key"]) == ("trial", manifest.key)
-
-
-def test_files_show_no_paths_and_no_times(files: dict[str, str], results: Path) -> None:
-    for text in files.values():
-        assert str(results) not in text
-        assert not re.search(r"\b\d\d:\d\d:\d\d\b|\b20\d\d-\d\d-\d\d\b", text)
-
-
 @pytest.mark.usefixtures("files")
 def test_progress_counts_the_cells(progress: list[tuple[int, int, str]]) -> None:
     # Of the mission five cells with code, of the scorecard two.
@@ -288,17 +272,6 @@ def test_a_notebook_runs_in_jupyter_and_shows_what_the_page_shows(
     NotebookClient(notebook, resources={"metadata": {"path": str(folder)}}).execute()
     assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
     assert body_of(notebook).html in (folder / "mission.html").read_text("utf-8")
-
-
-@pytest.mark.usefixtures("files")
-def test_pages_fit_a_phone_and_request_nothing(
-    visit: Callable[[Path, int], Visit], out: Path
-) -> None:
-    for name in ("mission.html", "index.html"):
-        opened = visit(out / name, 390)
-        assert opened.page.evaluate("document.documentElement.scrollWidth") <= 390
-        assert opened.requests == [(out / name).as_uri()]
-        assert opened.complaints == []
 
 
 def test_a_page_runs_nothing_of_the_working_directory(files: dict[str, str], trap: Path) -> None:

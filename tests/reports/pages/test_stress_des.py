@@ -107,28 +107,6 @@ def test_no_number_of_the_model_is_typed() -> None:
     assert all(len(of_scenario) > 30 for of_scenario in numbers)
 
 
-def test_studies_say_what_they_are_about() -> None:
-    others = [Manifest.of(load_study(name)).data for name in ("fig5", "sweet-spot")]
-    rows = stress_des.describe(manifest(), others).studies.set_index("Study")
-    for data in others:
-        study = data["study"]
-        row = rows.loc[study["name"]]
-        assert (row["Aim"], row["Design"]) == (study["description"], study["design"]["kind"])
-        assert row["Design points"] == str(len(data["points"]))
-        assert "ddqn" in row["Policies"]
-    assert "by a selection" in rows.loc["sweet-spot", "Missions per policy and point"]
-    texts = items(manifest(), *others)
-    assert "`initial_data`" in texts["2.3"] and "`uavs`" in texts["2.3"]
-    assert "`ddqn`" in texts["2.4"]
-
-
-def test_missions_are_those_of_the_manifests() -> None:
-    one = manifest() | {"missions": [[1234], [1234]]}
-    two = manifest() | {"missions": [[20, 7], [31, 1500]]}
-    missions = stress_des.describe(one, [two]).studies["Missions per policy and point"]
-    assert missions.tolist() == ["1,234", "7 to 1,500"]
-
-
 def test_scarce_pads_make_a_queue() -> None:
     queue = items(manifest(set={"pads": 1}))["2.5.4"]
     assert "With 1 pad for 1 to 3 UAVs, UAVs may have to wait" in queue

@@ -11,14 +11,13 @@ from pathlib import Path
 import nbformat
 import pandas as pd
 import pytest
-from nbclient import NotebookClient
 
 from analysis import load_results, run_study
 from analysis.answers import settings
 from dess import InputError
 from reports.pages import html
 from reports.pages.html import STUDY, embedded
-from reports.pages.render import body_of, render_study
+from reports.pages.render import render_study
 from reports.pages.verify import verify_page
 from tests.analysis.small import files_of, grid, small_study
 from tests.reports.small import Links, words_of
@@ -134,9 +133,7 @@ def test_it_is_verified(page, out):
 
 
 @pytest.mark.slow
-def test_the_same_results_give_the_same_bytes_and_the_notebook_shows_them(
-    page, folder, out, tmp_path, monkeypatch
-):
+def test_the_same_results_give_the_same_bytes(page, folder, out, tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONHASHSEED", "5")
     render_study(folder, tmp_path / "a" / "b")
     again = files_of(tmp_path / "a" / "b")
@@ -144,19 +141,10 @@ def test_the_same_results_give_the_same_bytes_and_the_notebook_shows_them(
     assert again["index.html"] == files_of(out)["index.html"]
     notebook = nbformat.read(out / "study-trial.ipynb", as_version=4)
     question = "# Which number of UAVs and number of charging pads for small.toml?"
-    assert notebook.cells.pop(0).source == f"{question}\n\nHow many UAVs &#38; pads?"
-    NotebookClient(notebook, resources={"metadata": {"path": str(out)}}).execute()
-    assert body_of(notebook).html in page
+    assert notebook.cells[0].source == f"{question}\n\nHow many UAVs &#38; pads?"
 
 
 # --- what is refused ---
-
-
-@pytest.mark.parametrize("name", ["speed", "results"])
-def test_an_unknown_parameter_is_refused(folder, tmp_path, name):
-    with pytest.raises(InputError, match=f"parameter: '{name}' is unknown to study-trial; allowed"):
-        render_study(folder, tmp_path / "out", parameters={name: 1})
-    assert not (tmp_path / "out").exists()
 
 
 def test_what_holds_no_complete_results_is_refused(tmp_path, folder):

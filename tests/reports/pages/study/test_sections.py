@@ -6,8 +6,6 @@ from html import unescape
 import pytest
 
 from analysis import run_study
-from dess import InputError
-from reports.pages import study
 from reports.pages.notebook import SHIPPED
 from reports.pages.study import TAGS, report_of
 from tests.analysis.small import grid, small_study
@@ -113,15 +111,3 @@ def test_the_title_is_that_of_the_study(tmp_path):
     report = report_of(tmp_path / "out")
     assert (report.name, report.title) == ("study-fleets", "Which policy for small.toml?")
     assert report.description == "greedy and random at the scenario small.toml."
-
-
-def test_a_metric_or_baseline_that_is_none_is_refused(tmp_path):
-    results = run_study(small_study(tmp_path, design=grid(quota=[20, 60])), tmp_path / "out")
-    assert study.metric_of(results, "reward") == "reward"
-    assert study.setting(results, 1) == "communication quota 60"
-    for metric in ("speed", "", 3):
-        with pytest.raises(InputError, match=f"metric: {metric!r} is unknown; allowed: success"):
-            study.metric_of(results, metric)
-    for point in (2, -1, "x"):
-        with pytest.raises(InputError, match=f"baseline: {point!r} is not a design .*: 0..1$"):
-            study.setting(results, point)

@@ -1,4 +1,4 @@
-"""A planner beside a learner: differences, the front, what each collects, and when it goes home."""
+"""A planner beside a learner: gaps to the bound, differences, and what each collects."""
 
 import numpy as np
 import pandas as pd
@@ -9,11 +9,83 @@ from analysis.answers import optimality
 from analysis.answers.optimality import ALL
 from analysis.bound import Bound
 from analysis.execution import jobs
-from analysis.names import PRODUCT
+from analysis.names import BOUND, GAP, PRODUCT
 from analysis.results.event_log import uav_slots
-from dess import InputError
 from policies.planner import Budget, Planner
 from tests.analysis.small import small_study
+
+
+class Made:
+    """Results of made-up missions."""
+
+    bounds = {(0, 0): None}
+
+    def __init__(self, missions):
+        self.missions = missions
+
+
+@pytest.fixture
+def made():
+    """Three missions of one UAV and two of two UAVs, by two policies; the gaps are by hand."""
+    gaps = {"low": [0.10, 0.20, 0.30, 0.2, 0.2], "high": [0.05, 0.15, 0.25, 0.0, 0.1]}
+    bound = np.array([0.7, 0.8, 0.9, 1.0, 1.0])
+    rows = [
+        {"policy": p, "point": 0, "replication": r, "uavs": u, BOUND: b, GAP: g, PRODUCT: b - g}
+        | {"success": 1, "collection_ratio": b - g, "reward": 0.0}
+        for p, of_policy in gaps.items()
+        for r, (u, b, g) in enumerate(zip([1, 1, 1, 2, 2], bound, of_policy, strict=True))
+    ]
+    return Made(pd.DataFrame(rows))
+
+
+def test_the_interval_is_that_of_paired_differences(made):
+    table = optimality.by_fleet(made).set_index(["uavs", "policy"])
+    row = table.loc[1, "low"]
+    # Gaps 0.1, 0.2 and 0.3: mean 0.2, deviation 0.1, t of 2 degrees of freedom 4.3027.
+    half = 4.3027 * 0.1 / np.sqrt(3)
+    assert row[GAP] == pytest.approx(0.2)
+    assert row[f"{GAP}_low"] == pytest.approx(0.2 - half, abs=1e-5)
+    assert row[f"{GAP}_high"] == pytest.approx(0.2 + half, abs=1e-5)
+    assert (row["n"], row[BOUND]) == (3, pytest.approx(0.8))
+    assert row[PRODUCT] == pytest.approx(row[BOUND] - row[GAP])
+    # The spread of the bounds and of the products, 0.1 each, is larger than that of the gaps here.
+    constant = table.loc[2, "low"]
+    assert constant[f"{GAP}_low"] == pytest.approx(constant[f"{GAP}_high"]) == pytest.approx(0.2)
+
+
+def test_rows_are_by_number_of_uavs_then_over_all(made):
+    table = optimality.by_fleet(made)
+    assert [*zip(table["uavs"], table["policy"], table["n"], strict=True)] == [
+        *((1, "low", 3), (1, "high", 3), (2, "low", 2), (2, "high", 2)),
+        *((optimality.ALL, "low", 5), (optimality.ALL, "high", 5)),
+    ]
+    assert table[GAP].tolist() == pytest.approx([0.2, 0.15, 0.2, 0.05, 0.2, 0.11])
+
+
+def test_the_sentence_is_about_fleets_whose_bound_says_something(made, monkeypatch):
+    text = optimality.in_words(made)
+    assert text.startswith("`high` is at most 39.8 points with 1 UAV (mean gap 15.0 [")
+    assert optimality.in_words(made, "low").startswith("`low` is at most 44.8 points")
+    table = optimality.by_fleet(made)
+    certain = table.assign(**{BOUND: table[BOUND].mask(table["uavs"] == 2, 1.0)})
+    assert {*optimality.useful(certain)["uavs"]} == {1}
+    monkeypatch.setattr(optimality, "by_fleet", lambda _: certain)
+    text = optimality.in_words(made)
+    assert "with 2 UAVs" not in text
+    assert text.endswith("The upper bound is 100 % for 2 UAVs, so there is no useful bound.")
+
+
+def test_results_without_bounds_have_no_gap(tmp_path, monkeypatch):
+    plain = run_study(small_study(tmp_path, missions=2), tmp_path / "plain")
+    assert optimality.by_fleet(plain).empty
+    bound = Bound(0.9, np.zeros((1, 3)), np.array([30]), 0)
+    monkeypatch.setattr(jobs, "upper_bound", lambda *_, **__: bound)
+    bounded = run_study(small_study(tmp_path, missions=2, bounds=True), tmp_path / "bounded")
+    table = optimality.by_fleet(bounded)
+    rows = table[table["uavs"] == optimality.ALL] if optimality.ALL in {*table["uavs"]} else table
+    means = bounded.missions.groupby("policy", sort=False)[PRODUCT].mean()
+    assert rows[GAP].tolist() == pytest.approx((0.9 - means).tolist())
+
 
 LOGGED = 3
 
@@ -32,22 +104,6 @@ def results(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(jobs, "upper_bound", one)
         return run_study(study, folder / "out")
-
-
-def test_differences_are_paired_by_fleet_and_over_all(results):
-    table = optimality.differences(results, ["tour", "greedy"], "random")
-    keys = table.loc[table["metric"] == PRODUCT, ["policy", "uavs"]].to_numpy().tolist()
-    assert keys == [[policy, uavs] for policy in ("tour", "greedy") for uavs in (1, 2, 3, ALL)]
-    wide = results.missions.pivot(index="replication", columns="policy", values=PRODUCT)
-    fleets = results.missions.query("policy == 'greedy'").set_index("replication")["uavs"]
-    rows = table[(table["policy"] == "greedy") & (table["metric"] == PRODUCT)].set_index("uavs")
-    for uavs in (1, 2, 3):
-        mine = (wide["greedy"] - wide["random"])[fleets == uavs]
-        assert rows.loc[uavs, "difference"] == pytest.approx(mine.mean())
-        assert rows.loc[uavs, "n"] == len(mine)
-    assert rows.loc[ALL, "n"] == 30
-    with pytest.raises(InputError, match="'none' is not in the study"):
-        optimality.differences(results, ["none"], "random")
 
 
 def test_the_answer_says_which_is_better_and_by_how_much(results):
@@ -87,16 +143,6 @@ def test_the_share_at_home_is_that_of_uavs_in_the_zone(results):
         inside += ((slots["x"] >= 5) & (slots["y"] <= 1)).sum()
         total += len(slots)
     assert table.loc[2, ["share", "n"]].tolist() == pytest.approx([inside / total, total])
-
-
-def test_sessions_are_those_of_the_logs(results):
-    logs = [results.events("greedy", 0, number) for number in range(LOGGED)]
-    sessions = [log[log["event"] == "charge_start"] for log in logs]
-    uavs = sum(len(log[(log["event"] == "mission_start") & (log["uav"] >= 0)]) for log in logs)
-    begun = pd.concat(sessions)
-    expected = [f"{len(begun) / uavs:.2f}", f"{begun['time'].mean():.1f}"]
-    row = optimality.returns(results, ["greedy"]).iloc[0].tolist()
-    assert row == ["greedy", *expected, f"{begun['battery'].mean():.1f} %", uavs]
 
 
 def test_the_example_is_the_first_of_the_smallest_fleets_with_a_log(results):

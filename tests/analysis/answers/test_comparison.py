@@ -1,0 +1,271 @@
+"""Two policies in the same missions: how they differ, where, and how long they take to decide."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import run_study
+from analysis.answers import comparison
+from analysis.answers.comparison import AHEAD, BEHIND, CALLS, OF_BASELINE, Pair
+from analysis.names import METRICS, PARAMETERS, PRODUCT
+from analysis.stats.differences import adjust, paired
+from analysis.stats.intervals import wilson
+from analysis.stats.verdict import INCONCLUSIVE
+from dess import InputError, simulate
+from policies import load
+from tests.analysis.small import grid, small_study
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    study = small_study(folder, policies=["random", "greedy", "nearest"], missions=40)
+    return run_study(study, folder / "out")
+
+
+@pytest.fixture
+def taught(monkeypatch):
+    """Make policies pass for learned ones: of every learner its trainings."""
+
+    def teach(*learners):
+        named = {f"learner {n}": names for n, names in enumerate(learners)}
+        monkeypatch.setattr(comparison, "learners", lambda results: named)
+
+    return teach
+
+
+def ranked(results):
+    means = results.missions.groupby("policy")[PRODUCT].mean()
+    return means.sort_values(ascending=False).index.tolist()
+
+
+def test_the_pair_is_the_best_learned_policy_and_the_best_other(results, taught):
+    first, second, third = ranked(results)
+    taught([second])
+    assert comparison.pair_of(results) == Pair(second, first, 2)
+    taught([third], [second])
+    assert comparison.pair_of(results) == Pair(second, first, 2)
+
+
+def test_without_a_learned_policy_the_best_two_are_the_pair(results):
+    first, second, _ = ranked(results)
+    assert comparison.pair_of(results) == Pair(first, second, 3)  # of three, any two
+
+
+def test_policies_may_be_named(results, taught):
+    first, second, third = ranked(results)
+    taught([first])
+    assert comparison.pair_of(results, heuristic=third) == Pair(first, third, 1)
+    assert comparison.pair_of(results, learned=third) == Pair(third, second, 1)
+    assert comparison.pair_of(results, third, first) == Pair(third, first, 1)
+
+
+def test_what_is_no_pair_is_refused(results, tmp_path):
+    with pytest.raises(InputError, match="learned: 'ddqn' is not in the study; allowed: random, "):
+        comparison.pair_of(results, learned="ddqn")
+    with pytest.raises(InputError, match="no two policies to compare among random, "):
+        comparison.pair_of(results, "greedy", "greedy")
+    alone = run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "out")
+    with pytest.raises(InputError, match="no two policies to compare among greedy; allowed: two"):
+        comparison.pair_of(alone)
+
+
+def test_duels_of_several_design_points_are_refused(tmp_path):
+    study = small_study(tmp_path, design=grid(uavs=[1, 2]), missions=2)
+    results = run_study(study, tmp_path / "out")
+    with pytest.raises(InputError, match="study trial: 2 design points; allowed: one"):
+        comparison.duels(results, Pair("greedy", "random", 1))
+
+
+def test_common_missions_are_worth_the_variance_that_they_save():
+    gains = pd.DataFrame({"metric": [*METRICS], "variance_reduction": [0.0, 0.5, 8 / 9]})
+    assert comparison.pairing(gains) == "9 times as many"
+    always = gains.assign(variance_reduction=1.0)
+    assert comparison.pairing(always) == "infinitely many"
+
+
+def test_missions_are_won_tied_lost_and_failed():
+    missions = missions_of(lambda t: 0, n=10).assign(
+        difference=[1, 1, 1, 1, 1, 0, 0, 0, -1, -1],
+        success=[1] * 8 + [0, 0],
+        success_baseline=[0] + [1] * 8 + [0],
+    )
+    table = comparison.outcomes(missions, Pair("ours", "theirs", 1))
+    assert dict(zip(table["Outcome"], table["Missions"], strict=True)) == {
+        "ours ahead": "5",
+        "level": "3",
+        "ours behind": "2",
+        "only ours fails": "1",
+        "only theirs fails": "1",
+    }
+    assert table["Share"].iloc[2] == "20.0 % [5.7, 51.0]"  # Wilson's interval of 2 in 10
+
+
+def test_the_worst_missions_and_the_most_lost():
+    missions = missions_of(lambda t: 0, n=4).assign(
+        collection_ratio=[0.9, 0.4, 0.8, 0.5],
+        **{PRODUCT: [0.0, 0.4, 0.0, 0.5]},
+        difference=[-0.9, 0.1, -0.2, -0.3],
+    )
+    assert comparison.worst(missions, 3)["replication"].tolist() == [2, 0, 1]
+    assert comparison.drawn(missions, Pair("ours", "theirs", 1)) == [
+        *(("ours", 2), ("theirs", 2)),
+        *(("ours", 0), ("theirs", 0)),
+    ]
+    assert comparison.most_lost(missions, 2)["replication"].tolist() == [0, 3]
+    assert comparison.most_lost(missions, 9)["replication"].tolist() == [0, 3, 2]
+
+
+def missions_of(gap, n=400, seed=1, **fixed):
+    """Missions with a difference that is a function of their parameters, and some noise."""
+    generator = np.random.default_rng(seed)
+    table = pd.DataFrame(
+        {
+            "replication": range(n),
+            "uavs": generator.integers(1, 4, n),
+            "flying_time": generator.integers(70, 81, n),
+            "charge_start": generator.integers(10, 51, n),
+            "charge_complete": generator.integers(60, 101, n),
+            "initial_data": generator.uniform(10, 15, n),
+        }
+    ).assign(**fixed)
+    theirs = generator.uniform(0.4, 0.5, n)
+    ours = theirs + gap(table) + generator.normal(0, 0.01, n)
+    for metric in METRICS:
+        ones = np.ones(n, int)
+        table[metric] = ones if metric == "success" else ours
+        table[f"{metric}_baseline"] = ones if metric == "success" else theirs
+    return table.assign(difference=ours - theirs)
+
+
+def test_bins_are_the_values_or_hold_about_as_many():
+    codes, names = comparison.bins(pd.Series([3, 1, 2, 3]))
+    assert (codes.tolist(), names) == ([2, 0, 1, 2], ["1", "2", "3"])
+    codes, names = comparison.bins(pd.Series(range(100)), 4)
+    assert np.bincount(codes).tolist() == [25, 25, 25, 25]
+    assert names == ["0–24", "25–49", "50–74", "75–99"]
+    values = np.random.default_rng(1).uniform(5, 20, 1000)
+    codes, names = comparison.bins(pd.Series(values), 5)
+    assert set(np.bincount(codes)) == {200}
+    assert all(values[codes == a].max() < values[codes == a + 1].min() for a in range(4))
+    codes, names = comparison.bins(pd.Series([0] * 90 + [*range(1, 11)]), 5)  # quantiles coincide
+    assert len(names) == codes.max() + 1 < 5 and names[0] == "0"
+
+
+def test_along_a_parameter_the_difference_is_that_of_its_missions():
+    missions = missions_of(lambda t: 0.05 * (t["uavs"] - 2))
+    table = comparison.along(missions, candidates=2)
+    assert table["field"].unique().tolist() == [*PARAMETERS]
+    assert (table.groupby("field")["n"].sum() == len(missions)).all()
+    by_uavs = table.query("field == 'uavs'").set_index("value")
+    assert by_uavs["verdict"].to_dict() == {"1": BEHIND, "2": INCONCLUSIVE, "3": AHEAD}
+    part = missions.query("uavs == 3")
+    sides = (part[PRODUCT + end].to_numpy() for end in ("", OF_BASELINE))
+    ends = paired(*sides, metric=PRODUCT)[:3]
+    assert by_uavs.loc["3", ["mean", "low", "high"]].tolist() == pytest.approx([*ends])
+    lost = wilson(int((part["difference"] < 0).sum()), len(part))
+    assert tuple(by_uavs.loc["3", ["behind", "behind_low", "behind_high"]]) == lost
+    expected = np.minimum(1, 2 * adjust(table["p"].to_numpy(), "holm"))
+    assert table["p_adjusted"].tolist() == expected.tolist()
+
+
+def test_what_all_missions_share_is_no_parameter():
+    missions = missions_of(lambda t: 0.1, uavs=2, flying_time=80)
+    assert comparison.varied(missions) == ["charge_start", "charge_complete", "initial_data"]
+    assert set(comparison.along(missions)["field"]) == {*comparison.varied(missions)}
+    fixed = {field: 50 for field in PARAMETERS}
+    alike = missions_of(lambda t: 0.1, **fixed)
+    assert comparison.along(alike).empty and comparison.dependence(alike).empty
+
+
+def test_dependence_finds_what_the_difference_depends_on():
+    table = comparison.dependence(missions_of(lambda t: 0.02 * t["uavs"])).set_index("field")
+    assert table.index[0] == "uavs"
+    assert table["explained"].is_monotonic_decreasing and 0.5 < table["explained"].iloc[0] < 1
+    assert table.loc["uavs", "p_adjusted"] < 1e-6
+    assert (table.drop("uavs")["p_adjusted"] > 0.05).all()
+    none = comparison.dependence(missions_of(lambda t: 0).assign(difference=0.1))
+    assert (none["p"] == 1).all() and (none["explained"] == 0).all()
+
+
+TICK = 2.0**-10  # seconds, so that no sum of ticks is rounded
+
+
+class Ticks:
+    """A clock that goes on by its step whenever it is read."""
+
+    def __init__(self, *steps):
+        self.steps, self.reads, self.time = steps, 0, 0.0
+
+    def __call__(self):
+        self.time += self.steps[self.reads % len(self.steps)]
+        self.reads += 1
+        return self.time
+
+
+@pytest.fixture(scope="module")
+def timed_study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("times")
+    (folder / "timed_here.py").write_text(
+        "from policies.heuristics import Greedy\nclass Mine(Greedy):\n    pass\n"
+    )
+    policies = ["greedy", f"{folder / 'timed_here.py'}:Mine", "random,greedy"]
+    return run_study(small_study(folder, policies=policies, missions=2), folder / "trial")
+
+
+@pytest.fixture(scope="module")
+def measured(timed_study):
+    """Calls that all take 2 ticks, with a tick in between."""
+    return comparison.measure(timed_study, Ticks(TICK, 2 * TICK))
+
+
+def test_times_are_those_of_the_calls_alone(measured):
+    for cost in measured.costs:
+        assert cost.median == cost.slow == 2 * TICK
+
+
+def test_calls_are_those_of_whole_missions(measured, timed_study):
+    """And no file of the timed_study is run."""
+    assert [cost.policy for cost in measured.costs] == ["greedy", "random,greedy"]
+    calls, greedy = 0, load("greedy")
+
+    class Counting:
+        name = "greedy"
+
+        def act(self, view):
+            nonlocal calls
+            calls += 1
+            return greedy.act(view)
+
+    for replication in range(CALLS):
+        if calls < CALLS:
+            simulate(timed_study.scenario(), Counting(), 7, replication)
+    assert measured.costs[0].calls == calls >= CALLS
+
+
+def test_slow_calls_make_the_upper_quantile(timed_study):
+    """Of ten calls one takes 9 ticks, the others one."""
+    clock = Ticks(*([0.0, TICK] * 9), 0.0, 9 * TICK)
+    cost = comparison.measure(timed_study, clock).costs[0]
+    assert (cost.median, cost.slow) == (TICK, 9 * TICK)
+
+
+def test_they_are_measured_once_for_the_same_results(timed_study, tmp_path, monkeypatch):
+    with pytest.raises(InputError, match=r"times-\w+.json: no such file; .* dess report"):
+        comparison.read(tmp_path, timed_study)
+    steps = []
+    comparison.make(tmp_path, timed_study, lambda *step: steps.append(step))
+    assert steps == [(1, 3), (2, 3), (3, 3)]
+    kept = comparison.read(tmp_path, timed_study)
+    monkeypatch.delattr(comparison, "measure")
+    comparison.make(tmp_path, timed_study)
+    assert comparison.read(tmp_path, timed_study) == kept
+
+
+def test_remarks_compare_the_pair_and_name_what_was_not_timed(measured, timed_study):
+    text = comparison.remarks(measured, timed_study, Pair("random,greedy", "greedy", 1))
+    assert "random,greedy takes 1 times as long as greedy." in text
+    assert text.endswith(f"Not timed: {timed_study.policies[1]}.")
+    assert measured.processor in text
+    without = comparison.remarks(measured, timed_study, Pair("greedy", "tour", 1))
+    assert "times as long" not in without
