@@ -27,17 +27,17 @@ from torch import nn
 from tqdm import tqdm
 
 from dess import load_scenario, simulate_batch
-from dess.observations.guard import guard
+from dess.guard import guard
 from dess.observations.observer import encoder_of
 from dess.observations.sets import Sets
 from dess.observations.states import CompactStates, compact_states, masks
 from dess.sea.families import FAMILIES, SETS
 from dess.view import View
-from policies.ddqn.config import MISSION_SEED, TrainingConfig, load_config
-from policies.ddqn.learner import soft_update
-from policies.ddqn.network import SetNetwork
-from policies.ddqn.policy import DDQN
-from policies.ddqn.trained import save_policy
+from policies.learner.config import MISSION_SEED, TrainingConfig, load_config
+from policies.learner.dqn import soft_update
+from policies.learner.network import SetNetwork
+from policies.learner.policy import LearnedPolicy
+from policies.learner.trained import save_policy
 from policies.planner import LongPlanner, Planner
 
 
@@ -124,7 +124,7 @@ def examples_on(name: str, kind: Round, weights: Path | None) -> Examples:
     space = load_scenario(name, uavs=uavs)
     other = None
     if weights:
-        other = DDQN("other", Sets, _network(load_config("any"), weights), True, None)
+        other = LearnedPolicy("other", Sets, _network(load_config("any"), weights), True, None)
     planner = TEACHERS.get(family, Planner)()
     demonstrator = Demonstrator(planner, kind.deviations, other, int(seed))
     simulate_batch(space, demonstrator, MISSION_SEED + int(seed), len(kind.deviations))

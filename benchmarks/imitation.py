@@ -26,14 +26,13 @@ from analysis.names import PRODUCT
 from analysis.stats.intervals import mean_interval
 from benchmarks.recorded import Recorded, Recorder
 from dess import load_scenario, simulate_batch
-from dess.observations.guard import guard
+from dess.guard import guard
 from dess.observations.states import CompactStates, masks
 from dess.view import View
-from policies.ddqn.config import MISSION_SEED, TrainingConfig, load_config
-from policies.ddqn.learner import Learner
-from policies.ddqn.replay import Batch
-from policies.ddqn.trained import save_policy
-from policies.ddqn.training import Training
+from policies.learner.config import MISSION_SEED, TrainingConfig, load_config
+from policies.learner.dqn import Batch, Learner
+from policies.learner.trained import save_policy
+from policies.learner.training import Training
 
 RECORDED, EVALUATED = 777_002, 777_001  # seeds of the planner's missions and of the evaluation
 HELD_OUT = 50  # of the planner's missions, which no training sees

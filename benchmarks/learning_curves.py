@@ -26,9 +26,9 @@ from dess import simulate_batch
 from dess.files.reading import paths_in
 from dess.files.tables import read_table, write_table
 from policies.base import Policy
-from policies.ddqn.config import TrainingConfig, load_config
-from policies.ddqn.session import device_of
-from policies.ddqn.training import Training
+from policies.learner.config import TrainingConfig, load_config
+from policies.learner.session import device_of
+from policies.learner.training import Training
 from policies.registry import TRAINED, load
 
 EVALUATION_SEED, MISSIONS = 900_000_001, 1000  # of the final evaluation

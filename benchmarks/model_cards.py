@@ -22,8 +22,8 @@ from dess import load_scenario, simulate_batch
 from dess.files.reading import read_text
 from dess.files.writing import write_file
 from policies.about import CARD
-from policies.ddqn.config import MISSION_SEED, load_config
-from policies.ddqn.description import read_description
+from policies.learner.config import MISSION_SEED, load_config
+from policies.learner.description import read_description
 from policies.registry import HEURISTICS, load
 
 # The seed of the missions of model cards, which neither training nor selection of weights uses.

@@ -8,8 +8,8 @@ import torch
 import policies
 from benchmarks.conftest import MISSIONS, SEED
 from dess import load_scenario, simulate_batch
-from policies.ddqn.config import config_names, load_config
-from policies.ddqn.proximal import training_of
+from policies.learner.config import config_names, load_config
+from policies.learner.ppo import training_of
 
 DEVICES = ["cpu", *(["cuda"] if torch.cuda.is_available() else [])]
 

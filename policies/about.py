@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import dess
 from dess.files.reading import Missing, read_text
 from dess.scenario import SAMPLED, load_scenario, scenario_names
-from policies.ddqn.description import read_description
+from policies.learner.description import read_description
 from policies.registry import FILE, SHIPPED, TypedByUser, folder_of, load, package_of, trained_names
 
 CARD = "README.md"  # beside the weights of a trained policy

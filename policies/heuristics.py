@@ -9,9 +9,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from dess import streams
+from dess import guard, streams
 from dess.code.kernels import inlined, kernel
-from dess.observations import guard
 from dess.observations.reach import reach_of
 from dess.rules import data_left, flies
 from dess.sea.chart import distance, spread

@@ -104,7 +104,7 @@ def load(name: str | Path) -> Policy:
         return _made(name, SHIPPED[name][0], lambda: _class_of(*SHIPPED[name][0].split(":")))
     if folder := folder_of(name):
         needs("learning", f"policy {name}")
-        from policies.ddqn.trained import load_policy  # imports torch
+        from policies.learner.trained import load_policy  # imports torch
 
         policy = load_policy(folder)
         if name in trained_names():
@@ -136,7 +136,7 @@ def folder_of(name: str) -> Path | None:
 
 def _check_untrained(folder: Path) -> None:
     """Raise an error if a folder has a training that has not written any weights yet."""
-    from policies.ddqn.config import CHECKPOINT  # imports pydantic
+    from policies.learner.config import CHECKPOINT  # imports pydantic
 
     if os.path.exists(folder / CHECKPOINT):  # False for a name that no folder can have
         raise InputError(
@@ -260,7 +260,7 @@ def _outside() -> dict[str, EntryPoint]:
 
 def _description(folder: Path) -> str:
     """The description in the config of a trained policy, or the policy that it repeats."""
-    from policies.ddqn.description import read_description  # imports pydantic
+    from policies.learner.description import read_description  # imports pydantic
 
     training = read_description(folder).training
     if training.name == folder.name:

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from dess.files.locks import check_lock
-from dess.files.writing import check_target
+from dess.files.writing import check_lock, check_target
 
 INDEX = "index.html"
 LOCK = ".index.lock"  # held while the index is written, which shows the pages of all processes

@@ -30,7 +30,7 @@ ROOMS = {
 # What a floor must not import, besides the floors above it.
 REFUSED = {"dess": {"pandas"}, "policies": {"pandas"}}
 # What only the learner may import: it takes seconds to load, and most commands need none of it.
-LEARNER, LEARNING = "policies.ddqn", {"torch", "safetensors"}
+LEARNER, LEARNING = "policies.learner", {"torch", "safetensors"}
 # The libraries that only the classes made for them import; who uses these classes imports them.
 INTEGRATIONS = "dess.integrations"
 FOREIGN = {"agilerl", "benchmarl", "pufferlib", "ray", "rliable", "sb3_contrib"}

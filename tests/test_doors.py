@@ -39,8 +39,8 @@ ALLOWED = {
     "dess.code.kernels": {"read_bytes"},
     "dess.code.sources": {"read_bytes", "walk"},
     # A library that opens a file which the door has checked, or a temporary one of the door.
-    "policies.ddqn.tensors": {"safe_open", "save_file"},
-    "policies.ddqn.session": {"SummaryWriter"},
+    "policies.learner.tensors": {"safe_open", "save_file"},
+    "policies.learner.session": {"SummaryWriter"},
     "reports.cli.simulate": {"savefig"},
     "reports.player.animation": {"saving"},
     # The null device in the place of a closed stream; the licence of the package.
@@ -103,7 +103,7 @@ MADE_HERE = {"dumps", "to_json"}
 # Text that is parsed outside the door, by the module.
 PARSED = {
     # The header of a checkpoint, which is a ``Document``, as it was written: for its checksum.
-    "policies.ddqn.checkpoint": {"parse_json"},
+    "policies.learner.checkpoint": {"parse_json"},
     # Lists and tables that are no objects of JSON, by types of pydantic.
     "analysis.results.parquet": {"validate_json"},
     "reports.pages.verify": {"validate_json"},

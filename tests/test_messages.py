@@ -23,9 +23,9 @@ from dess.files.documents import Document
 from dess.record import MISSION_RECORD, UAV_RECORD
 from dess.scenario import Scenario, ScenarioSpace, validated
 from dess.sea import no_fly, nodes
-from policies.ddqn.checkpoint import Header
-from policies.ddqn.config import TrainingConfig, load_config
-from policies.ddqn.description import Description
+from policies.learner.checkpoint import Header
+from policies.learner.config import TrainingConfig, load_config
+from policies.learner.description import Description
 from policies.registry import TRAINED
 
 SECTIONS = {

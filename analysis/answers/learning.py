@@ -21,8 +21,8 @@ from dess import InputError
 from dess.errors import one_of
 from dess.files.reading import paths_in
 from dess.files.tables import read_table
-from policies.ddqn.config import TrainingConfig, learner_of
-from policies.ddqn.description import read_description
+from policies.learner.config import TrainingConfig, learner_of
+from policies.learner.description import read_description
 
 BASELINE = "quick"  # the variant with which the others of the shipped curves are compared
 SHIPPED = "ddqn"  # the variant of the shipped policy, which is trained longer

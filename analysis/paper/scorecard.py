@@ -32,9 +32,9 @@ from analysis.paper.measures import (
 from analysis.results.tables import Results
 from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED, position
 from dess import InputError
-from dess.files.parsing import parse_toml
+from dess.files.documents import parse_toml
 from dess.files.reading import read_text
-from policies.ddqn.config import TrainingConfig
+from policies.learner.config import TrainingConfig
 
 TRAININGS = "trainings"  # in place of the name of a study, for claims about learning curves
 

@@ -29,9 +29,8 @@ from analysis.results.chunks import FOLDERS, LOCK, MANIFEST, Chunk, Part, Presen
 from analysis.results.manifest import NO_TEAM, Cell, Manifest, Selected
 from analysis.study.study import Study
 from dess import InputError
-from dess.files.locks import locked
 from dess.files.reading import paths_in
-from dess.files.writing import check_folder, check_target, delete, make_folder, write_file
+from dess.files.writing import check_folder, check_target, delete, locked, make_folder, write_file
 
 _BUSY = "in use by another run; allowed: another --out, or wait for its end"
 

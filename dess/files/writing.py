@@ -1,23 +1,23 @@
-"""Writing files completely or not at all.
+"""Writing files completely or not at all, and locks on folders.
 
-write_file(Path("table.json"), text)
-with replacing(Path("mission.gif")) as temporary:
-    animation.save(temporary)
+A temporary folder that a killed process has left is removed by a later one.
 """
 
 import os
 import re
 import secrets
+import shutil
 import stat
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
+from filelock import FileLock, Timeout
 from psutil import pid_exists
 
 from dess.errors import InputError
-from dess.files.reading import kind_of
+from dess.files.reading import kind_of, paths_in
 
 # The longest name of a file or a folder in the usual file systems [bytes].
 _LONGEST = 255
@@ -189,3 +189,79 @@ def delete(path: Path) -> None:
     if not path.is_dir():
         with writable(path):
             path.unlink(missing_ok=True)
+
+
+SUFFIX = ".lock"
+
+
+@contextmanager
+def locked(path: Path, busy: str, patience: float = 0.0) -> Iterator[None]:
+    """Let no other process work in a folder; the folder is made if there is none.
+
+    Args:
+        path: A file in the folder, which is there as long as the work goes on.
+        busy: What the message says if another process works there.
+        patience: How long to wait for the end of its work [s].
+
+    Raises:
+        InputError: If another process works there, or if the file cannot be written.
+    """
+    check_lock(path)
+    make_folder(path.parent)
+    lock = FileLock(path)
+    try:
+        with writable(path):
+            try:
+                lock.acquire(timeout=patience)
+            except Timeout:
+                raise InputError(f"{path.parent}: {busy}") from None
+        yield
+    finally:
+        if lock.is_locked:
+            _unlink(path)
+        lock.release()
+
+
+def check_lock(path: Path) -> None:
+    """Refuse a file that cannot be the lock of a folder, before a long computation begins.
+
+    Raises:
+        InputError: If it is a link or no regular file, or if the folder cannot be written.
+    """
+    check_target(path)
+    if path.is_symlink():
+        raise InputError(f"{path}: is a link; allowed: a folder without it")
+
+
+@contextmanager
+def temporary_folder(parent: Path, prefix: str) -> Iterator[Path]:
+    """Make a new folder, which only this user can read, and remove it at the end.
+
+    A file beside the folder is locked as long as the process lives. So the next call finds the
+    folders of processes that were killed, and removes them.
+
+    Args:
+        parent: The folder in which the new folder is made.
+        prefix: The beginning of its name.
+    """
+    for left in paths_in(parent, f"{prefix}*{SUFFIX}"):
+        with suppress(Timeout, OSError), FileLock(left, timeout=0):  # its process is dead
+            _remove(left)
+    lock = parent / f"{prefix}{secrets.token_hex(4)}{SUFFIX}"
+    with FileLock(lock), ExitStack() as cleaning:
+        for _ in range(2):  # an interrupt may end the first time in the middle
+            cleaning.callback(_remove, lock)
+        folder = lock.with_suffix("")
+        folder.mkdir(mode=0o700)
+        yield folder
+
+
+def _remove(lock: Path) -> None:
+    """Remove a locked file, and the folder that belongs to it."""
+    shutil.rmtree(lock.with_suffix(""), ignore_errors=True)
+    _unlink(lock)
+
+
+def _unlink(lock: Path) -> None:
+    with suppress(OSError):  # some systems keep an open file until it is closed
+        lock.unlink()

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dess import guard
 from dess.code.kernels import kernel
 from dess.errors import InputError
-from dess.observations import guard
 from dess.observations.reach import reach_of
 from dess.rules import data_left, legal_moves, may_act
 from dess.scenario import ScenarioSpace

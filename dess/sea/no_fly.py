@@ -5,7 +5,7 @@
 A map (``.txt``) has a line for each row of cells, from north to south: ``#`` is a no-fly cell and
 ``.`` an open one. A CSV file has cells or degrees (``dess.sea.positions``). A GeoJSON file has
 Polygon and MultiPolygon features: a cell is a no-fly cell if its centre lies in one of them, and
-not in a hole. Degrees are projected as those of the nodes are (``dess.sea.projection``).
+not in a hole. Degrees are projected as those of the nodes are (``dess.sea.positions``).
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,8 +19,7 @@ from dess.errors import InputError, shown
 from dess.files.documents import Document
 from dess.files.reading import read_text
 from dess.sea.chart import Cell
-from dess.sea.positions import LIMIT, OnEarth, csv_positions
-from dess.sea.projection import Projection
+from dess.sea.positions import LIMIT, OnEarth, Projection, csv_positions
 
 _ALLOWED = "a GeoJSON FeatureCollection of polygons"
 

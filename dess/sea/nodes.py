@@ -3,7 +3,7 @@
     nodes = "buoys.csv"  # in the TOML file of a scenario: a file in the same folder
 
 A CSV file has cells or degrees (``dess.sea.positions``), a GeoJSON file Point features. Degrees are
-projected about the centre of their bounding box (``dess.sea.projection``).
+projected about the centre of their bounding box (``dess.sea.positions``).
 """
 
 from collections.abc import Sequence
@@ -16,8 +16,7 @@ from pydantic import Field
 from dess.errors import InputError
 from dess.files.documents import Document
 from dess.sea.chart import Cell
-from dess.sea.positions import LIMIT, OnEarth, Positions, csv_positions
-from dess.sea.projection import Projection
+from dess.sea.positions import LIMIT, OnEarth, Positions, Projection, csv_positions
 
 MAX_NODES, MAX_GRID = 1024, 256  # as of a scenario
 

@@ -1,20 +1,49 @@
-"""Positions in CSV and GeoJSON files: cells of the grid, or degrees of WGS 84.
-
-A CSV file has a header line, with either the columns ``x`` and ``y`` or the columns ``lon`` and
-``lat``; other columns are ignored. ``x`` and ``y`` are a cell of the grid, where (0, 0) is the
-north-western cell. GeoJSON (RFC 7946) has degrees.
-"""
+"""Positions in CSV and GeoJSON files: cells of the grid, or degrees projected on it."""
 
 import csv
 import io
+import math
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 from pydantic import AfterValidator
 
 from dess.errors import InputError, shown
 from dess.files.reading import read_text
+
+EARTH_RADIUS = 6_371_008.8  # mean radius of WGS 84 [m]
+
+
+class Projection(NamedTuple):
+    """The projection of a sea.
+
+    Attributes:
+        middle: Longitude and latitude of the centre of the grid [degrees].
+        size: Cells of the grid from west to east and from north to south.
+        cell_size: Side of a cell [m].
+    """
+
+    middle: tuple[float, float]
+    size: tuple[int, int]
+    cell_size: float
+
+    @classmethod
+    def about(cls, degrees: np.ndarray, size: tuple[int, int], cell_size: float) -> Self:
+        """The projection about the centre of the bounding box of (K, 2) places on the Earth."""
+        if np.ptp(degrees[:, 0]) > 180:  # on both sides of the 180th meridian
+            degrees = degrees + [360, 0] * (degrees < 0)
+        lon, lat = (degrees.min(0) + degrees.max(0)) / 2
+        return cls((float(lon), float(lat)), size, cell_size)
+
+    def cells(self, degrees: np.ndarray) -> np.ndarray:
+        """The (K, 2) places on the grid [cells] of (K, 2) places on the Earth; y grows south."""
+        away = degrees - self.middle
+        away[:, 0] -= 360 * np.round(away[:, 0] / 360)  # the short way around the Earth
+        degree = math.radians(1) * EARTH_RADIUS / self.cell_size  # of latitude [cells]
+        east = degree * math.cos(math.radians(self.middle[1]))
+        return np.array(self.size) / 2 + away * [east, -degree]
+
 
 LIMIT = 2**20  # bytes of the largest file
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from dess.errors import InputError, one_of, shown
-from dess.files.parsing import parse_toml
+from dess.files.documents import parse_toml
 
 
 def policies(start: str) -> list[str]:
@@ -39,7 +39,7 @@ def studies(start: str) -> list[str]:
 
 def configs(start: str) -> list[str]:
     """Names of shipped configs of trainings."""
-    from policies.ddqn.config import config_names
+    from policies.learner.config import config_names
 
     return _beginning(config_names(), start)
 

@@ -14,7 +14,7 @@ from reports.cli import console, options
 from reports.cli.options import SetOption, command, setting
 
 if TYPE_CHECKING:
-    from policies.ddqn.training import Training
+    from policies.learner.training import Training
 
 app = typer.Typer()
 MEASURED = 5.0  # seconds of training after which it is said how long it will take
@@ -48,7 +48,7 @@ def train(
         start: Trained policy whose weights the training begins with; with --resume, it has begun.
         yes: Train even if it takes more memory than is available.
     """
-    from policies.ddqn.config import CHECKPOINT, load_config, resume_command
+    from policies.learner.config import CHECKPOINT, load_config, resume_command
     from policies.registry import folder_of
 
     fields = dict(setting(text) for text in settings or [])
@@ -61,8 +61,8 @@ def train(
             f"--from: {shown(start)} is no trained policy; allowed: one, or its folder"
         )
     needs("learning", "dess train")
-    from policies.ddqn.learner import DivergenceError
-    from policies.ddqn.session import EVENTS, train
+    from policies.learner.dqn import DivergenceError
+    from policies.learner.session import EVENTS, train
 
     def announce(memory: int) -> None:
         """Print how much memory [bytes] the missions take, and how to see the curves."""

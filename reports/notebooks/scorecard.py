@@ -30,7 +30,7 @@ from analysis.figures.comparison import claims
 from analysis.paper import scorecard
 from analysis.results.chunks import MANIFEST
 from dess.files.reading import paths_in
-from policies.ddqn.description import read_description
+from policies.learner.description import read_description
 from reports.pages import html
 from reports.pages import scorecard as page
 

@@ -18,7 +18,7 @@ from analysis.answers.missions import keep_logs
 from analysis.results.tables import load_results
 from analysis.verification import measurements
 from dess import InputError
-from dess.files.locks import temporary_folder
+from dess.files.writing import temporary_folder
 from reports.pages import cells
 from reports.pages.cells import kill
 from reports.pages.notebook import Report

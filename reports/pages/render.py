@@ -24,9 +24,8 @@ from analysis.results.manifest import Manifest
 from dess import InputError
 from dess.code.sources import OURS
 from dess.files.documents import LIMIT
-from dess.files.locks import locked
 from dess.files.reading import paths_in, read_bytes, read_text
-from dess.files.writing import delete, write_files
+from dess.files.writing import delete, locked, write_files
 from reports.folders import INDEX, LOCK, check_pages
 from reports.pages import kernels
 from reports.pages.body import Body, fill

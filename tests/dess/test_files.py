@@ -12,14 +12,15 @@ import pytest
 from filelock import FileLock
 
 from dess.errors import InputError
-from dess.files.locks import locked, temporary_folder
-from dess.files.parsing import parse_json, parse_toml
+from dess.files.documents import parse_json, parse_toml
 from dess.files.reading import Missing, checked, paths_in, read_bytes, read_text
 from dess.files.writing import (
     check_folder,
     check_target,
+    locked,
     replacing,
     replacing_all,
+    temporary_folder,
     write_file,
     write_files,
 )
@@ -220,7 +221,7 @@ def test_an_interrupt_while_a_temporary_folder_is_removed_leaves_none(tmp_path, 
             raise interrupts.pop()
         remove(folder, **options)
 
-    monkeypatch.setattr("dess.files.locks.shutil.rmtree", interrupted)
+    monkeypatch.setattr("dess.files.writing.shutil.rmtree", interrupted)
     with pytest.raises(KeyboardInterrupt), temporary_folder(tmp_path, "t-") as folder:
         (folder / "file").write_text("half")
     assert not [*tmp_path.iterdir()]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import policies
 from dess.channel import world_of
-from dess.observations.guard import guard
+from dess.guard import guard
 from dess.observations.reach import reach_of
 from dess.rules import launch
 from dess.scenario import ScenarioSpace

@@ -79,7 +79,7 @@ def write_texts(ready: Path) -> None:
     shipped = (
         files("dess") / "scenarios",
         files("analysis") / "study/shipped",
-        files("policies") / "ddqn/configs",
+        files("policies") / "learner/configs",
     )
     for file in (file for folder in (TEXTS, *shipped) for file in folder.iterdir()):
         (ready / file.name).write_bytes(file.read_bytes())

@@ -22,8 +22,8 @@ from pyarrow.types import is_floating
 
 from analysis.results.chunks import name_of, short_hash
 from analysis.results.parquet import INDICES
-from policies.ddqn import tensors
-from policies.ddqn.session import CHECKPOINT
+from policies.learner import tensors
+from policies.learner.session import CHECKPOINT
 from reports.pages.verify import sealed
 from tests.analysis.hostile import hostile_folder
 from tests.fuzz.case import CWD, READY, SECRET_FILE

@@ -18,9 +18,9 @@ from dess.scenario import Scenario, load_scenario, scenario_names
 from policies import registry
 from policies.about import about
 from policies.base import Policy
-from policies.ddqn.config import config_of
-from policies.ddqn.trained import save_policy
-from policies.ddqn.training import build
+from policies.learner.config import config_of
+from policies.learner.trained import save_policy
+from policies.learner.training import build
 from policies.registry import SHIPPED, TypedByUser
 
 ROOT = Path(__file__).parents[2]

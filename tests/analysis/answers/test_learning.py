@@ -25,7 +25,7 @@ from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess import InputError
 from policies.registry import TRAINED
 from tests.analysis.small import grid, small_study
-from tests.policies.ddqn.tiny import tiny
+from tests.policies.learner.tiny import tiny
 
 
 def test_the_difference_of_means_is_welchs():

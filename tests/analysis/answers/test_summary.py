@@ -19,11 +19,11 @@ from analysis.numbers import why_nan
 from analysis.study.design import Saltelli
 from dess import InputError
 from policies import load
-from policies.ddqn.trained import save_policy
-from policies.ddqn.training import Training
+from policies.learner.trained import save_policy
+from policies.learner.training import Training
 from reports import cli
 from tests.analysis.small import grid, small_study, write_scenario
-from tests.policies.ddqn.tiny import CPU, PHASES, tiny
+from tests.policies.learner.tiny import CPU, PHASES, tiny
 
 FIELDS = ("edge_snr", "arrival_rate", "path_loss_exponent")  # names only: nothing is simulated
 INDICES = ["first", "first_low", "first_high", "total", "total_low", "total_high"]

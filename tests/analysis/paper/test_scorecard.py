@@ -32,7 +32,7 @@ from analysis.paper.scorecard import (
 from analysis.results.tables import Results
 from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from dess import InputError
-from policies.ddqn.description import read_description
+from policies.learner.description import read_description
 from policies.registry import TRAINED
 from tests.analysis.small import grid, small_study
 

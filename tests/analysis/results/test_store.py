@@ -120,11 +120,9 @@ def _simulated_by_other_code(out, *modules):
 
 
 def test_other_code_is_refused_by_its_modules(out, tmp_path):
-    _simulated_by_other_code(out, "dess.rules", "dess.observations.guard")
+    _simulated_by_other_code(out, "dess.rules", "dess.guard")
     before = files_of(out)
-    line = (
-        "made by other code of dess.observations.guard, dess.rules; allowed: .*, or --accept-code"
-    )
+    line = "made by other code of dess.guard, dess.rules; allowed: .*, or --accept-code"
     with pytest.raises(InputError, match=line):
         run_study(small_study(tmp_path), out)
     assert files_of(out) == before
@@ -160,9 +158,9 @@ def test_other_weights_are_refused_whatever_is_accepted(out, tmp_path):
 
 def test_a_policy_depends_on_the_modules_of_what_it_holds():
     learned = provenance.code_behind(["ddqn"])
-    held = {"policies.ddqn.policy", "policies.ddqn.network", "dess.observations.vector"}
+    held = {"policies.learner.policy", "policies.learner.network", "dess.observations.vector"}
     assert held <= learned.keys()
-    assert "policies.ddqn.training" not in learned
+    assert "policies.learner.training" not in learned
 
 
 def test_an_output_that_cannot_be_written(tmp_path):

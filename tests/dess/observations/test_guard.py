@@ -10,8 +10,8 @@ from hypothesis import event, given
 import policies
 from dess import streams
 from dess.batch import simulate_batch
+from dess.guard import guard
 from dess.mission import simulate
-from dess.observations.guard import guard
 from dess.observations.states import HOME, compact_states, masks
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import BATTERY, HOVER

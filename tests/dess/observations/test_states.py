@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 
 import dess
+from dess.guard import guard
 from dess.mission import simulate
 from dess.observations import states as column
-from dess.observations.guard import guard
 from dess.observations.states import compact_states, masks
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from dess import InputError, load_scenario
 from dess.sea.no_fly import centres_in, no_fly_in
-from dess.sea.projection import Projection
+from dess.sea.positions import Projection
 
 # A cell is a hundredth of a degree of latitude and, at the equator, of longitude; 0, 0 is the
 # centre of the grid.

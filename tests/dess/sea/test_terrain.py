@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from dess import streams
 from dess.sea.chart import FAR, spread
-from dess.sea.terrain import Draws, grow_island, make_coast, make_islands, make_lane
+from dess.sea.families import Draws, grow_island, make_coast, make_islands, make_lane
 
 seeds = st.integers(0, 10**9 - 1)
 

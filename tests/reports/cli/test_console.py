@@ -59,7 +59,7 @@ def test_no_control_character_reaches_the_terminal(tell, capsys):
 def test_a_warning_is_a_line_of_printable_characters(monkeypatch, capsys):
     monkeypatch.setattr(logging.root, "handlers", [])  # those of pytest
     assert cli.main(["scenarios"]) == 0
-    logging.getLogger("policies.ddqn").warning("%s\nuses other settings", RAW)
+    logging.getLogger("policies.learner").warning("%s\nuses other settings", RAW)
     err = capsys.readouterr().err
     assert is_printable(err)
     assert err.count("\n") == 1

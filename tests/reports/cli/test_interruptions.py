@@ -16,7 +16,7 @@ import safetensors
 from analysis import run_study
 from tests.analysis.small import files_of, small_study
 from tests.killing import Command, kill
-from tests.policies.ddqn.tiny import PHASES, write_config
+from tests.policies.learner.tiny import PHASES, write_config
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends signals")
 
@@ -91,7 +91,7 @@ def test_studies_that_are_killed_in_their_bounds_equal_an_undisturbed_one(
 CHECKPOINT = "checkpoint.safetensors"
 EVERY_TICK = (
     "sys.modules['torch.utils.tensorboard'] = None\n"
-    "from policies.ddqn import session; session.CHECKPOINT_EVERY = 0"
+    "from policies.learner import session; session.CHECKPOINT_EVERY = 0"
 )
 
 

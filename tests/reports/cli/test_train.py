@@ -16,14 +16,14 @@ import torch
 
 import policies
 from dess.code import memory
-from policies.ddqn import session
-from policies.ddqn.checkpoint import load_training
-from policies.ddqn.config import load_config
-from policies.ddqn.proximal import ProximalTraining
-from policies.ddqn.training import Training
+from policies.learner import session
+from policies.learner.checkpoint import load_training
+from policies.learner.config import load_config
+from policies.learner.ppo import ProximalTraining
+from policies.learner.training import Training
 from reports.cli import train
 from tests.analysis.small import files_of
-from tests.policies.ddqn.tiny import (
+from tests.policies.learner.tiny import (
     CPU,
     ON_SEAS,
     PHASES,

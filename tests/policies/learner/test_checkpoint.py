@@ -15,14 +15,14 @@ from safetensors.torch import load_file, save_file
 from dess import InputError
 from dess.errors import printable
 from dess.state import MISSION, SENSOR, UAV
-from policies.ddqn import tensors as files
-from policies.ddqn.checkpoint import load_training, save_training
-from policies.ddqn.config import CHECKPOINT
-from policies.ddqn.description import MODEL
-from policies.ddqn.trained import load_policy, save_policy
-from policies.ddqn.training import Training
+from policies.learner import tensors as files
+from policies.learner.checkpoint import load_training, save_training
+from policies.learner.config import CHECKPOINT
+from policies.learner.description import MODEL
+from policies.learner.trained import load_policy, save_policy
+from policies.learner.training import Training
 from tests.analysis.small import files_of, write_scenario
-from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, tiny
+from tests.policies.learner.tiny import CPU, PHASES, assert_same, tiny
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ from typing import Any
 import tomli_w
 import torch
 
-from policies.ddqn.config import TrainingConfig, config_of
-from policies.ddqn.training import Training
+from policies.learner.config import TrainingConfig, config_of
+from policies.learner.training import Training
 
 CPU = torch.device("cpu")
 PHASES: list[dict[str, Any]] = [

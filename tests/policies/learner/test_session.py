@@ -15,15 +15,15 @@ import torch
 
 import policies
 from dess import InputError
-from policies.ddqn import session
-from policies.ddqn.checkpoint import load_training
-from policies.ddqn.config import CHECKPOINT
-from policies.ddqn.description import CONFIG, MODEL
-from policies.ddqn.learner import DivergenceError
-from policies.ddqn.session import CURVE, LOCK, SIGNALS, device_of, train
-from policies.ddqn.training import Training
+from policies.learner import session
+from policies.learner.checkpoint import load_training
+from policies.learner.config import CHECKPOINT
+from policies.learner.description import CONFIG, MODEL
+from policies.learner.dqn import DivergenceError
+from policies.learner.session import CURVE, LOCK, SIGNALS, device_of, train
+from policies.learner.training import Training
 from tests.analysis.small import files_of
-from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, tiny
+from tests.policies.learner.tiny import CPU, PHASES, assert_same, tiny
 
 SHORT = tiny(
     phases=[phase | {"ticks": 20} for phase in PHASES], learning_starts=20, evaluate_every=8

@@ -30,11 +30,11 @@ from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import spread
 from dess.state import HOVER
-from policies.ddqn.config import MISSION_SEED, TrainingConfig
-from policies.ddqn.learner import check_finite, soft_update
-from policies.ddqn.network import SetNetwork
-from policies.ddqn.policy import ROWS
-from policies.ddqn.training import MISSIONS_PER_PHASE, SELECT_BY, Training, between
+from policies.learner.config import MISSION_SEED, TrainingConfig
+from policies.learner.dqn import check_finite, soft_update
+from policies.learner.network import SetNetwork
+from policies.learner.policy import ROWS
+from policies.learner.training import MISSIONS_PER_PHASE, SELECT_BY, Training, between
 
 TRACE = 0.98  # lambda of generalized advantage estimation
 CLIP = 0.2  # by which share an action may become more likely or less before it gains no more

@@ -16,12 +16,12 @@ from safetensors.torch import load_file, save_file
 
 from dess import InputError
 from dess.batch import simulate_batch
-from policies.ddqn import trained
-from policies.ddqn.description import CONFIG, MODEL
-from policies.ddqn.trained import load_policy, save_policy
-from policies.ddqn.training import Training
+from policies.learner import trained
+from policies.learner.description import CONFIG, MODEL
+from policies.learner.trained import load_policy, save_policy
+from policies.learner.training import Training
 from tests.analysis.small import files_of
-from tests.policies.ddqn.tiny import CPU, PHASES, tiny
+from tests.policies.learner.tiny import CPU, PHASES, tiny
 
 
 @pytest.fixture(scope="module")

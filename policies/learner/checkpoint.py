@@ -15,19 +15,18 @@ import torch
 from pydantic import Field, create_model
 
 from dess.errors import InputError
-from dess.files.documents import Document
-from dess.files.parsing import parse_json
+from dess.files.documents import Document, parse_json
 from dess.observations import states as column
 from dess.record import MISSION_RECORD
 from dess.scenario import SAMPLED, ScenarioSpace
 from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, types_of
-from policies.ddqn import tensors
-from policies.ddqn.config import CHECKPOINT, TrainingConfig
-from policies.ddqn.description import Name, Number, Sha256
-from policies.ddqn.proximal import training_of
-from policies.ddqn.tensors import Tensors, array_of, bytes_of, part
-from policies.ddqn.trained import require_version
-from policies.ddqn.training import METRICS, Training
+from policies.learner import tensors
+from policies.learner.config import CHECKPOINT, TrainingConfig
+from policies.learner.description import Name, Number, Sha256
+from policies.learner.ppo import training_of
+from policies.learner.tensors import Tensors, array_of, bytes_of, part
+from policies.learner.trained import require_version
+from policies.learner.training import METRICS, Training
 
 FORMAT = 2
 # Room for the header of a checkpoint; safetensors allows 100 MB.

@@ -21,7 +21,7 @@ CLOSE, DECIMALS = 1e-5, 9
 ROWS = 256
 
 
-class DDQN:
+class LearnedPolicy:
     """A network as a policy.
 
     Attributes:

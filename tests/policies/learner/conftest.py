@@ -2,7 +2,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.policies.ddqn.tiny import one_thread
+from tests.policies.learner.tiny import one_thread
 
 
 @pytest.fixture(autouse=True, scope="module")

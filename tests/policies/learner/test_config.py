@@ -8,13 +8,8 @@ import pytest
 import policies
 from dess import InputError
 from dess.scenario import load_scenario
-from policies.ddqn.config import (
-    config_names,
-    learner_of,
-    load_config,
-    resume_command,
-)
-from tests.policies.ddqn.tiny import PHASES, TINY, tiny, tiny_on_seas, write_config
+from policies.learner.config import config_names, learner_of, load_config, resume_command
+from tests.policies.learner.tiny import PHASES, TINY, tiny, tiny_on_seas, write_config
 
 PHASE = PHASES[0]
 BAD: list[tuple[dict[str, Any], str]] = [

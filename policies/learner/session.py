@@ -21,22 +21,21 @@ import dess
 from dess.batch import BATCH_SIZE
 from dess.code.memory import check_memory
 from dess.errors import InputError, shown
-from dess.files.locks import locked
 from dess.files.reading import paths_in
 from dess.files.tables import write_table
-from dess.files.writing import check_folder, writable
+from dess.files.writing import check_folder, locked, writable
 from dess.observations.observer import encoder_of
 from dess.observations.states import layout_of
 from dess.record import MISSION_RECORD
 from dess.state import MISSION, UAV
-from policies.ddqn.checkpoint import load_training, save_training
-from policies.ddqn.config import CHECKPOINT, TrainingConfig
-from policies.ddqn.description import MODEL
-from policies.ddqn.network import units_of
-from policies.ddqn.proximal import training_of
-from policies.ddqn.replay import ReplayMemory
-from policies.ddqn.trained import load_policy, save_policy
-from policies.ddqn.training import Training, build
+from policies.learner.checkpoint import load_training, save_training
+from policies.learner.config import CHECKPOINT, TrainingConfig
+from policies.learner.description import MODEL
+from policies.learner.dqn import ReplayMemory
+from policies.learner.network import units_of
+from policies.learner.ppo import training_of
+from policies.learner.trained import load_policy, save_policy
+from policies.learner.training import Training, build
 
 CURVE, EVENTS, LOCK = "training.parquet", "tensorboard", ".lock"
 CHECKPOINT_EVERY = 240.0  # seconds between checkpoints

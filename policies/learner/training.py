@@ -25,12 +25,11 @@ from dess.observations.states import CompactStates, Layout, compact_states, layo
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import FAR, spread
 from dess.state import HOVER, STEP_X, STEP_Y
-from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
-from policies.ddqn.learner import Learner
-from policies.ddqn.network import NARROWEST, DuelingNetwork, PaperNetwork, SetNetwork
-from policies.ddqn.policy import DDQN
-from policies.ddqn.replay import ReplayMemory
-from policies.ddqn.tensors import require_forms
+from policies.learner.config import MISSION_SEED, Phase, TrainingConfig
+from policies.learner.dqn import Learner, ReplayMemory
+from policies.learner.network import NARROWEST, DuelingNetwork, PaperNetwork, SetNetwork
+from policies.learner.policy import LearnedPolicy
+from policies.learner.tensors import require_forms
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 MISSIONS_PER_PHASE = 2**28
@@ -182,15 +181,15 @@ class Training:
             self.losses.append(self.learner.update(batch, rate))
             self.updates += 1
 
-    def policy(self, weights: dict[str, torch.Tensor]) -> DDQN:
+    def policy(self, weights: dict[str, torch.Tensor]) -> LearnedPolicy:
         """A policy with these weights."""
         _, network = build(self.config, self.layout)
         network.load_state_dict(weights)
         return self._as_policy(network)
 
-    def _as_policy(self, network: nn.Module) -> DDQN:
+    def _as_policy(self, network: nn.Module) -> LearnedPolicy:
         config = self.config
-        return DDQN(config.name, self.observation, network, config.guard, self.layout)
+        return LearnedPolicy(config.name, self.observation, network, config.guard, self.layout)
 
     def begin_with(self, weights: Mapping[str, torch.Tensor]) -> None:
         """Begin with the weights of another training.

@@ -7,10 +7,9 @@ import torch
 from torch import nn
 
 from dess.observations.states import masks
-from policies.ddqn.learner import Learner
-from policies.ddqn.replay import Batch
-from policies.ddqn.training import Training
-from tests.policies.ddqn.tiny import CPU, PHASES, tiny
+from policies.learner.dqn import Batch, Learner
+from policies.learner.training import Training
+from tests.policies.learner.tiny import CPU, PHASES, tiny
 
 LOSSES = {"mse": lambda e: e**2, "huber": lambda e: e**2 / 2 if e < 1 else e - 0.5}
 

@@ -14,29 +14,29 @@ from dess import InputError
 from dess.batch import simulate_batch
 from dess.channel import world_of
 from dess.env.stepper import MissionStepper
+from dess.guard import guard
 from dess.mission import simulate
-from dess.observations.guard import guard
 from dess.observations.sets import Sets, sea_of
 from dess.observations.states import ACTIVE, Layout, compact_states, layout_of
 from dess.observations.vector import Vector
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import constants_of
-from policies.ddqn.network import DuelingNetwork, SetNetwork
-from policies.ddqn.policy import DDQN
+from policies.learner.network import DuelingNetwork, SetNetwork
+from policies.learner.policy import LearnedPolicy
 from tests.drawn import PLAIN_SEA, Checked, Recorder, Wanderer, replications, seeds, spaces
 
 PAPER = load_scenario("paper")
 
 
-def _random(layout: Layout, guarded: bool = True, seed: int = 1) -> DDQN:
+def _random(layout: Layout, guarded: bool = True, seed: int = 1) -> LearnedPolicy:
     """A policy of random weights."""
     torch.manual_seed(seed)
     vector = Vector(layout)
     network = DuelingNetwork(vector.shapes[0][0], [32, 32])
-    return _exact(DDQN("random weights", vector, network, guarded, layout))
+    return _exact(LearnedPolicy("random weights", vector, network, guarded, layout))
 
 
-def _exact(policy: DDQN) -> DDQN:
+def _exact(policy: LearnedPolicy) -> LearnedPolicy:
     """The policy with close decisions in double precision, as one that is loaded has it."""
     policy.exact = copy.deepcopy(policy.network).double()
     return policy
@@ -53,12 +53,12 @@ class _Fixed(nn.Module):
         return self.values.expand(len(vector), 5)
 
 
-def _fixed(values: list[float], space: ScenarioSpace, guarded: bool = False) -> DDQN:
+def _fixed(values: list[float], space: ScenarioSpace, guarded: bool = False) -> LearnedPolicy:
     layout = layout_of(space)
-    return _exact(DDQN("fixed", Vector(layout), _Fixed(values), guarded, layout))
+    return _exact(LearnedPolicy("fixed", Vector(layout), _Fixed(values), guarded, layout))
 
 
-def _checked(policy: DDQN) -> Checked:
+def _checked(policy: LearnedPolicy) -> Checked:
     return Checked(policy, guard if policy.guarded else lambda view: view.legal)
 
 
@@ -139,10 +139,10 @@ def test_away_from_home_it_refuses(changes: dict[str, Any], problem: str) -> Non
 # --- on any sea ---
 
 
-def _any(seed: int = 1) -> DDQN:
+def _any(seed: int = 1) -> LearnedPolicy:
     """A policy of random weights that decides on any sea."""
     torch.manual_seed(seed)
-    return _exact(DDQN("any", Sets, SetNetwork(Sets.shapes, [16, 8, 16]), True, None))
+    return _exact(LearnedPolicy("any", Sets, SetNetwork(Sets.shapes, [16, 8, 16]), True, None))
 
 
 @settings(max_examples=8)

@@ -1,6 +1,6 @@
 """A trained policy as a folder: ``model.safetensors`` (the weights) and ``config.json``.
 
-``config.json`` describes the weights (``policies.ddqn.description``) and has their checksum.
+``config.json`` describes the weights (``policies.learner.description``) and has their checksum.
 """
 
 import copy
@@ -23,9 +23,9 @@ from dess.files.writing import write_file
 from dess.observations.observer import ENCODERS
 from dess.observations.states import layout_of
 from dess.scenario import ScenarioSpace
-from policies.ddqn import tensors
-from policies.ddqn.config import TrainingConfig, config_names, learner_of, resume_command
-from policies.ddqn.description import (
+from policies.learner import tensors
+from policies.learner.config import TrainingConfig, config_names, learner_of, resume_command
+from policies.learner.description import (
     CONFIG,
     FORMAT,
     MODEL,
@@ -34,8 +34,8 @@ from policies.ddqn.description import (
     Run,
     read_description,
 )
-from policies.ddqn.policy import DDQN
-from policies.ddqn.training import build
+from policies.learner.policy import LearnedPolicy
+from policies.learner.training import build
 
 # The largest file of weights that is read [bytes]; the largest network of a config is half of it.
 MODEL_LIMIT = 2**30
@@ -83,7 +83,7 @@ def save_policy(
     write_file(folder / CONFIG, _text(description, sums))
 
 
-def load_policy(folder: Path) -> DDQN:
+def load_policy(folder: Path) -> LearnedPolicy:
     """Load a policy that ``save_policy`` wrote.
 
     If the best two values are nearly equal, they are computed in double precision, so that an
@@ -119,7 +119,7 @@ def load_policy(folder: Path) -> DDQN:
     tensors.require_forms(weights, network.state_dict(), str(path))
     network = network.to_empty(device="cpu")
     network.load_state_dict(weights)
-    policy = DDQN(config.name, observation, network, config.guard, layout)
+    policy = LearnedPolicy(config.name, observation, network, config.guard, layout)
     policy.exact = copy.deepcopy(network).double()
     policy.learner = learner_of(config)
     policy.weights = tensors.digest([config.observation, config.guard, values], weights)

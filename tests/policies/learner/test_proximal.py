@@ -8,8 +8,8 @@ import torch
 
 from dess.observations.states import layout_of, masks
 from dess.scenario import load_scenario
-from policies.ddqn.checkpoint import load_training, save_training
-from policies.ddqn.proximal import (
+from policies.learner.checkpoint import load_training, save_training
+from policies.learner.ppo import (
     CLIP,
     TRACE,
     WORTH,
@@ -18,7 +18,7 @@ from policies.ddqn.proximal import (
     _with_range,
     training_of,
 )
-from tests.policies.ddqn.tiny import CPU, assert_same, tiny_on_seas, weights_of
+from tests.policies.learner.tiny import CPU, assert_same, tiny_on_seas, weights_of
 
 
 def _training(ticks: int = 0, **changes: object) -> ProximalTraining:

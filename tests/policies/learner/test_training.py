@@ -11,11 +11,11 @@ import torch
 from dess.observations.states import ACTIVE, CHARGING, compact_states, masks
 from dess.record import empty_records
 from dess.scenario import ScenarioSpace
-from policies.ddqn import training as module
-from policies.ddqn.checkpoint import load_training, save_training
-from policies.ddqn.replay import Batch
-from policies.ddqn.training import MISSION_SEED, SELECT_BY, Training
-from tests.policies.ddqn.tiny import (
+from policies.learner import training as module
+from policies.learner.checkpoint import load_training, save_training
+from policies.learner.dqn import Batch
+from policies.learner.training import MISSION_SEED, SELECT_BY, Training
+from tests.policies.learner.tiny import (
     CPU,
     PHASES,
     assert_same,
