@@ -1,4 +1,4 @@
-"""Sets: values by hand, and what a mirrored, rotated or renamed sea changes."""
+"""Sets: the plain ones, values by hand, and what a mirrored, rotated or renamed sea changes."""
 
 from typing import Any
 
@@ -14,12 +14,20 @@ from dess.observations.states import CompactStates, empty_states
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import NO_FLY
 from dess.state import constants_of, starts_of, state_of
+from tests.dess.observations.any_teams import any_teams
+from tests.dess.observations.plain_sets import arrays_of
 from tests.drawn import PLAIN_SEA, seas, spaces
 
 OWN_PART, ACTIONS, NODES, NODE_MOVES, MATES, MATE_MOVES, ZONES, ZONE_MOVES = range(8)
 NORTH, EAST, SOUTH, WEST, HOVER = range(5)
 # What becomes of the four moves on a sea that is mirrored along x, and on one that is transposed.
 MIRRORED, TRANSPOSED = [NORTH, WEST, SOUTH, EAST], [WEST, SOUTH, EAST, NORTH]
+# Walls with a gap in the north or south, so that some ways are longer than the longest that counts.
+MAZE: dict[str, Any] = {
+    **{"grid": 81, "rows": 12, "nodes": ((0, 11), (40, 5), (78, 3), (80, 0)), "zone": (0, 4, 1, 2)},
+    "zones": [{"cells": (x, 2, 1, height)} for x, height in ((2, 1), (4, 1), (6, 1), (78, 10))],
+    "no_fly": [(x, y) for x in range(1, 80, 2) for y in range(12) if y != x % 4 // 2 * 11],
+}
 
 
 def _sets(space: ScenarioSpace) -> Sets:
@@ -38,30 +46,16 @@ def _cases(draw: st.DrawFn, **fixed: Any) -> tuple[dict[str, Any], CompactStates
 
 
 @st.composite
-def _teams(draw: st.DrawFn, space: ScenarioSpace) -> tuple[CompactStates, int]:
-    """A team of up to twelve in any state, more than missions come to, and a UAV that is active."""
-    cells, nodes = np.argwhere(space.chart.zones.T != NO_FLY), len(space.nodes)
-    rng, uavs = np.random.default_rng(draw(st.integers(0, 2**32 - 1))), draw(st.integers(1, 12))
-    states, shape = empty_states(1, uavs, nodes), (1, uavs)
-    states.missions[:, column.CHARGE_START] = rng.integers(10, 51, 1)
-    states.missions[:, column.CHARGE_COMPLETE] = rng.integers(60, 101, 1)
-    team = states.uavs
-    # Each mission has its own scales, so that numbers lie on both sides of the bounds on them. Some
-    # teams are on three cells, mostly neighbours.
-    spots = rng.integers(0, rng.choice([3, len(cells)], (1, 1)), shape)
-    spots += rng.integers(0, len(cells), (1, 1))
-    team[..., [column.X, column.Y]] = cells[spots % len(cells)]
-    team[..., column.BATTERY] = rng.integers(0, 101, shape)
-    team[..., column.NEEDED] = rng.integers(0, rng.choice([1, 12, 111, 400], (1, 1)), shape)
-    team[..., column.HOME] = rng.integers(0, rng.choice([20, 80], (1, 1)), shape)
-    flags = [column.ACTIVE, column.LATCH, column.CHARGING, column.MUST_CHARGE]
-    team[..., flags] = rng.random((*shape, 4)) < rng.random((1, 1, 4))
-    team[..., column.MASK] = rng.integers(1, 32, shape)
-    most = rng.choice([0.0, 0.01, 20.0], (1, nodes), p=[0.4, 0.1, 0.5])
-    states.residual[:] = rng.uniform(0, most)
-    uav = draw(st.integers(0, uavs - 1))
-    team[:, uav, column.ACTIVE] = 1
-    return states, uav
+def _worlds(draw: st.DrawFn, **sea: Any) -> tuple[ScenarioSpace, CompactStates, int]:
+    """A space, some missions with teams in any state on it, and a UAV that is active in each."""
+    data = draw(st.sampled_from([(0.0, 0.0), (0.0, 40.0), (8.0, 12.0)]))
+    space = draw(spaces(**sea, initial_data=data))
+    return space, *draw(_teams(space, 10))
+
+
+def _teams(space: ScenarioSpace, count: int = 1) -> st.SearchStrategy[tuple[CompactStates, int]]:
+    open_cells = np.argwhere(space.chart.zones.T != NO_FLY).tolist()
+    return any_teams(open_cells, len(space.nodes), count)
 
 
 def _space(sea: dict[str, Any]) -> ScenarioSpace:
@@ -93,6 +87,18 @@ def _turned_states(states: CompactStates, grid: int, transposes: bool) -> Compac
     bits = states.uavs[..., column.MASK, None] >> np.array([*moves, HOVER]) & 1
     team[..., column.MASK] = (bits << np.arange(5)).sum(-1)
     return states._replace(uavs=team)
+
+
+@pytest.mark.parametrize("sea", [{}, MAZE], ids=["drawn", "maze"])
+@given(st.data())
+def test_its_numbers_are_the_plain_ones(sea: dict[str, Any], data: st.DataObject) -> None:
+    """Without a tolerance: both round at the same places."""
+    space, states, uav = data.draw(_worlds(**sea))
+    missions = np.arange(len(states.missions))
+    parts = _sets(space).encode(states, missions, np.full_like(missions, uav))
+    for b in missions:
+        for part, plain in zip(parts, arrays_of(space, states, b, uav), strict=True):
+            np.testing.assert_array_equal(part[b], plain)
 
 
 @given(_cases(), st.booleans())
