@@ -32,7 +32,7 @@ from analysis.paper.measures import (
 from analysis.results.tables import Results
 from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED, position
 from dess import InputError
-from dess.files.documents import parse_toml
+from dess.files.parsing import parse_toml
 from dess.files.reading import read_text
 from policies.learner.config import TrainingConfig
 

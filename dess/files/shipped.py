@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from dess.errors import InputError, one_of, shown
-from dess.files.documents import is_text, parse_toml
+from dess.files.parsing import is_text, parse_toml
 from dess.files.reading import Missing, read_text
 
 # The largest TOML file that is read [bytes].

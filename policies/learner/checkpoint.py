@@ -15,7 +15,8 @@ import torch
 from pydantic import Field, create_model
 
 from dess.errors import InputError
-from dess.files.documents import Document, parse_json
+from dess.files.documents import Document
+from dess.files.parsing import parse_json
 from dess.observations import states as column
 from dess.record import MISSION_RECORD
 from dess.scenario import SAMPLED, ScenarioSpace

@@ -53,7 +53,7 @@ def test_a_chunk_that_raises_is_recorded_and_the_rest_goes_on(plugin, tmp_path):
 def test_what_the_store_refuses_is_a_failure_of_its_chunk(tmp_path, monkeypatch):
     keys = set()  # of the cell of either team
 
-    def refuse_the_second(tables, rows, seed):
+    def refuse_the_second(tables, rows):
         (key, start, _), *_ = rows
         keys.add(key)
         if len(keys) == 2 and start == 4:
