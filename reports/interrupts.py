@@ -84,7 +84,7 @@ class Interrupts(AbstractContextManager["Interrupts"]):
             while time.process_time() < end and not self.received:
                 time.sleep(0.05)
             if not self.received and signal.getsignal(number[0]) == self._receive:
-                os.write(2, f"{LINE}\n".encode())
+                os.write(2, f"\n{LINE}\n".encode())  # there may be a progress bar
                 os._exit(EXIT_CODE)
 
     def _unraisable(self, error: Any) -> None:

@@ -155,5 +155,5 @@ def test_a_signal_ends_a_command_that_is_in_code_that_notices_none():
     with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True) as child:
         assert child.stdout.readline() == "busy\n"
         child.send_signal(signal.SIGTERM)
-        assert child.communicate() == ("", LINE)
+        assert child.communicate() == ("", f"\n{LINE}")
     assert child.returncode == 130
