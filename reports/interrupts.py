@@ -29,8 +29,8 @@ class Interrupts(AbstractContextManager["Interrupts"]):
     signal. A signal that was ignored before, as SIGHUP under ``nohup``, stays ignored.
 
     While functions are compiled, and in other code that is not Python, the main thread notices no
-    signal for seconds. If the process is to end after the block, it ends then without a cleanup, as
-    after a kill, which results and pages survive.
+    signal for seconds. If the process is to end after the block, it then ends as after a kill,
+    which results and pages survive; only its temporary files are removed.
 
     Attributes:
         received: Whether there was a signal.
@@ -84,6 +84,9 @@ class Interrupts(AbstractContextManager["Interrupts"]):
             while time.process_time() < end and not self.received:
                 time.sleep(0.05)
             if not self.received and signal.getsignal(number[0]) == self._receive:
+                writing = sys.modules.get("dess.files.writing")
+                for path in [*writing.TEMPORARIES] if writing else ():
+                    path.unlink(missing_ok=True)
                 os.write(2, f"\n{LINE}\n".encode())  # there may be a progress bar
                 os._exit(EXIT_CODE)
 

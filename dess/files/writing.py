@@ -23,6 +23,7 @@ from dess.files.reading import kind_of, paths_in
 _LONGEST = 255
 # Temporary files: the number of their process, and a random one.
 _TEMPORARY = re.compile(r"\.dess-(\d{1,9})-[0-9a-f]+\.tmp")
+TEMPORARIES: set[Path] = set()  # of this process, to be removed where it ends without a cleanup
 
 
 def write_file(path: Path, content: str | bytes) -> None:
@@ -91,12 +92,14 @@ def _temporary(path: Path) -> Iterator[Path]:
     with writable(path):
         _check_place(path)
         temporary = path.with_name(f".dess-{os.getpid()}-{secrets.token_hex(4)}.tmp")
+        TEMPORARIES.add(temporary)
         _sweep(path.parent.absolute())
         try:
             temporary.touch(exist_ok=False)  # an interrupt may come as soon as the file is there
             yield temporary
         finally:
             temporary.unlink(missing_ok=True)
+            TEMPORARIES.discard(temporary)
 
 
 def check_target(path: Path) -> None:

@@ -136,25 +136,30 @@ def test_a_signal_during_the_imports_ends_the_command(tmp_path):
 
 
 BUSY = """
-import hashlib, sys
+import hashlib, pathlib, sys
 import dess.mission
+from dess.files.writing import replacing
 from reports.cli import main
 
 def busy(*_, **__):
-    print("busy", flush=True)
-    hashlib.pbkdf2_hmac("md5", b"", b"", 2**31 - 1)
+    with replacing(pathlib.Path("there")) as temporary:
+        temporary.touch()
+        print("busy", flush=True)
+        hashlib.pbkdf2_hmac("md5", b"", b"", 2**31 - 1)
 
 dess.mission.simulate, sys.argv = busy, ["dess", "simulate"]
 sys.exit(main())
 """
 
 
-def test_a_signal_ends_a_command_that_is_in_code_that_notices_none():
+def test_a_signal_ends_a_command_that_is_in_code_that_notices_none(tmp_path):
     """As the compiler of functions: the main thread runs no Python for a long time."""
     words, pipe = [sys.executable, "-c", BUSY], subprocess.PIPE
-    with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True) as child:
+    with subprocess.Popen(words, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True) as child:
         assert child.stdout.readline() == "busy\n"
+        assert len([*tmp_path.iterdir()]) == 1
         time.sleep(0.5)  # until it is there
         child.send_signal(signal.SIGTERM)
         assert child.communicate()[1].lstrip() == LINE
     assert child.returncode == 130
+    assert [*tmp_path.iterdir()] == []
