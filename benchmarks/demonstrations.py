@@ -27,10 +27,10 @@ from torch import nn
 from tqdm import tqdm
 
 from dess import load_scenario, simulate_batch
+from dess.guard import guard
 from dess.observations.observer import encoder_of
 from dess.observations.sets import Sets
 from dess.observations.states import CompactStates, compact_states, masks
-from dess.return_guard.guard import guard
 from dess.sea.families import FAMILIES, SETS
 from dess.view import View
 from policies.learner.config import MISSION_SEED, TrainingConfig, load_config

@@ -26,8 +26,8 @@ from analysis.names import PRODUCT
 from analysis.stats.intervals import mean_interval
 from benchmarks.recorded import Recorded, Recorder
 from dess import load_scenario, simulate_batch
+from dess.guard import guard
 from dess.observations.states import CompactStates, masks
-from dess.return_guard.guard import guard
 from dess.view import View
 from policies.learner.config import MISSION_SEED, TrainingConfig, load_config
 from policies.learner.dqn import Batch, Learner

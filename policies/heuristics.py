@@ -9,10 +9,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from dess import streams
+from dess import guard, streams
 from dess.code.kernels import inlined, kernel
-from dess.return_guard import guard, parking
-from dess.return_guard.reach import reach_of
+from dess.observations.reach import reach_of
 from dess.rules import data_left, flies
 from dess.sea.chart import distance, spread
 from dess.state import HOVER, STEP_X, STEP_Y
@@ -139,7 +138,7 @@ def _decide(
     kind, missions, uavs, residual, sensors, nodes, circuit, chart, reach, rows_mission, rows_uav
 ):  # fmt: skip
     actions = np.empty(len(rows_mission), np.int64)
-    memory = parking.parking_memory(chart, uavs.shape[1])
+    memory = guard.parking_memory(chart, uavs.shape[1])
     last, left = -1, 0.0
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
@@ -156,10 +155,10 @@ def _decide(
 def _action(kind, mission, team, i, data, left, sensors, nodes, circuit, chart, reach, memory):
     """The action of UAV ``i``; ``left`` are all data, ``memory`` is that of its parking cell."""
     u = team[i]
-    charge = parking.must_charge(mission, u, left)
-    home = parking.stays(u)
+    charge = guard.must_charge(mission, u, left)
+    home = guard.stays(u)
     if charge:
-        home = parking.parking_cell(mission, team, i, chart, memory, reach)
+        home = guard.parking_cell(mission, team, i, chart, memory, reach)
     safe = guard.safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
     goal_x, goal_y = home.x, home.y
     node = _goal(kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach)
@@ -178,7 +177,7 @@ def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
         if not safe >> action & 1:
             continue
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-        cost = parking.path_length(mission, team, i, chart, None, x, y, goal_x, goal_y)
+        cost = guard.path_length(mission, team, i, chart, None, x, y, goal_x, goal_y)
         cost += _CONTEST_COST[guard.contest(levels, action)]
         if cost < least:
             best, least = action, cost
@@ -191,7 +190,7 @@ def _goal(
 ):  # fmt: skip
     """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
     u = team[i]
-    spare = parking.slots_needed(mission, u)
+    spare = guard.slots_needed(mission, u)
     if charge:
         spare = u.battery - 1 - guard.margin(mission, u) - home.wait
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dess import guard
 from dess.code.kernels import kernel
 from dess.errors import InputError
-from dess.return_guard import guard, parking
-from dess.return_guard.reach import reach_of
+from dess.observations.reach import reach_of
 from dess.rules import data_left, legal_moves, may_act
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import Chart, zones_of
@@ -117,7 +117,7 @@ def compact_states(state: State, chart: Chart, guarded: bool) -> CompactStates:
 
 @kernel
 def _fill(missions, uavs, residual, guarded, chart, reach, out):
-    memory = parking.parking_memory(chart, uavs.shape[1])
+    memory = guard.parking_memory(chart, uavs.shape[1])
     for b in range(len(missions)):
         mission, team = missions[b], uavs[b]
         out.missions[b, CHARGE_START] = mission.charge_start
@@ -127,13 +127,13 @@ def _fill(missions, uavs, residual, guarded, chart, reach, out):
         for i in range(mission.uavs):
             u, row = team[i], out.uavs[b, i]
             row[X], row[Y], row[BATTERY] = u.x, u.y, u.battery
-            row[NEEDED] = min(max(parking.slots_needed(mission, u), 0), _MOST)
+            row[NEEDED] = min(max(guard.slots_needed(mission, u), 0), _MOST)
             row[ACTIVE], row[LATCH], row[CHARGING] = u.active, u.latch, u.charging
             row[MASK] = 1 << HOVER
             if not u.active:
                 continue
-            row[MUST_CHARGE] = parking.must_charge(mission, u, data)
-            home = parking.parking_cell(mission, team, i, chart, memory, reach)
+            row[MUST_CHARGE] = guard.must_charge(mission, u, data)
+            home = guard.parking_cell(mission, team, i, chart, memory, reach)
             battery = guard.battery_home(mission, team, i, chart, None, u.x, u.y, home, reach)
             row[HOME] = min(battery, _MOST)
             if may_act(u):

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
-from dess.return_guard.parking import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
+from dess.guard import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
 from dess.sea.chart import distance, in_zone, is_open
 from dess.sections.failures import working_pads
 from dess.sections.fleet import leg

@@ -16,8 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
-from dess.return_guard.guard import guard
-from dess.return_guard.parking import must_charge
+from dess.guard import guard, must_charge
 from dess.state import HOVER, STEP_X, State
 from dess.view import View
 from policies.heuristics import step_towards

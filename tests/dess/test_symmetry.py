@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import policies
 from dess.channel import world_of
-from dess.return_guard.guard import guard
-from dess.return_guard.reach import reach_of
+from dess.guard import guard
+from dess.observations.reach import reach_of
 from dess.rules import launch
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y, State, starts_of, state_of

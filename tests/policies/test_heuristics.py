@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 import policies
 from dess.batch import simulate_batch
 from dess.env.stepper import MissionStepper
+from dess.guard import guard
 from dess.mission import simulate
-from dess.return_guard.guard import guard
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from dess.state import HOVER
 from dess.view import View

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 
 import dess
+from dess.guard import guard
 from dess.mission import simulate
 from dess.observations import states as column
 from dess.observations.states import compact_states, masks
-from dess.return_guard.guard import guard
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER
 from dess.view import View

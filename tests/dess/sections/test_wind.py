@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import policies
 from dess import simulate
-from dess.return_guard.reach import reach_of
+from dess.observations.reach import reach_of
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import parking_of
 from dess.sections.wind import Wind, surcharges

@@ -14,11 +14,11 @@ from dess import InputError
 from dess.batch import simulate_batch
 from dess.channel import world_of
 from dess.env.stepper import MissionStepper
+from dess.guard import guard
 from dess.mission import simulate
 from dess.observations.sets import Sets, sea_of
 from dess.observations.states import ACTIVE, Layout, compact_states, layout_of
 from dess.observations.vector import Vector
-from dess.return_guard.guard import guard
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import constants_of
 from policies.learner.network import DuelingNetwork, SetNetwork

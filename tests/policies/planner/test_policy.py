@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import policies
 from dess import load_scenario, simulate, simulate_batch
 from dess.env.stepper import MissionStepper
-from dess.return_guard.guard import guard
+from dess.guard import guard
 from dess.scenario import ScenarioSpace
 from dess.view import View, acting_rows
 from policies.planner import Planner, plan_of

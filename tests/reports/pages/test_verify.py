@@ -235,10 +235,10 @@ def test_what_the_results_were_made_with_is_compared_with_what_is_here(results: 
     team = evidence.policies[0]
     member = team.members[0].model_copy(update={"weights": "other"})
     other = team.model_copy(update={"members": [member]})
-    code = evidence.code | {"dess.rules": "other", "dess.return_guard.guard": "other"}
+    code = evidence.code | {"dess.rules": "other", "dess.guard": "other"}
     changes = {"code": code, "policies": [other, *evidence.policies[1:]]}
     assert evidence.model_copy(update=changes).changes_here() == [
-        "made by other code of dess.return_guard.guard, dess.rules",
+        "made by other code of dess.guard, dess.rules",
         "made by other weights of random",
     ]
     older = evidence.model_copy(update={"version": "0.0.1"})

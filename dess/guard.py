@@ -1,8 +1,13 @@
-"""When UAVs must charge, and the plan of the charging pads: who charges when, and in which cell.
+"""The return guard: which actions let a UAV still reach the charging zone in time.
 
-The functions are compiled and work on the arrays of one mission; ``chart`` is a
-``dess.sea.chart.Chart``, ``reach`` the table of ``dess.return_guard.reach``. The rules are
-described in ``docs/concepts/return-guard.md``.
+    mask = guard(view)                                   # (R, 5), at least one action per row
+    actions = np.where(mask, values, -np.inf).argmax(1)
+
+A UAV that cannot fill its quota with its present battery must be able to reach a free cell of the
+charging zone, with a margin of some slots for detours around teammates. The rules are described in
+``docs/concepts/return-guard.md``. The functions below are compiled and work on the arrays of one
+mission; ``chart`` is a ``dess.sea.chart.Chart``, ``reach`` the table of
+``dess.observations.reach``.
 """
 
 import math
@@ -12,10 +17,14 @@ import numpy as np
 
 from dess.code.kernels import inlined, kernel
 from dess.constants import MOST_ZONES
-from dess.rules import flies
-from dess.sea.chart import distance, length_around
+from dess.observations.reach import reach_of
+from dess.rules import data_left, flies
+from dess.sea.chart import distance, in_zone, is_open, length_around
 from dess.sections.failures import working_pads
 from dess.sections.section import extension
+from dess.sections.wind import move_surcharge
+from dess.state import HOVER, STEP_X, STEP_Y
+from dess.view import View
 
 # Margin [cells] on the way to the zone per active teammate, since each may cause a detour.
 MARGIN_PER_TEAMMATE = 2
@@ -247,7 +256,7 @@ def _chooses_first(mission, uavs, i, chart, memory, reach):
     lacks = _plan(mission, uavs, i, -1, chart, memory, reach).lacks
     first = i if lacks > 0 else -1
     for j in range(mission.uavs):
-        if first < 0 and will_charge(mission, uavs[j]) and not is_parked(uavs[j]):
+        if first < 0 and _will_charge(mission, uavs[j]) and not is_parked(uavs[j]):
             first = j if _plan(mission, uavs, j, -1, chart, memory, reach).lacks > 0 else -1
     if first >= 0 and _plan(mission, uavs, i, first, chart, memory, reach).lacks > lacks:
         return -1
@@ -255,7 +264,7 @@ def _chooses_first(mission, uavs, i, chart, memory, reach):
 
 
 @inlined
-def will_charge(mission, u):
+def _will_charge(mission, u):
     """Whether a UAV in the air cannot fill its quota with its battery."""
     return flies(u) and u.battery < mission.flight_cost * slots_needed(mission, u)
 
@@ -325,8 +334,8 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
     for place in range(_sort(mission, uavs, first, memory.order)):
         j = memory.order[place]
         o = uavs[j]
-        charges = will_charge(mission, o)
-        if j != i and (o.grounded or o.pad_request >= 0 or (home_zone >= 0 and not charges)):
+        will_charge = _will_charge(mission, o)
+        if j != i and (o.grounded or o.pad_request >= 0 or (home_zone >= 0 and not will_charge)):
             continue
         if j != i and is_parked(o):  # it asks for a pad in this slot
             cell, slots, zone = np.int64(chart.nearest[o.y, o.x]), 0, np.int64(o.zone)
@@ -351,7 +360,7 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
                 break
         else:
             memory.planned[j] = cell
-            if not charges or not _plans_wait(mission, zone):
+            if not will_charge or not _plans_wait(mission, zone):
                 continue
             asked = _until_asked(mission, o, slots)
             if may_ask and zone == u.zone:
@@ -403,7 +412,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
             continue
         slots = path_length(mission, uavs, i, chart, None, u.x, u.y, x, y)
         wait = waiting_time(mission, u, zone, slots, memory.free)
-        until = battery_needed(mission, u, chart, u.x, u.y, x, y, slots, reach)
+        until = _battery(mission, u, chart, u.x, u.y, x, y, slots, reach)
         # the slots that lack if it begins to charge as soon as it may and a pad is free
         spare = u.battery - mission.charge_start
         lacks = max(max(until, spare) + wait + 1 - u.battery, 0)
@@ -486,7 +495,36 @@ def _take_pad(mission, u, zone, asked, free):
 
 
 @inlined
-def battery_needed(mission, u, chart, x, y, home_x, home_y, cells, reach):
+def margin(mission, u):
+    """The margin [%] on the way of UAV ``u`` to the zone for detours around teammates.
+
+    A detour goes forth and back, so the wind costs the most in one direction only.
+    """
+    return (mission.active - 1) * (MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most)
+
+
+@inlined
+def battery_home(mission, uavs, i, chart, planned, x, y, home, reach):
+    """The battery [%] that UAV ``i`` needs from a cell to its parking cell.
+
+    Args:
+        mission: ``MISSION`` record.
+        uavs: (I,) ``UAV`` records.
+        i: Index of the UAV.
+        chart: ``Chart``.
+        x, y: The cell.
+        home: ``Home``.
+        reach: The table of ``reach_of``. A detour around parked teammates is not in it; each of
+            its cells may cost the most.
+    """
+    if reach is None and is_crowded(mission, chart, chart.zones[home.y, home.x]):
+        return path_length(mission, uavs, i, chart, planned, x, y, home.x, home.y)
+    cells = path_length(mission, uavs, i, chart, None, x, y, home.x, home.y)
+    return _battery(mission, uavs[i], chart, x, y, home.x, home.y, cells, reach)
+
+
+@inlined
+def _battery(mission, u, chart, x, y, home_x, home_y, cells, reach):
     """The battery [%] for a way home of so many cells, those of a detour included."""
     if reach is None:
         return cells
@@ -496,3 +534,174 @@ def battery_needed(mission, u, chart, x, y, home_x, home_y, cells, reach):
     detour = cells - distance(chart, x, y, home_x, home_y)
     home = chart.nearest[home_y, home_x]
     return reach[home, u.slots_per_cell - 1, y, x] + detour * dearest
+
+
+@inlined
+def round_trip(mission, u, chart, x, y, home, reach):
+    """The battery [%] that UAV ``u`` needs to fly to a cell and from there to the zone.
+
+    Gusts on the way out are not considered; the safe moves are what keeps the zone in reach.
+    """
+    cells = distance(chart, x, y, home.x, home.y)
+    back = _battery(mission, u, chart, x, y, home.x, home.y, cells, reach)
+    if mission.zones > 1:  # once there, another zone may be nearer
+        near = chart.parking[chart.nearest[y, x]]
+        cells = distance(chart, x, y, near[0], near[1])
+        back = min(back, _battery(mission, u, chart, x, y, near[0], near[1], cells, reach))
+    cells = distance(chart, u.x, u.y, x, y)
+    if reach is None:
+        return cells + back
+    against = max(mission.wind_x * (u.x - x), 0.0) + max(mission.wind_y * (u.y - y), 0.0)
+    return cells * u.slots_per_cell + int(against) + back
+
+
+@inlined
+def contests(mission, uavs, i):
+    """Whether teammates of UAV ``i`` may occupy the cells that its actions lead to.
+
+    Returns:
+        Two bits for each action, as ``contest`` reads them: 0 if the cell is free; 1 if a teammate
+        that gives way is on it; 2 if a teammate with the right of way (less battery; on a tie,
+        lower index) may come or stay there; 3 if a parked teammate is on it.
+    """
+    u = uavs[i]
+    levels = 0
+    for j in range(mission.uavs):
+        o = uavs[j]
+        east, south = o.x - u.x, o.y - u.y
+        if j == i or not o.active or abs(east) + abs(south) > 2:
+            continue
+        parked = is_parked(o)
+        goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
+        for action in range(5):
+            slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
+            level = 0
+            if slots == 0:
+                level = 3 if parked else 2 if goes_first else 1
+            elif slots == 1 and goes_first and not parked:
+                level = 2
+            levels += max(level - contest(levels, action), 0) << 2 * action
+    return levels
+
+
+@inlined
+def contest(levels, action):
+    """The two bits of ``contests`` for an action."""
+    return levels >> 2 * action & 3
+
+
+@inlined
+def _is_in_the_way(mission, uavs, i):
+    """Whether UAV ``i`` has just overruled a teammate that must charge and has less battery."""
+    for j in range(mission.uavs):
+        o = uavs[j]
+        blocked = o.overruled and o.overruled_by == i and o.battery < uavs[i].battery
+        if blocked and _will_charge(mission, o):
+            return True
+    return False
+
+
+@inlined
+def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
+    """Find the safe actions: those after which UAV ``i`` can still reach its parking cell in time.
+
+    If there is no such action, the actions that lead nearest to the parking cell are safe, except
+    moves into a cell that a teammate with the right of way may take; the UAV may spend its margin
+    to let this teammate pass. Moves off the grid, into a no-fly cell and into the cell of a parked
+    teammate are never safe. A UAV that has just been overruled also avoids cells that a teammate
+    may occupy: otherwise two UAVs could block each other until the battery of one of them is
+    depleted. A UAV leaves its cell if a teammate that must charge has just been overruled by it.
+
+    Args:
+        mission: ``MISSION`` record.
+        uavs: (I,) ``UAV`` records.
+        i: Index of the UAV.
+        chart: ``Chart``.
+        charge: Whether the UAV must charge; if not, every legal action is safe.
+        home: The result of ``parking_cell``.
+        planned: As in ``Parking``, as ``parking_cell`` leaves it.
+        reach: The table of ``reach_of``.
+
+    Returns:
+        The safe actions, a bit for each.
+    """
+    u = uavs[i]
+    if charge and u.pad_request >= 0:
+        return 1 << HOVER  # it would lose its place in the queue
+    reserve = margin(mission, u) + home.wait if charge else 0
+    # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
+    # that lead nearest to the parking cell, and those after which it is reached if the margin and
+    # the slots for a pad are spent.
+    clear = nearest = in_time = 0
+    least = 1_000_000  # battery [%] that lacks on the way to the parking cell
+    levels = contests(mission, uavs, i)
+    for action in range(5):
+        x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
+        # Teammates fly around a parked UAV, so it need not leave its cell for any.
+        stays = action == HOVER and is_parked(u)
+        contested = 0 if stays else contest(levels, action)
+        gives_way = charge and home.gives_way == 1 and action == HOVER
+        if not is_open(chart, x, y) or contested == 3 or gives_way:
+            continue
+        late = 0
+        if charge:
+            needed = battery_home(mission, uavs, i, chart, planned, x, y, home, reach)
+            needed += 1 if reach is None else _cost(mission, u, chart, action, x, y)
+            # One slot is the charging slot itself; the battery must not be depleted before it.
+            late = max(needed + 1 + reserve - u.battery, 0)
+        bit = 1 << action
+        if contested < 2:
+            clear |= bit
+        if late <= reserve:
+            in_time |= bit
+        if late < least:
+            least, nearest = late, 0
+        if late == least:
+            nearest |= bit
+    if nearest & clear and (least > 0 or u.overruled):
+        return nearest & clear
+    elsewhere = nearest & clear & ~(1 << HOVER)
+    if elsewhere and not is_parked(u) and _is_in_the_way(mission, uavs, i):
+        return elsewhere
+    if least > 0 and clear & in_time:
+        # these slots are there to wait or step aside until the teammate has passed
+        return clear & in_time
+    # Two UAVs that both insist block each other: the one without the right of way waits a slot.
+    if u.overruled and not nearest & clear and (least > 0 or nearest >> HOVER & 1):
+        return 1 << HOVER
+    return nearest or 1 << HOVER  # who gives way may have nowhere to go
+
+
+@inlined
+def _cost(mission, u, chart, action, x, y):
+    """The battery [%] for an action of a UAV that leads to a cell, in wind or at a low speed."""
+    if action == HOVER:
+        return 0 if u.latch and in_zone(chart, x, y) else 1
+    return u.slots_per_cell + move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
+
+
+@kernel
+def _mask(missions, uavs, residual, rows_mission, rows_uav, chart, reach):
+    masks = np.zeros((len(rows_mission), 5), np.bool_)
+    memory = parking_memory(chart, uavs.shape[1])
+    for row in range(len(rows_mission)):
+        b, i = rows_mission[row], rows_uav[row]
+        mission, team = missions[b], uavs[b]
+        charge = must_charge(mission, team[i], data_left(mission, residual[b]))
+        home = stays(team[i])
+        if charge:
+            home = parking_cell(mission, team, i, chart, memory, reach)
+        safe = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
+        for action in range(5):
+            masks[row, action] = safe >> action & 1
+    return masks
+
+
+def guard(view: View) -> np.ndarray:
+    """The (R, 5) mask of the actions after which the charging zone is still reached in time.
+
+    Every row allows at least one action. Any policy can restrict its choice to the mask.
+    """
+    state, chart = view.state, view.world.chart
+    reach = reach_of(state.missions, chart)
+    return _mask(state.missions, state.uavs, state.residual, view.mission, view.uav, chart, reach)

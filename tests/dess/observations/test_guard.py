@@ -10,9 +10,9 @@ from hypothesis import event, given
 import policies
 from dess import streams
 from dess.batch import simulate_batch
+from dess.guard import guard
 from dess.mission import simulate
 from dess.observations.states import HOME, compact_states, masks
-from dess.return_guard.guard import guard
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import BATTERY, HOVER
 from dess.view import View

@@ -1,1 +1,0 @@
-"""The return guard: when UAVs must charge, where, and which moves keep a charge in reach."""
