@@ -23,7 +23,7 @@ from dess.files.reading import kind_of, paths_in
 _LONGEST = 255
 # Temporary files: the number of their process, and a random one.
 _TEMPORARY = re.compile(r"\.dess-(\d{1,9})-[0-9a-f]+\.tmp")
-TEMPORARIES: set[Path] = set()  # of this process, to be removed where it ends without a cleanup
+_OWN: set[Path] = set()  # temporary files of this process
 
 
 def write_file(path: Path, content: str | bytes) -> None:
@@ -92,14 +92,20 @@ def _temporary(path: Path) -> Iterator[Path]:
     with writable(path):
         _check_place(path)
         temporary = path.with_name(f".dess-{os.getpid()}-{secrets.token_hex(4)}.tmp")
-        TEMPORARIES.add(temporary)
+        _OWN.add(temporary)
         _sweep(path.parent.absolute())
         try:
             temporary.touch(exist_ok=False)  # an interrupt may come as soon as the file is there
             yield temporary
         finally:
             temporary.unlink(missing_ok=True)
-            TEMPORARIES.discard(temporary)
+            _OWN.discard(temporary)
+
+
+def remove_temporaries() -> None:
+    """Delete the temporary files of this process, which ends without a cleanup."""
+    for temporary in [*_OWN]:
+        temporary.unlink(missing_ok=True)
 
 
 def check_target(path: Path) -> None:
