@@ -124,3 +124,18 @@ def test_ci_runs_every_nox_session() -> None:
     lines = re.findall(r"^\S*nox .*-s ([\w ]+?)(?: --|$)", (ROOT / ".ci/run").read_text(), re.M)
     assert {"tests", "verify", "fuzz"} <= set(defined)
     assert sorted(" ".join(lines).split()) == sorted(defined)
+
+
+def test_the_hooks_before_a_commit_are_what_lint_runs() -> None:
+    lint = (ROOT / "noxfile.py").read_text("utf-8").split("def lint(")[1].split("@nox")[0]
+    commands = [words.replace('", "', " ") for words in re.findall(r'session\.run\("(.+)"\)', lint)]
+    config = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text("utf-8"))
+    assert [hook["entry"] for hook in config["repos"][0]["hooks"]] == commands
+
+
+def test_the_workflow_runs_every_python_that_is_promised() -> None:
+    jobs = yaml.safe_load((ROOT / ".github/workflows/tests.yml").read_text("utf-8"))["jobs"]
+    pythons = jobs["all-sessions"]["strategy"]["matrix"]["python"]
+    claimed = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["classifiers"]))
+    assert pythons[0] == PROJECT["requires-python"].removeprefix(">=")
+    assert {*claimed} <= {*pythons}
