@@ -20,7 +20,7 @@ from analysis.study.study import Study
 from analysis.verification.measurements import CrossCheck
 from dess import InputError
 from dess.files.documents import Document
-from dess.record import MISSION_RECORD, UAV_RECORD
+from dess.record import MISSION_RECORD
 from dess.scenario import Scenario, ScenarioSpace, validated
 from dess.sea import no_fly, nodes
 from policies.learner.checkpoint import Header
@@ -110,11 +110,9 @@ def tables() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
             "curve": [ROW | {f"evaluation_{metric}": 0.5 for metric in METRICS}],
         },
     )
-    mission = {"policy": "greedy", **dict.fromkeys(MISSION_RECORD.names or (), 0)}
-    uav = {**dict.fromkeys(UAV_RECORD.names or (), 0), "end": "quota"}
+    mission = {"policy": "greedy", "replication": 0, "differs": ""}
     lists = {"missions": [mission], "rates": [0.5], "slots": [0.5, 0.5]}
-    of_uav = {"policy": "greedy", "replication": 0, "uav": 0, **uav}
-    yield CrossCheck, {"study": "0" * 16, "uavs": [of_uav]} | lists
+    yield CrossCheck, {"study": "0" * 16} | lists
 
 
 FLOORS = ("dess", "policies", "analysis", "reports")

@@ -54,7 +54,7 @@ def rates(table: pd.DataFrame, space: ScenarioSpace) -> Figure:
     """The mean rate against the distance: closed form, simulation and their difference.
 
     Args:
-        table: The result of ``lone_uav.rates``.
+        table: The result of ``measurements.rates``.
         space: The scenario.
     """
     away = np.geomspace(table["distance"].min(), table["distance"].max(), 60)

@@ -1,35 +1,23 @@
-"""What our results say on each claim of the paper, and the rules of its verdict."""
+"""What our results say on each claim of the paper: the evidence, and what is measured in it."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import hypot
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 import pandas as pd
 
-from analysis.answers import learning, main_effects, missions, summary
+from analysis import numbers
+from analysis.answers import learning, main_effects, missions
 from analysis.answers.learning import Transfer, last_phase, settled
-from analysis.answers.main_effects import Shape
 from analysis.names import RATIO, parameter, value_text
 from analysis.paper import values
-from analysis.paper.values import CROSSING
+from analysis.paper.rules import MARGIN
 from analysis.results.tables import Results
 from analysis.stats.intervals import Interval, bounded_interval, mean_interval, wilson
 from analysis.stats.intervals import summary as means_of
-from analysis.stats.verdict import (
-    ABOVE,
-    BELOW,
-    HOLDS,
-    IN_PART,
-    INCONCLUSIVE,
-    REFUTED,
-    above,
-    judged,
-    position_by_test,
-)
-from analysis.study.selection import Choice
+from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 
 
 class MissingError(Exception):
@@ -40,12 +28,27 @@ class Pairs(NamedTuple):
     """The values of a parameter, compared with each other.
 
     Attributes:
+        field: The parameter.
         changes: The result of ``main_effects.changes``.
         positions: The position of every value, by its text.
     """
 
+    field: str
     changes: pd.DataFrame
     positions: Mapping[str, int]
+
+    @property
+    def shape(self) -> main_effects.Shape:
+        """How the metric changes along the values."""
+        return main_effects.shape(self.changes)
+
+    @property
+    def course(self) -> str:
+        """The shape in words."""
+        shape = self.shape
+        tops = [value for value, position in self.positions.items() if position in shape.peaks]
+        peak = f", highest at {' or '.join(tops)}" if shape.words == main_effects.PEAK else ""
+        return f"it {shape.words}{peak}"
 
     def position(self, value: str) -> int:
         """The position of a value."""
@@ -113,7 +116,7 @@ class EvidenceOfPolicy:
         changes = main_effects.changes(
             self.results, self.effects, self.policy, field, metric, fewest_uavs
         )
-        return Pairs(changes, dict(zip(values["value"], values["position"], strict=True)))
+        return Pairs(field, changes, dict(zip(values["value"], values["position"], strict=True)))
 
     def logs(self, uavs: int) -> list[tuple[pd.DataFrame, np.ndarray]]:
         """The stored event logs of missions with a number of UAVs, each with the (K, 2) nodes."""
@@ -130,38 +133,13 @@ class EvidenceOfPolicy:
         ]
 
 
-def evidence_of_policy(
-    studies: Mapping[str, Results], study: str, learner: str = "", policy: str = ""
-) -> EvidenceOfPolicy:
-    """The results of one policy of a study, by default of its best learned policy.
-
-    Args:
-        studies: Results by the name of the study.
-        study: The study.
-        learner: A learner, to take its best policy.
-        policy: A policy, to take this one.
-    """
-    if study not in studies:
-        raise MissingError(f"the study {study} has not been run")
-    if policy:
-        if policy not in studies[study].policies:
-            raise MissingError(f"the study {study} has no policy {policy}")
-        return EvidenceOfPolicy(studies[study], policy)
-    learners = summary.learners(studies[study])
-    wanted = [learner] if learner else [*learners]
-    among = [trained for name in wanted for trained in learners.get(name, [])]
-    if not among:
-        which = f"policy {learner}" if learner else "learned policy"
-        raise MissingError(f"the study {study} has no {which}")
-    return EvidenceOfPolicy(studies[study], summary.best_policy(studies[study].missions, among))
-
-
 class EvidenceOfTrainings(NamedTuple):
     """Learning curves, and the names of the variants with and without transfer learning."""
 
     trainings: pd.DataFrame
     using: str
     without: str
+    policy: str = ""  # claims about trainings are about no policy
 
     def curves(self, metric: str) -> pd.DataFrame:
         """Smoothed curves of a metric."""
@@ -170,189 +148,16 @@ class EvidenceOfTrainings(NamedTuple):
     def transfer(self, metric: str) -> learning.Transfer:
         """The trainings with transfer learning, compared with those without."""
         curves = self.curves(metric)
-        return learning.transfer(curves, self.using, self.without, shortest=CROSSING)
-
-
-def evidence_of_trainings(
-    trainings: pd.DataFrame, variants: tuple[str, str] | None
-) -> EvidenceOfTrainings:
-    """The trainings of two variants, with transfer learning and without."""
-    if variants is None:
-        raise MissingError("no trainings of this policy with and without transfer learning")
-    if trainings.empty or not {*variants} <= {*trainings["variant"]}:
-        raise MissingError(f"no trainings {' and '.join(variants)}")
-    return EvidenceOfTrainings(trainings, *variants)
+        return learning.transfer(curves, self.using, self.without, shortest=values.CROSSING)
 
 
 NO_RESULTS = "no results"
 VERDICTS = (HOLDS, IN_PART, INCONCLUSIVE, REFUTED, NO_RESULTS)
 # The verdicts as pages write them: of claims that hold, those with an interval above the paper's
 # number exceed it; what holds in part without such a number is inconclusive.
-EXCEEDS, MATCHES, FALLS_SHORT, NOT_APPLICABLE = (
-    "exceeds",
-    "matches",
-    "falls short",
-    "does not apply",
-)
+EXCEEDS, MATCHES, FALLS_SHORT = "exceeds", "matches", "falls short"
+NOT_APPLICABLE = "does not apply"
 OUTCOMES = (EXCEEDS, MATCHES, FALLS_SHORT, INCONCLUSIVE, NOT_APPLICABLE)
-
-# A value is near a printed number if its interval is above that number - NEAR; a change is small if
-# it is less than NEAR.
-NEAR = 0.05
-# A smaller difference does not matter, unless the study of the sweet spot gives another margin.
-MARGIN = 0.01
-
-
-# Means, shares and differences.
-
-
-def reached(mean: Interval, printed: Interval) -> str:
-    """Whether a printed number is reached."""
-    difference = gap(mean, printed)
-    near = difference.low > -NEAR
-    if difference.high < 0:
-        return IN_PART if near else REFUTED
-    return HOLDS if near else INCONCLUSIVE
-
-
-def gap(mean: Interval, printed: Interval) -> Interval:
-    """How much higher a mean is than a printed number, which may have its own interval.
-
-    The interval of the difference is computed from the two intervals (R. G. Newcombe, Statistics in
-    Medicine 17 (1998) 873-890, method 10).
-    """
-    difference = mean.mean - printed.mean
-    below = hypot(mean.mean - mean.low, printed.high - printed.mean)
-    beyond = hypot(mean.high - mean.mean, printed.mean - printed.low)
-    return Interval(difference, difference - below, difference + beyond)
-
-
-def gained(difference: Interval, printed: Interval) -> str:
-    """Whether a metric rises, and by as much as the paper prints."""
-    near = difference.low > printed.mean - NEAR or None
-    return judged(above(difference), near if difference.high >= printed.mean else False)
-
-
-def higher(difference: Interval) -> str:
-    """Whether a metric is higher."""
-    return judged(above(difference))
-
-
-def lower(difference: Interval) -> str:
-    """Whether a metric is lower."""
-    return higher(Interval(-difference.mean, -difference.high, -difference.low))
-
-
-def slightly_lower(difference: Interval) -> str:
-    """Whether a metric falls, but only slightly."""
-    if difference.low > 0 or difference.high <= -NEAR:
-        return REFUTED
-    if difference.high >= 0:
-        return INCONCLUSIVE
-    return HOLDS if difference.low > -NEAR else IN_PART
-
-
-def kept(difference: Interval, margin: float) -> str:
-    """Whether a metric does not fall by more than the margin."""
-    return judged(above(difference, -margin))
-
-
-def most(share: Interval) -> str:
-    """Whether something occurs in most missions."""
-    return judged(above(share, 0.5))
-
-
-def never_all(ratio: Interval, whole: Interval) -> str:
-    """Whether the collection ratio stays below 100 %, by the share of missions that reach it."""
-    if whole.mean == 1:
-        return REFUTED
-    never = whole.mean == 0 and whole.high < NEAR
-    return judged(never or None, ratio.high < 1 or None)
-
-
-# Who serves which nodes.
-
-
-def ignored(share: Interval, beyond_others: Interval) -> str:
-    """Whether most nodes of a kind are ignored, and more of them than of the others."""
-    return judged(above(share, 0.5), above(beyond_others))
-
-
-def divided(beyond_chance: Interval, division: Interval) -> str:
-    """Whether UAVs have sectors, and nodes of their own."""
-    return judged(above(beyond_chance), above(division, 0.75))
-
-
-# The values of a parameter. ``leads`` are rows of ``main_effects.changes``, with signs such that a
-# difference is the value in question minus another value.
-
-
-def best(leads: pd.DataFrame) -> str:
-    """Whether the metric is highest at a value."""
-    tests = zip(leads["difference"], leads["p_adjusted"], strict=True)
-    positions = {position_by_test(difference, p) for difference, p in tests}
-    if BELOW in positions:
-        return REFUTED
-    return HOLDS if positions == {ABOVE} else INCONCLUSIVE
-
-
-lowest = best  # of differences with the other sign
-
-
-def no_lower(leads: pd.DataFrame, margin: float) -> str:
-    """Whether the metric at some values is not lower than at all others, up to a margin."""
-    if (leads["wide_high"] < -margin).any():
-        return REFUTED
-    return HOLDS if (leads["low"] > -margin).all() else INCONCLUSIVE
-
-
-def alike(changes: pd.DataFrame, margin: float) -> str:
-    """Whether the metric is the same at all values, up to a margin."""
-    if ((changes["wide_low"] > margin) | (changes["wide_high"] < -margin)).any():
-        return REFUTED
-    within = (changes["low"] >= -margin) & (changes["high"] <= margin)
-    return HOLDS if within.all() else INCONCLUSIVE
-
-
-def rises(shape: Shape) -> str:
-    """Whether the metric rises along the values."""
-    verdicts = {main_effects.RISES: HOLDS, main_effects.LEVELS: INCONCLUSIVE}
-    return verdicts.get(shape.words, REFUTED)
-
-
-def peaks(shape: Shape, wanted: int) -> str:
-    """Whether the metric rises up to a value and falls after it."""
-    if wanted not in shape.peaks:
-        return REFUTED
-    return HOLDS if shape.words == main_effects.PEAK else INCONCLUSIVE
-
-
-def chosen(choice: Choice, wanted: Collection[int]) -> str:
-    """Whether a selection has chosen one of the design points with these numbers."""
-    left = {choice.best, *choice.survivors}
-    return judged(left <= {*wanted} or (None if left & {*wanted} else False))
-
-
-# Learning curves, with transfer learning and without.
-
-
-def passes(transfer: Transfer) -> str:
-    """Whether the curve with transfer learning is above from some step to the end."""
-    return transfer.verdict
-
-
-def throughout(transfer: Transfer) -> str:
-    """Whether the curve with transfer learning is above at every step."""
-    in_part = transfer.verdict == HOLDS and not transfer.throughout
-    return IN_PART if in_part else transfer.verdict
-
-
-def levels_off(settled: float, transfer: Transfer) -> str:
-    """Whether training without transfer learning levels off early, and at a low value."""
-    if transfer.length < CROSSING:
-        return INCONCLUSIVE
-    return judged(settled <= 0.5 or None, above(transfer.last))
-
 
 Unit = Literal["share", "points", "reward", "steps", "number"]
 
@@ -361,107 +166,148 @@ SHUFFLES = 100
 
 
 class Quantity(NamedTuple):
-    """A quantity with its interval, if it has one.
+    """A quantity with its interval.
 
     Attributes:
-        value: The value, in its unit.
-        low: Lower end of the interval, or None.
-        high: Upper end of the interval, or None.
+        interval: The value and its interval, in its unit; without one, the ends are the value.
         n: Number of missions or trainings that it is computed from; 0 if it is not known.
         unit: ``share``, ``points`` (for a difference of shares), ``reward``, ``steps`` (of a
             training) or ``number``.
         name: What the quantity is, if the claim does not say so.
     """
 
-    value: float
-    low: float | None = None
-    high: float | None = None
+    interval: Interval
     n: int = 0
     unit: Unit = "share"
     name: str = ""
 
+    @classmethod
+    def exact(cls, value: float, n: int = 0, unit: Unit = "share", name: str = "") -> Self:
+        """A quantity without an interval."""
+        return cls(Interval(value, value, value), n, unit, name)
+
     @property
-    def interval(self) -> Interval:
-        """The value and the ends; without an interval, the ends are equal to the value."""
-        low = self.value if self.low is None else self.low
-        return Interval(self.value, low, self.value if self.high is None else self.high)
+    def text(self) -> str:
+        """The quantity with its interval, in its unit: ``97.3 % [96.1, 98.1]``."""
+        value, low, high = self.interval
+        spread = low < high
+        match self.unit:
+            case "share":
+                return numbers.interval(value, low, high) if spread else numbers.percent(value)
+            case "points":
+                text = numbers.points(value, low, high) if spread else numbers.difference(value, 0)
+                return f"{text} points"
+            case "reward":
+                return numbers.with_ends(_reward, value, low, high) if spread else _reward(value)
+            case "steps":
+                return f"{value:,.0f} steps"
+        return f"{value:g}"
 
 
-class Measured(NamedTuple):
-    """What is measured for a claim.
+def _reward(value: float) -> str:
+    return f"{value:+,.0f}".replace("-", "−")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the results of a policy say about a claim.
 
     Attributes:
-        arguments: The arguments for the judge of the claim's rule.
-        quantities: The quantities to show; the first one is compared with the paper's number.
-        note: A remark in words.
+        verdict: One of ``VERDICTS``.
+        quantities: The quantities that the verdict is based on; the first one is compared with the
+            paper's number.
+        note: A remark in words, or the reason why there are no results.
+        policy: The policy; empty for a claim about trainings.
+        against: Where the interval of the first quantity lies relative to the paper's number
+            (``stats.verdict.position``); empty if they cannot be compared.
     """
 
-    arguments: tuple[Any, ...]
-    quantities: tuple[Quantity, ...]
+    verdict: str
+    quantities: tuple[Quantity, ...] = ()
     note: str = ""
+    policy: str = ""
+    against: str = ""
 
-    @classmethod
-    def of(cls, *quantities: Quantity) -> "Measured":
-        """Quantities whose intervals are the arguments of the judge."""
-        return cls(tuple(quantity.interval for quantity in quantities), quantities)
+    @property
+    def holds(self) -> bool:
+        """Whether the policy passes the claim."""
+        return self.verdict == HOLDS
+
+    @property
+    def outcome(self) -> str:
+        """The verdict as pages write it: one of ``OUTCOMES``."""
+        if self.holds:
+            return EXCEEDS if self.against == ABOVE else MATCHES
+        short = self.verdict == REFUTED or (self.verdict == IN_PART and self.against == BELOW)
+        if short:
+            return FALLS_SHORT
+        return NOT_APPLICABLE if self.verdict == NO_RESULTS else INCONCLUSIVE
+
+
+# The measures. Each gives what it finds in the evidence to the judge of a claim's rule.
+
+Judge = Callable[..., str]
+
+
+def _found(judge: Judge, *quantities: Quantity) -> Finding:
+    """What the intervals of quantities say to a judge."""
+    return Finding(judge(*(quantity.interval for quantity in quantities)), quantities)
 
 
 # Means.
 
 
-def mean(evidence: EvidenceOfPolicy, metric: str, uavs: int | None = None) -> Measured:
+def mean(judge: Judge, evidence: EvidenceOfPolicy, metric: str, uavs: int | None = None) -> Finding:
     """The mean of a metric over all missions, or over those with a number of UAVs."""
-    return Measured.of(_mean_of(evidence.missions(uavs), metric))
+    return _found(judge, _mean_of(evidence.missions(uavs), metric))
 
 
-def missed_data(evidence: EvidenceOfPolicy) -> Measured:
+def missed_data(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     """The mean collection ratio, and the share of missions that collected everything."""
     missions = evidence.missions()
     everything = missions[RATIO].to_numpy() >= 1
     name = "missions that collected everything"
-    return Measured.of(_mean_of(missions, RATIO), _share_of(everything, name))
+    return _found(judge, _mean_of(missions, RATIO), _share_of(everything, name))
 
 
 # Event logs.
 
 
-def single_charges(evidence: EvidenceOfPolicy) -> Measured:
+def single_charges(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     """The share of missions in which a lone UAV charges once."""
     charges = [(events["event"] == "charge_start").sum() for events, _ in evidence.logs(uavs=1)]
-    return Measured.of(_share_of(np.array(charges) == 1, "missions with one charge"))
+    return _found(judge, _share_of(np.array(charges) == 1, "missions with one charge"))
 
 
-def ignored_nodes(evidence: EvidenceOfPolicy) -> Measured:
+def ignored_nodes(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     """The shares of nodes that a lone UAV ignores, on the far edges and elsewhere."""
     far, others = np.transpose([_left_behind(*log) for log in evidence.logs(uavs=1)])
     shares = _mean_share(far, "ignored of these nodes"), _mean_share(others, "of the others")
-    return Measured((shares[0].interval, mean_interval(far - others)), shares)
+    return Finding(judge(shares[0].interval, mean_interval(far - others)), shares)
 
 
-def reached_nodes(evidence: EvidenceOfPolicy) -> Measured:
+def reached_nodes(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     """How many more nodes on the far edges two UAVs reach than one UAV, in the same missions."""
     one, two = ([_left_behind(*log)[0] for log in evidence.logs(uavs)] for uavs in (1, 2))
     more = np.array([alone - team for alone, team in zip(one, two, strict=False)])
     name = "more of these nodes than by a lone UAV"
-    gain = Quantity(*mean_interval(more), len(more), "points", name)
-    return Measured(
-        (gain.interval,), (gain, _mean_share(1 - np.array(two), "of these nodes not ignored"))
-    )
+    gain = Quantity(mean_interval(more), len(more), "points", name)
+    reached = _mean_share(1 - np.array(two), "of these nodes not ignored")
+    return Finding(judge(gain.interval), (gain, reached))
 
 
-def sectors(evidence: EvidenceOfPolicy) -> Measured:
+def sectors(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     """The share of data that two UAVs collect on their own sides, and the share by chance."""
     generator = np.random.default_rng(evidence.results.store.manifest.seed)
     rows = [row for log in evidence.logs(uavs=2) if (row := _division(*log, generator))]
     if not rows:
         raise MissingError("no data was collected")
     sides, chance, most = np.transpose(rows)
-    quantities = (
-        _mean_share(sides, "data collected on the own side"),
-        Quantity(float(np.mean(chance)), name="by chance"),
-        _mean_share(most, "data by the UAV that serves the node most"),
-    )
-    return Measured((mean_interval(sides - chance), quantities[2].interval), quantities)
+    own = _mean_share(sides, "data collected on the own side")
+    by_chance = Quantity.exact(float(np.mean(chance)), name="by chance")
+    division = _mean_share(most, "data by the UAV that serves the node most")
+    verdict = judge(mean_interval(sides - chance), division.interval)
+    return Finding(verdict, (own, by_chance, division))
 
 
 def _left_behind(events: pd.DataFrame, nodes: np.ndarray) -> tuple[float, float]:
@@ -488,60 +334,44 @@ def _division(
 # The values of a parameter, compared mission by mission.
 
 
-def change(
-    evidence: EvidenceOfPolicy,
-    field: str,
-    metric: str,
-    first: str,
-    second: str,
-    fewest_uavs: int = 1,
-) -> Measured:
-    """How much a metric changes from one value of a parameter to another."""
-    pairs = evidence.pairs(field, metric, fewest_uavs)
-    return Measured.of(_points(pairs.change(first, second)))
+def change(judge: Judge, pairs: Pairs, first: str, second: str) -> Finding:
+    """How much the metric changes from one value to another."""
+    return _found(judge, _points(pairs.change(first, second)))
 
 
-def lead(
-    evidence: EvidenceOfPolicy, field: str, metric: str, values: Sequence[str], name: str = ""
-) -> Measured:
-    """How much higher a metric is at some values of a parameter than at all others."""
-    leads = evidence.pairs(field, metric).leads(*values)
-    name = name or f"{setting(field, values[0])} above the next best"
-    return Measured((leads,), (_least(leads, name),))
+def lead(judge: Judge, pairs: Pairs, values: Sequence[str], name: str = "") -> Finding:
+    """How much higher the metric is at some values than at all others."""
+    leads = pairs.leads(*values)
+    name = name or f"{setting(pairs.field, values[0])} above the next best"
+    return Finding(judge(leads), (_least(leads, name),))
 
 
-def lag(evidence: EvidenceOfPolicy, field: str, metric: str, value: str) -> Measured:
-    """How much lower a metric is at a value of a parameter than at all others."""
-    lags = negated(evidence.pairs(field, metric).leads(value))
-    return Measured((lags,), (_least(lags, "the next lowest is higher by"),))
+def lag(judge: Judge, pairs: Pairs, value: str) -> Finding:
+    """How much lower the metric is at a value than at all others."""
+    lags = negated(pairs.leads(value))
+    return Finding(judge(lags), (_least(lags, "the next lowest is higher by"),))
 
 
-def spread(evidence: EvidenceOfPolicy, field: str, metric: str) -> Measured:
-    """The differences between all values of a parameter."""
-    changes = evidence.pairs(field, metric).changes
-    largest = changes.loc[changes["difference"].abs().idxmax()]
-    return Measured((changes,), (_points(largest, "largest difference"),))
+def spread(judge: Judge, pairs: Pairs) -> Finding:
+    """The differences between all values."""
+    largest = pairs.changes.loc[pairs.changes["difference"].abs().idxmax()]
+    return Finding(judge(pairs.changes), (_points(largest, "largest difference"),))
 
 
-def course(evidence: EvidenceOfPolicy, field: str, metric: str) -> Measured:
-    """How a metric changes along the values of a parameter, from the first to the last."""
-    pairs = evidence.pairs(field, metric)
+def course(judge: Judge, pairs: Pairs) -> Finding:
+    """How the metric changes along the values, from the first to the last."""
     first, *_, last = pairs.positions
-    shape = main_effects.shape(pairs.changes)
-    tops = [value for value, position in pairs.positions.items() if position in shape.peaks]
-    peak = f", highest at {' or '.join(tops)}" if shape.words == main_effects.PEAK else ""
     quantity = _points(pairs.change(first, last), f"from {first} to {last}")
-    return Measured((shape,), (quantity,), f"it {shape.words}{peak}")
+    return Finding(judge(pairs.shape), (quantity,), pairs.course)
 
 
-def peak(evidence: EvidenceOfPolicy, field: str, metric: str, value: str) -> Measured:
-    """The result of ``course``, with the lead of a value over all others."""
-    pairs, along = evidence.pairs(field, metric), course(evidence, field, metric)
-    ahead = _least(pairs.leads(value), f"{setting(field, value)} above the best other")
-    return Measured((*along.arguments, pairs.position(value)), (ahead,), along.note)
+def peak(judge: Judge, pairs: Pairs, value: str) -> Finding:
+    """How the metric changes along the values, with the lead of a value over all others."""
+    ahead = _least(pairs.leads(value), f"{setting(pairs.field, value)} above the best other")
+    return Finding(judge(pairs.shape, pairs.position(value)), (ahead,), pairs.course)
 
 
-def selected_uavs(evidence: EvidenceOfPolicy) -> Measured:
+def selected_uavs(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     """The number of UAVs in the setting that a study selects."""
     choice = evidence.results.choice(evidence.policy)
     points = evidence.results.store.manifest.points
@@ -549,9 +379,9 @@ def selected_uavs(evidence: EvidenceOfPolicy) -> Measured:
         raise MissingError(f"the study {evidence.study} selects no number of UAVs")
     wanted = [n for n, point in enumerate(points) if point.values.get("uavs") == values.BEST_UAVS]
     best = points[choice.best].values
-    uavs = Quantity(best["uavs"], n=choice.missions, unit="number", name="UAVs")
+    uavs = Quantity.exact(best["uavs"], choice.missions, "number", "UAVs")
     note = ", ".join(setting(field, value_text(value)) for field, value in best.items())
-    return Measured((choice, wanted), (uavs,), note)
+    return Finding(judge(choice, wanted), (uavs,), note)
 
 
 def setting(field: str, value: str) -> str:
@@ -562,29 +392,29 @@ def setting(field: str, value: str) -> str:
 # Learning curves.
 
 
-def final_lead(evidence: EvidenceOfTrainings, metric: str, unit: Unit) -> Measured:
+def final_lead(judge: Judge, evidence: EvidenceOfTrainings, metric: str, unit: Unit) -> Finding:
     """How much higher training with transfer learning ends than training without it."""
     transfer = evidence.transfer(metric)
     variants = f"trainings {evidence.using} and {evidence.without}"
     note = f"{variants}: {transfer.course}{_if_short(transfer)}"
-    return Measured((transfer,), _at_the_end(transfer, unit), note)
+    return Finding(judge(transfer), _at_the_end(transfer, unit), note)
 
 
-def level_from(evidence: EvidenceOfTrainings, metric: str) -> Measured:
+def level_from(judge: Judge, evidence: EvidenceOfTrainings, metric: str) -> Finding:
     """The step from which on the mean curve without transfer learning stays near its end."""
     transfer, curves = evidence.transfer(metric), evidence.curves(metric)
     means = last_phase(curves, evidence.without).mean(axis="columns")
     since = int(means.index[settled(means, MARGIN)])
-    level = Quantity(since, unit="steps", name="level from")
-    quantities = level, *_at_the_end(transfer, "points")
+    level = Quantity.exact(since, unit="steps", name="level from")
     note = f"trainings {evidence.without}{_if_short(transfer)}"
-    return Measured((since / means.index[-1], transfer), quantities, note)
+    verdict = judge(since / means.index[-1], transfer)
+    return Finding(verdict, (level, *_at_the_end(transfer, "points")), note)
 
 
 def _at_the_end(transfer: Transfer, unit: Unit) -> tuple[Quantity, Quantity]:
     """The last difference, and how long the trainings are."""
-    last = Quantity(*transfer.last, min(transfer.trainings), unit, "with transfer, at the end")
-    return last, Quantity(transfer.length, unit="steps", name="length of the trainings")
+    last = Quantity(transfer.last, min(transfer.trainings), unit, "with transfer, at the end")
+    return last, Quantity.exact(transfer.length, unit="steps", name="length of the trainings")
 
 
 def _if_short(transfer: Transfer) -> str:
@@ -596,23 +426,23 @@ def _if_short(transfer: Transfer) -> str:
 
 def _mean_of(missions: pd.DataFrame, metric: str) -> Quantity:
     row = means_of(missions, by=[]).set_index("metric").loc[metric]
-    return Quantity(float(row["mean"]), float(row["low"]), float(row["high"]), int(row["n"]))
+    return Quantity(Interval(*map(float, row[["mean", "low", "high"]])), int(row["n"]))
 
 
 def _share_of(occurs: np.ndarray, name: str) -> Quantity:
     """The share of missions in which something occurs."""
-    return Quantity(*wilson(int(occurs.sum()), len(occurs)), n=len(occurs), name=name)
+    return Quantity(wilson(int(occurs.sum()), len(occurs)), len(occurs), name=name)
 
 
 def _mean_share(values: np.ndarray, name: str) -> Quantity:
     """The mean of a share per mission."""
-    return Quantity(*bounded_interval(values), n=len(values), name=name)
+    return Quantity(bounded_interval(values), len(values), name=name)
 
 
 def _points(row: pd.Series, name: str = "") -> Quantity:
     """A row of ``main_effects.changes``."""
-    value, low, high = (float(row[column]) for column in ("difference", "low", "high"))
-    return Quantity(value, low, high, int(row["n"]), "points", name)
+    interval = Interval(*map(float, row[["difference", "low", "high"]]))
+    return Quantity(interval, int(row["n"]), "points", name)
 
 
 def _least(leads: pd.DataFrame, name: str) -> Quantity:

@@ -1,36 +1,33 @@
-"""The claims of the paper and our verdict on each."""
+"""The claims of the paper, our verdict on each, and what they say together."""
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, partial, reduce
 from inspect import signature
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import pandas as pd
 
 from analysis import numbers
+from analysis.answers import summary
 from analysis.answers.learning import BAND
-from analysis.paper import measures, values
+from analysis.paper import measures, rules, values
 from analysis.paper.measures import (
-    EXCEEDS,
     FALLS_SHORT,
-    MARGIN,
-    MATCHES,
-    NEAR,
     NO_RESULTS,
-    NOT_APPLICABLE,
+    OUTCOMES,
     EvidenceOfPolicy,
-    Measured,
+    EvidenceOfTrainings,
+    Finding,
     MissingError,
     Quantity,
     Unit,
-    evidence_of_policy,
-    evidence_of_trainings,
-    gap,
 )
+from analysis.paper.rules import MARGIN, NEAR
 from analysis.results.tables import Results
-from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED, position
+from analysis.stats.verdict import INCONCLUSIVE, position
 from dess import InputError
 from dess.files.parsing import parse_toml
 from dess.files.reading import read_text
@@ -48,74 +45,66 @@ _NAMED = {
 }
 
 
-@dataclass(frozen=True)
-class Rule:
-    """A rule that judges a claim by quantities.
+class Rule(NamedTuple):
+    """A rule that judges a claim by what is measured.
 
     Attributes:
         words: When the claim holds; names in braces stand for numbers.
-        judge: A function from quantities to one of ``verdict_rules.VERDICTS``.
-        remark: A remark that follows the words.
+        judge: A function from what is measured to one of ``measures.VERDICTS``.
     """
 
     words: str
     judge: Callable[..., str]
-    remark: str = ""
 
-    def in_words(self, margin: float) -> str:
-        """The rule in words; ``margin`` is the difference that does not matter."""
-        text = f"{self.words}; else it is inconclusive. {self.remark}".strip()
-        return text.format(margin=numbers.margin(margin), **_NAMED)
+    @classmethod
+    def of(
+        cls, name: str, words: str, remark: str = "", judge: str = "", above: Any = None
+    ) -> Self:
+        """A rule of the file: its judge has its name, another one, or is ``rules.all_above``."""
+        of_limits = partial(rules.all_above, above)
+        text = f"{words}; else it is inconclusive. {remark}".strip()
+        return cls(text, of_limits if above else getattr(rules, judge or name))
 
 
-@dataclass(frozen=True)
-class Claim:
+class Claim(NamedTuple):
     """A claim of the paper.
 
     Attributes:
+        page: The page with the evidence, for example ``mission.html#fig-4``.
+        study: The study with the evidence, or ``TRAININGS``.
         text: What the paper claims.
         place: Where in the paper the claim stands.
         rule: The rule that judges the claim.
-        measure: The function that computes what the rule judges, from the evidence of the section.
+        measure: The function that finds what the evidence says to the rule's judge.
+        compared: The parameter whose values are compared, and the metric, if it is about such.
         printed: The paper's number, if it prints one.
         basis: What is measured, in words, if the text does not say so.
     """
 
+    page: str
+    study: str
     text: str
     place: str
     rule: Rule
-    measure: Callable[..., Measured]
+    measure: Callable[..., Finding]
+    compared: Mapping[str, Any] | None = None
     printed: Quantity | None = None
     basis: str = ""
 
-    def rule_in_words(self, margin: float) -> str:
-        """The rule in words; ``margin`` is the difference that does not matter."""
-        return f"{self.basis} {self.rule.in_words(margin)}".strip()
-
-
-class Section(NamedTuple):
-    """Claims about the same evidence: a heading, the page with the evidence, the study, the claims.
-
-    The page is, for example, ``mission.html#fig-4``; the study may be ``TRAININGS``.
-    """
-
-    heading: str
-    page: str
-    study: str
-    claims: list[Claim]
-
 
 def _claim(
+    section: Mapping[str, Any],
     rule: str,
     measure: str,
     arguments: Mapping[str, Any] | None = None,
     printed: Mapping[str, Any] | None = None,
-    **texts: str,
+    **others: Any,
 ) -> Claim:
-    """A claim of the file."""
+    """A claim of a section of the file."""
     measured = partial(getattr(measures, measure), **arguments or {})
     number = _printed(**printed) if printed else None
-    return Claim(rule=RULES[rule], measure=measured, printed=number, **texts)
+    place = {name: section[name] for name in ("page", "study")}
+    return Claim(rule=RULES[rule], measure=measured, printed=number, **place, **others)
 
 
 def _printed(
@@ -129,8 +118,8 @@ def _printed(
     """A number of the paper, with an interval if it is a share of a known number of missions."""
     n = _figure(missions) if missions else 0
     if is_share:
-        return Quantity(*values.spread(_figure(figure), n), n=n)
-    return Quantity(_figure(figure) - (_figure(less) if less else 0), n=n, unit=unit, name=name)
+        return Quantity(values.spread(_figure(figure), n), n)
+    return Quantity.exact(_figure(figure) - (_figure(less) if less else 0), n, unit, name)
 
 
 def _figure(path: str) -> Any:
@@ -142,14 +131,12 @@ def _figure(path: str) -> Any:
 
 
 _CONTENT = parse_toml(read_text(_FILE), str(_FILE))
-RULES = {
-    name: Rule(judge=getattr(measures, name), **texts) for name, texts in _CONTENT["rules"].items()
-}
-SECTIONS = {
-    key: Section(**section | {"claims": [_claim(**claim) for claim in section["claims"]]})
-    for key, section in _CONTENT["sections"].items()
-}
-
+RULES = {name: Rule.of(name, **texts) for name, texts in _CONTENT["rules"].items()}
+CLAIMS = [
+    _claim(section, **claim)
+    for section in _CONTENT["sections"].values()
+    for claim in section["claims"]
+]
 
 # The learner with the paper's observation, network and algorithm.
 PAPERS_NETWORK = "ddqn-paper"
@@ -160,50 +147,11 @@ COLUMNS = ("the best learned policy", PAPERS_NETWORK, *NULLS)
 # Trainings with and without transfer learning, with the methods of the best learned policy.
 VARIANTS = ("quick", "no transfer")
 
-Evidence = Callable[[str], Any]  # from the name of a study to its evidence
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What the results of a policy say about a claim.
-
-    Attributes:
-        verdict: One of ``verdict_rules.VERDICTS``.
-        policy: The policy; empty for a claim about trainings.
-        quantities: The quantities that the verdict is based on; the first one is compared with the
-            paper's number.
-        against: Where the interval of the first quantity lies relative to the paper's number
-            (``stats.verdict.position``); empty if they cannot be compared.
-        note: A remark in words, or the reason why there are no results.
-    """
-
-    verdict: str
-    policy: str = ""
-    quantities: tuple[Quantity, ...] = ()
-    against: str = ""
-    note: str = ""
-
-    @property
-    def holds(self) -> bool:
-        """Whether the policy passes the claim."""
-        return self.verdict == HOLDS
-
-    @property
-    def outcome(self) -> str:
-        """The verdict as pages write it: one of ``verdict_rules.OUTCOMES``."""
-        if self.holds:
-            return EXCEEDS if self.against == ABOVE else MATCHES
-        short = self.verdict == REFUTED or (self.verdict == IN_PART and self.against == BELOW)
-        if short:
-            return FALLS_SHORT
-        return NOT_APPLICABLE if self.verdict == NO_RESULTS else INCONCLUSIVE
-
 
 @dataclass(frozen=True)
 class Row:
-    """A claim of the paper, its section, its rule in words, and the findings of each policy."""
+    """A claim of the paper, its rule in words, and the findings of each policy."""
 
-    section: Section
     claim: Claim
     rule: str
     findings: tuple[Finding, ...]
@@ -227,22 +175,23 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
         A row per claim, with a finding for each of ``COLUMNS``.
     """
 
-    def evidence(
-        variants: tuple[str, str] | None, study: str, learner: str = "", policy: str = ""
-    ) -> Any:
+    @cache
+    def evidence(study: str, column: str) -> Any:
         if study == TRAININGS:
-            return evidence_of_trainings(trainings, variants)
-        if learner == PAPERS_NETWORK and study + SMALLER in studies:
-            study += SMALLER
-        return evidence_of_policy(studies, study, learner, policy)
+            return _evidence_of_trainings(trainings, column)
+        own = study + SMALLER
+        is_own = column == PAPERS_NETWORK and own in studies
+        return _evidence_of_policy(studies, own if is_own else study, column)
 
-    policies = (
-        partial(evidence, VARIANTS),
-        partial(evidence, None, learner=PAPERS_NETWORK),
-        *(partial(evidence, None, policy=name) for name in NULLS),
-    )
+    known = {"margin": margin(studies)}
+    words = {"margin": numbers.margin(known["margin"]), **_NAMED}
     return [
-        row for section in SECTIONS.values() for row in _rows(section, margin(studies), policies)
+        Row(
+            claim,
+            f"{claim.basis} {claim.rule.words.format(**words)}".strip(),
+            tuple(_finding(claim, known, partial(evidence, claim.study, c)) for c in COLUMNS),
+        )
+        for claim in CLAIMS
     ]
 
 
@@ -269,52 +218,90 @@ def departures(training: TrainingConfig) -> list[str]:
     return [words for words, applies in differs.items() if applies]
 
 
-def _rows(section: Section, margin: float, policies: Iterable[Evidence]) -> list[Row]:
-    """The claims of a section, with findings from the evidence of several policies."""
-    evidence = [cache(partial(of_study, section.study)) for of_study in policies]
-    return [
-        Row(
-            section,
-            claim,
-            claim.rule_in_words(margin),
-            tuple(_finding(claim, margin, of_policy) for of_policy in evidence),
-        )
-        for claim in section.claims
-    ]
+def _evidence_of_policy(
+    studies: Mapping[str, Results], study: str, column: str
+) -> EvidenceOfPolicy:
+    """The results in a study of the policy of a column: the best one, of a learned column."""
+    if study not in studies:
+        raise MissingError(f"the study {study} has not been run")
+    results, which = studies[study], f"policy {column}"
+    learners = summary.learners(results)
+    if column in NULLS:
+        among = [name for name in results.policies if name == column]
+    elif column == COLUMNS[0]:
+        among, which = [name for of in learners.values() for name in of], "learned policy"
+    else:
+        among = learners.get(column, [])
+    if not among:
+        raise MissingError(f"the study {study} has no {which}")
+    best = among[0] if len(among) == 1 else summary.best_policy(results.missions, among)
+    return EvidenceOfPolicy(results, best)
 
 
-def _finding(claim: Claim, margin: float, evidence: Callable[[], Any]) -> Finding:
+def _evidence_of_trainings(trainings: pd.DataFrame, column: str) -> EvidenceOfTrainings:
+    """The trainings with transfer learning and without; only the best learned policy has them."""
+    if column != COLUMNS[0]:
+        raise MissingError("no trainings of this policy with and without transfer learning")
+    if trainings.empty or not {*VARIANTS} <= {*trainings["variant"]}:
+        raise MissingError(f"no trainings {' and '.join(VARIANTS)}")
+    return EvidenceOfTrainings(trainings, *VARIANTS)
+
+
+def _finding(claim: Claim, known: Mapping[str, Any], evidence: Callable[[], Any]) -> Finding:
     """What a policy's results say about a claim or, without results, why there are none."""
+    printed, judge = claim.printed, claim.rule.judge
+    if printed:
+        known = {**known, "printed": printed.interval}
+    takes = known.keys() & signature(judge).parameters.keys()
     try:
         of_study = evidence()
-        measured = claim.measure(of_study)
+        judge = partial(judge, **{name: known[name] for name in takes})
+        compared = claim.compared
+        found = claim.measure(judge, of_study.pairs(**compared) if compared else of_study)
     except MissingError as missing:
         return Finding(NO_RESULTS, note=str(missing))
     except InputError:  # a study of another design
         return Finding(NO_RESULTS, note="the results come from a study of another design")
-    policy = of_study.policy if isinstance(of_study, EvidenceOfPolicy) else ""
-    verdict, against = _verdict(claim, margin, measured), _against(claim, measured)
-    return Finding(verdict, policy, measured.quantities, against, measured.note)
+    if any(quantity.n == 1 for quantity in found.quantities):
+        found = replace(found, verdict=INCONCLUSIVE)  # one mission or training shows nothing
+    first, against = found.quantities[0], ""
+    if printed and first.unit == printed.unit and first.unit in ("share", "points"):
+        against = position(first.interval, printed.interval.mean)
+    return replace(found, policy=of_study.policy, against=against)
 
 
-def _verdict(claim: Claim, margin: float, measured: Measured) -> str:
-    """The verdict by the rule; a single mission or training cannot show anything."""
-    if any(quantity.n == 1 for quantity in measured.quantities):
-        return INCONCLUSIVE
-    judge = claim.rule.judge
-    known: dict[str, Any] = {"margin": margin}
-    if claim.printed:
-        known["printed"] = claim.printed.interval
-    takes = known.keys() & signature(judge).parameters.keys()
-    return judge(*measured.arguments, **{name: known[name] for name in takes})
+def answer(rows: Sequence[Row]) -> str:
+    """How many claims hold for the best learned policy, diagnostic ones and all, in words."""
+    telling = [row for row in rows if row.is_diagnostic]
+    held, all_held = (sum(row.findings[0].holds for row in of) for of in (telling, rows))
+    short = [f"“{r.claim.text}”" for r in telling if r.findings[0].outcome == FALLS_SHORT]
+    return (
+        f"Of {len(rows)} claims, {len(telling)} are diagnostic: {numbers.words(NULLS)} do not pass "
+        f"them. {names(rows)[0]} passes {held} of these {len(telling)}, and {all_held} of all."
+        + f" It falls short of {numbers.words(short)}; open: {len(telling) - held - len(short)}."
+        * bool(short)
+    )
 
 
-def _against(claim: Claim, measured: Measured) -> str:
-    """Where the interval of the first quantity lies relative to the paper's number, if any."""
-    first, printed = measured.quantities[0], claim.printed
-    if printed is None or first.low is None or first.unit != printed.unit:
-        return ""
-    return position(first.interval, printed.value)
+def names(rows: Sequence[Row]) -> list[str]:
+    """For each of ``COLUMNS`` the policy of most of its findings, or its own name."""
+    found = []
+    for number, name in enumerate(COLUMNS):
+        policies = Counter(row.findings[number].policy for row in rows)
+        del policies[""]
+        found.append(policies.most_common(1)[0][0] if policies else name)
+    return found
+
+
+def counts(rows: Sequence[Row]) -> pd.DataFrame:
+    """The number of verdicts of each kind, for every policy, of diagnostic claims and of all."""
+    table = []
+    for claims, of in (("diagnostic", [row for row in rows if row.is_diagnostic]), ("all", rows)):
+        for number, name in enumerate(names(rows)):
+            given = Counter(row.findings[number].outcome for row in of)
+            counted = {outcome.capitalize(): given[outcome] for outcome in OUTCOMES}
+            table.append({"Claims": claims, "Policy": name, **counted})
+    return pd.DataFrame(table)
 
 
 def against_paper(rows: Iterable[Row]) -> pd.DataFrame:
@@ -326,7 +313,7 @@ def against_paper(rows: Iterable[Row]) -> pd.DataFrame:
         where it has one, and ``n``.
     """
     table = [
-        (row.claim.text, finding.policy, *gap(first.interval, printed.interval), first.n)
+        (row.claim.text, finding.policy, *rules.gap(first.interval, printed.interval), first.n)
         for row in rows
         if (printed := row.claim.printed) and printed.unit == "share"
         for finding in row.findings[:3]

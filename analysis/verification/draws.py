@@ -166,9 +166,7 @@ def initial_checks(starts: np.ndarray, totals: np.ndarray, space: ScenarioSpace)
     if low == high:
         error = np.abs(starts - low).max(initial=0.0) / (low or 1.0)
         known = f"{low:g}"
-        return [
-            Check(DRAWS, "Initial data per node", known, known, starts.size, error=float(error))
-        ]
+        return [Check.exact(DRAWS, "Initial data per node", known, known, starts.size, error)]
     range_of = f"U({low:g}, {high:g})"
     per_node, total = stats.uniform(low, high - low), closed_forms.initial_total(space)
     return [
@@ -208,7 +206,7 @@ _COMMUNICATIONS = ["node", "value", "best", "known", "residual"]
 
 
 def rate_check(rates: pd.DataFrame) -> Check:
-    """Compare the mean rates of ``lone_uav.rates`` with the integral over all shadowing."""
+    """Compare the mean rates of ``measurements.rates`` with the integral over all shadowing."""
     test = "Mean rate of a lone UAV at each distance: chi-square"
     known, n = "E[δ log₂(1 + SNR)] by integration", int(rates["n"].sum())
     off = float((rates["mean"] / rates["known"] - 1).abs().max())
@@ -220,7 +218,7 @@ def rate_check(rates: pd.DataFrame) -> Check:
 
 
 def shadowing_checks(deviates: np.ndarray) -> list[Check]:
-    """Compare the shadowing of ``lone_uav.deviates`` with independent standard normal variables."""
+    """Compare the shadowing of ``measurements.deviates`` with independent normal variables."""
     n, test = deviates.size, "Correlation of a communication slot and the next"
     mean, deviation = (minus(f"{value:.3f}") for value in (deviates.mean(), deviates.std()))
     seen = f"mean {mean}, deviation {deviation}"

@@ -6,7 +6,7 @@ nothing::
 
     make("results", results)
     missions = read("results", results)
-    records.engine_check(results, missions)
+    balances.engine_check(results, missions)
 
 In a mission, UAVs serve the node with the highest SNR, so the data that they collect are not a
 random sample of the channel. With one node there is no choice, and the data of every communication
@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from pydantic import create_model
 
 from analysis.answers.missions import FOLDER
 from analysis.results import event_log
+from analysis.results.resimulate import difference, recorded
 from analysis.results.tables import Results
 from analysis.study.stopping import Text
 from analysis.verification import closed_forms
@@ -32,9 +32,8 @@ from dess import InputError, simulate, simulate_batch
 from dess.files.documents import Document, Outdated
 from dess.files.reading import Missing
 from dess.files.writing import check_target, write_file
-from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace
-from dess.state import END_NAMES, HOVER
+from dess.state import HOVER
 from dess.view import View
 from policies.registry import files_of, load_team
 
@@ -144,10 +143,7 @@ def arrivals(logs: Sequence[Log], space: ScenarioSpace) -> np.ndarray:
     return np.concatenate([none, *(log.arrivals for log in logs)])
 
 
-PER_DISTANCE, SLOTS = (
-    200,
-    100,
-)  # missions per distance and slots per mission, with the batch engine
+PER_DISTANCE, SLOTS = 200, 100  # missions per distance, and their slots, with the batch engine
 LONG = 5000  # mission slots of the mission with the SimPy engine
 
 _PLENTY = 1e9  # data units at the node, more than the UAV can collect
@@ -239,7 +235,7 @@ def _draws(space: ScenarioSpace) -> int:
 
 
 STUDY = "verification"
-FILE = Path(FOLDER, "missions.json")  # in the folder of all results
+FILE = Path(FOLDER, "engines.json")  # in the folder of all results
 MISSIONS = 50  # missions of every policy to simulate again, spread over its replications
 
 # Called with the number of steps done and of all steps.
@@ -248,20 +244,18 @@ Progress = Callable[[int, int], None]
 _ALLOWED = "what is made by: dess report verification"
 
 
-def _fields(record: np.dtype) -> dict[str, Any]:
-    """The fields of a record, as those of a model."""
-    assert record.fields is not None
-    kinds = {name: kind for name, (kind, *_) in record.fields.items()}
-    return {name: (float if kind.kind == "f" else int, ...) for name, kind in kinds.items()}
+class SimulatedAgain(Document):
+    """A mission of a study, simulated again with the SimPy engine.
 
+    Attributes:
+        policy: The team.
+        replication: The replication; the design point is the first one.
+        differs: In which fields the record differs from the stored one, in words; empty if in none.
+    """
 
-Mission: Any = create_model(
-    "Mission", __base__=Document, policy=(Text, ...), **_fields(MISSION_RECORD)
-)
-_OF_UAV = {"policy": (Text, ...), "replication": (int, ...), "uav": (int, ...)}
-Uav: Any = create_model(
-    "Uav", __base__=Document, **_OF_UAV | _fields(UAV_RECORD) | {"end": (Text, ...)}
-)
+    policy: Text
+    replication: int
+    differs: str
 
 
 class CrossCheck(Document):
@@ -269,15 +263,13 @@ class CrossCheck(Document):
 
     Attributes:
         study: The key of the study, a hash of all that its records depend on.
-        missions: Records by the SimPy engine, each with its ``policy``.
-        uavs: The records of their UAVs, each with ``policy``, ``replication`` and ``uav``.
-        rates: The result of ``lone_uav.simulate_rates``.
-        slots: The result of ``lone_uav.simulate_slots``.
+        missions: Missions simulated again, each compared with its record in the study.
+        rates: The result of ``simulate_rates``.
+        slots: The result of ``simulate_slots``.
     """
 
     study: str
-    missions: list[Mission]
-    uavs: list[Uav]
+    missions: list[SimulatedAgain]
     rates: list[float]
     slots: list[float]
 
@@ -285,7 +277,7 @@ class CrossCheck(Document):
 def simulate_missions(
     results: Results, count: int = MISSIONS, progress: Progress | None = None
 ) -> CrossCheck:
-    """Simulate the missions; those of policies that are classes of Python files are left out.
+    """Simulate the missions, and compare records; those of policies of Python files are left out.
 
     Args:
         results: The results of the study.
@@ -294,18 +286,16 @@ def simulate_missions(
     """
     space, seed = results.scenario(), results.store.manifest.seed
     teams = {name: load_team(name) for name in results.policies if not files_of(name)}
-    missions, uavs, chosen = [], [], [*_chosen(results, teams, count)]
+    missions, chosen = [], [*_chosen(results, teams, count)]
     for done, (policy, replication) in enumerate(chosen, 1):
         record = simulate(space, teams[policy], seed, replication)
-        fields = {name: record.metrics[name].item() for name in MISSION_RECORD.names or ()}
-        missions.append({"policy": policy, **fields})
-        uavs += [{"policy": policy, "replication": replication, **uav} for uav in _uavs(record)]
+        differs = difference(record, recorded(results, policy, 0, replication))
+        missions.append(SimulatedAgain(policy=policy, replication=replication, differs=differs))
         if progress:
             progress(done, len(chosen))
     return CrossCheck(
         study=results.store.manifest.key,
         missions=missions,
-        uavs=uavs,
         rates=simulate_rates(space, seed),
         slots=simulate_slots(space, seed),
     )
@@ -318,12 +308,6 @@ def _chosen(results: Results, policies: Iterable[str], count: int) -> Iterator[t
         replications = missions.loc[missions["policy"] == policy, "replication"].to_numpy()
         rows = np.unique(np.linspace(0, len(replications) - 1, count).astype(int))
         yield from ((policy, int(replication)) for replication in replications[rows])
-
-
-def _uavs(record: MissionRecord) -> Iterator[dict[str, Any]]:
-    for number, uav in enumerate(record.uavs):
-        fields = {name: uav[name].item() for name in UAV_RECORD.names or ()}
-        yield {"uav": number, **fields, "end": END_NAMES[uav["end"]]}
 
 
 def make(folder: str | Path, results: Results, progress: Progress | None = None) -> None:

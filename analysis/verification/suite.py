@@ -1,13 +1,10 @@
 """All checks of the page of the verification, on the results that they compare::
 
-suite = Suite.load("results")
+suite = Suite("results")
 table = judge(suite.checks(block=100))
 """
 
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 import pandas as pd
@@ -15,99 +12,63 @@ import pandas as pd
 from analysis.answers.summary import best_policy
 from analysis.names import METRICS, SUCCESS
 from analysis.numbers import words
-from analysis.results.tables import Results, load_results
+from analysis.results.tables import load_results
 from analysis.verification import balances, draws, measurements
 from analysis.verification.checks import Check
-from analysis.verification.measurements import STUDY, CrossCheck, Log
+from analysis.verification.measurements import STUDY
 from dess import InputError
-from dess.scenario import ScenarioSpace
 
 _LARGEST_BLOCK = 1_000_000  # missions
 
 
-@dataclass(frozen=True)
 class Suite:
-    """The results of the study ``verification`` and of all other studies in the same folder.
+    """What is checked: the study ``verification``, and all other studies in the same folder.
 
     Attributes:
         study: The results of the study ``verification``.
         others: The results of the other studies, by name.
         damaged: The names of the studies that cannot be loaded.
+        studies: All studies that could be loaded, by name.
         again: Missions that ``dess report`` has simulated for this page.
+        space: The scenario of the study.
+        logs: All missions with an event log.
+        realisations: One mission with an event log per replication, since policies share the draws.
+        missions: The missions of one policy, since policies share the draws.
+        best: The policy whose intervals are checked.
+        arrivals: (T, K) data units that arrived in all realisations, by mission slot and node.
+        rates: The rates of a single UAV, as ``measurements.rates`` returns them.
     """
 
-    study: Results
-    others: dict[str, Results]
-    damaged: list[str]
-    again: CrossCheck
-
-    @classmethod
-    def load(cls, folder: str | Path) -> Self:
+    def __init__(self, folder: str | Path):
         """Load a folder that contains a results folder per study.
 
         Raises:
             InputError: If the study or its cross-check is missing or damaged, or if its scenario
                 has failures or arrivals in continuous time, which the checks of logs do not know.
         """
-        study = load_results(Path(folder) / STUDY)
+        self.study = load_results(Path(folder) / STUDY)
+        self.space = self.study.scenario()
         for section in ("failures", "arrivals"):
-            if getattr(study.scenario(), section).is_on:
+            if getattr(self.space, section).is_on:
                 raise InputError(
                     f"{Path(folder) / STUDY}: its scenario has {section}, which this page cannot "
                     "check; allowed: a study without them"
                 )
-        again = measurements.read(folder, study)
-        return cls(study, *balances.studies_in(Path(folder), but=STUDY), again)
-
-    @property
-    def studies(self) -> dict[str, Results]:
-        """All studies that could be loaded, by their names."""
-        return {STUDY: self.study, **self.others}
+        self.again = measurements.read(folder, self.study)
+        self.others, self.damaged = balances.studies_in(Path(folder), but=STUDY)
+        self.studies = {STUDY: self.study, **self.others}
+        self.logs = measurements.logs_of(self.study)
+        self.realisations = measurements.longest(self.logs)
+        self.missions = self._missions_of(self.study.policies[0])
+        self.best = best_policy(self.study.missions)
+        self.arrivals = measurements.arrivals(self.realisations, self.space)
+        self.rates = measurements.rates(self.space, self.again.rates)
 
     @property
     def names(self) -> str:
         """The names of the studies in words, including those that cannot be loaded."""
         unread = f" (not read, incomplete or of other code: {words(self.damaged)})"
         return words([f"`{name}`" for name in self.studies]) + (unread if self.damaged else "")
-
-    @cached_property
-    def space(self) -> ScenarioSpace:
-        """The scenario of the study."""
-        return self.study.scenario()
-
-    @cached_property
-    def logs(self) -> list[Log]:
-        """All missions with an event log."""
-        return measurements.logs_of(self.study)
-
-    @cached_property
-    def realisations(self) -> list[Log]:
-        """One mission with an event log per replication, since policies share the draws."""
-        return measurements.longest(self.logs)
-
-    @cached_property
-    def missions(self) -> pd.DataFrame:
-        """The missions of one policy, since policies share the draws."""
-        return self._missions_of(self.study.policies[0])
-
-    @cached_property
-    def best(self) -> str:
-        """The policy whose intervals are checked."""
-        return best_policy(self.study.missions)
-
-    @cached_property
-    def arrivals(self) -> np.ndarray:
-        """(T, K) data units that arrived in all realisations, by mission slot and node."""
-        return measurements.arrivals(self.realisations, self.space)
-
-    @cached_property
-    def rates(self) -> pd.DataFrame:
-        """The rates of a single UAV, as ``missions.rates`` returns them."""
-        return measurements.rates(self.space, self.again.rates)
-
-    def values(self, metric: str) -> np.ndarray:
-        """(n,) a metric of the missions of the best policy."""
-        return self._missions_of(self.best)[metric].to_numpy()
 
     def _missions_of(self, policy: str) -> pd.DataFrame:
         missions = self.study.missions
@@ -125,6 +86,7 @@ class Suite:
         if block not in range(2, _LARGEST_BLOCK + 1):
             raise InputError(f"block: {block!r}; allowed: 2..{_LARGEST_BLOCK:,}")
         space, seed, logs = self.space, self.study.store.manifest.seed, self.logs
+        of_best = self._missions_of(self.best)
         initial = np.array([log.initial for log in self.realisations])
         start_cells = np.array([log.first_cell for log in self.realisations])
         return [
@@ -143,7 +105,7 @@ class Suite:
             *draws.initial_checks(initial, self.missions["initial"].to_numpy(), space),
             draws.start_check(start_cells, space),
             *(
-                draws.coverage_check(name, self.values(metric), block, metric == SUCCESS)
+                draws.coverage_check(name, of_best[metric].to_numpy(), block, metric == SUCCESS)
                 for metric, name in METRICS.items()
             ),
         ]

@@ -32,7 +32,7 @@ from analysis.results.chunks import MANIFEST
 from dess.files.reading import paths_in
 from policies.learner.description import read_description
 from reports.pages import html
-from reports.pages import scorecard as page
+from reports.pages.scorecard import as_html
 
 # %%
 folder = Path(str(trained or files("policies") / "trained"))
@@ -44,7 +44,7 @@ telling = [row for row in rows if row.is_diagnostic]
 against = scorecard.against_paper(rows)
 
 # %%
-html.answer(page.answer(rows))
+html.answer(scorecard.answer(rows))
 
 # %%
 html.lead(
@@ -64,7 +64,7 @@ html.lead(
 # *matched* if our interval reaches it, *exceeded* if the whole interval is above it.
 
 # %%
-page.as_html(telling, "The diagnostic claims")
+as_html(telling, "The diagnostic claims")
 
 # %% [markdown]
 # ## How far to trust it
@@ -74,14 +74,14 @@ page.as_html(telling, "The diagnostic claims")
 # how many missions a number is a mean, the number counts as exact.
 
 # %%
-html.table(page.counts(rows), "Verdicts by policy")
+html.table(scorecard.counts(rows), "Verdicts by policy")
 
 # %% [markdown]
 # ## Tables
 
 # %%
 others = [row for row in rows if not row.is_diagnostic]
-page.as_html(others, "Claims that a policy passes that has learned nothing")
+as_html(others, "Claims that a policy passes that has learned nothing")
 
 # %% [markdown]
 # ## How this page was made

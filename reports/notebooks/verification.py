@@ -30,7 +30,7 @@ from analysis.verification.suite import Suite
 from reports.pages import html, stress_des
 
 # %%
-suite = Suite.load(results)
+suite = Suite(results)
 space, level = suite.space, numbers.level(LEVEL)
 judged = checks.judge(suite.checks(block))
 band = f"the band below, which contains all dots in {level} of such figures."

@@ -41,10 +41,7 @@ def test_a_fit_shows_both_numbers_and_their_difference() -> None:
     assert sorted(dots(figure, 1)[:, 1]) == pytest.approx(sorted(z))
     labels = [label.get_text() for label in figure.axes[1].get_xticklabels()]
     assert labels == ["0", "1", "2\nor more"]
-
-
-def test_classes_that_are_far_off_are_marked() -> None:
-    figure = drawings.fit(Fit(TABLE, 0.1), "Title", "units")
+    # Classes that are far off are marked.
     assert dots(figure, 1, MISS)[:, 0].tolist() == [2]
     assert dots(figure, 1, SEEN)[:, 0].tolist() == [0, 1]
     low, high = figure.axes[1].get_ylim()
@@ -60,12 +57,3 @@ def test_rates_stand_beside_their_curve() -> None:
     assert curve.get_ydata()[[0, -1]] == pytest.approx(ends)
     z = (table["mean"] - table["known"]) / table["error"]
     assert sorted(dots(figure, 1)[:, 1]) == pytest.approx(sorted(z))
-
-
-def test_the_order_of_events_goes_down_and_back_up() -> None:
-    steps = [("Start", "here"), ("First", "this"), ("Second", "that")]
-    figure = drawings.slot(steps, "again", "End")
-    texts = {text.get_text(): text.get_position() for text in figure.axes[0].texts}
-    heights = [texts[name][1] for name in ("Start\nhere", "First\nthis", "Second\nthat", "End")]
-    assert heights == sorted(heights, reverse=True)
-    assert "again" in texts

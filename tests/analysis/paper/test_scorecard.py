@@ -18,13 +18,13 @@ from analysis.paper.measures import (
     NO_RESULTS,
     NOT_APPLICABLE,
     VERDICTS,
+    Finding,
 )
 from analysis.paper.scorecard import (
     NULLS,
     PAPERS_NETWORK,
-    SECTIONS,
+    TRAININGS,
     VARIANTS,
-    Finding,
     Row,
     departures,
     scorecard,
@@ -37,7 +37,6 @@ from policies.registry import TRAINED
 from tests.analysis.small import grid, small_study
 
 NOTEBOOKS = Path(__file__).parents[3] / "reports" / "notebooks"
-TABLE_4, FIG_3, FIG_5 = (SECTIONS[name] for name in ("table-4", "fig-3", "fig-5"))
 POLICIES = ["greedy", "random", "random-unguarded", "ddqn"]
 RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.02, "budget": 40, "check": 12}
 NONE = pd.DataFrame()
@@ -112,8 +111,8 @@ def test_every_claim_has_a_section_with_its_evidence_and_a_rule(rows: list[Row])
     assert len(rows) >= 25
     assert len({row.claim.text for row in rows}) == len(rows)
     for row in rows:
-        assert row.section.heading and row.claim.place and "olds if" in row.rule
-        page, _, section = row.section.page.partition(".html#")
+        assert row.claim.place and "olds if" in row.rule
+        page, _, section = row.claim.page.partition(".html#")
         assert f'<a id="{section}"></a>' in (NOTEBOOKS / f"{page}.py").read_text()
         assert {finding.verdict for finding in row.findings} <= {*VERDICTS}
 
@@ -121,11 +120,12 @@ def test_every_claim_has_a_section_with_its_evidence_and_a_rule(rows: list[Row])
 def test_every_claim_is_judged_by_the_learned_policy_alone(rows: list[Row]) -> None:
     for row in rows:
         ours, papers, *nulls = row.findings
+        learning = row.claim.study == TRAININGS
         assert ours.verdict != NO_RESULTS and ours.quantities, ours.note
-        assert ours.policy == ("" if row.section is FIG_3 else "ddqn")
-        lacks = "trainings of this policy" if row.section is FIG_3 else "has no policy ddqn-paper"
+        assert ours.policy == ("" if learning else "ddqn")
+        lacks = "trainings of this policy" if learning else "has no policy ddqn-paper"
         assert papers.verdict == NO_RESULTS and lacks in papers.note
-        assert [null.policy for null in nulls] == ([""] * 3 if row.section is FIG_3 else [*NULLS])
+        assert [null.policy for null in nulls] == ([""] * 3 if learning else [*NULLS])
 
 
 @pytest.mark.parametrize("null", [NULLS[0], pytest.param(NULLS[1], marks=pytest.mark.slow)])
@@ -171,7 +171,9 @@ def test_the_margin_is_that_of_the_sweet_spot(rows: list[Row]) -> None:
 def test_a_single_mission_tells_nothing(studies: dict[str, Results]) -> None:
     alone = studies["table4"].missions.query("replication == 0")
     for row in scorecard({"table4": replace(studies["table4"], missions=alone)}, NONE):
-        assert row.findings[0].verdict == (INCONCLUSIVE if row.section is TABLE_4 else NO_RESULTS)
+        assert row.findings[0].verdict == (
+            INCONCLUSIVE if row.claim.study == "table4" else NO_RESULTS
+        )
 
 
 def test_missions_that_collect_everything(studies: dict[str, Results]) -> None:
@@ -188,7 +190,7 @@ def test_a_policy_that_is_not_in_the_study_is_not_judged(studies: dict[str, Resu
 
 def test_the_papers_network_has_studies_of_its_own(studies: dict[str, Results]) -> None:
     smaller = scorecard({"fig5-paper": studies["fig5"]}, NONE)
-    notes = {row.findings[1].note for row in smaller if row.section is FIG_5}
+    notes = {row.findings[1].note for row in smaller if row.claim.study == "fig5"}
     assert notes == {"the study fig5-paper has no policy ddqn-paper"}
 
 
@@ -200,14 +202,9 @@ def test_a_study_without_event_logs_does_not_say_where_uavs_fly(tmp_path: Path) 
 
 
 def test_learning_is_judged_by_the_curves(rows: list[Row]) -> None:
-    higher, passes, levels = (row for row in rows if row.section is FIG_3)
-    assert (
-        higher.findings[0].verdict
-        == passes.findings[0].verdict
-        == levels.findings[0].verdict
-        == HOLDS
-    )
-    assert passes.findings[0].quantities[0].value == pytest.approx(0.4)
+    higher, passes, levels = (row for row in rows if row.claim.study == TRAININGS)
+    assert {row.findings[0].verdict for row in (higher, passes, levels)} == {HOLDS}
+    assert passes.findings[0].quantities[0].interval.mean == pytest.approx(0.4)
     assert higher.findings[0].note == "trainings quick and no transfer: is above in all of phase II"
 
 
@@ -215,7 +212,7 @@ def test_learning_that_fails_is_told() -> None:
     """It ends below, and what it should beat levels off, but not low."""
     using, without = VARIANTS
     curves = trained({using: (0.1, 0.5), without: (0.9, 0.9)})
-    *both, levels = (row for row in scorecard({}, curves) if row.section is FIG_3)
+    *both, levels = (row for row in scorecard({}, curves) if row.claim.study == TRAININGS)
     assert [row.findings[0].verdict for row in both] == [REFUTED, REFUTED]
     assert levels.findings[0].verdict == IN_PART
 

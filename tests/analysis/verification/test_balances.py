@@ -61,9 +61,7 @@ def test_data_that_are_recorded_as_lost_are_no_imbalance(results: Results) -> No
 @pytest.mark.parametrize("name", ["collected", "residual", "initial", "arrived"])
 def test_data_that_come_from_nowhere_are_noticed(results: Results, name: str) -> None:
     changed = with_records(results, 3, **{name: lambda value: value + 1e-9})
-    assert fails(balances.conservation_check({"trial": changed}))
     assert fails(balances.conservation_check({"sound": results, "trial": changed}))
-    assert not fails(balances.conservation_check({"sound": results}))
 
 
 def test_what_the_simulator_leaves_passes(
@@ -107,34 +105,26 @@ def test_a_record_that_its_log_does_not_add_up_to_is_noticed(logs: list[Log], na
     assert fails(balances.record_check([changed, *rest]))
 
 
-@pytest.mark.parametrize("name", ["initial", "flying_time"])
 def test_policies_that_meet_different_missions_are_noticed(
-    results: Results, logs: list[Log], name: str
+    results: Results, logs: list[Log]
 ) -> None:
-    parameters, arrivals = balances.realisation_checks(
-        with_records(results, 0, **{name: lambda value: value + 1}), logs
-    )
-    assert fails(parameters) and not fails(arrivals)
+    elsewhere = altered(logs, "mission_start", 0, x=lambda x: x - 1)
+    for changed, of_logs in (
+        (with_records(results, 0, initial=lambda value: value + 1), logs),
+        (with_records(results, 0, flying_time=lambda value: value + 1), logs),
+        (results, elsewhere),
+    ):
+        parameters, arrivals = balances.realisation_checks(changed, of_logs)
+        assert (fails(parameters), fails(arrivals)) == (of_logs is logs, of_logs is elsewhere)
 
 
-def test_a_uav_that_starts_elsewhere_is_noticed(results: Results, logs: list[Log]) -> None:
-    changed = altered(logs, "mission_start", 0, x=lambda x: x - 1)
-    assert fails(balances.realisation_checks(results, changed)[1])
-
-
-@pytest.mark.parametrize("name", ["collected", "reward", "residual"])
-def test_a_record_that_is_off_by_its_last_bit_is_noticed(
-    results: Results, again: CrossCheck, name: str
-) -> None:
-    changed = with_records(results, 0, **{name: lambda value: np.nextafter(value, np.inf)})
-    check = balances.engine_check(changed, again)
-    assert (check.n, check.error) == (6, 1)
-    assert check.seen == "5 of 6 missions"
-
-
-def test_a_uav_that_the_other_engine_does_not_leave_is_noticed(
-    results: Results, again: CrossCheck
-) -> None:
+def test_a_record_that_the_other_engine_does_not_leave_is_noticed(results: Results) -> None:
+    """A mission is off by its last bit, and a UAV of another one by a percent of battery."""
+    changed = with_records(results, 0, reward=lambda value: np.nextafter(value, np.inf))
+    row = results.uavs.index[results.uavs["replication"] == results.missions["replication"].max()]
     uavs = results.uavs.copy()
-    uavs.loc[0, "battery"] += 1
-    assert balances.engine_check(replace(results, uavs=uavs), again).error == 1
+    uavs.loc[row[0], "battery"] += 1
+    again = measurements.simulate_missions(replace(changed, uavs=uavs), 3)
+    check = balances.engine_check(changed, again)
+    assert (check.n, check.error) == (6, 2)
+    assert check.seen == "4 of 6 missions"

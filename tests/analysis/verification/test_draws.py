@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.stats.intervals import mean_interval, wilson
 from analysis.verification import balances, draws
 from analysis.verification.measurements import Log
 from dess import load_scenario
@@ -91,59 +90,53 @@ def drawn(**ranges: Any) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
+DRAWN = drawn()
+OUTSIDE, LATER = DRAWN["flying_time"].where(DRAWN.index != 17, 81), DRAWN["charge_start"] + 50
+
+
 @pytest.mark.parametrize(
-    "missions",
+    ("missions", "tests"),
     [
-        drawn(uavs=(1, 2)),
-        drawn(flying_time=(70, 79)),
-        drawn(charge_start=(10, 51)),
-        drawn(charge_complete=(59, 100)),
+        (DRAWN, set()),
+        (drawn(uavs=(1, 2)), {"Number of UAVs: chi-square"}),
+        (drawn(flying_time=(70, 79)), {"Flying time: chi-square"}),
+        (drawn(charge_start=(10, 51)), {"Charging start capacity C_S: chi-square"}),
+        (drawn(charge_complete=(59, 100)), {"Charging complete capacity C_C: chi-square"}),
+        (DRAWN.assign(flying_time=OUTSIDE), {"Flying time: chi-square"}),
+        (DRAWN.assign(charge_complete=LATER), {"Correlations of all pairs: chi-square"}),
     ],
-    ids=SAMPLED,
 )
-def test_parameters_of_other_ranges_do_not(missions: pd.DataFrame) -> None:
-    assert len(failing(draws.parameter_checks(missions, SPACE))) == 1
+def test_other_parameters_are_found_out(missions: pd.DataFrame, tests: set[str]) -> None:
+    assert failing(draws.parameter_checks(missions, SPACE)) == tests
 
 
-def test_a_single_value_outside_its_range_is_wrong() -> None:
-    missions = drawn()
-    missions.loc[17, "flying_time"] = 81
-    assert failing(draws.parameter_checks(missions, SPACE))
+STARTS, FIXED = np.random.default_rng(9).uniform(5, 20, (3000, NODES)), np.full((4, NODES), 12.5)
+ONE_MORE = FIXED.copy()
+ONE_MORE[2, 3] = 12.6
 
 
-def test_parameters_that_depend_on_each_other_are_found_out() -> None:
-    missions = drawn()
-    missions["charge_complete"] = 60 + (missions["charge_start"] - 10)
-    assert failing(draws.parameter_checks(missions, SPACE)) == {
-        "Correlations of all pairs: chi-square"
-    }
+@pytest.mark.parametrize(
+    ("starts", "data", "wrong"),
+    [
+        (STARTS, [5, 20], 0),
+        (12.5 + 0.8 * (STARTS - 12.5), [5, 20], 2),
+        (FIXED, 12.5, 0),
+        (ONE_MORE, 12.5, 1),
+    ],
+    ids=["drawn", "narrow", "fixed", "one node"],
+)
+def test_other_initial_data_are_found_out(starts: np.ndarray, data: Any, wrong: int) -> None:
+    space = load_scenario("paper", initial_data=data)
+    assert len(failing(draws.initial_checks(starts, starts.sum(1), space))) == wrong
 
 
-def test_initial_data_hold_and_others_do_not() -> None:
-    starts = np.random.default_rng(9).uniform(5, 20, (3000, NODES))
-    assert not failing(draws.initial_checks(starts, starts.sum(1), SPACE))
-    narrow = 12.5 + 0.8 * (starts - 12.5)
-    assert len(failing(draws.initial_checks(narrow, narrow.sum(1), SPACE))) == 2
-
-
-def test_fixed_initial_data_are_exact() -> None:
-    fixed = load_scenario("paper", initial_data=12.5)
-    starts = np.full((4, NODES), 12.5)
-    assert not failing(draws.initial_checks(starts, starts.sum(1), fixed))
-    starts[2, 3] = 12.6
-    assert failing(draws.initial_checks(starts, starts.sum(1), fixed))
-
-
-def test_start_cells_are_uniform_over_the_zone() -> None:
-    generator = np.random.default_rng(10)
+def test_other_start_cells_are_found_out() -> None:
     x, y, width, height = SPACE.zone
-    cells = np.stack(
-        [generator.integers(x, x + width, 400), generator.integers(y, y + height, 400)]
-    )
-    assert not failing([draws.start_check(cells.T, SPACE)])
-    assert failing([draws.start_check(np.full((400, 2), [x, y]), SPACE)])
-    beside = cells.T.copy()
+    cells = np.random.default_rng(10).integers([x, y], [x + width, y + height], (400, 2))
+    beside = cells.copy()
     beside[0] = [x + width, y]
+    assert not failing([draws.start_check(cells, SPACE)])
+    assert failing([draws.start_check(np.full((400, 2), [x, y]), SPACE)])
     assert failing([draws.start_check(beside, SPACE)])
 
 
@@ -155,30 +148,13 @@ def test_the_logs_have_what_is_audited(logs: list[Log]) -> None:
     assert any(log.uav_slots["waiting"].any() for log in logs)
 
 
-def test_data_that_are_a_trifle_off_are_noticed(logs: list[Log]) -> None:
-    changed = altered(logs, "communication", 5, value=lambda value: value * (1 + 1e-9))
-    choice, amount = draws.communication_checks(changed, 7)
-    assert fails(amount) and not fails(choice)
-    assert fails(balances.balance_check(changed))
-
-
-def test_another_node_is_noticed(logs: list[Log]) -> None:
-    changed = altered(logs, "communication", 5, node=lambda node: (node + 1) % 3)
-    choice, _ = draws.communication_checks(changed, 7)
-    assert fails(choice)
-    assert fails(balances.balance_check(changed))
-
-
-def test_blocks_have_the_intervals_of_their_missions() -> None:
-    values = np.random.default_rng(12).uniform(size=45)
-    table = draws.blocks(values, 10, share=False)
-    assert len(table) == 4
-    assert tuple(table.loc[1, ["mean", "low", "high"]]) == mean_interval(values[10:20])
-    held = [low <= values[:40].mean() <= high for low, high in table[["low", "high"]].to_numpy()]
-    assert table["holds"].tolist() == held
-    successes = (values > 0.3).astype(int)
-    ends = tuple(draws.blocks(successes, 10, share=True).loc[0, ["mean", "low", "high"]])
-    assert ends == wilson(successes[:10].sum(), 10)
+def test_another_communication_is_found_out(logs: list[Log]) -> None:
+    """Data that are a trifle off, and another node."""
+    trifle = altered(logs, "communication", 5, value=lambda value: value * (1 + 1e-9))
+    choice, amount = draws.communication_checks(trifle, 7)
+    assert fails(amount) and not fails(choice) and fails(balances.balance_check(trifle))
+    other = altered(logs, "communication", 5, node=lambda node: (node + 1) % 3)
+    assert fails(draws.communication_checks(other, 7)[0]) and fails(balances.balance_check(other))
 
 
 def covered(values: np.ndarray, share: bool) -> set[str]:

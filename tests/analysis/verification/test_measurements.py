@@ -114,4 +114,4 @@ def test_a_study_with_failures_is_refused(tmp_path: Path) -> None:
     study = small_study(tmp_path, set={"failures.node_rate": 0.1})
     run_study(study, tmp_path / STUDY)
     with pytest.raises(InputError, match="verification: its scenario has failures.*; allowed: "):
-        Suite.load(tmp_path)
+        Suite(tmp_path)

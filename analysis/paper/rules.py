@@ -1,0 +1,165 @@
+"""The rules of the verdicts on the paper's claims: judges of what is measured.
+
+Each is a function from what a measure finds to one of ``VERDICTS``. Its words are in
+``claims.toml``, which also has the limits of the rules that only need ``all_above``.
+"""
+
+from collections.abc import Collection, Sequence
+from math import hypot
+
+import pandas as pd
+
+from analysis.answers import main_effects
+from analysis.answers.learning import Transfer
+from analysis.answers.main_effects import Shape
+from analysis.paper.values import CROSSING
+from analysis.stats.intervals import Interval
+from analysis.stats.verdict import (
+    ABOVE,
+    BELOW,
+    HOLDS,
+    IN_PART,
+    INCONCLUSIVE,
+    REFUTED,
+    above,
+    judged,
+    position,
+    position_by_test,
+)
+from analysis.study.selection import Choice
+
+# A value is near a printed number if its interval is above that number - NEAR; a change is small if
+# it is less than NEAR.
+NEAR = 0.05
+# A smaller difference does not matter, unless the study of the sweet spot gives another margin.
+MARGIN = 0.01
+
+
+# Means, shares and differences.
+
+
+def all_above(limits: Sequence[float], *intervals: Interval) -> str:
+    """Whether all of some means, shares or differences are above their limits."""
+    return judged(*map(above, intervals, limits))
+
+
+def reached(mean: Interval, printed: Interval) -> str:
+    """Whether a printed number is reached."""
+    difference = gap(mean, printed)
+    near = difference.low > -NEAR
+    if difference.high < 0:
+        return IN_PART if near else REFUTED
+    return HOLDS if near else INCONCLUSIVE
+
+
+def gap(mean: Interval, printed: Interval) -> Interval:
+    """How much higher a mean is than a printed number, which may have its own interval.
+
+    The interval of the difference is computed from the two intervals (R. G. Newcombe, Statistics in
+    Medicine 17 (1998) 873-890, method 10).
+    """
+    difference = mean.mean - printed.mean
+    below = hypot(mean.mean - mean.low, printed.high - printed.mean)
+    beyond = hypot(mean.high - mean.mean, printed.mean - printed.low)
+    return Interval(difference, difference - below, difference + beyond)
+
+
+def gained(difference: Interval, printed: Interval) -> str:
+    """Whether a metric rises, and by as much as the paper prints."""
+    near = difference.low > printed.mean - NEAR or None
+    return judged(above(difference), near if difference.high >= printed.mean else False)
+
+
+def lower(difference: Interval) -> str:
+    """Whether a metric is lower."""
+    return {BELOW: HOLDS, ABOVE: REFUTED}.get(position(difference), INCONCLUSIVE)
+
+
+def kept(difference: Interval, margin: float) -> str:
+    """Whether a metric does not fall by more than the margin."""
+    return judged(above(difference, -margin))
+
+
+def slightly_lower(difference: Interval) -> str:
+    """Whether a metric falls, but only slightly."""
+    if difference.low > 0 or difference.high <= -NEAR:
+        return REFUTED
+    if difference.high >= 0:
+        return INCONCLUSIVE
+    return HOLDS if difference.low > -NEAR else IN_PART
+
+
+def never_all(ratio: Interval, whole: Interval) -> str:
+    """Whether the collection ratio stays below 100 %, by the share of missions that reach it."""
+    if whole.mean == 1:
+        return REFUTED
+    never = whole.mean == 0 and whole.high < NEAR
+    return judged(never or None, ratio.high < 1 or None)
+
+
+# The values of a parameter. ``leads`` are rows of ``main_effects.changes``, with signs such that a
+# difference is the value in question minus another value.
+
+
+def best(leads: pd.DataFrame) -> str:
+    """Whether the metric is highest at a value."""
+    tests = zip(leads["difference"], leads["p_adjusted"], strict=True)
+    positions = {position_by_test(difference, p) for difference, p in tests}
+    if BELOW in positions:
+        return REFUTED
+    return HOLDS if positions == {ABOVE} else INCONCLUSIVE
+
+
+def no_lower(leads: pd.DataFrame, margin: float) -> str:
+    """Whether the metric at some values is not lower than at all others, up to a margin."""
+    if (leads["wide_high"] < -margin).any():
+        return REFUTED
+    return HOLDS if (leads["low"] > -margin).all() else INCONCLUSIVE
+
+
+def alike(changes: pd.DataFrame, margin: float) -> str:
+    """Whether the metric is the same at all values, up to a margin."""
+    if ((changes["wide_low"] > margin) | (changes["wide_high"] < -margin)).any():
+        return REFUTED
+    within = (changes["low"] >= -margin) & (changes["high"] <= margin)
+    return HOLDS if within.all() else INCONCLUSIVE
+
+
+def rises(shape: Shape) -> str:
+    """Whether the metric rises along the values."""
+    verdicts = {main_effects.RISES: HOLDS, main_effects.LEVELS: INCONCLUSIVE}
+    return verdicts.get(shape.words, REFUTED)
+
+
+def peaks(shape: Shape, wanted: int) -> str:
+    """Whether the metric rises up to a value and falls after it."""
+    if wanted not in shape.peaks:
+        return REFUTED
+    return HOLDS if shape.words == main_effects.PEAK else INCONCLUSIVE
+
+
+def chosen(choice: Choice, wanted: Collection[int]) -> str:
+    """Whether a selection has chosen one of the design points with these numbers."""
+    left = {choice.best, *choice.survivors}
+    return judged(left <= {*wanted} or (None if left & {*wanted} else False))
+
+
+# Learning curves, with transfer learning and without.
+
+
+def passes(transfer: Transfer) -> str:
+    """Whether the curve with transfer learning is above from some step to the end."""
+    return transfer.verdict
+
+
+def throughout(transfer: Transfer) -> str:
+    """Whether the curve with transfer learning is above at every step."""
+    in_part = transfer.verdict == HOLDS and not transfer.throughout
+    return IN_PART if in_part else transfer.verdict
+
+
+def levels_off(settled: float, transfer: Transfer) -> str:
+    """Whether training without transfer learning levels off early, and at a low value."""
+    if transfer.length < CROSSING:
+        return INCONCLUSIVE
+    return judged(settled <= 0.5 or None, above(transfer.last))

@@ -1,0 +1,217 @@
+"""Every rule can be met, refuted and left open, by figures made up for it."""
+
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from analysis.answers.learning import Transfer
+from analysis.answers.main_effects import FALLS, LEVELS, PEAK, RISES, VALLEY, Shape
+from analysis.paper import rules, values
+from analysis.paper.measures import Pairs, negated
+from analysis.paper.scorecard import RULES
+from analysis.stats.intervals import Interval
+from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
+from analysis.study.selection import Choice
+from tests.analysis.answers.test_main_effects import pairs_of
+
+
+def around(mean: float, half: float = 0.01) -> Interval:
+    return Interval(mean, mean - half, mean + half)
+
+
+KNOWN: dict[str, dict[str, Any]] = {
+    "reached": {"printed": around(0.5, 0)},
+    "gained": {"printed": around(0.2, 0)},
+    **dict.fromkeys(("kept", "no_lower", "alike"), {"margin": 0.01}),
+}
+
+
+def judged(rule: str, *arguments: object) -> str:
+    return RULES[rule].judge(*arguments, **KNOWN.get(rule, {}))
+
+
+@pytest.mark.parametrize(
+    ("rule", "mean", "half", "verdict"),
+    [
+        ("reached", 0.60, 0.01, HOLDS),  # wholly above
+        ("reached", 0.495, 0.01, HOLDS),  # around it
+        ("reached", 0.49, 0.01, HOLDS),  # the upper end is the figure
+        ("reached", 0.48, 0.01, IN_PART),  # wholly below, but near
+        ("reached", 0.40, 0.20, INCONCLUSIVE),  # too few missions to say, but far
+        ("reached", 0.51, 0.20, INCONCLUSIVE),  # too few missions to say, if near
+        ("reached", 0.44, 0.005, REFUTED),
+        ("reached", 0.45, 0.01, REFUTED),  # wholly below, and not shown to be near
+        ("gained", 0.24, 0.01, HOLDS),
+        ("gained", 0.195, 0.01, HOLDS),
+        ("gained", 0.195, 0.19, IN_PART),  # it rises, but who knows how much
+        ("gained", 0.09, 0.01, IN_PART),
+        ("gained", 0.005, 0.01, REFUTED),  # perhaps it rises, but surely not that much
+        ("gained", -0.3, 0.01, REFUTED),
+        ("gained", 0.14, 0.3, INCONCLUSIVE),
+        ("higher", 0.02, 0.01, HOLDS),
+        ("higher", -0.001, 0.01, INCONCLUSIVE),
+        ("higher", -0.02, 0.01, REFUTED),
+        ("lower", -0.02, 0.01, HOLDS),
+        ("lower", -0.005, 0.01, INCONCLUSIVE),
+        ("lower", 0.02, 0.01, REFUTED),
+        ("slightly_lower", -0.02, 0.01, HOLDS),
+        ("slightly_lower", 0.0, 0.01, INCONCLUSIVE),
+        ("slightly_lower", -0.05, 0.04, IN_PART),  # it falls, but who knows how much
+        ("slightly_lower", -0.10, 0.01, REFUTED),  # more than slightly
+        ("slightly_lower", 0.02, 0.01, REFUTED),
+        ("kept", 0.0, 0.009, HOLDS),
+        ("kept", -0.005, 0.001, HOLDS),  # surely lower, but by less than matters
+        ("kept", 0.0, 0.02, INCONCLUSIVE),  # it might be lower by more than the margin
+        ("kept", -0.05, 0.01, REFUTED),
+        ("most", 0.6, 0.05, HOLDS),
+        ("most", 0.6, 0.2, INCONCLUSIVE),
+        ("most", 0.4, 0.05, REFUTED),
+    ],
+)
+def test_a_rule_about_one_interval(rule: str, mean: float, half: float, verdict: str) -> None:
+    assert judged(rule, around(mean, half)) == verdict
+    assert judged(rule, Interval(mean, -9.0, 9.0)) == INCONCLUSIVE
+
+
+def test_the_paper_s_figures_vary_as_well() -> None:
+    """Newcombe's example: 56 of 70 against 48 of 80, 20 points [5.2, 33.4]."""
+    ours, theirs = values.spread(56 / 70, 70), values.spread(48 / 80, 80)
+    assert tuple(rules.gap(ours, theirs)) == pytest.approx((0.2, 0.0524, 0.3339), abs=5e-5)
+    assert tuple(rules.gap(around(0.8, 0.02), around(0.7, 0))) == pytest.approx((0.1, 0.08, 0.12))
+    below = around(0.89, 0.009)
+    assert rules.reached(below, around(0.9, 0)) == IN_PART
+    assert rules.reached(below, Interval(0.9, 0.88, 0.92)) == HOLDS
+
+
+NONE, SOME, EVERY = Interval(0, 0, 0.01), Interval(0.1, 0.05, 0.2), Interval(1, 0.9, 1)
+
+
+@pytest.mark.parametrize(
+    ("rule", "first", "second", "verdict"),
+    [
+        ("never_all", around(0.9), NONE, HOLDS),
+        ("never_all", around(0.9), SOME, IN_PART),
+        ("never_all", around(0.9), Interval(0, 0, 0.2), IN_PART),  # few missions
+        ("never_all", around(0.99), SOME, INCONCLUSIVE),
+        ("never_all", around(1.0, 0), EVERY, REFUTED),
+        ("ignored", around(0.8), around(0.5), HOLDS),
+        ("ignored", around(0.4), around(0.2), IN_PART),  # more than others, not most
+        ("ignored", around(0.9), around(-0.1), IN_PART),  # most, but the others too
+        ("ignored", around(0.2), around(-0.1), REFUTED),
+        ("ignored", around(0.5), around(0.0), INCONCLUSIVE),
+        ("divided", around(0.2), around(0.95), HOLDS),
+        ("divided", around(0.0), around(0.95), IN_PART),  # nodes of their own, no sectors
+        ("divided", around(0.2), around(0.6), IN_PART),
+        ("divided", around(0.0), around(0.6), REFUTED),
+        ("divided", around(0.0), around(0.75), INCONCLUSIVE),
+    ],
+)
+def test_a_rule_about_two_intervals(
+    rule: str, first: Interval, second: Interval, verdict: str
+) -> None:
+    assert judged(rule, first, second) == verdict
+
+
+@pytest.mark.parametrize(
+    ("best", "left", "verdict"),
+    [
+        (4, (4, 5), HOLDS),
+        (4, (4, 1), INCONCLUSIVE),
+        (1, (1, 4), INCONCLUSIVE),
+        (1, (1, 2), REFUTED),
+    ],
+)
+def test_a_chosen_setting(best: int, left: tuple[int, ...], verdict: str) -> None:
+    choice = Choice((), 0, True, "", best, left, guaranteed=True, stage=0)
+    assert judged("chosen", choice, [4, 5]) == verdict
+
+
+def transfer(
+    last: float, verdict: str = HOLDS, throughout: bool = True, length: int = values.CROSSING
+) -> Transfer:
+    """Trainings that are as long as the paper's, if nothing else is said."""
+    return Transfer(verdict, 0, throughout, around(last), length, (3, 3))
+
+
+@pytest.mark.parametrize(
+    ("rule", "arguments", "verdict"),
+    [
+        ("throughout", [transfer(0.1)], HOLDS),
+        ("throughout", [transfer(0.1, throughout=False)], IN_PART),  # below at first
+        ("throughout", [transfer(0.1, INCONCLUSIVE)], INCONCLUSIVE),
+        ("throughout", [transfer(0.1, REFUTED)], REFUTED),
+        ("passes", [transfer(0.1)], HOLDS),
+        ("passes", [transfer(0.1, throughout=False)], HOLDS),
+        ("levels_off", [0.4, transfer(0.1)], HOLDS),
+        ("levels_off", [0.4, transfer(0.0)], IN_PART),  # early, not shown to be low
+        ("levels_off", [0.9, transfer(0.1)], IN_PART),  # low, not early
+        ("levels_off", [0.9, transfer(0.0)], INCONCLUSIVE),
+        ("levels_off", [0.9, transfer(-0.1)], REFUTED),
+        ("levels_off", [0.4, transfer(0.1, length=values.CROSSING - 1)], INCONCLUSIVE),
+    ],
+)
+def test_learning_curves(rule: str, arguments: list[object], verdict: str) -> None:
+    assert judged(rule, *arguments) == verdict
+
+
+def leads_of(
+    steps: list[float], *positions: int, sure: bool = True, half: float = 0.001
+) -> pd.DataFrame:
+    """The differences of some values of a parameter to all others, from the steps in between."""
+    changes = pairs_of(steps, sure, half)
+    values = {str(n): n for n in range(len(steps) + 1)}
+    return Pairs("uavs", changes, values).leads(*map(str, positions))
+
+
+@pytest.mark.parametrize(
+    ("rule", "of", "verdict"),
+    [
+        ("best", leads_of([1, 1], 2), HOLDS),
+        ("best", leads_of([1, -2], 1), HOLDS),
+        ("best", leads_of([1, 1], 1), REFUTED),
+        ("best", leads_of([1, 0], 2), INCONCLUSIVE),  # as high as the one before
+        ("best", leads_of([1, 1], 2, sure=False), INCONCLUSIVE),
+        ("lowest", negated(leads_of([1, 1], 0)), HOLDS),
+        ("lowest", negated(leads_of([1, 1], 1)), REFUTED),
+        ("lowest", negated(leads_of([0, 1], 0)), INCONCLUSIVE),
+        ("no_lower", leads_of([0, 0, 0], 0, 1), HOLDS),
+        ("no_lower", leads_of([0, -1, 0], 0, 1), HOLDS),
+        ("no_lower", leads_of([0, 1, 0], 0, 1), REFUTED),
+        ("no_lower", leads_of([0, -1, 0], 2, 3), REFUTED),
+        ("no_lower", leads_of([0, 0, 0], 0, 1, half=0.02), INCONCLUSIVE),
+        ("no_lower", leads_of([1, 0, 0], 0, 1), REFUTED),  # the first is lower
+        ("no_lower", leads_of([0, 0.005, 0], 0, 1), HOLDS),  # by less than matters
+        # Surely lower, perhaps by less than matters; beyond, but not with all at once; beyond.
+        ("no_lower", leads_of([0, 0.02, 0], 0, 1, half=0.015), INCONCLUSIVE),
+        ("no_lower", leads_of([0, 0.02, 0], 0, 1, half=0.006), INCONCLUSIVE),
+        ("no_lower", leads_of([0, 0.02, 0], 0, 1, half=0.004), REFUTED),
+        ("alike", pairs_of([0, 0.02], half=0.015), INCONCLUSIVE),
+        ("alike", pairs_of([0, 0.02], half=0.006), INCONCLUSIVE),
+        ("alike", pairs_of([0, 0.02], half=0.004), REFUTED),
+        ("alike", pairs_of([0, 0.005]), HOLDS),
+        ("alike", pairs_of([0.005, 0.005]), INCONCLUSIVE),  # perhaps a little more
+        ("alike", pairs_of([0, 0.05]), REFUTED),
+        ("alike", pairs_of([0, -0.05]), REFUTED),
+        ("rises", Shape(RISES, (1,)), HOLDS),
+        ("rises", Shape(LEVELS, (0, 1)), INCONCLUSIVE),
+        ("rises", Shape(FALLS, (0,)), REFUTED),
+        ("rises", Shape(PEAK, (1,)), REFUTED),
+    ],
+)
+def test_the_values_of_a_parameter(rule: str, of: object, verdict: str) -> None:
+    assert judged(rule, of) == verdict
+
+
+@pytest.mark.parametrize(
+    ("shape", "verdict"),
+    [
+        (Shape(PEAK, (2,)), HOLDS),
+        (Shape(PEAK, (1,)), REFUTED),
+        (Shape(RISES, (2, 3)), INCONCLUSIVE),  # nothing is seen to fall
+        (Shape(LEVELS, (0, 1, 2, 3)), INCONCLUSIVE),
+        (Shape(VALLEY, ()), REFUTED),
+    ],
+)
+def test_a_peak(shape: Shape, verdict: str) -> None:
+    assert judged("peaks", shape, 2) == verdict
