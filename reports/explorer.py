@@ -22,7 +22,7 @@ from analysis.answers.settings import points, varied
 from analysis.figures import style
 from analysis.results.tables import Results
 from dess import InputError
-from reports.pages.body import template
+from reports.pages.html import template
 
 
 class Slider(NamedTuple):

@@ -12,7 +12,7 @@ from IPython.display import HTML
 from analysis import numbers
 from analysis.paper.measures import EXCEEDS, FALLS_SHORT, MATCHES, OUTCOMES, Quantity
 from analysis.paper.scorecard import COLUMNS, Row
-from reports.pages.body import template
+from reports.pages.html import template
 
 _LOOKS = dict.fromkeys(OUTCOMES, "") | {EXCEEDS: "better", MATCHES: "better", FALLS_SHORT: "worse"}
 

@@ -6,10 +6,8 @@ file name has a hash of the file. If somebody changes both the content and the h
 missions again still shows the difference.
 """
 
-import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -26,19 +24,16 @@ from analysis.results.resimulate import Evidence, Mission, chosen, difference, l
 from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from dess import InputError, simulate
-from dess.files.reading import paths_in, read_text
+from dess.files.reading import paths_in
 from dess.record import PARAMETER_EVENTS
 from dess.scenario import ScenarioSpace
 from policies.base import Policy
 from policies.registry import confirmed, load_team
-from reports.pages.html import FILES, STUDY, embedded
+from reports.pages.page import ALLOWED, FILES, LIMIT, Page
 
-LIMIT = 64 * 2**20  # bytes of the largest page
 BOUNDS_CHECKED = 3  # upper bounds that are computed again at most, since each takes seconds
 
-# The place in a page that contains the checksum of the rest of the page.
-_SEAL = re.compile(r'(<meta name="dess-checksum" content=")([0-9a-f]*)(">)')
-_ALLOWED = "a page of dess report, or a results folder"
+_ALLOWED = f"{ALLOWED}, or a results folder"
 
 _Drawn = Sequence[tuple[Mission, ScenarioSpace, list[Policy]]]
 
@@ -92,17 +87,6 @@ class _Sampling:
             self.seconds = check_missions(what, spaces, self.seconds)
 
 
-def sealed(html: str) -> str:
-    """The page with its checksum filled in."""
-    checksum = sha256(_SEAL.sub(r"\g<1>\g<3>", html, count=1).encode()).hexdigest()
-    return _SEAL.sub(rf"\g<1>{checksum}\g<3>", html, count=1)
-
-
-def is_sealed(html: str) -> bool:
-    """Whether the checksum in a page is the checksum of its text."""
-    return _SEAL.search(html) is not None and sealed(html) == html
-
-
 def verify_page(
     path: Path, missions: int, seed: int, named: Collection[str] = (), yes: bool = False
 ) -> list[Check]:
@@ -119,12 +103,11 @@ def verify_page(
         InputError: If the file is not a page of dess, a policy cannot be loaded, or the missions
             may take more than an hour.
     """
-    html = read_text(path, LIMIT, allowed=_ALLOWED)
-    if not _SEAL.search(html):
+    page = Page.read(path, LIMIT, _ALLOWED)
+    if not page.has_seal:
         raise InputError(f"{path}: is not a page of dess; allowed: {_ALLOWED}")
-    altered = [] if is_sealed(html) else ["the page has been altered"]
-    files = [_check_files(text, path) for text in embedded(FILES, html)]
-    studies = [Evidence.parse(text, str(path), _ALLOWED) for text in embedded(STUDY, html)]
+    altered = [] if page.is_sealed else ["the page has been altered"]
+    files, studies = [_check_files(text, path) for text in page.hidden(FILES)], page.evidence
     notes = [] if studies else ["contains no missions to simulate again"]
     sampling = _Sampling(missions, seed, named, yes)
     drawn = [_drawn(evidence, sampling) for evidence in studies]  # all, before any is simulated
