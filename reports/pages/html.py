@@ -34,7 +34,7 @@ from analysis.results.resimulate import Evidence, learned_files
 from analysis.results.tables import Results
 from analysis.study.study import budget_of
 from dess.errors import printable
-from reports.pages.page import FILES, STUDY, Page, hidden
+from reports.pages.page import FILES, STUDY, Learned, Page, hidden
 
 SHORT = 12  # characters of a hash that are shown
 PART = "application/vnd.dess.part+json"  # type of the output of a cell that contains a ``Part``
@@ -225,7 +225,7 @@ def weights(folder: Path) -> HTML:
     files = learned_files(folder)
     rows = [(name, digest[:SHORT]) for name, digest in files.items()]
     shown = table(pd.DataFrame(rows, columns=["File", "SHA-256"]), "The learned policies")
-    return HTML(f"{shown.data}{hidden(FILES, json.dumps(files))}")
+    return HTML(f"{shown.data}{hidden(FILES, Learned(files=files).model_dump_json())}")
 
 
 def _weights(evidence: Evidence) -> Iterator[str]:

@@ -12,11 +12,11 @@ from types import MappingProxyType
 from markupsafe import Markup
 
 from dess import InputError
-from dess.files.reading import Missing, paths_in
+from dess.files.reading import paths_in
 from reports.folders import INDEX, PREFIX
 from reports.pages import html
 from reports.pages.html import fill, template
-from reports.pages.notebook import GROUPS, NAMES, SCORECARD
+from reports.pages.notebook import GROUPS, SCORECARD
 from reports.pages.page import FILES, Page
 
 log = logging.getLogger(__name__)
@@ -84,15 +84,12 @@ def pages_in(out: Path, but: Container[str] = ()) -> dict[str, Page]:
         but: File names that are left out without a warning.
     """
     pages = {}
-    studies = [path.name for path in paths_in(out, "*.html") if _OF_STUDY.fullmatch(path.name)]
-    names = (*(f"{name}.html" for name in NAMES), *studies)
+    names = in_order(path.name for path in paths_in(out, "*.html"))
     for path in (out / name for name in names if name not in but):
         try:
             page = Page.read(path)
             if not (page.is_sealed and page.card and page.evidence is not None):
                 raise InputError("altered")
-        except Missing:
-            continue
         except InputError:
             log.warning("%s: altered, or of another version; the index leaves it out", path)
         else:

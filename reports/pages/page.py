@@ -28,6 +28,12 @@ class Picture(Document):
     narrow: str
 
 
+class Learned(Document):
+    """The files of learned policies, with their hashes."""
+
+    files: dict[str, str]
+
+
 class Card(Document):
     """What a page tells the index: its question and, in one sentence, what it found.
 
@@ -94,6 +100,11 @@ class Page:
     def evidence(self) -> list[Evidence]:
         """The evidence of its studies, or an ``InputError`` if it is not valid."""
         return [Evidence.parse(text, self.where, self.allowed) for text in self.hidden(STUDY)]
+
+    @property
+    def learned(self) -> list[Learned]:
+        """Its lists of files of learned policies, or an ``InputError`` if one is not valid."""
+        return [Learned.parse(text, self.where, self.allowed) for text in self.hidden(FILES)]
 
     def hidden(self, kind: str) -> list[str]:
         """The distinct JSON texts of a kind, such as ``STUDY``, that are hidden in the page."""

@@ -121,7 +121,7 @@ TINY = {"mission": MISSION, "scorecard": SCORECARD}
 MODULES = ("pandas", "sitecustomize", "matplotlib", "joblib", "typer")
 MODULES += ("ipython_config", "ipython_kernel_config", "jupyter_config")
 STARTUP = ".ipython/profile_default/startup/00.py"
-TEMPLATES = ("index.html.j2", "base.html.j2", "base/null.j2")
+TEMPLATES = ("report.html", "layout.html", "part.html", "base/null.j2")
 
 
 def write_notebooks(folder: Path, **sources: str) -> Path:
@@ -148,7 +148,7 @@ def trap(results: Path) -> Path:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(f"open({str(results / 'hit')!r}, 'a').write({name!r})\n")
     for name in TEMPLATES:
-        file = results / "basic" / name
+        file = results / name
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text("the template of a stranger")
     (results / "matplotlibrc").write_text("this is no setting\n")
