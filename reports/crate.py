@@ -19,17 +19,13 @@ from packaging.licenses import InvalidLicenseExpression, canonicalize_license_ex
 from analysis import numbers
 from analysis.results.chunks import BOUNDS, MANIFEST, partition
 from analysis.results.parquet import files_in
-from analysis.results.resimulate import Evidence
 from analysis.results.tables import Results
 from dess import InputError
 from dess.files import documents, tables
 from dess.files.archives import write_zip
-from dess.files.reading import read_bytes, read_text
-from reports.pages.body import template
-from reports.pages.html import STUDY as EVIDENCE
-from reports.pages.html import embedded
-from reports.pages.index import LARGEST
-from reports.pages.verify import LIMIT, is_sealed
+from dess.files.reading import read_bytes
+from reports.pages.html import template
+from reports.pages.page import LARGEST, LIMIT, Page
 
 _TABLES = ("missions", "uavs", "events", BOUNDS)
 
@@ -73,9 +69,9 @@ def check_page(page: Path, results: Results) -> None:
         InputError: If the file is not a page, shows other results, or has been changed.
     """
     allowed = f"their page, as dess report {results.store.folder} writes it"
-    html = read_text(page, LIMIT, allowed=allowed)
-    keys = [Evidence.parse(text, str(page), allowed).key for text in embedded(EVIDENCE, html)]
-    if keys != [results.store.manifest.key] or not is_sealed(html):
+    shown = Page.read(page, LIMIT, allowed)
+    keys = [evidence.key for evidence in shown.evidence]
+    if keys != [results.store.manifest.key] or not shown.is_sealed:
         raise InputError(f"{page}: does not show the results of this study; allowed: {allowed}")
 
 

@@ -22,7 +22,7 @@ from analysis.answers.settings import points, varied
 from analysis.figures import style
 from analysis.results.tables import Results
 from dess import InputError
-from reports.pages.body import template
+from reports.pages.html import template
 
 
 class Slider(NamedTuple):
@@ -131,22 +131,8 @@ def explorer(results: Results) -> HTML:
         (row.metric, row.policy): f"{numbers.interval(row.mean, row.low, row.high)}, n = {row.n:,}"
         for row in grid.at_start().itertuples()
     }
-    shown = {"sliders": grid.sliders, "policies": looks, "metrics": names.METRICS, "texts": texts}
-    data = json.dumps(_data(grid), separators=(",", ":")).replace("<", "\\u003c")
-    return HTML(template("explorer.html").render(data=data, **shown))
-
-
-def _data(grid: Grid) -> dict[str, Any]:
-    """The data for the script of the page: the sliders, and the estimates of every design point.
-
-    An estimate has its mean and the ends of its interval, in tenths of a percent, and its number of
-    missions. The estimates are in the order of ``Grid.means``.
-    """
     columns = ["mean", "low", "high", "n"]
-    estimates = [
-        [*map(_tenths, ends), n] for *ends, n in grid.means[columns].itertuples(index=False)
-    ]
-    return {
+    data = {
         "sliders": [
             {
                 "name": slider.parameter.plain,
@@ -156,8 +142,14 @@ def _data(grid: Grid) -> dict[str, Any]:
             }
             for slider in grid.sliders
         ],
-        "estimates": estimates,
+        # Of each estimate in the order of the means: the mean and the ends of its interval, in
+        # tenths of a percent, and the number of missions.
+        "estimates": [
+            [*map(_tenths, ends), n] for *ends, n in grid.means[columns].itertuples(index=False)
+        ],
     }
+    shown = {"sliders": grid.sliders, "policies": looks, "metrics": names.METRICS, "texts": texts}
+    return HTML(template("explorer.html").render(data=data, **shown))
 
 
 def _tenths(share: float) -> int:

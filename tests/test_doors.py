@@ -104,9 +104,8 @@ MADE_HERE = {"dumps", "to_json"}
 PARSED = {
     # The header of a checkpoint, which is a ``Document``, as it was written: for its checksum.
     "policies.learner.checkpoint": {"parse_json"},
-    # Lists and tables that are no objects of JSON, by types of pydantic.
+    # Tables that are no objects of JSON, by types of pydantic.
     "analysis.results.parquet": {"validate_json"},
-    "reports.pages.verify": {"validate_json"},
     # Keys of dictionaries and of a cache, which are texts of JSON.
     "analysis.study.cheapest": {"loads"},
     "analysis.results.provenance": {"loads"},

@@ -18,7 +18,7 @@ from dess.errors import InputError
 EXTRAS = {
     "learning": ("torch", "safetensors"),
     "reports": (
-        *("matplotlib", "PIL", "seaborn", "SALib", "IPython", "bs4"),
+        *("matplotlib", "PIL", "seaborn", "SALib", "IPython"),
         *(
             "jinja2",
             "jupytext",

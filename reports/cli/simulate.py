@@ -258,7 +258,7 @@ def _write_page(mission: _Mission, path: Path) -> None:
     """Write a page with the player of the mission; the same mission gives the same bytes."""
     from dess.files import writing
     from reports import player
-    from reports.pages.body import fill
+    from reports.pages.html import fill
 
     caption = player.reading(mission.scenario)
     played = player.player(mission.log, mission.scenario, "mission", caption=caption)

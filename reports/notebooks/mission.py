@@ -51,7 +51,7 @@ library()
 
 
 # %%
-def played(mission: missions.LoggedMission, name: str) -> html.HTML:
+def played(mission: missions.LoggedMission, name: str) -> html.Part:
     policy_name = mission.row["policy"]
     title = f"{mission.fleet}, {policy_name}: {numbers.percent(mission.row[RATIO])} collected"
     caption = (

@@ -143,9 +143,12 @@ display(html.gallery(page.index_figures(study, by)), page.sensitivity(study))
 # %% tags=["if-effects"]
 display(html.gallery(page.effect_figures(study, metrics)), page.main_effects(study, by))
 
+# %% [markdown] tags=["if-settings"]
+# ## Comparison with a baseline
+
 # %% tags=["if-settings"]
 html.say(
-    "## Comparison with a baseline\n\nEvery policy is compared with itself at design point "
+    "Every policy is compared with itself at design point "
     "{point}: {words}. The parameter `baseline` names another point.",
     point=baseline,
     words=page.setting(study, baseline),

@@ -1,56 +1,27 @@
-"""The body of a page, made of the output of its cells, and the frame around it."""
+"""The page of a notebook that has been run: nbconvert fills our template with what cells say.
+
+A cell says what it is as data (``html.Part``), Markdown, HTML or text; a cell of Markdown that
+begins with a second-level heading begins a section. Here are the filters of the template
+``report.html``, which number figures, explain terms and make the sections.
+"""
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
-from bs4 import BeautifulSoup, Tag
-from bs4.element import NavigableString
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup
-from nbconvert import HTMLExporter
+from nbconvert.exporters import TemplateExporter
+from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 from nbformat import NotebookNode
 from pygments.formatters import HtmlFormatter
 
 import dess
-from reports.pages.html import Marked, text
-from reports.pages.verify import sealed
+from reports.pages.html import JINJA, PART, indexed
+from reports.pages.notebook import SCORECARD, Report
+from reports.pages.page import CARD, Card, Page, Picture, hidden
 
-
-def template(name: str, **filters: Callable[..., str]) -> Template:
-    """Load a template, which escapes values and raises an error if one is undefined.
-
-    Args:
-        name: File name in ``reports/templates``.
-        **filters: Filters in addition to those of Jinja.
-    """
-    environment = Environment(
-        loader=PackageLoader("reports", "templates"),
-        autoescape=select_autoescape(),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        finalize=_in_markdown if name.endswith(".md") else None,
-    )
-    environment.filters |= filters
-    return environment.get_template(name)
-
-
-def _in_markdown(value: object) -> object:
-    return value if isinstance(value, int | float | Marked) else text(value)
-
-
-def fill(name: str, scripts: bool = False, **values: Any) -> str:
-    """Fill a template with values, and seal the page.
-
-    A browser makes no request for the page, and runs a script only if ``scripts`` is set.
-    """
-    style = Markup(HtmlFormatter().get_style_defs(".highlight"))
-    return sealed(
-        template(name).render(scripts=scripts, code_style=style, version=dess.__version__, **values)
-    )
-
-
+TEMPLATES = Path(__file__).parents[1] / "templates"
 FOLDED = "How this page was made"  # the heading of the section with method and provenance
 # What the pages explain where a word stands first.
 TERMS = {
@@ -65,126 +36,95 @@ TERMS = {
     "Holm": "a correction of p-values for the number of comparisons",
 }
 _TERM = re.compile(rf"\b({'|'.join(TERMS)})\b")
-_EXPLAINED = ("p", "li", "figcaption")  # elements in whose text terms are explained
-_PLAIN = ("code", "a", "button", "script")  # but not within these
-# What nbconvert puts around the cells of a notebook and around their outputs.
-_WRAPPERS = 'div.cell, div.inner_cell, div.text_cell_render, div[class^="output"]'
-_INDEX = re.compile(r"\bC_([SC])\b")  # as in C_S, a threshold of charging
+_HEADING = re.compile(r"## (.*)\n*")
 
 
-@dataclass(frozen=True)
-class Body:
-    """The parts of a page.
+class _Writer(IPythonRenderer):
+    """Writes the texts of a page from its beginning; explains a term where it stands first."""
 
-    Attributes:
-        answer: The answer to the question of the page, with its terms explained; may be empty.
-        number: The number of the answer, which the index shows large; may be empty.
-        sections: The headings of the sections, by their anchors.
-        html: The rest.
-    """
+    def __init__(self) -> None:
+        super().__init__(escape=False, exclude_anchor_links=True)
+        self._left = dict(TERMS)
 
-    answer: Markup
-    number: str
-    sections: dict[str, str]
-    html: str
+    def explained(self, text: object) -> Markup:
+        return Markup(_TERM.sub(self._with_meaning, str(Markup.escape(text))))
 
-    @classmethod
-    def of(cls, notebook: NotebookNode) -> "Body":
-        """The parts of a notebook that has been run."""
-        exporter = HTMLExporter(
-            template_name="basic",
-            exclude_input=True,
-            exclude_output_prompt=True,
-            exclude_anchor_links=True,
-            extra_template_basedirs=[],  # otherwise templates in the working directory come first
-        )
-        soup = BeautifulSoup(exporter.from_notebook_node(notebook)[0], "html.parser")
-        for prompt in soup.select("div.prompt"):
-            prompt.decompose()
-        for wrapper in soup.select(_WRAPPERS):
-            wrapper.unwrap()
-        for count, figure in enumerate(soup.find_all("figure"), 1):
-            _number(soup, figure, count)
-        _explain(soup)
-        found = soup.select_one("p.answer")
-        answer = found.extract() if found else soup.new_tag("p")
-        for scrolling in soup.find_all("pre"):
-            scrolling["tabindex"] = "0"
-        for string in [*soup.find_all(string=_INDEX)]:
-            if not string.find_parent(["code", "pre", "script", "style"]):
-                string.replace_with(*_with_indices(soup, string))
-        sections = {str(section["id"]): title for section, title in _sections(soup)}
-        number = str(answer.get("data-number", ""))
-        return cls(Markup(answer.decode_contents()), number, sections, soup.decode().strip())
+    def _with_meaning(self, found: re.Match[str]) -> str:
+        meaning = self._left.pop(found[0], None)
+        return f'<abbr title="{meaning}">{found[0]}</abbr>' if meaning else found[0]
+
+    def markdown(self, source: str) -> Markup:
+        return Markup(MarkdownWithMath(self).render(source))
+
+    def text(self, text: str) -> str:
+        return self.explained(indexed(Markup(super().text(text))))
+
+    def block_code(self, code: str, info: str | None = None) -> str:
+        return super().block_code(code, info).replace("<pre>", '<pre tabindex="0">')  # it scrolls
 
 
-def _number(soup: BeautifulSoup, figure: Tag, number: int) -> None:
-    """Give a figure an anchor and its number."""
-    caption = figure.find("figcaption")
-    figure.attrs.setdefault("id", f"figure-{number}")
-    if caption:
-        label = soup.new_tag("a", href=f"#{figure['id']}", attrs={"class": "number"})
-        label.string = f"Figure {number}"
-        caption.insert(0, label, " ")
+def page_of(report: Report) -> Page:
+    """The page of a report that has been run."""
+    writer, card = _Writer(), _card(report)
+    filters = {"explained": writer.explained, "indexed": indexed, "markdown": writer.markdown}
+    exporter = TemplateExporter(
+        template_file="report.html",
+        template_paths=[str(TEMPLATES)],
+        filters=filters | {"anchor": anchor, "is_beside": is_beside, "sections": sections},
+    )
+    for option, value in JINJA.items():
+        setattr(exporter.environment, option, value)
+    exporter.environment.globals |= {
+        "report": report,
+        "scripts": report.scripts,
+        "version": dess.__version__,
+        "answer": card.finding,
+        "card": hidden(CARD, card.model_dump_json()),
+        "code_style": Markup(HtmlFormatter().get_style_defs(".highlight")),
+        "code": Markup(writer.block_code("\n\n\n".join(report.code), "python")),
+        "folded": FOLDED,
+        "part_type": PART,
+    }
+    return Page(exporter.from_notebook_node(report.notebook)[0]).sealed
 
 
-def _explain(soup: BeautifulSoup) -> None:
-    """Explain every term where it stands first."""
-    left = {*TERMS}
-    for string in [*soup.find_all(string=_TERM)]:
-        if not string.find_parent(_EXPLAINED) or string.find_parent(
-            ["code", "a", "button", "script"]
-        ):
-            continue
-        parts: list[str | Tag] = []
-        for part in _TERM.split(string):
-            if part in left:
-                left.remove(part)
-                term = soup.new_tag("abbr", title=TERMS[part])
-                term.string = part
-                parts.append(term)
-            else:
-                parts.append(part)
-        string.replace_with(*parts)
+def _card(report: Report) -> Card:
+    """The card of a report, whose figures get their numbers."""
+    parts = parts_of(report.notebook.cells)
+    figures = [figure for part in parts for figure in part.get("figures", [])]
+    for number, figure in enumerate(figures, 1):
+        figure |= {"number": number, "name": figure["name"] or f"figure-{number}"}
+    said = next((part for part in parts if "sentence" in part), {})
+    finding, number = said.get("sentence", report.description), said.get("number", "")
+    picture = None
+    if report.name == SCORECARD and figures:
+        picture = Picture(**{name: figures[0][name] for name in Picture.model_fields})
+    return Card(title=report.title, finding=finding, number=number, picture=picture)
 
 
-def _with_indices(soup: BeautifulSoup, text: NavigableString) -> list[str | Tag]:
-    """A text in which the S of ``C_S`` is an index."""
-    parts: list[str | Tag] = [*_INDEX.split(text)]
-    for place in range(1, len(parts), 2):
-        index = soup.new_tag("sub")
-        index.string = str(parts[place])
-        parts[place - 1], parts[place] = f"{parts[place - 1]}C", index
-    return parts
+def parts_of(cells: Iterable[NotebookNode]) -> list[dict[str, Any]]:
+    """The parts that cells show, in the order of the page."""
+    outputs = [output.get("data", {}) for cell in cells for output in cell.get("outputs", [])]
+    return [data[PART] for data in outputs if PART in data]
 
 
-def _sections(soup: BeautifulSoup) -> Iterator[tuple[Tag, str]]:
-    """Make a section of every second-level heading and what follows it; the method is folded."""
-    for heading in soup.find_all("h2"):
-        title, following = heading.get_text(), [*heading.next_siblings]
-        section = soup.new_tag("section", id=re.sub(r"\W+", "-", title).strip("-"))
-        heading.insert_before(section)
-        ends = (n for n, item in enumerate(following) if getattr(item, "name", "") == "h2")
-        content = following[: next(ends, len(following))]
-        if title == FOLDED:
-            folded = soup.new_tag("details")
-            summary = soup.new_tag("summary")
-            summary.append(heading.extract())
-            folded.extend([summary, *content])
-            section.append(folded)
-        else:
-            section.extend([heading.extract(), *content])
-            _beside(soup, section)
-        yield section, title
+def sections(cells: Iterable[NotebookNode]) -> list[tuple[Markup, list[NotebookNode]]]:
+    """Headings as HTML, each taken out of its cell, with the cells below; the first has none."""
+    found: list[tuple[Markup, list[NotebookNode]]] = [(Markup(), [])]
+    for cell in cells:
+        if cell.cell_type == "markdown" and (heading := _HEADING.match(cell.source)):
+            cell.source = cell.source[heading.end() :]
+            found.append((Markup(heading[1]), []))
+        found[-1][1].append(cell)
+    return found
 
 
-def _beside(soup: BeautifulSoup, section: Tag) -> None:
-    """Put the text of a section beside its figure, if it has one figure and begins with text."""
-    figures = section.find_all("figure", class_=lambda name: name != "lead", recursive=False)
-    words = section.find_all(["p", "ul"], recursive=False)
-    if len(figures) == 1 and words:
-        both = soup.new_tag("div", attrs={"class": "beside"})
-        figures[0].insert_before(both)
-        text = soup.new_tag("div")
-        text.extend(words)
-        both.extend([text, figures[0]])
+def anchor(heading: Markup) -> str:
+    """The anchor of a section."""
+    return re.sub(r"\W+", "-", heading.striptags()).strip("-")
+
+
+def is_beside(cells: Sequence[NotebookNode]) -> bool:
+    """Whether the text of a section stands beside its figure: there is text, and one figure."""
+    single = [part for part in parts_of(cells) if not part.get("look", "none")]
+    return len(single) == 1 and any(c.cell_type == "markdown" and c.source for c in cells)

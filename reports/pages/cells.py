@@ -112,10 +112,8 @@ def _run_cell(shell: InteractiveShell, cell: str) -> tuple[list[dict], list[str]
         if stream.getvalue()
     ]
     for shown in shell.display_pub.outputs:
-        kind = "display_data" if "transient" in shown else "execute_result"
-        counted = {} if "transient" in shown else {"execution_count": None}
         parts = {"data": shown["data"], "metadata": shown["metadata"]}
-        outputs.append({"output_type": kind, **parts, **counted})
+        outputs.append({"output_type": "display_data", **parts})
     return outputs, None
 
 

@@ -12,7 +12,8 @@ import io
 import json
 import re
 from base64 import b64encode
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from html import escape
 from numbers import Number
 from pathlib import Path
@@ -22,17 +23,21 @@ from typing import Any
 import matplotlib as mpl
 import pandas as pd
 from IPython.display import HTML, Markdown
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
+import dess
 from analysis import numbers
 from analysis.numbers import span
 from analysis.results.resimulate import Evidence, learned_files
 from analysis.results.tables import Results
 from analysis.study.study import budget_of
 from dess.errors import printable
+from reports.pages.page import FILES, STUDY, Learned, Page, hidden
 
 SHORT = 12  # characters of a hash that are shown
-STUDY, FILES = "dess-study", "dess-files"  # classes of the elements that contain evidence
+PART = "application/vnd.dess.part+json"  # type of the output of a cell that contains a ``Part``
 
 # A figure, its alternative text, its caption and, if the page links to them, its data.
 Drawing = tuple[Figure, str] | tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame]
@@ -50,15 +55,72 @@ _HARMFUL = re.compile(r"[<>\[\]$]|:(?=//)|(?<=www)\.")
 _MARKUP = re.compile(
     rf"{_HARMFUL.pattern}|[&\\`*|~]|(?<![^\W_])_|_(?![^\W_])|^[-+=#](?!\d)|^\d+(?=[.)](\s|$))"
 )
+# A figure without anything.
+_BARE = dict.fromkeys(("name", "alt", "source", "narrow", "player", "caption", "links"), "")
 # The coordinates in a figure, a number with many decimals, the space around a command of a path.
 _PLACES, _DIGITS = re.compile(rb' (?:d|x|y)="[^"]*"'), re.compile(rb"(\.\d)\d+")
 _EMPTY_HEADER = re.compile(r"<th[^>]*></th>")  # which is no header for a screen reader
 _BREAKS = re.compile(rb"\s+([LCQz]) ?")
+_INDEX = re.compile(r"\bC_([SC])\b")  # as in C_S, a threshold of charging
 _NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
+
+
+# What all templates have in common: they escape values, and one that is undefined is an error.
+JINJA: dict[str, Any] = {"autoescape": select_autoescape(), "undefined": StrictUndefined}
 
 
 class Marked(str):
     """Markdown in which every name is escaped."""
+
+
+def indexed(text: object) -> Markup:
+    """Text, or HTML without such a name in an attribute, in which the S of ``C_S`` is an index."""
+    return Markup(_INDEX.sub(r"C<sub>\1</sub>", str(Markup.escape(text))))
+
+
+@cache
+def template(name: str, **filters: Callable[..., str]) -> Template:
+    """Load a template.
+
+    Args:
+        name: File name in ``reports/templates``.
+        **filters: Filters in addition to ``indexed`` and those of Jinja. Only a page explains
+            terms; elsewhere ``explained`` text is the same text.
+    """
+    finalize = _in_markdown if name.endswith(".md") else None
+    loader = PackageLoader("reports", "templates")
+    environment = Environment(loader=loader, finalize=finalize, trim_blocks=True, **JINJA)
+    environment.filters |= {"indexed": indexed, "explained": Markup.escape, **filters}
+    return environment.get_template(name)
+
+
+def fill(name: str, scripts: bool = False, **values: Any) -> str:
+    """Fill a template with values, and seal the page.
+
+    A browser makes no request for the page, and runs a script only if ``scripts`` is set.
+    """
+    page = template(name).render(scripts=scripts, version=dess.__version__, **values)
+    return Page(page).sealed.text
+
+
+def _in_markdown(value: object) -> object:
+    return value if isinstance(value, int | float | Marked) else text(value)
+
+
+class Part(HTML):
+    """A part of a page as data, which the page numbers and explains; Jupyter shows it as HTML.
+
+    Attributes:
+        values: The answer (``sentence``, ``number``), or figures (``figures``, ``look``, ``note``).
+    """
+
+    def __init__(self, **values: Any):
+        """Make the HTML of the values."""
+        super().__init__(template("part.html").render(part=values))
+        self.values = values
+
+    def _repr_mimebundle_(self, **_: object) -> dict[str, object]:
+        return {PART: self.values}
 
 
 class _Escaping(Formatter):
@@ -126,9 +188,9 @@ def carrying(evidence: Sequence[Evidence], files: Iterable[str] = ()) -> HTML:
         evidence: The evidence of the studies.
         files: Lists of files, as JSON, which become hidden elements as well.
     """
-    hidden = [_embedded(STUDY, json.dumps(of_study.data)) for of_study in evidence]
-    hidden += [_embedded(FILES, text) for text in files]
-    return HTML((_origins(evidence).data if evidence else "") + "".join(hidden))
+    inside = [hidden(STUDY, json.dumps(of_study.data)) for of_study in evidence]
+    inside += [hidden(FILES, text) for text in files]
+    return HTML((_origins(evidence).data if evidence else "") + "".join(inside))
 
 
 def _origins(evidence: Sequence[Evidence]) -> HTML:
@@ -163,18 +225,7 @@ def weights(folder: Path) -> HTML:
     files = learned_files(folder)
     rows = [(name, digest[:SHORT]) for name, digest in files.items()]
     shown = table(pd.DataFrame(rows, columns=["File", "SHA-256"]), "The learned policies")
-    return HTML(shown.data + _embedded(FILES, json.dumps(files)))
-
-
-def embedded(kind: str, html: str) -> list[str]:
-    """The distinct JSON texts of a kind, ``STUDY`` or ``FILES``, that are hidden in a page."""
-    texts = re.findall(f'<script class="{kind}" [^>]*>(.*?)</script>', html, re.S)
-    return list(dict.fromkeys(texts))
-
-
-def _embedded(kind: str, text: str) -> str:
-    inert = text.replace("<", "\\u003c")  # so that the text cannot end the element
-    return f'<script class="{kind}" type="application/json">{inert}</script>'
+    return HTML(f"{shown.data}{hidden(FILES, Learned(files=files).model_dump_json())}")
 
 
 def _weights(evidence: Evidence) -> Iterator[str]:
@@ -202,10 +253,10 @@ def table(
     """
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
-    html = _EMPTY_HEADER.sub("<td></td>", html)
+    html = str(indexed(Markup(_EMPTY_HEADER.sub("<td></td>", html))))
     caption = ". ".join(filter(None, [caption, numbers.why_nan(frame.to_numpy().flat)]))
     if caption:
-        html = html.replace(">", f"><caption>{escape(caption)}</caption>", 1)
+        html = html.replace(">", f"><caption>{indexed(caption)}</caption>", 1)
     below = "" if data is None else _downloads(caption, data, frame)
     label = escape(caption or "Table")
     return HTML(
@@ -213,18 +264,17 @@ def table(
     )
 
 
-def answer(sentence: str, number: str = "") -> HTML:
+def answer(sentence: str, number: str = "") -> Part:
     """The answer to the question of a page: it stands below the title, and on the page's card.
 
     Args:
         sentence: One sentence, in plain text or as ``analysis`` writes it for Markdown.
         number: The number of the answer, for pages that have a tile on the index.
     """
-    plain = escape(printable(re.sub(r"[*`]", "", sentence)))
-    return HTML(f'<p class="answer" data-number="{escape(number)}">{plain}</p>')
+    return Part(sentence=printable(re.sub(r"[*`]", "", sentence)), number=number)
 
 
-def figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = None) -> HTML:
+def figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = None) -> Part:
     """A figure with its alternative text and its caption.
 
     Args:
@@ -233,7 +283,7 @@ def figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = 
         caption: The text below the figure.
         data: The data of the figure. If given, links in the caption save them as CSV and as LaTeX.
     """
-    return HTML(_figure(drawing, alt, caption, data))
+    return figures([_figure(drawing, alt, caption, data)])
 
 
 def lead(
@@ -242,28 +292,39 @@ def lead(
     caption: str,
     data: pd.DataFrame | None = None,
     narrow: Figure | None = None,
-) -> HTML:
+) -> Part:
     """The figure that shows the answer, as wide as the page; with the arguments of ``figure``.
 
     Narrow windows show ``narrow`` in its place, or the same figure drawn for their width.
     """
     on_phone = narrow or drawing
     on_phone.set_size_inches(LEAD_ON_PHONE[0], max(LEAD_ON_PHONE[1], on_phone.get_figheight()))
-    source = f'<source media="(max-width: 45rem)" srcset="{_source(on_phone)}">'
+    source = _source(on_phone)
     drawing.set_size_inches(LEAD)
-    return HTML(_figure(drawing, alt, caption, data, source))
+    return figures([_figure(drawing, alt, caption, data) | {"narrow": source}], "lead")
 
 
-def gallery(drawings: Iterable[Drawing], note: str = "") -> HTML:
+def gallery(drawings: Iterable[Drawing], note: str = "") -> Part:
     """Several figures side by side where there is room.
 
     Args:
         drawings: The arguments of ``figure`` of each; the caption may be left out.
         note: What holds for all of them, in a paragraph below.
     """
-    below = f'<p class="note">{escape(note)}</p>' if note else ""
-    figures = "".join(_figure(*parts) for parts in drawings)
-    return HTML(f'<div class="gallery">{figures}</div>{below}')
+    return figures([_figure(*parts) for parts in drawings], "gallery", note)
+
+
+def figures(values: Sequence[Mapping[str, str]], look: str = "", note: str = "") -> Part:
+    """Figures as data, in one of the looks of ``style.css``.
+
+    Args:
+        values: Of each its ``caption``, and ``links`` to its data. A drawing has ``alt``,
+            ``source`` and, for narrow windows, ``narrow``; what a script draws is HTML, ``player``,
+            with ``name``, which is its anchor.
+        look: ``lead``, ``gallery``, or none.
+        note: What holds for all of them, in a paragraph below.
+    """
+    return Part(figures=[{**_BARE, **value} for value in values], look=look, note=note)
 
 
 def svg(drawing: Figure) -> bytes:
@@ -282,15 +343,10 @@ def _shorter(coordinates: re.Match[bytes]) -> bytes:
 
 
 def _figure(
-    drawing: Figure, alt: str, caption: str = "", data: pd.DataFrame | None = None, narrow: str = ""
-) -> str:
-    """A figure; with ``narrow``, what narrow windows show instead, it is one that leads."""
-    image = f'<img alt="{escape(alt)}" src="{_source(drawing)}">'
-    below = "" if data is None else _downloads(alt, data, data)
-    caption = f"<figcaption>{escape(caption)}{below}</figcaption>"
-    if narrow:
-        return f'<figure class="lead"><picture>{narrow}{image}</picture>{caption}</figure>'
-    return f"<figure>{image}{caption}</figure>"
+    drawing: Figure, alt: str, caption: str = "", data: pd.DataFrame | None = None
+) -> dict[str, str]:
+    links = "" if data is None else _downloads(alt, data, data)
+    return {"alt": alt, "source": _source(drawing), "caption": caption, "links": links}
 
 
 def _source(drawing: Figure) -> str:

@@ -1,6 +1,7 @@
 """Run notebooks, each in a process of its own, after the missions that only its page needs."""
 
 import json
+import logging
 import os
 import subprocess
 import sys
@@ -22,6 +23,8 @@ from dess.files.writing import temporary_folder
 from reports.pages import cells
 from reports.pages.cells import kill
 from reports.pages.notebook import Report
+
+log = logging.getLogger(__name__)
 
 # Called after every cell, with the number of cells run so far and of all cells, and the report.
 Progress = Callable[[int, int, str], None]
@@ -48,14 +51,16 @@ def run(
     total = sum(len(report.cells) for report in reports)
     codes = [[cell.source for cell in report.cells] for report in reports]
     work = {"cells": codes, "folders": [str(folder.absolute()) for folder in shared]}
-    with temporary_folder(Path(gettempdir()), HOME) as home, TemporaryFile() as log:
-        with _process(home, log) as (asked, answers):
+    with temporary_folder(Path(gettempdir()), HOME) as home, TemporaryFile() as errors:
+        with _process(home, errors) as (asked, answers):
             with suppress(BrokenPipeError):
                 asked.write(json.dumps(work).encode() + b"\n")
                 asked.flush()
             for number, outputs, error in map(json.loads, answers):
                 report = reports[number]
                 report.cells[report.done].outputs = [from_dict(output) for output in outputs]
+                for warning in (output for output in outputs if output.get("name") == "stderr"):
+                    log.warning(warning["text"].rstrip())
                 if error:
                     _fail(report, *error)
                     continue
@@ -64,8 +69,8 @@ def run(
                     progress(sum(report.done for report in reports), total, report.name)
         for report in reports:
             if report.done < len(report.cells) and not report.failure:
-                log.seek(0)
-                last = log.read().decode("utf-8", "replace").strip().splitlines()[-1:]
+                errors.seek(0)
+                last = errors.read().decode("utf-8", "replace").strip().splitlines()[-1:]
                 report.failure = ": ".join([_cell(report), "its process ended", *last])
 
 
@@ -83,7 +88,7 @@ def _cell(report: Report) -> str:
 
 
 @contextmanager
-def _process(home: Path, log: IO[bytes]) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
+def _process(home: Path, errors: IO[bytes]) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
     """Input and output of the process that runs notebooks in a folder; it is killed at the end.
 
     A session of its own keeps Ctrl-C from it and its children, and makes them a group to kill.
@@ -94,7 +99,7 @@ def _process(home: Path, log: IO[bytes]) -> Iterator[tuple[IO[bytes], IO[bytes]]
         env=_environment(home),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        stderr=log,
+        stderr=errors,
         start_new_session=True,
     )
     assert process.stdin

@@ -13,27 +13,22 @@ from types import MappingProxyType
 from typing import Any
 
 import nbformat
-from markupsafe import Markup
-from nbformat import NotebookNode
-from pygments import highlight
-from pygments.formatters import HtmlFormatter
-from pygments.lexers import PythonLexer
 
 from analysis.results.chunks import MANIFEST
 from analysis.results.manifest import Manifest
 from dess import InputError
 from dess.code.sources import OURS
 from dess.files.documents import LIMIT
-from dess.files.reading import paths_in, read_bytes, read_text
+from dess.files.reading import paths_in, read_bytes
 from dess.files.writing import delete, locked, write_files
 from reports.folders import INDEX, LOCK, check_pages
 from reports.pages import kernels
-from reports.pages.body import Body, fill
-from reports.pages.index import LARGEST, index_of, pages_in, with_bar
+from reports.pages.body import page_of
+from reports.pages.index import index_of, pages_in, with_bars
 from reports.pages.kernels import Progress
 from reports.pages.notebook import SHIPPED, Report, check_parameters, names_in, read, with_paths
+from reports.pages.page import Page
 from reports.pages.study import report_of
-from reports.pages.verify import is_sealed
 
 PACKAGES = Path(__file__).parents[2]
 
@@ -55,10 +50,10 @@ def key_of(report: Report, studies: Mapping[str, Path]) -> str:
 def has_key(page: Path, key: str) -> bool:
     """Whether a file is a page with this key that has not been altered."""
     try:
-        content = read_text(page, LARGEST)
+        found = Page.read(page)
     except (OSError, InputError):
         return False
-    return f'<meta name="dess-key" content="{key}">' in content and is_sealed(content)
+    return f'<meta name="dess-key" content="{key}">' in found.text and found.is_sealed
 
 
 @lru_cache
@@ -83,7 +78,6 @@ log = logging.getLogger(__name__)
 
 PATIENCE = 60.0  # for which the page of another process is waited for [s]
 _BUSY = "another process writes there; allowed: wait"
-_WIDGET = "application/vnd.jupyter.widget-view+json"  # type of an output, such as a progress bar
 
 
 class ReportError(RuntimeError):
@@ -187,13 +181,13 @@ def _write(
     kernels.make([report.name for report in changed], results, values, progress)
     read_by = Counter(f for report in changed for f in _folders(report, results).values())
     kernels.run(changed, progress, [folder for folder, count in read_by.items() if count > 1])
-    files = {report.page: _page(report) for report in changed}
+    made = {report.page: page_of(report) for report in changed}
     complete = [report for report in reports if not report.failure]
-    files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
+    files = {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
     with locked(out / LOCK, _BUSY, PATIENCE):
-        pages = pages_in(out, but=files) | {r.page: files[r.page] for r in changed}
-        with_bars = {name: with_bar(page, name, pages) for name, page in pages.items()}
-        files |= {name: page for name, page in with_bars.items() if page != pages[name]}
+        others = pages_in(out, but=made)
+        pages = with_bars(others | made)
+        files |= {name: page.text for name, page in pages.items() if page != others.get(name)}
         files[INDEX] = index_of(pages, left_out)
         write_files({out / name: text for name, text in files.items()})
         for report in complete:
@@ -233,27 +227,3 @@ def _check_results(folder: Path) -> None:
         raise InputError(f"results: {folder} holds study {study}; allowed: {folder.name}")
     if not manifest.complete:
         raise InputError(f"results: {folder}: incomplete; allowed: run the study again")
-
-
-def _page(report: Report) -> str:
-    """The page of a report that has been run."""
-    code = highlight("\n\n\n".join(report.code), PythonLexer(), HtmlFormatter())
-    code = Markup(code.replace("<pre>", '<pre tabindex="0">', 1))  # it scrolls on a phone
-    body = body_of(report.notebook)
-    return fill("report.html", scripts=report.scripts, report=report, body=body, code=code)
-
-
-def body_of(notebook: NotebookNode) -> Body:
-    """The body of the page of a notebook that has been run, without widgets.
-
-    What the notebook wrote to stderr is logged instead.
-    """
-    notebook.metadata.pop("widgets", None)
-    for cell in notebook.cells:
-        for output in [*cell.get("outputs", [])]:
-            if output.get("name") == "stderr":
-                log.warning(output.text.rstrip())
-            is_error = output.get("name") == "stderr" or output.output_type == "error"
-            if is_error or _WIDGET in output.get("data", {}):
-                cell.outputs.remove(output)
-    return Body.of(notebook)

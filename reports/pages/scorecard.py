@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from IPython.display import HTML
 
 from analysis.paper import scorecard
-from reports.pages.body import template
+from reports.pages.html import template
 
 
 def as_html(rows: Sequence[scorecard.Row], caption: str) -> HTML:

@@ -22,8 +22,7 @@ from analysis.numbers import level
 from analysis.stats.intervals import LEVEL
 from dess.record import EVENT_NAMES
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace, fields_of
-from reports.pages.body import template
-from reports.pages.html import Marked, code, marked, text
+from reports.pages.html import Marked, code, marked, template, text
 
 Manifest = Mapping[str, Any]
 

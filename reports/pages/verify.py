@@ -6,16 +6,14 @@ file name has a hash of the file. If somebody changes both the content and the h
 missions again still shows the difference.
 """
 
-import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from hashlib import sha256
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-from pydantic import TypeAdapter, ValidationError
 
 from analysis.bound import upper_bound
 from analysis.execution.effort import check_missions
@@ -26,20 +24,18 @@ from analysis.results.resimulate import Evidence, Mission, chosen, difference, l
 from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from dess import InputError, simulate
-from dess.files.reading import paths_in, read_text
+from dess.files.reading import paths_in
 from dess.record import PARAMETER_EVENTS
 from dess.scenario import ScenarioSpace
 from policies.base import Policy
 from policies.registry import confirmed, load_team
-from reports.pages.html import FILES, STUDY, embedded
+from reports.pages.page import ALLOWED, LIMIT, Page
 
-LIMIT = 64 * 2**20  # bytes of the largest page
 BOUNDS_CHECKED = 3  # upper bounds that are computed again at most, since each takes seconds
 
-# The place in a page that contains the checksum of the rest of the page.
-_SEAL = re.compile(r'(<meta name="dess-checksum" content=")([0-9a-f]*)(">)')
-_ALLOWED = "a page of dess report, or a results folder"
+_ALLOWED = f"{ALLOWED}, or a results folder"
 
+_Item = TypeVar("_Item")
 _Drawn = Sequence[tuple[Mission, ScenarioSpace, list[Policy]]]
 
 
@@ -78,9 +74,9 @@ class _Sampling:
     yes: bool = False
     seconds: float = 0.0
 
-    def drawn(self, count: int) -> Sequence[int]:
-        """Which of a number of missions are simulated again."""
-        return chosen(count, self.missions, self.seed)
+    def drawn(self, missions: Sequence[_Item]) -> list[_Item]:
+        """Those of some missions that are simulated again."""
+        return [missions[number] for number in chosen(len(missions), self.missions, self.seed)]
 
     def admit(self, what: str, spaces: Sequence[ScenarioSpace]) -> None:
         """Refuse missions that take too much, before the first of them is simulated.
@@ -90,17 +86,6 @@ class _Sampling:
         """
         if not self.yes:
             self.seconds = check_missions(what, spaces, self.seconds)
-
-
-def sealed(html: str) -> str:
-    """The page with its checksum filled in."""
-    checksum = sha256(_SEAL.sub(r"\g<1>\g<3>", html, count=1).encode()).hexdigest()
-    return _SEAL.sub(rf"\g<1>{checksum}\g<3>", html, count=1)
-
-
-def is_sealed(html: str) -> bool:
-    """Whether the checksum in a page is the checksum of its text."""
-    return _SEAL.search(html) is not None and sealed(html) == html
 
 
 def verify_page(
@@ -119,12 +104,11 @@ def verify_page(
         InputError: If the file is not a page of dess, a policy cannot be loaded, or the missions
             may take more than an hour.
     """
-    html = read_text(path, LIMIT, allowed=_ALLOWED)
-    if not _SEAL.search(html):
+    page = Page.read(path, LIMIT, _ALLOWED)
+    if not page.has_seal:
         raise InputError(f"{path}: is not a page of dess; allowed: {_ALLOWED}")
-    altered = [] if is_sealed(html) else ["the page has been altered"]
-    files = [_check_files(text, path) for text in embedded(FILES, html)]
-    studies = [Evidence.parse(text, str(path), _ALLOWED) for text in embedded(STUDY, html)]
+    altered = [] if page.is_sealed else ["the page has been altered"]
+    files, studies = [_check_files(learned.files) for learned in page.learned], page.evidence
     notes = [] if studies else ["contains no missions to simulate again"]
     sampling = _Sampling(missions, seed, named, yes)
     drawn = [_drawn(evidence, sampling) for evidence in studies]  # all, before any is simulated
@@ -187,7 +171,7 @@ def _drawn(evidence: Evidence, sampling: _Sampling) -> _Drawn:
     study = f"study {evidence.study['name']}"
     names = (team.policy for team in evidence.policies)
     teams = {name: load_team(confirmed(name, sampling.named)) for name in names}
-    sample = [evidence.sample[number] for number in sampling.drawn(len(evidence.sample))]
+    sample = sampling.drawn(evidence.sample)
     spaces = [evidence.space(mission.values) for mission in sample]
     sampling.admit(study, spaces)
     return [
@@ -200,10 +184,10 @@ def _compared(evidence: Evidence, drawn: _Drawn, named: Collection[str] = ()) ->
     """Simulate missions again, and compare their records."""
     lines = []
     for mission, space, team in drawn:
-        policy, values, replication = mission.policy, mission.values, mission.replication
-        record = simulate(space, team, evidence.seed, replication)
+        record = simulate(space, team, evidence.seed, mission.replication)
         if changed := difference(record, mission.record):
-            command = tables.of_fields(evidence, policy, values, replication)
+            of = (mission.policy, mission.values, mission.replication)
+            command = tables.of_fields(evidence, *of)
             lines.append(f"{changed}; command: {command}")
     return Check(evidence.study["name"], len(drawn), lines, evidence.changes_here(named))
 
@@ -211,8 +195,7 @@ def _compared(evidence: Evidence, drawn: _Drawn, named: Collection[str] = ()) ->
 def _check_logs(store: Store, sampling: _Sampling) -> Check:
     """Simulate some missions with a stored event log again, and compare the logs."""
     manifest, lines = store.manifest, []
-    all_logged = store.logged
-    logged = [all_logged[number] for number in sampling.drawn(len(all_logged))]
+    logged = sampling.drawn(store.logged)
     what = f"study {manifest.study['name']}"
     sampling.admit(what, [manifest.scenarios[cell.point] for cell, _ in logged])
     for cell, replication in logged:
@@ -230,8 +213,7 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
 
 def _check_bounds(results: Results, sampling: _Sampling) -> Check:
     """Compute a few upper bounds again, and compare them bit for bit."""
-    places, lines = [*results.bounds], []
-    drawn = [places[number] for number in sampling.drawn(len(places))][:BOUNDS_CHECKED]
+    drawn, lines = sampling.drawn([*results.bounds])[:BOUNDS_CHECKED], []
     for point, replication in drawn:
         stored = results.bounds[point, replication]
         seed = results.store.manifest.seed
@@ -252,12 +234,8 @@ def _as_stored(log: pd.DataFrame, stored: pa.Table) -> pd.DataFrame:
     return events[stored.column_names].reset_index(drop=True)
 
 
-def _check_files(text: str, path: Path) -> Check:
+def _check_files(files: Mapping[str, str]) -> Check:
     """Compare the hashes of the learned policies on a page with those of the files here."""
-    try:
-        files = TypeAdapter(dict[str, str]).validate_json(text)
-    except ValidationError:
-        raise InputError(f"{path}: its list of files is not valid; allowed: {_ALLOWED}") from None
     shipped = learned_files()
     others = [name for name, digest in files.items() if shipped.get(name) != digest]
     return Check(

@@ -14,7 +14,7 @@ from IPython.display import HTML
 from analysis.figures import style
 from analysis.results.event_log import Events
 from dess.scenario import Scenario
-from reports.pages.body import template
+from reports.pages.html import Part, figures, template
 from reports.player.playback import Playback
 
 READING = (
@@ -42,15 +42,14 @@ def library() -> HTML:
     return HTML(f"<script>{template('player.js').render(style=style)}</script>")
 
 
-def together(players: Iterable[HTML]) -> HTML:
+def together(players: Iterable[Part]) -> Part:
     """Several players side by side, which show the same slot."""
-    shown = "".join(player.data for player in players)
-    return HTML(f'<div class="gallery together">{shown}</div>')
+    return figures([player.values["figures"][0] for player in players], "gallery together")
 
 
 def player(
     events: Events, scenario: Scenario, name: str, title: str = "", caption: str = ""
-) -> HTML:
+) -> Part:
     """A player of a mission: it can be played, paused and shown slot by slot.
 
     Args:
@@ -64,5 +63,6 @@ def player(
         InputError: If the log is not that of a complete mission of this scenario.
     """
     playback = Playback(events, scenario)
-    shown = {"name": name, "title": title, "caption": caption, "end": playback.end}
-    return HTML(template("player.html").render(data=playback.data, **shown))
+    shown = {"name": name, "title": title, "end": playback.end}
+    drawn = template("player.html").render(data=playback.data, **shown)
+    return figures([{"name": name, "player": drawn, "caption": caption}])

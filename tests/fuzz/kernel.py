@@ -16,8 +16,11 @@ from nbformat.v4 import new_output
 
 from dess import InputError
 from reports.pages import html, kernels
+from reports.pages.html import PART, Part
 from reports.pages.kernels import Progress
 from reports.pages.notebook import Report
+
+HTML = "text/html"
 
 
 def run_here() -> None:
@@ -50,6 +53,9 @@ def _execute(report: Report) -> None:
         exec(compile(tree, report.name, "exec"), scope)
         if isinstance(last, ast.Expr):
             shown.append(eval(compile(ast.Expression(last.value), report.name, "eval"), scope))
-        texts = [piece.data for piece in shown if isinstance(piece, IPython.display.DisplayObject)]
-        cell.outputs = [new_output("display_data", {"text/html": text}) for text in texts]
+        pieces = [piece for piece in shown if isinstance(piece, IPython.display.DisplayObject)]
+        cell.outputs = [
+            new_output("display_data", {PART: p.values} if isinstance(p, Part) else {HTML: p.data})
+            for p in pieces
+        ]
         shown.clear()

@@ -24,7 +24,7 @@ from analysis.results.chunks import name_of, short_hash
 from analysis.results.parquet import INDICES
 from policies.learner import tensors
 from policies.learner.session import CHECKPOINT
-from reports.pages.verify import sealed
+from reports.pages.page import Page
 from tests.analysis.hostile import hostile_folder
 from tests.fuzz.case import CWD, READY, SECRET_FILE
 
@@ -135,7 +135,7 @@ def change_page(box: Path, path: str, block: int, edits: Edits, is_sealed: bool 
     begin, end = blocks[block % len(blocks)].span(1)
     html = html[:begin] + edited(html[begin:end], edits) + html[end:]
     html = html.encode("utf-8", "replace").decode()
-    _write_text(box / path, sealed(html) if is_sealed else html)
+    _write_text(box / path, Page(html).sealed.text if is_sealed else html)
 
 
 @_step
@@ -260,7 +260,7 @@ def name_evil(box: Path, path: str) -> None:
     for file in [box / path] if (box / path).is_file() else (box / path).rglob("*"):
         if file.suffix in (".json", ".toml", ".html") and not {*results} & {*file.parents}:
             text = _read_text(file).replace('"greedy"', f'"{EVIL}:Evil0"')
-            _write_text(file, sealed(text) if file.suffix == ".html" else text)
+            _write_text(file, Page(text).sealed.text if file.suffix == ".html" else text)
     for folder in results:
         hostile(str(folder.relative_to(box)), f"{EVIL}:Evil").do(box)
 

@@ -18,7 +18,7 @@ from analysis.verification.balances import engine_check
 from dess import InputError
 from reports.cli import main
 from reports.pages import html
-from reports.pages.verify import sealed
+from reports.pages.page import Page
 from tests.analysis.hostile import hostile_folder
 from tests.analysis.small import small_study
 from tests.reports.small import words_of
@@ -58,7 +58,7 @@ def stranger(sound: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
 def page_of(*evidence: Evidence) -> str:
     """A page with nothing but evidence, whose checksum is right."""
     seal = '<meta name="dess-checksum" content="">'
-    return sealed(seal + html.carrying(evidence).data)
+    return Page(seal + html.carrying(evidence).data).sealed.text
 
 
 def printed(capsys: pytest.CaptureFixture[str]) -> str:

@@ -1,75 +1,93 @@
-"""The body of a page: sections, numbered figures, explained terms, the answer apart."""
+"""The page of a notebook: sections, numbered figures, explained terms, the answer apart."""
 
 import re
 
 import nbformat
+from IPython.display import HTML, DisplayObject
+from matplotlib.figure import Figure
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from reports.pages.body import FOLDED, TERMS, Body
-from reports.pages.index import Card
+from reports.pages import html
+from reports.pages.body import FOLDED, TERMS, page_of
+from reports.pages.html import PART, Part
+from reports.pages.notebook import Report
+from reports.pages.page import Page
 
 
-def body(*cells: str) -> Body:
-    """The body of a notebook with HTML outputs, and with Markdown where a cell begins with #."""
-    notebook = new_notebook()
-    notebook.cells = [
-        new_markdown_cell(cell)
-        if cell.startswith(("#", "text"))
-        else new_code_cell("1", outputs=[new_output("display_data", {"text/html": cell})])
-        for cell in cells
-    ]
+def page(*cells: str | DisplayObject) -> Page:
+    """The page of a notebook with cells that show Markdown, parts, or HTML."""
+    notebook = new_notebook(cells=[new_code_cell("x = 1", metadata={"tags": ["parameters"]})])
+    for cell in cells:
+        if isinstance(cell, DisplayObject):
+            data = {PART: cell.values} if isinstance(cell, Part) else {"text/html": cell.data}
+            shown = new_code_cell("1", outputs=[new_output("display_data", data)])
+            notebook.cells.append(shown)
+        else:
+            notebook.cells.append(new_markdown_cell(cell))
     nbformat.validate(notebook)
-    return Body.of(notebook)
+    return page_of(Report("test", "A title", "About it.", [], [], False, notebook, notebook))
 
 
-FIGURE = '<figure><img alt="a" src=""><figcaption>n = 3.</figcaption></figure>'
+def main_of(*cells: str | DisplayObject) -> str:
+    """The page below its header."""
+    return page(*cells).text.split("<main>")[1].split('<details class="code">')[0]
 
 
-def test_the_answer_moves_out_of_the_text() -> None:
-    found = body('<p class="answer" data-number="4 %">It is 4 % &amp; more.</p>', "<p>rest</p>")
-    assert (found.answer, found.number) == ("It is 4 % &amp; more.", "4 %")
-    assert "more" not in found.html and "rest" in found.html
-    assert body("<p>rest</p>").answer == ""
+def figure() -> Part:
+    return html.figure(Figure(figsize=(1, 1)), "a", "n = 3.")
 
 
-def test_the_answer_explains_a_term_where_it_stands_first() -> None:
-    found = body('<p class="answer">The product is 4 %.</p>', "<p>a product</p>")
-    assert f'<abbr title="{TERMS["product"]}">product</abbr>' in found.answer
-    assert "abbr" not in found.html
-    page = f'<h1>A</h1><p class="lead">{found.answer}</p>'
-    assert Card.of("a.html", page).finding == "The product is 4 %."
+def gallery() -> Part:
+    return html.gallery([(Figure(figsize=(1, 1)), "a", "n = 4.")] * 2, "A note.")
 
 
-def test_figures_have_numbers_and_anchors() -> None:
-    found = body(FIGURE, f'<div class="gallery">{FIGURE}{FIGURE}</div>').html
+def test_the_answer_stands_in_the_header_and_on_the_card() -> None:
+    found = page("text", html.answer("The **product** is 4 % & more.", "4 %"))
+    explained = f'<abbr title="{TERMS["product"]}">product</abbr>'
+    assert f'<p class="lead">The {explained} is 4 % &amp; more.</p>' in found.text
+    assert "more" not in found.text.split("<main>")[1]
+    assert (found.card.finding, found.card.number) == ("The product is 4 % & more.", "4 %")
+    without = page("text")
+    assert without.card.finding == "About it." and '<p class="lead">About it.</p>' in without.text
+
+
+def test_figures_have_numbers_and_anchors_on_the_page_alone() -> None:
+    found = main_of(figure(), gallery())
     assert re.findall('<figure id="(figure-.)">', found) == ["figure-1", "figure-2", "figure-3"]
-    assert re.findall('href="#(figure-.)">Figure (.)</a> n = 3', found) == [
+    assert re.findall(r'href="#(figure-.)">Figure (.)</a> n = .', found) == [
         ("figure-1", "1"), ("figure-2", "2"), ("figure-3", "3"),
     ]  # fmt: skip
+    assert '<p class="note">A note.</p>' in found
+    in_jupyter = gallery().data
+    assert in_jupyter.count("<figcaption>n = 4.") == 2 and "Figure" not in in_jupyter
 
 
 def test_second_level_headings_make_sections_and_the_method_is_folded() -> None:
-    found = body("## Why\n\ntext one", "## Tables", "<table></table>", f"## {FOLDED}\n\ntext two")
-    assert [*found.sections.values()] == ["Why", "Tables", FOLDED]
-    assert all(f'<section id="{anchor}">' in found.html for anchor in found.sections)
-    assert found.html.index("text one") < found.html.index("<table>") < found.html.index("two")
-    (folded,) = re.findall("<details>.*</details>", found.html, re.S)
+    parts = ("## Why\n\ntext one", "## Tables & C_S", HTML("<table></table>"))
+    whole = page(*parts, f"## {FOLDED}\n\ntext two").text
+    listed = re.findall('<a href="#(.*)">(.*)</a>', whole.split("<main>")[0])
+    assert [title for _, title in listed] == ["Why", "Tables &amp; C<sub>S</sub>", FOLDED]
+    found = whole.split("<main>")[1]
+    assert all(f'<section id="{anchor}">' in found for anchor, _ in listed)
+    assert found.index("text one") < found.index("<table>") < found.index("two")
+    folded = re.findall("<details>.*?</details>", found, re.S)[0]
     assert "two" in folded and "one" not in folded and "<table>" not in folded
 
 
 def test_the_text_of_a_section_stands_beside_its_only_figure() -> None:
-    assert 'class="beside"' in body("## Why\n\ntext one", FIGURE).html
-    assert 'class="beside"' not in body("## Why\n\ntext one", FIGURE, FIGURE).html
+    assert 'class="beside"' in main_of("## Why\n\ntext one", figure())
+    assert 'class="beside"' not in main_of("## Why\n\ntext one", figure(), figure())
+    assert 'class="beside"' not in main_of("## Why", figure(), "## Next\n\ntext")
 
 
 def test_a_term_is_explained_once_and_only_in_text() -> None:
-    found = body("text: the return guard, the return guard, a `product`", "<pre>product</pre>").html
+    text = "text: the return guard, the return guard, a `product`"
+    found = main_of(text, HTML("<pre>product</pre>"))
     assert found.count(f'<abbr title="{TERMS["return guard"]}">return guard</abbr>') == 1
     assert found.count("<abbr") == 1
 
 
 def test_thresholds_have_indices_but_in_code() -> None:
-    found = body('<p title="C_S">C_S, DC_S, C_C</p><pre>C_C</pre>').html
-    text, kept = found.split("<pre", 1)
-    assert text == '<p title="C_S">C<sub>S</sub>, DC_S, C<sub>C</sub></p>'
-    assert kept == ' tabindex="0">C_C</pre>'
+    found = main_of("C_S, DC_S, C_C\n\n```\nC_C\n```")
+    assert "<p>C<sub>S</sub>, DC_S, C<sub>C</sub></p>" in found
+    assert '<pre tabindex="0"><code>C_C' in found

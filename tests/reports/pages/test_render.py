@@ -21,8 +21,9 @@ from analysis import run_study
 from dess import InputError
 from reports.cli import main
 from reports.pages import kernels
-from reports.pages.notebook import Report
-from reports.pages.render import ReportError, body_of, render
+from reports.pages.body import page_of
+from reports.pages.notebook import Report, read
+from reports.pages.render import ReportError, render
 from tests.analysis.small import environment, small_study
 from tests.reports.small import Links, words_of
 
@@ -120,7 +121,7 @@ TINY = {"mission": MISSION, "scorecard": SCORECARD}
 MODULES = ("pandas", "sitecustomize", "matplotlib", "joblib", "typer")
 MODULES += ("ipython_config", "ipython_kernel_config", "jupyter_config")
 STARTUP = ".ipython/profile_default/startup/00.py"
-TEMPLATES = ("index.html.j2", "base.html.j2", "base/null.j2")
+TEMPLATES = ("report.html", "layout.html", "part.html", "base/null.j2")
 
 
 def write_notebooks(folder: Path, **sources: str) -> Path:
@@ -147,7 +148,7 @@ def trap(results: Path) -> Path:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(f"open({str(results / 'hit')!r}, 'a').write({name!r})\n")
     for name in TEMPLATES:
-        file = results / "basic" / name
+        file = results / name
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text("the template of a stranger")
     (results / "matplotlibrc").write_text("this is no setting\n")
@@ -206,18 +207,6 @@ def test_there_are_pages_notebooks_and_an_index_and_nothing_else(files: dict[str
     assert {*files} == {*kinds, "index.html"}
 
 
-def test_a_page_has_no_widgets() -> None:
-    view = {"application/vnd.jupyter.widget-view+json": {"model_id": "1"}, "text/plain": "a bar"}
-    shown = nbformat.v4.new_output("display_data", {"text/plain": "a number"})
-    outputs = [nbformat.v4.new_output("display_data", view), shown]
-    state = {"application/vnd.jupyter.widget-state+json": {"state": {"1": {}}}}
-    notebook = nbformat.v4.new_notebook(metadata={"widgets": state})
-    notebook.cells = [nbformat.v4.new_code_cell("bar", outputs=outputs)]
-    html = body_of(notebook).html
-    assert "a number" in html
-    assert "a bar" not in html and "<script" not in html
-
-
 def test_a_page_shows_outputs_and_no_warnings(files: dict[str, str]) -> None:
     page = files["mission.html"]
     text = words_of(page)
@@ -263,7 +252,7 @@ def test_the_same_results_give_the_same_bytes(
 
 @pytest.mark.usefixtures("files")
 def test_a_notebook_runs_in_jupyter_and_shows_what_the_page_shows(
-    results: Path, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    results: Path, notebooks: Path, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = another_environment(results, out, tmp_path, monkeypatch)
     notebook = nbformat.read(folder / "mission.ipynb", as_version=4)
@@ -271,7 +260,10 @@ def test_a_notebook_runs_in_jupyter_and_shows_what_the_page_shows(
     assert notebook.cells.pop(0).source.startswith("# ")
     NotebookClient(notebook, resources={"metadata": {"path": str(folder)}}).execute()
     assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
-    assert body_of(notebook).html in (folder / "mission.html").read_text("utf-8")
+    report = read("mission", notebooks)
+    report.notebook = notebook
+    main = page_of(report).text.split("<main>")[1].split('<details class="code">')[0]
+    assert "Figure 1" in main and main in (folder / "mission.html").read_text("utf-8")
 
 
 def test_a_page_runs_nothing_of_the_working_directory(files: dict[str, str], trap: Path) -> None:

@@ -19,8 +19,8 @@ from analysis.answers.comparison import Cost, Times
 from analysis.answers.missions import FOLDER
 from analysis.results.tables import Results
 from dess import InputError
-from reports.pages.html import STUDY, embedded
 from reports.pages.notebook import NAMES, read
+from reports.pages.page import STUDY, Page
 from reports.pages.render import render
 from reports.player import library
 from tests.pins.pinned import pinned
@@ -154,7 +154,7 @@ def test_every_page_carries_the_evidence_of_its_studies(
     pages: dict[str, str], results: Path
 ) -> None:
     for name in NAMES:
-        evidence_of_page = [json.loads(text) for text in embedded(STUDY, pages[f"{name}.html"])]
+        evidence_of_page = [json.loads(text) for text in Page(pages[f"{name}.html"]).hidden(STUDY)]
         studies = read(name).studies
         shown = [evidence["study"]["name"] for evidence in evidence_of_page]
         assert shown[: len(studies)] == studies

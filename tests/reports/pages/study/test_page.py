@@ -16,7 +16,7 @@ from analysis import load_results, run_study
 from analysis.answers import settings
 from dess import InputError
 from reports.pages import html
-from reports.pages.html import STUDY, embedded
+from reports.pages.page import STUDY, Page
 from reports.pages.render import render_study
 from reports.pages.verify import verify_page
 from tests.analysis.small import files_of, grid, small_study
@@ -74,7 +74,7 @@ def test_there_are_a_page_a_notebook_and_an_index_with_a_card(page, out):
     for text in (page, index):
         assert "Which number of UAVs and number of charging pads for small.toml?" in text
         assert "The best setting is " in text
-        assert len(embedded(STUDY, text)) == 1
+        assert len(Page(text).hidden(STUDY)) == 1
 
 
 def test_it_states_the_answer_first(page, folder):
