@@ -23,8 +23,8 @@ from analysis.results.resimulate import Evidence
 from analysis.results.tables import Results
 from dess import InputError
 from dess.files import documents, tables
-from dess.files.archives import write_zip
 from dess.files.reading import read_bytes, read_text
+from dess.files.writing import write_zip
 from reports.pages.body import template
 from reports.pages.html import STUDY as EVIDENCE
 from reports.pages.html import embedded
