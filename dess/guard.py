@@ -16,12 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
-from dess.constants import MOST_ZONES
 from dess.observations.reach import reach_of
 from dess.rules import data_left, flies
+from dess.scenario import MOST_ZONES
 from dess.sea.chart import distance, in_zone, is_open, length_around
 from dess.sections.failures import working_pads
-from dess.sections.section import extension
+from dess.sections.section import for_sections
 from dess.sections.wind import move_surcharge
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
@@ -97,7 +97,7 @@ def _all_pads(mission):
     return pads
 
 
-@extension
+@for_sections
 def _most_wind(mission, u, slots):
     """The battery [%] that the wind costs at most in moves that take so many slots."""
     return mission.wind_most * ((slots + u.slots_per_cell - 1) // u.slots_per_cell)
@@ -423,7 +423,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     return best, way, fewest
 
 
-@extension
+@for_sections
 def _is_given_up(mission, zone):
     """Whether no pad of one of several zones will ever work again."""
     never = mission.zones > 1 and mission.pad_rate > 0.0 and mission.pad_repair == 0.0

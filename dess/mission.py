@@ -2,8 +2,8 @@
 
 This module decides when things happen; ``rules.py`` decides what they change. One SimPy process,
 the mission clock, opens each mission slot t, runs its communication slots at the times t + n/m, and
-adds the arrivals at its end. A charging zone is a ``simpy.Resource`` (dess.sections.zone): a UAV
-that may charge asks for a pad, and gives it back when it may not any more.
+adds the arrivals at its end. A charging zone is a ``simpy.Resource`` (``ChargingZone``): a UAV that
+may charge asks for a pad, and gives it back when it may not any more.
 
     record = simulate(load_scenario("paper"), policies.load("greedy"), seed=1, events=True)
     record.success, record.collection_ratio, record.events.columns()
@@ -29,6 +29,7 @@ from typing import Any
 
 import numpy as np
 import simpy
+from simpy.resources.resource import Request
 
 from dess import channel, rules
 from dess.channel import empty_scratch, world_of
@@ -36,12 +37,73 @@ from dess.code.kernels import kernel
 from dess.record import PARAMETER_EVENTS, EventLog, MissionRecord, empty_records, write_records
 from dess.scenario import Scenario, ScenarioSpace
 from dess.sections import fleet
-from dess.sections.failure_log import log_failures
 from dess.sections.failures import strike
 from dess.sections.packets import Packets
-from dess.sections.zone import ChargingZone
 from dess.state import BATTERY, LOST, QUOTA, UAV, State, check_seed, spaces_of, starts_of, state_of
 from dess.view import decide, team_of
+
+
+class ChargingZone(simpy.Resource):
+    """The pads of a charging zone, granted in the order of the scenario (``rules.grant_pads``).
+
+    The UAVs of a slot ask one after the other at the same time. Pads are granted when all have
+    asked, so that the order of asking does not matter. A pad out of order is not granted.
+
+    Attributes:
+        requests: For each UAV its request, waiting or granted, or None.
+    """
+
+    def __init__(self, env: simpy.Environment, mission: np.void, uavs: np.ndarray, zone: int = 0):
+        pads = mission["zone_pads"]
+        super().__init__(env, int(pads[zone]))
+        self._mission, self._uavs = mission, uavs
+        self._pads = slice(int(pads[:zone].sum()), int(pads[: zone + 1].sum()))
+        self.requests: list[Request | None] = [None] * int(mission["uavs"])
+
+    @property
+    def capacity(self) -> int:
+        """The number of pads that work."""
+        pads = self._pads
+        return pads.stop - pads.start - int(self._mission["pads_out"][pads].sum())
+
+    def _do_put(self, event: Request) -> None:
+        """Let a request wait until ``grant``."""
+
+    def ask(self, uav: int) -> None:
+        """Put a UAV into the queue."""
+        self.leave(uav)
+        self.requests[uav] = self.request()
+
+    def leave(self, uav: int) -> None:
+        """Take a UAV out of the queue, or take back its pad."""
+        request, self.requests[uav] = self.requests[uav], None
+        if request is not None:
+            request.cancel()  # of no effect if the pad has been granted
+            self.release(request)
+
+    def holds_pad(self, uav: int) -> bool:
+        """Whether a UAV has been granted a pad and has not left it."""
+        request = self.requests[uav]
+        return request is not None and request.triggered
+
+    def grant(self) -> list[int]:
+        """Grant the free pads to the first UAVs in the queue; return these UAVs."""
+        waiting = [i for i, r in enumerate(self.requests) if r is not None and not r.triggered]
+        waiting.sort(key=self._order)
+        granted = waiting[: max(self.capacity - self.count, 0)]
+        for uav in granted:
+            request = self.requests[uav]
+            assert request is not None
+            self.put_queue.remove(request)
+            super()._do_put(request)
+        return granted
+
+    def _order(self, uav: int) -> tuple[int, int, int]:
+        """The place of a UAV in the queue (``charging.is_before``)."""
+        u = self._uavs[uav]
+        battery = int(u["battery"]) if self._mission["lowest_battery_first"] else 0
+        return battery, int(u["pad_request"]), uav
+
 
 _NOBODY = np.zeros(0, np.int64)
 Process = Generator[simpy.Event, Any, None]
@@ -118,8 +180,7 @@ class MissionModel:
         write_records(np.zeros(1, np.int64), self.state, records)
         if self.packets is not None:
             self.packets.write(records.operations[0])
-        operations = records.operations[0] if self.is_extended else None
-        return MissionRecord(records.missions[0], records.uavs[0], self.log, operations)
+        return records.mission(0, self.log)
 
     def _clock(self) -> Process:
         """Open every mission slot, run its communication slots and close it."""
@@ -187,8 +248,7 @@ class MissionModel:
         """Let things fail and be repaired; return the number of UAVs that are still active."""
         before = State(*(array.copy() for array in self.state))
         strike(self.mission, self.uavs, self.residual, self.sensors, LOST)
-        if self.log is not None:
-            log_failures(self.log, float(slot), before, self.state, self.world.nodes)
+        self._log_failures(float(slot), before)
         for i in self.fleet:
             if before.uavs[0, i]["charging"] and not self.uavs[i]["charging"]:  # its pad has failed
                 self._log_uav("charge_end", slot, i)
@@ -262,6 +322,30 @@ class MissionModel:
                 self._log_uav("quota_filled", time, i, u.communications)
             if was.active and u.end == BATTERY:
                 self._log_uav("battery_empty", time, i)
+
+    def _log_failures(self, time: float, before: State) -> None:
+        """Log what has failed or was repaired since a copy of the state at the end of the slot."""
+        log, mission, nodes = self.log, self.mission, self.world.nodes
+        if log is None:
+            return
+        for i, (was, u) in enumerate(zip(before.uavs[0], self.uavs, strict=True)):
+            where = u["x"], u["y"], u["battery"]
+            if u["grounded"] > was["grounded"] or u["end"] == LOST != was["end"]:
+                log.add(time, "uav_failure", i, -1, u["battery"], *where)
+            if u["grounded"] < was["grounded"]:
+                log.add(time, "uav_repair", i, -1, u["battery"], *where)
+            if u["collected"] < was["collected"]:
+                log.add(time, "data_lost", i, -1, was["collected"], *where)
+        change = mission["pads_out"] - before.missions[0]["pads_out"]
+        for pad in np.nonzero(change)[0].tolist():
+            log.add(time, "pad_failure" if change[pad] > 0 else "pad_repair", -1, -1, pad)
+        silent, held = self.sensors["silent"], before.residual[0]
+        for k in np.nonzero(silent != before.sensors[0]["silent"])[0].tolist():
+            event, data = ("node_failure", held) if silent[k] else ("node_repair", self.residual)
+            log.add(time, event, -1, k, data[k], *nodes[k])
+        if mission["node_data_lost"] and not mission["continuous"]:
+            for k in np.nonzero(silent & (held > 0))[0].tolist():
+                log.add(time, "data_lost", -1, k, held[k], *nodes[k])
 
 
 @kernel

@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
-from dess.constants import Constants
 from dess.rules import data_left
+from dess.scenario import Constants
 from dess.sections.age import write_age
 from dess.sections.charging import write_use
 from dess.sections.failures import write_failures
-from dess.sections.section import extension
+from dess.sections.section import for_sections
 from dess.state import END_NAMES, QUOTA, fields
 
 # One mission. Data are in data units; rewards are summed over the slots and the UAVs (eq. 14).
@@ -120,6 +120,18 @@ class Records(NamedTuple):
     uavs: np.ndarray
     operations: np.ndarray = np.zeros(0, OPERATIONS)
 
+    def mission(self, row: int, events: "EventLog | None" = None) -> "MissionRecord":
+        """The record of one mission, with its event log if there is one."""
+        metrics = self.missions[row]
+        operations = self.operations[row] if len(self.operations) else None
+        return MissionRecord(metrics, self.uavs[row, : metrics["uavs"]], events, operations)
+
+    def add(self, row: int, record: "MissionRecord") -> None:
+        """Put the record of one mission into a row."""
+        self.missions[row], self.uavs[row, : len(record.uavs)] = record.metrics, record.uavs
+        if record.operations is not None:
+            self.operations[row] = record.operations
+
 
 @kernel
 def write_records(places, state, records):
@@ -171,7 +183,7 @@ def write_record(mission, uavs, residual, sensors, teeth, records, row):
     _write_operations(mission, uavs, sensors, teeth, records.operations, row)
 
 
-@extension
+@for_sections
 def _write_operations(mission, uavs, sensors, teeth, operations, row):
     """Write what an extended scenario measures into an ``OPERATIONS`` record filled with nan."""
     out = operations[row]

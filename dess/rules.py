@@ -22,7 +22,7 @@ from dess.sea.chart import is_open
 from dess.sections import age, fleet, wind
 from dess.sections.charging import is_before, share_power
 from dess.sections.failures import strike_if_on, take_pad, working_pads
-from dess.sections.section import extension
+from dess.sections.section import for_sections
 from dess.state import (
     ACTIVE,
     BATTERY,
@@ -282,7 +282,7 @@ def spend(mission, uavs):
     mission.slot_collected = 0.0
 
 
-@extension
+@for_sections
 def _spend_against_wind(mission, u):
     """Take the surcharge of a move, in its first slot; a battery is never below 0."""
     if mission.wind_most > 0 and fleet.begins_move(u):

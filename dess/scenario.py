@@ -5,54 +5,64 @@ space = ScenarioSpace.of(space, quota=200)         # the same with another quota
 scenario = Scenario.of(uavs=2, forbid_swaps=True)  # a single scenario; Table III for the rest
 """
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from functools import cache
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import Field
+import numpy as np
+import tomli_w
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    Field,
+    SerializerFunctionWrapHandler,
+    TypeAdapter,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
 from pydantic.fields import FieldInfo
 
-from dess.constants import (
-    AS_RANGE,
-    EXTENSIONS,
-    GEOMETRY,
-    MOST_CELLS,
-    MOST_DATA,
-    MOST_NODES,
-    MOST_SLOTS,
-    MOST_UAVS,
-    ZONE_PADS,
-    Constants,
-    Zone,
-    dotted,
-    is_number,
-    merged,
-    validated,
-)
-from dess.errors import InputError, one_of, shown
+from dess.errors import InputError, one_of, shown, validation_line
 from dess.files.shipped import Shipped
+from dess.sea.chart import FAR, Cell, Chart, Rectangle, chart_at, parking_of, spread, zones_of
 from dess.sea.families import FAMILIES, is_generated, sea_of
-from dess.sea.no_fly import no_fly_in
-from dess.sea.nodes import nodes_in, projection_in
-from dess.sections.section import Integer, Number, Section
+from dess.sea.files import no_fly_in, nodes_in, projection_in
+from dess.sections.age import MOST_TEETH, Age
+from dess.sections.arrivals import Arrivals
+from dess.sections.charging import Charging
+from dess.sections.failures import MOST_PADS, Failures
+from dess.sections.fleet import UavType, legs, places_per_slot
+from dess.sections.section import Integer, Number, Section, Strict
+from dess.sections.wind import Wind
 
-__all__ = ["SAMPLED", "Scenario", "ScenarioSpace", "fields_of", "load_scenario", "scenario_names"]
-__all__ += [
-    "scenario_description",
-    "scenario_families",
-    "scenario_at",
-    "SEA",
-    "is_scenario_name",
-    "dotted",
-    "merged",
-    "validated",
-    "Integer",
-    "Number",
-]
-__all__ += ["EXTENSIONS", "GEOMETRY", "MOST_CELLS", "MOST_NODES", "MOST_SLOTS", "MOST_UAVS"]
-__all__ += ["ZONE_PADS"]
+# Section VI-A: all combinations of five columns and five rows.
+PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 26))
+
+# The largest scenario: cells along a side of the grid, nodes, mission slots and UAVs.
+MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS = 256, 1024, 100_000, 64
+
+# The most charging zones, and the most cells of a grid with no-fly cells: 200 MB of distances.
+MOST_ZONES, MOST_CHARTED = 8, 10_000
+
+# Largest amount of initial data of a node [data units].
+MOST_DATA = 10**9
+
+# Largest number of packets of a mission with continuous arrivals, at their highest rate: some 70
+# bytes each, and less than a second of compiled code to draw them all.
+MOST_PACKETS = 2_000_000
+
+# Largest number of entries in the channel's table (dess.channel): 8 GiB if all of it were filled.
+MOST_ENTRIES = 2**30
+
+# The fields that go beyond the paper.
+SECTIONS = ("arrivals", "age", "charging", "failures", "wind", "fleet")
+# The fields of seas that the paper does not have; records are the same with and without them.
+GEOMETRY = ("rows", "zones", "no_fly")
+ZONE_PADS = "zones.pads"  # sets the pads of the zones of ``zones``, and leaves their cells
 
 # The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
 SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
@@ -62,30 +72,228 @@ SEA = "scenario"
 
 _SCENARIOS = Shipped("scenario", "dess", "scenarios")
 
+# A reward per event. Sums of many of them are still finite, and so are their squares.
+Reward = Annotated[Number, Field(ge=-(10**9), le=10**9)]
 
-class _Sampled(Constants):
-    """The checks of the sampled parameters."""
 
-    def _problems(self) -> Iterator[str]:
-        yield from super()._problems()
-        ends = {name: self._ends(name) for name in SAMPLED}
-        for name, (low, high) in ends.items():
-            least, most = self._limits(name)
-            if not least <= low <= high <= most:
-                given = low if low == high else [low, high]
-                reason = f" (cells of the zone, at most {MOST_UAVS})" if name == "uavs" else ""
-                yield f"{name}: {given} is out of range; allowed: {least}..{most}{reason}"
-        start, complete = ends["charge_start"][1], ends["charge_complete"][0]
-        if start >= complete:
-            yield (
-                f"charge_start: {start} is not below charge_complete {complete}; "
-                "allowed: 10 <= charge_start < charge_complete <= 100 (eq. 1)"
-            )
+def is_number(value: Any) -> bool:
+    """Whether a value is an integer or a float, and no truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
-    def _ends(self, name: str) -> tuple[int, int]:
-        """The least and the largest value of a sampled parameter."""
-        value = getattr(self, name)
-        return value if isinstance(value, tuple) else (value, value)
+
+# Lets a single number stand for a range of one element.
+AS_RANGE = BeforeValidator(lambda value: (value, value) if is_number(value) else value)
+
+
+class Zone(Strict):
+    """A further charging zone."""
+
+    cells: Rectangle = Field(description="[x, y, width, height] in cells")
+    pads: Integer | None = Field(
+        None,
+        ge=1,
+        description="charging pads of a further zone; without it, as many as the zone has cells",
+    )
+
+
+class Constants(Strict):
+    """The common base of both kinds of scenario: the constants, which are never sampled."""
+
+    # World
+    grid: Integer = Field(
+        32, ge=2, le=MOST_CELLS, description="cells of the grid from west to east (M)"
+    )
+    rows: Integer | None = Field(
+        None,
+        ge=2,
+        le=MOST_CELLS,
+        description="cells of the grid from north to south; without it, as many as from west to "
+        "east",
+    )
+    cell_size: Number = Field(800.0, ge=0.01, le=100_000, description="side of a cell [m] (c)")
+    altitude: Number = Field(10.0, ge=0.01, le=100_000, description="flying altitude [m] (h)")
+    nodes: tuple[Cell, ...] = Field(
+        PAPER_NODES,
+        min_length=1,
+        max_length=MOST_NODES,
+        description="cells of the sensor nodes: [x, y] for each",
+    )
+    zone: Rectangle = Field(
+        (26, 2, 4, 4), description="start and charging zone (L): [x, y, width, height] in cells"
+    )
+    pads: Integer | None = Field(
+        None, ge=1, description="charging pads; without it, as many as the zone has cells"
+    )
+    zones: tuple[Zone, ...] = Field(
+        (),
+        max_length=MOST_ZONES - 1,
+        description="further charging zones: a table of cells and pads for each",
+    )
+    no_fly: tuple[Cell, ...] = Field(
+        (), description="cells that no UAV may enter, such as islands: [x, y] for each"
+    )
+    forbid_swaps: bool = Field(False, description="cancel the moves of two UAVs that swap cells")
+
+    # Time
+    slot_length: Number = Field(
+        1.0, ge=1e-6, le=1_000_000, description="length of a mission slot (delta_t)"
+    )
+    communication_slots: Integer = Field(
+        4, ge=1, le=64, description="communication slots in a mission slot (m)"
+    )
+    max_slots: Integer = Field(
+        500, ge=1, le=MOST_SLOTS, description="mission slots after which a mission is truncated"
+    )
+
+    # Energy
+    charge_rate: Integer = Field(
+        10, ge=1, le=100, description="battery gained in a charging slot [%]"
+    )
+    flight_cost: Integer = Field(
+        1,
+        ge=0,
+        le=1,
+        description="battery spent in a slot without charging [%]; 0 to fly without battery "
+        "decrease (Algorithm 1, phase I)",
+    )
+
+    # Channel
+    edge_snr: Number = Field(
+        -25.0, ge=-300, le=300, description="mean SNR at half the grid's diagonal [dB]"
+    )
+    path_loss_exponent: Number = Field(
+        2.27, ge=0.01, le=10, description="path loss exponent (alpha)"
+    )
+    shadowing_variance: Number = Field(
+        2.0, ge=0, le=400, description="variance of shadowing [dB^2]"
+    )
+
+    # Data
+    initial_data: Annotated[tuple[Number, Number], AS_RANGE] = Field(
+        (5.0, 20.0), description="initial data per node [data units]: a number or [low, high]"
+    )
+    arrival_rate: Number = Field(
+        0.02, ge=0, le=100, description="new data per node and mission slot [data units] (lambda)"
+    )
+    quota: Integer = Field(
+        440, ge=1, le=1_000_000, description="communication slots that a UAV must fill (U_C)"
+    )
+
+    # Reward (Table III)
+    reward_data: Reward = Field(
+        1.3, description="reward per data unit that the team collects (alpha)"
+    )
+    reward_overruled: Reward = Field(
+        -1.0, description="reward of an action that the safety controller overrules (beta)"
+    )
+    reward_depleted: Reward = Field(
+        -300.0, description="reward of a UAV whose battery is empty before its quota is filled (nu)"
+    )
+    reward_charging: Reward = Field(0.05, description="reward per charging slot (c)")
+    reward_quota: Reward = Field(100.0, description="reward of a UAV that fills its quota (omega)")
+    reward_step: Reward = Field(-0.1, description="reward per mission slot (zeta)")
+
+    # Beyond the paper; off by default
+    arrivals: Arrivals = Arrivals.off()
+    age: Age = Age.off()
+    charging: Charging = Charging.off()
+    failures: Failures = Failures.off()
+    wind: Wind = Wind.off()
+    fleet: tuple[UavType, ...] = Field(
+        (),
+        max_length=MOST_UAVS,
+        description="types of UAVs: a table for each; UAV i has type i modulo their number",
+    )
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_off(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out the sections that are off: so scenarios without them are stored as before."""
+        values = handler(self)
+        return {n: v for n, v in values.items() if n not in (*SECTIONS, *GEOMETRY) or self.has(n)}
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        for check in (_off_the_grid, _too_large, _unreachable, _unfit, _out_of_range):
+            for problem in check(self):
+                raise ValueError(problem)
+        return self
+
+    @classmethod
+    def of(cls, scenario: "Constants | None" = None, **values: Any) -> Self:
+        """A scenario of the given values, on top of another one (default: the paper's).
+
+        Raises:
+            InputError: For unknown keys, wrong types and values out of range.
+        """
+        base = scenario.model_dump() if scenario is not None else {}
+        return validated(cls, merged(base, values), "scenario")
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """The cells of the grid from west to east, and from north to south."""
+        return self.grid, self.grid if self.rows is None else self.rows
+
+    @property
+    def rectangles(self) -> tuple[Rectangle, ...]:
+        """The cells of all charging zones, the start zone first."""
+        return (self.zone, *(zone.cells for zone in self.zones))
+
+    @property
+    def chart(self) -> Chart:
+        """The zones, the no-fly cells and the ways between cells."""
+        return chart_at(*self.size, self.rectangles, self.no_fly)
+
+    @property
+    def zone_cells(self) -> int:
+        """Number of cells of the start and charging zone."""
+        return self.zone[2] * self.zone[3]
+
+    @property
+    def zone_pads(self) -> tuple[int, ...]:
+        """The charging pads of each zone; by default, as many as the zone has cells."""
+        pads = self.pads, *(zone.pads for zone in self.zones)
+        cells = zip(self.rectangles, pads, strict=True)
+        return tuple(width * height if n is None else n for (*_, width, height), n in cells)
+
+    @property
+    def charging_pads(self) -> int:
+        """Number of charging pads of all zones together."""
+        return sum(self.zone_pads)
+
+    @property
+    def is_extended(self) -> bool:
+        """Whether the scenario goes beyond the paper, so that records have ``OPERATIONS``."""
+        return any(self.has(name) for name in SECTIONS)
+
+    def has(self, section: str) -> bool:
+        """Whether a section is on."""
+        value = getattr(self, section)
+        return value.is_on if isinstance(value, Section) else bool(value)
+
+    @property
+    def needs_events(self) -> bool:
+        """Whether only the SimPy engine can simulate the scenario."""
+        return self.arrivals.process != "slotted"
+
+    @property
+    def packets(self) -> float:
+        """The packets of a mission with continuous arrivals at their highest rate; otherwise 0."""
+        if not self.needs_events:
+            return 0.0
+        rates = self.arrivals.rates or [self.arrival_rate] * len(self.nodes)
+        highest = max([1.0, *(factor for _, factor in self.arrivals.schedule)])
+        return sum(rates) * highest * self.max_slots
+
+    def value(self, field: str) -> Any:
+        """The value of a field; ``failures.uav_rate`` is the field of a section."""
+        if field == ZONE_PADS:
+            return self.zone_pads[1:]
+        section, _, name = field.rpartition(".")
+        return getattr(getattr(self, section) if section else self, name)
+
+    def plain_value(self, field: str) -> Any:
+        """The value of a field as JSON has it: lists for tuples, a dictionary for a type of UAV."""
+        return TypeAdapter(Any).dump_python(self.value(field), mode="json")
 
     @property
     def numeric(self) -> list[str]:
@@ -108,10 +316,9 @@ class _Sampled(Constants):
         return self._limits(field)
 
     def _limits(self, field: str) -> tuple[float, float]:
-        cells = self.zone_cells
         between = {
-            "uavs": (1, min(cells, MOST_UAVS)),
-            "pads": (1, cells),
+            "uavs": (1, min(self.zone_cells, MOST_UAVS)),
+            "pads": (1, self.zone_cells),
             ZONE_PADS: (1, min((w * h for *_, w, h in self.rectangles[1:]), default=1)),
             "initial_data": (0, MOST_DATA),
         }
@@ -120,8 +327,61 @@ class _Sampled(Constants):
         most = [m.le for m in limits if hasattr(m, "le")]
         return between.get(field) or (max(least, default=-inf), min(most, default=inf))
 
+    def to_toml(self) -> str:
+        """The scenario as TOML text that ``load_scenario`` reads back to an equal one."""
+        return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
 
-class Scenario(_Sampled):
+
+def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
+    """Values on top of others; ``failures.uav_rate`` and a table replace parts of a section.
+
+    ``zones.pads`` replaces the pads of the further zones: a number for all, or one for each.
+
+    Raises:
+        InputError: If ``zones.pads`` has another length than ``zones``.
+    """
+    result: dict[str, Any] = {}
+    for name, value in (dotted(base) | dotted(values)).items():
+        section, _, part = name.partition(".")
+        table = result.setdefault(section, {}) if part and section in SECTIONS else None
+        if isinstance(table, dict):
+            table[part] = value
+        else:
+            result[name] = value
+    if ZONE_PADS in result:
+        pads, zones = result.pop(ZONE_PADS), result.get("zones") or ()
+        each = pads if isinstance(pads, list | tuple) else [pads] * len(zones)
+        if not zones or len(each) != len(zones):
+            allowed = f"a number, or a list of {len(zones)}" if zones else "with further zones"
+            raise InputError(f"{ZONE_PADS}: {shown(pads)} does not fit; allowed: {allowed}")
+        result["zones"] = [{**zone, "pads": n} for zone, n in zip(zones, each, strict=True)]
+    return result
+
+
+def dotted(values: dict[str, Any]) -> dict[str, Any]:
+    """Values by field: the table of a section becomes fields such as ``failures.uav_rate``."""
+    fields: dict[str, Any] = {}
+    for name, value in values.items():
+        if name in (*SECTIONS, "zones") and isinstance(value, dict):
+            fields |= {f"{name}.{part}": of_part for part, of_part in value.items()}
+        else:
+            fields[name] = value
+    return fields
+
+
+def validated(model: type[BaseModel], values: dict[str, Any], where: str) -> Any:
+    """The model of these values.
+
+    Raises:
+        InputError: If they are not valid; ``where`` is their name or path.
+    """
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise InputError(validation_line(error, where, model)) from None
+
+
+class Scenario(Constants):
     """Every constant of one mission (Sections II and VI-A of the paper), frozen and validated.
 
     Raises:
@@ -141,7 +401,7 @@ class Scenario(_Sampled):
 IntegerRange = Annotated[tuple[Integer, Integer], AS_RANGE]
 
 
-class ScenarioSpace(_Sampled):
+class ScenarioSpace(Constants):
     """The ranges from which a mission draws its parameters (Table II), both ends included.
 
     A single value is a range with one element. If one range is narrowed or fixed, the draws of the
@@ -186,8 +446,8 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     Args:
         name_or_path: One of ``scenario_names()``, a sea such as ``archipelago:7``
             (``dess.sea.families``), or the path of a TOML file. In such a file, ``nodes`` may be
-            the name of a file in the same folder, which ``dess.sea.nodes`` reads, and ``no_fly``
-            one that ``dess.sea.no_fly`` reads.
+            the name of a file in the same folder, which ``dess.sea.files`` reads, and ``no_fly``
+            one that ``dess.sea.files`` reads.
         **overrides: Values that replace those of the file. A sampled field that is set to a single
             value is no longer sampled.
 
@@ -269,3 +529,109 @@ def _read(name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
     if is_generated(name):
         return f"scenario {name}", sea_of(name)
     return _SCENARIOS.load(name_or_path, others=scenario_families())
+
+
+# --- what no field can check alone ---
+
+
+def _off_the_grid(c: Constants) -> Iterator[str]:
+    columns, rows = c.size
+    cells: Counter[Cell] = Counter()
+    for number, (x, y, width, height) in enumerate(c.rectangles):
+        name = f"zones.{number - 1}.cells" if number else "zone"
+        if min(x, y) < 0 or min(width, height) < 1 or x + width > columns or y + height > rows:
+            yield (
+                f"{name}: {[x, y, width, height]} does not lie on the {columns} x {rows} grid; "
+                "allowed: [x, y, width, height] with 0 <= x, y and x + width, y + height <= grid"
+            )
+            return
+        cells.update((x + i % width, y + i // width) for i in range(width * height))
+    for cell, count in cells.items():
+        if count > 1:
+            yield f"zones: two zones have the cell {[*cell]}; allowed: zones without common cells"
+    size = f"0 <= x < {columns}, 0 <= y < {rows}" if c.rows else f"0 <= x, y < {columns}"
+    for name in ("nodes", "no_fly"):
+        for (x, y), count in Counter(getattr(c, name)).items():
+            if not (0 <= x < columns and 0 <= y < rows):
+                yield f"{name}: {[x, y]} is off the grid; allowed: {size}"
+            if count > 1:
+                yield f"{name}: {[x, y]} is listed twice; allowed: distinct cells"
+
+
+def _too_large(c: Constants) -> Iterator[str]:
+    """The tables of a mission fit into memory."""
+    ways, (columns, rows) = max(5 * len(c.nodes) * legs(c.fleet), places_per_slot(c.fleet)), c.size
+    if columns * rows * c.communication_slots * ways > MOST_ENTRIES:
+        yield (
+            "grid, nodes, communication_slots, fleet: too large together; allowed: 5 * grid^2 * "
+            f"nodes * communication_slots <= {MOST_ENTRIES}, and less with slots_per_cell"
+        )
+    if c.no_fly and columns * rows > MOST_CHARTED:
+        yield (
+            f"no_fly: the {columns} x {rows} grid is too large; allowed: at most "
+            f"{MOST_CHARTED:,} cells where some are no-fly cells"
+        )
+    has_teeth = c.age.measured and not c.needs_events
+    if has_teeth and c.max_slots * c.communication_slots > MOST_TEETH:
+        yield (
+            "age.measured: the mission has too many communication slots; allowed: "
+            f"max_slots * communication_slots <= {MOST_TEETH}"
+        )
+    if c.packets > MOST_PACKETS:
+        yield (
+            f"arrivals: {c.packets:,.0f} packets at the highest rate; allowed: "
+            f"{MOST_PACKETS:,} at most (rates of all nodes * highest factor * max_slots)"
+        )
+
+
+def _unreachable(c: Constants) -> Iterator[str]:
+    """The first of the cells of zones and nodes that no UAV can reach from the start zone."""
+    if not c.no_fly:
+        return
+    zones = zones_of(*c.size, (), c.no_fly)
+    x, y, *_ = c.zone
+    ways = spread(zones, np.array([[x, y]]))[0].reshape(zones.shape)
+    for name, cells in (("zone", parking_of(c.rectangles)), ("nodes", c.nodes)):
+        for cell in cells:
+            if ways[cell[::-1]] == FAR:
+                is_in = "is a no-fly cell" if cell in c.no_fly else "cannot be reached"
+                yield f"{name}: {[*cell]} {is_in}; allowed: cells with a way from the start zone"
+                return
+
+
+def _unfit(c: Constants) -> Iterator[str]:
+    """The rates, the pads and the initial data fit to the nodes and the zones."""
+    rates, (low, high) = c.arrivals.rates, c.initial_data
+    if rates and len(rates) != len(c.nodes):
+        yield f"arrivals.rates: there are {len(rates)}; allowed: {len(c.nodes)}, a rate per node"
+    for number, ((*_, width, height), pads) in enumerate(
+        zip(c.rectangles, c.zone_pads, strict=True)
+    ):
+        name, cells = f"zones.{number - 1}.pads" if number else "pads", width * height
+        if pads > cells:
+            yield f"{name}: {pads} is more than the zone has cells; allowed: 1..{cells}"
+    if c.failures.pad_rate > 0 and c.charging_pads > MOST_PADS:
+        yield f"pads: {c.charging_pads} are too many to fail; allowed: {MOST_PADS} at most"
+    if not 0 <= low <= high <= MOST_DATA:
+        yield (
+            f"initial_data: {[low, high]} is not a range; allowed: a number 0..{MOST_DATA:,} "
+            f"or [low, high] with 0 <= low <= high <= {MOST_DATA:,}"
+        )
+
+
+def _out_of_range(c: Constants) -> Iterator[str]:
+    """The sampled parameters lie within their limits, and C_S is below C_C."""
+    values = {name: getattr(c, name) for name in SAMPLED}
+    ends = {name: (of, of) if is_number(of) else of for name, of in values.items()}
+    for name, (low, high) in ends.items():
+        least, most = c._limits(name)
+        if not least <= low <= high <= most:
+            given = low if low == high else [low, high]
+            reason = f" (cells of the zone, at most {MOST_UAVS})" if name == "uavs" else ""
+            yield f"{name}: {given} is out of range; allowed: {least}..{most}{reason}"
+    start, complete = ends["charge_start"][1], ends["charge_complete"][0]
+    if start >= complete:
+        yield (
+            f"charge_start: {start} is not below charge_complete {complete}; "
+            "allowed: 10 <= charge_start < charge_complete <= 100 (eq. 1)"
+        )

@@ -14,9 +14,8 @@ import numpy as np
 
 from dess import streams
 from dess.code.kernels import kernel
-from dess.constants import MOST_ZONES
 from dess.errors import InputError
-from dess.scenario import SAMPLED, Scenario, ScenarioSpace
+from dess.scenario import MOST_ZONES, SAMPLED, Scenario, ScenarioSpace
 from dess.sections import fleet, wind
 from dess.sections.failures import MOST_PADS
 
@@ -84,7 +83,7 @@ MISSION = np.dtype(
 )
 
 # The same for scenarios without sections. It differs in the name of a field only, which tells the
-# compiler to leave out the code of the sections (``dess.sections.section.extension``).
+# compiler to leave out the code of the sections (``dess.sections.section.for_sections``).
 PLAIN_MISSION = np.dtype(
     [("is_plain", *field[1:]) if field[0] == "is_extended" else field for field in MISSION.descr],
     align=True,

@@ -22,8 +22,8 @@ from analysis.results.parquet import files_in
 from analysis.results.tables import Results
 from dess import InputError
 from dess.files import documents, tables
-from dess.files.archives import write_zip
 from dess.files.reading import read_bytes
+from dess.files.writing import write_zip
 from reports.pages.html import template
 from reports.pages.page import LARGEST, LIMIT, Page
 

@@ -1,62 +1,15 @@
-"""The matrix of libraries: how it is made from reports, and that the page has the current one."""
+"""The matrix of libraries has the present one, and the pins of the libraries are exact."""
 
 import re
-from xml.etree import ElementTree
 
-import pytest
 from packaging.utils import canonicalize_name
 
 from tests.distributions import ROOT
-from tests.integrations.matrix import (
-    BEGIN,
-    CHECKS,
-    END,
-    FAILED,
-    MISSING,
-    NO_ENVIRONMENT,
-    PAGE,
-    YES,
-    row,
-)
+from tests.integrations.matrix import BEGIN, CHECKS, END, NO_ENVIRONMENT, PAGE, YES
 from tests.test_packaging import pins
 
 OWN_PINS = sorted((ROOT / "examples" / "requirements").glob("*.txt"))
 TESTED = {path.stem.removeprefix("test_") for path in (ROOT / "tests/integrations").glob("test_*")}
-
-
-def suite(**outcomes: str) -> ElementTree.Element:
-    """The report of a library whose tests had some outcomes; all others passed."""
-    cases = [
-        f'<testcase name="{check}">{outcomes.get(check, "")}</testcase>'
-        for check in CHECKS
-        if outcomes.get(check) != "absent"
-    ]
-    library = '<properties><property name="library" value="ray 2.60.0"/></properties>'
-    return ElementTree.fromstring(f"<testsuite>{library}{''.join(cases)}</testsuite>")
-
-
-OUTCOMES = [("", YES), ("<failure/>", FAILED), ("<error/>", FAILED)]
-OUTCOMES += [("<skipped/>", MISSING), ("absent", MISSING)]
-
-
-@pytest.mark.parametrize(("outcome", "cell"), OUTCOMES)
-def test_a_row_has_the_outcome_of_every_check(outcome: str, cell: str) -> None:
-    *others, last = row(suite(test_training_step=outcome), "rllib")
-    assert others == ["`rllib` (`ray`)", "2.60.0", *[YES] * (len(CHECKS) - 1)]
-    assert last == cell
-
-
-def test_one_case_that_fails_is_enough() -> None:
-    report = suite()
-    for name, inner in (("test_step[leave]", ""), ("test_step[stay]", "<failure/>")):
-        report.append(ElementTree.fromstring(f'<testcase name="{name}">{inner}</testcase>'))
-    assert row(report, "rllib")[2:4] == [YES, FAILED]
-
-
-def test_a_library_that_is_not_installed_is_seen() -> None:
-    skipped = ElementTree.fromstring("<testsuite><testcase><skipped/></testcase></testsuite>")
-    skipped[0].attrib["name"] = "tests.integrations.test_rllib"
-    assert set(row(skipped, "rllib")[1:]) == {MISSING}
 
 
 def test_own_pins_are_exact_and_those_of_a_library_with_tests() -> None:

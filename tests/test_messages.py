@@ -22,7 +22,7 @@ from dess import InputError
 from dess.files.documents import Document
 from dess.record import MISSION_RECORD
 from dess.scenario import Scenario, ScenarioSpace, validated
-from dess.sea import no_fly, nodes
+from dess.sea import files
 from policies.learner.checkpoint import Header
 from policies.learner.config import TrainingConfig, load_config
 from policies.learner.description import Description
@@ -81,10 +81,10 @@ def documents() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     cost = {"policy": "greedy", "calls": 1, "median": 1e-6, "slow": 1e-6}
     yield Times, {"processor": "x", "costs": [cost]}
     point = {"type": "Point", "coordinates": [1.0, 2.0]}
-    yield nodes._Collection, {"features": [{"geometry": point}]}
+    yield files.Points, {"features": [{"geometry": point}]}
     ring = [[1.0, 2.0], [3.0, 2.0], [3.0, 4.0], [1.0, 2.0]]
     polygon = {"type": "Polygon", "coordinates": [ring]}
-    yield no_fly._Collection, {"features": [{"geometry": polygon}]}
+    yield files.Polygons, {"features": [{"geometry": polygon}]}
 
 
 def tables() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:

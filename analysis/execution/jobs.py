@@ -52,11 +52,7 @@ def simulate_missions(
     is_extended = any(space.is_extended for space in spaces)
     records = empty_records(len(spaces), max(space.uavs[1] for space in spaces), is_extended)
     for row, (space, replication) in enumerate(zip(spaces, replications, strict=True)):
-        record = simulate(space, team[: space.uavs[1]], seed, replication)
-        records.missions[row] = record.metrics
-        records.uavs[row, : len(record.uavs)] = record.uavs
-        if record.operations is not None:
-            records.operations[row] = record.operations
+        records.add(row, simulate(space, team[: space.uavs[1]], seed, replication))
         if progress:
             progress(1)
     return records

@@ -183,8 +183,7 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
 
     def record(self) -> MissionRecord:
         """The record of the episode up to the present slot."""
-        records = self._stepper.records(self._stepper.indices)
-        return MissionRecord(records.missions[0], records.uavs[0, : records.missions["uavs"][0]])
+        return self._stepper.records(self._stepper.indices).mission(0)
 
     def render(self) -> np.ndarray | None:
         """A picture (H, W, 3) of uint8, or None if it is shown in a window or not asked for."""

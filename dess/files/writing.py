@@ -8,16 +8,36 @@ import re
 import secrets
 import shutil
 import stat
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from filelock import FileLock, Timeout
 from psutil import pid_exists
 
 from dess.errors import InputError
 from dess.files.reading import kind_of, paths_in
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip file can store
+_FILE, _FOLDER = 0o100644, 0o40755
+
+
+def write_zip(path: Path, entries: Iterable[tuple[str, bytes]]) -> None:
+    """Write a zip file.
+
+    Args:
+        path: The file, a temporary one of ``replacing``.
+        entries: Names with their contents; the name of a folder ends with a slash.
+    """
+    with ZipFile(path, "w") as archive:
+        for name, content in entries:
+            entry = ZipInfo(name, _EPOCH)
+            entry.compress_type = ZIP_DEFLATED
+            entry.external_attr = (_FOLDER if entry.is_dir() else _FILE) << 16  # permissions
+            archive.writestr(entry, content)
+
 
 # The longest name of a file or a folder in the usual file systems [bytes].
 _LONGEST = 255

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from dess.code.kernels import inlined, kernel
-from dess.sections.section import Number, Section, extension
+from dess.sections.section import Number, Section, for_sections
 
 # The most communication slots of a mission whose ages are measured: the batch engine counts the
 # teeth of each mission by their length, in an array with an entry per communication slot.
@@ -52,7 +52,7 @@ def empty(mission, sensor, teeth, n):
     sensor.newest = now
 
 
-@extension
+@for_sections
 def _end_tooth(mission, sensor, teeth, now):
     if mission.age_measured != 0:
         teeth[_length(mission, sensor, now)] += 1
@@ -64,7 +64,7 @@ def _length(mission, sensor, now):
     return np.int64(round((now - sensor.newest) * mission.communication_slots))
 
 
-@extension
+@for_sections
 def mean_age(mission):
     """The mean age of all nodes at the end of a slot [slots]."""
     return mission.slot - mission.newest / mission.nodes

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from dess.code.kernels import inlined, kernel
-from dess.sections.section import Integer, Section, extension
+from dess.sections.section import Integer, Section, for_sections
 
 
 class Charging(Section):
@@ -55,7 +55,7 @@ def is_before(mission, u, other):
     return u.pad_request < other.pad_request
 
 
-@extension
+@for_sections
 def share_power(mission, uavs):
     """Charge the UAVs on the pads if the power is limited; return whether it is."""
     if mission.power > 0:

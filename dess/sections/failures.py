@@ -6,7 +6,7 @@ from pydantic import Field
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
-from dess.sections.section import Probability, Section, Slots, extension
+from dess.sections.section import Probability, Section, Slots, for_sections
 
 MOST_PADS = 64  # charging pads that can fail: as many as the largest fleet has UAVs
 
@@ -57,7 +57,7 @@ class Failures(Section):
         }
 
 
-@extension
+@for_sections
 def strike_if_on(mission, uavs, residual, sensors, lost):
     """``strike``, if the section is on."""
     if mission.has_failures:
@@ -157,7 +157,7 @@ def working_pads(mission, zone):
     return mission.zone_pads[zone] - _broken_pads(mission, zone)
 
 
-@extension
+@for_sections
 def _broken_pads(mission, zone):
     broken = 0
     if mission.pad_rate > 0.0:
@@ -176,7 +176,7 @@ def first_pad(mission, zone):
     return first
 
 
-@extension
+@for_sections
 def take_pad(mission, uavs, u):
     """Give a UAV the first pad of its zone that works and is free; ``charging`` is set after."""
     if not mission.has_failures:

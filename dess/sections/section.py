@@ -58,7 +58,7 @@ class Section(Strict):
         return cls.model_validate({})
 
 
-def extension(function: Callable) -> Any:
+def for_sections(function: Callable) -> Any:
     """Compile a function like ``inlined`` for missions with sections; in others it does nothing.
 
     The first argument is the record of a mission. Of ``PLAIN_MISSION`` the compiler knows that no

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
-from dess.sections.section import Integer, Number, Section, extension
+from dess.sections.section import Integer, Number, Section, for_sections
 
 
 class Wind(Section):
@@ -65,7 +65,7 @@ def surcharge(columns, wind_x, wind_y, gusts, seed, step_x, step_y, x, y):
     return int(math.floor(against + streams.uniform(words[2 if step_y == 0 else 3])))
 
 
-@extension
+@for_sections
 def move_surcharge(mission, step_x, step_y, x, y):
     """The surcharge [%] of a move in a mission, 0 of no step; see ``surcharge``."""
     if mission.wind_most == 0 or (step_x == 0 and step_y == 0):

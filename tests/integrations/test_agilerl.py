@@ -60,28 +60,6 @@ def training():
     return population, chosen
 
 
-@pytest.mark.parametrize("design", [{}, {"uavs": 3}])
-def test_reset(design):
-    env = harvest(**design)
-    observations, infos = PzDummyVecEnv(env).reset(seed=1)
-    own, _ = env.reset(seed=1)
-    assert list(observations) == list(infos) == UAVS
-    assert all(np.array_equal(observations[uav], own[uav][None]) for uav in UAVS)
-    assert all(infos[uav]["action_mask"].shape == (5,) for uav in UAVS)
-
-
-def test_step():
-    for _, rewards, *_, infos in flown(PzDummyVecEnv(harvest(**SHORT)), 40):
-        for uav in UAVS:
-            assert rewards[uav] == pytest.approx(infos[uav]["reward_terms"].sum())
-
-
-def test_mask_is_respected(training):
-    masks, actions = (np.array(part) for part in zip(*training[1], strict=True))
-    assert (masks[:, :HOVER] == 0).any() and len(set(actions.tolist())) > 1
-    assert np.all(masks[np.arange(len(masks)), actions] == 1)
-
-
 def test_agents_that_end():
     waits = 0
     for observations, rewards, terminated, truncated, infos in flown(
@@ -98,6 +76,9 @@ def test_agents_that_end():
 
 def test_training_step(training):
     population, chosen = training
+    masks, actions = (np.array(part) for part in zip(*chosen, strict=True))
+    assert (masks[:, :HOVER] == 0).any() and len(set(actions.tolist())) > 1
+    assert np.all(masks[np.arange(len(masks)), actions] == 1)
     assert len(population) == 2 and len(chosen) >= 3 * 256
     assert all(np.isfinite(agent.fitness).all() and agent.fitness for agent in population)
     actor = population[0].actors["uav"]

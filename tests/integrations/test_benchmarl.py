@@ -15,18 +15,11 @@ from dess.integrations.benchmarl import HarvestTask  # noqa: E402
 from tests.integrations.test_torchrl import (  # noqa: E402
     SHORT,
     test_agents_that_end,
-    test_mask_is_respected,
-    test_reset,
     test_step,
     torch,
 )
 
-__all__ = [
-    "test_agents_that_end",
-    "test_mask_is_respected",
-    "test_reset",
-    "test_step",
-]
+__all__ = ["test_agents_that_end", "test_step"]
 EXAMPLE = Path(__file__).parents[2] / "examples" / "benchmarl_mappo.py"
 
 

@@ -39,42 +39,13 @@ def flown(env, steps: int, seed: int = 1) -> list[tuple]:
     return story
 
 
-def test_reset() -> None:
-    env = harvest()
-    env.reset()
-    assert masking.is_masking_supported(env)
-    masks = masking.get_action_masks(env)
-    assert masks.shape == (ROWS, 5) and masks.dtype == bool
-    _, info = dess.vector_env(QUICK, MISSIONS).reset()
-    assert np.array_equal(masks, info["action_mask"])
-
-
-def test_step() -> None:
-    env, plain = harvest(), dess.vector_env(QUICK, MISSIONS)
-    plain.reset(seed=1)
-    info = {"action_mask": plain.action_masks()}
-    for masks, _, actions, observations, rewards, over, _ in flown(env, 40):
-        assert np.array_equal(masks, info["action_mask"])
-        expected, gained, terminated, truncated, info = plain.step(actions)
-        assert np.array_equal(observations, expected)
-        assert np.array_equal(rewards, gained)
-        assert np.array_equal(over, terminated | truncated)
-
-
-def test_mask_is_respected() -> None:
-    for guarded in (False, True):
-        story = flown(harvest(guarded=guarded), 40)
-        for masks, _, actions, *_ in story:
-            assert masks[range(ROWS), actions].all()
-        assert not all(masks[active].all() for masks, active, *_ in story)
-
-
 def test_agents_that_end() -> None:
     waits = 0
     for masks, active, actions, _, rewards, *_ in flown(harvest(FLEET), 60):
         assert (masks[~active] == np.eye(5, dtype=bool)[HOVER]).all()
         assert (actions[~active] == HOVER).all()
         assert not rewards[~active].any()
+        assert masks[range(ROWS), actions].all()
         waits += (~active).sum()
     assert waits
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import data_equivalence
 
 import dess
 from dess.env.parallel import HarvestEnv
@@ -57,22 +56,6 @@ def legal(infos: Any, generator: np.random.Generator) -> np.ndarray:
 @both_ways
 @every_fleet
 @every_wrapper
-def test_reset(wrapper: str, fleet: str, ended: str) -> None:
-    plain, env = team(fleet, ended), WRAPPERS[wrapper](team(fleet, ended))
-    for seed in range(3):
-        expected, expected_infos = plain.reset(seed)
-        observations, infos = env.reset(seed)
-        assert env.agents == plain.agents
-        assert data_equivalence(infos, expected_infos, exact=True)
-        for agent, own in observations.items():
-            assert env.observation_space(agent).contains(own)
-            # What some wrappers add stands behind or before the observation.
-            assert set(expected[agent].tolist()) <= set(own.ravel().tolist())
-
-
-@both_ways
-@every_fleet
-@every_wrapper
 def test_step(wrapper: str, fleet: str, ended: str) -> None:
     """Whole episodes have the rewards and the ends of the plain environment."""
     plain, env = team(fleet, ended), WRAPPERS[wrapper](team(fleet, ended))
@@ -90,17 +73,6 @@ def test_step(wrapper: str, fleet: str, ended: str) -> None:
         if wrapper == "black_death_v3":  # which ends in the step after the last
             env.step(dict.fromkeys(env.agents, HOVER))
         assert not env.agents
-
-
-def test_mask_is_respected() -> None:
-    env, generator = vectors(1), np.random.default_rng(0)
-    _, infos = env.reset(seed=1)
-    masked = 0
-    for _ in range(150):
-        masked += sum((info["action_mask"] == 0).sum() for info in infos)
-        *_, infos = env.step(legal(infos, generator))
-        assert not any(info["overruled"] for info in infos)  # nobody is in the way of a lone UAV
-    assert masked
 
 
 @every_fleet

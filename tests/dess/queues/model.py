@@ -1,6 +1,6 @@
 """The charging zone and the buffers of nodes as queues: arrivals, customers and a server.
 
-Zone (``dess.sections.zone``), buffers (``dess.sections.buffers``) and arrivals are those of the
+Zone (``dess.mission``), buffers (``dess.sections.packets``) and arrivals are those of the
 SimPy model. Only the UAVs are other ones: they come to the zone, charge for a given time and leave.
 A UAV collects data at fixed times, so a SimPy process takes its place where theory asks for
 exponential service. With a UAV above a node, a whole mission of the model is the queue.
@@ -15,11 +15,11 @@ import simpy
 from analysis.verification import closed_forms
 from analysis.verification.measurements import Hovering
 from dess import simulate
+from dess.mission import ChargingZone
 from dess.record import OPERATIONS, MissionRecord
 from dess.scenario import ScenarioSpace
 from dess.sections.arrivals import draw_arrival, factors_of, sources_of
-from dess.sections.buffers import Buffers
-from dess.sections.zone import ChargingZone
+from dess.sections.packets import Buffers
 from dess.state import MISSION, UAV, constants_of
 
 Process = Generator[simpy.Event, Any, None]

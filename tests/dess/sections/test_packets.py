@@ -9,7 +9,7 @@ from dess import InputError, parallel_env
 from dess.batch import simulate_batch
 from dess.mission import MissionModel
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
-from dess.sections.buffers import Buffers
+from dess.sections.packets import Buffers
 from dess.view import View
 from tests.drawn import Script
 

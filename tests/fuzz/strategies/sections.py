@@ -2,10 +2,10 @@
 
 from hypothesis import strategies as st
 
-from dess.scenario import EXTENSIONS, ScenarioSpace, fields_of
+from dess.scenario import SECTIONS, ScenarioSpace, fields_of
 from tests.fuzz.strategies.values import texts, toml_values
 
-FIELDS = (*fields_of(ScenarioSpace), *EXTENSIONS)
+FIELDS = (*fields_of(ScenarioSpace), *SECTIONS)
 # Plain settings of sections, single fields and whole tables.
 PLAIN = (
     "age.measured=true",
@@ -28,7 +28,7 @@ _ENDS = st.sampled_from(
     + ['"/dev/zero"', "{}", "{measured=true}", "[{slots_per_cell=0}]", "[{a=1}]"]
     + ["[{slots_per_cell=100000}]"]
 )
-_names = st.sampled_from(FIELDS) | st.sampled_from(EXTENSIONS).flatmap(
+_names = st.sampled_from(FIELDS) | st.sampled_from(SECTIONS).flatmap(
     lambda section: texts.map(lambda name: f"{section}.{name}")
 )
 odd_settings = st.tuples(_names, _ENDS | toml_values).map("=".join)

@@ -7,7 +7,7 @@ from analysis import load_study
 from analysis.figures import verification as drawings
 from analysis.results.manifest import Manifest
 from analysis.stats.intervals import LEVEL
-from dess.scenario import EXTENSIONS, GEOMETRY, Scenario
+from dess.scenario import GEOMETRY, SECTIONS, Scenario
 from reports.pages import stress_des
 
 # Monks et al. (2019), Table 1.
@@ -90,7 +90,7 @@ def test_every_item_of_the_checklist_is_on_the_page() -> None:
 def test_every_input_parameter_is_in_the_table() -> None:
     table = stress_des.describe(manifest()).parameters
     fields = table["Input parameter [unit]"].str.partition(":")[0]
-    off = {*EXTENSIONS, *GEOMETRY}
+    off = {*SECTIONS, *GEOMETRY}
     assert set(fields) == set(Scenario.model_fields) - off == set(OTHER)
     assert table.notna().all(axis=None)
 
