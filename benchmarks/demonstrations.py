@@ -34,10 +34,10 @@ from dess.observations.states import CompactStates, compact_states, masks
 from dess.sea.families import FAMILIES, SETS
 from dess.view import View
 from policies.learner.config import MISSION_SEED, TrainingConfig, load_config
-from policies.learner.dqn import soft_update
 from policies.learner.network import SetNetwork
 from policies.learner.policy import LearnedPolicy
 from policies.learner.trained import save_policy
+from policies.learner.training import soft_update
 from policies.planner import LongPlanner, Planner
 
 

@@ -30,9 +30,8 @@ from dess.guard import guard
 from dess.observations.states import CompactStates, masks
 from dess.view import View
 from policies.learner.config import MISSION_SEED, TrainingConfig, load_config
-from policies.learner.dqn import Batch, Learner
+from policies.learner.dqn import Batch, DQNLearner, DQNTraining
 from policies.learner.trained import save_policy
-from policies.learner.training import Training
 
 RECORDED, EVALUATED = 777_002, 777_001  # seeds of the planner's missions and of the evaluation
 HELD_OUT = 50  # of the planner's missions, which no training sees
@@ -48,7 +47,7 @@ VARIANTS = {
 }
 
 
-class ImitatingLearner(Learner):
+class ImitatingLearner(DQNLearner):
     """A learner with other losses on the transitions of the first environments."""
 
     environments, flown, has_td, weight = 1, 0, True, 0.0
@@ -77,7 +76,7 @@ def _part_of(batch: Batch, which: np.ndarray) -> Batch:
     return Batch(batch.state, *(part[which] for part in batch[1:]))
 
 
-class ImitatingTraining(Training):
+class ImitatingTraining(DQNTraining):
     """A training whose first environments fly the planner's missions again and again."""
 
     def __init__(
@@ -90,11 +89,6 @@ class ImitatingTraining(Training):
         self.learner = ImitatingLearner(self.learner.online, self.observation, config, device)
         self.learner.environments, self.learner.flown = config.num_envs, flown
         self.learner.has_td, self.learner.weight = has_td, weight * has_margin
-
-    def begin_with(self, weights: dict[str, torch.Tensor]) -> None:
-        """Begin with these weights in all networks."""
-        for network in (self.learner.online, self.learner.target, self.learner.average):
-            network.load_state_dict(weights)
 
     def _collect(self, epsilon: float) -> None:
         # The memory of a trained network is not to begin with random actions.

@@ -27,8 +27,8 @@ from dess.files.reading import paths_in
 from dess.files.tables import read_table, write_table
 from policies.base import Policy
 from policies.learner.config import TrainingConfig, load_config
+from policies.learner.dqn import DQNTraining
 from policies.learner.session import device_of
-from policies.learner.training import Training
 from policies.registry import TRAINED, load
 
 EVALUATION_SEED, MISSIONS = 900_000_001, 1000  # of the final evaluation
@@ -70,7 +70,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
 
 def run(config: TrainingConfig) -> pd.DataFrame:
     """Train once; the curve, with the metrics of the selected weights on new missions."""
-    training = Training(config, device_of("cpu"))
+    training = DQNTraining(config, device_of("cpu"))
     training.run(config.ticks)
     return _evaluated(pd.DataFrame(training.curve), training.policy(training.best), config)
 

@@ -8,8 +8,8 @@ import torch
 import policies
 from benchmarks.conftest import MISSIONS, SEED
 from dess import load_scenario, simulate_batch
+from policies.learner.checkpoint import new_training
 from policies.learner.config import config_names, load_config
-from policies.learner.ppo import training_of
 
 DEVICES = ["cpu", *(["cuda"] if torch.cuda.is_available() else [])]
 
@@ -27,9 +27,8 @@ def _one_thread() -> Iterator[None]:
 def test_ticks(benchmark, name: str, device: str) -> None:
     """A slot of all environments and one update, 20 of them per round; a whole tick for any sea."""
     config = load_config(name)
-    training, ticks = training_of(config, torch.device(device)), 20
-    if config.observation == "sets":
-        ticks = 1
+    training = new_training(config, torch.device(device))
+    ticks = 20 if config.algorithm == "dqn" else 1
     if benchmark.enabled:  # otherwise one round shows that it runs
         training.run(ticks)
     benchmark.pedantic(training.run, args=(ticks,), rounds=10)

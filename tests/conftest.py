@@ -26,7 +26,7 @@ QUICK = (
     *("dess/test_scenario.py", "dess/sections/test_age.py", "dess/sections/test_failures.py"),
     *("dess/sections/test_fleet.py", "dess/test_errors.py", "dess/test_files.py"),
     *("dess/test_missions.py", "dess/test_rules.py", "dess/sea", "dess/test_streams.py"),
-    *("policies/test_trained.py", "analysis/stats", "test_doors.py"),
+    *("policies/test_registry.py", "analysis/stats", "test_doors.py"),
 )
 # Files that take longest; they come first, so that workers end together.
 LONGEST = ("reports", "analysis/execution", "fuzz", "test_architecture.py", "test_docs.py")

@@ -24,7 +24,8 @@ from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, types_of
 from policies.learner import tensors
 from policies.learner.config import CHECKPOINT, TrainingConfig
 from policies.learner.description import Name, Number, Sha256
-from policies.learner.ppo import training_of
+from policies.learner.dqn import DQNTraining
+from policies.learner.ppo import ProximalTraining
 from policies.learner.tensors import Tensors, array_of, bytes_of, part
 from policies.learner.trained import require_version
 from policies.learner.training import METRICS, Training
@@ -37,7 +38,7 @@ _WHOLE = "a checkpoint as dess train has written it"
 
 
 class Progress(Document):
-    """What ``Training.progress`` returns."""
+    """The attributes of a training that are plain values, but for the curve."""
 
     tick: Number
     updates: Number
@@ -49,27 +50,21 @@ class Progress(Document):
     best_score: float | None
 
 
-class _Row(Document):
-    tick: Number
-    phase: Name
-    uav_slots: Number
-    updates: Number
-    seconds: float
-    epsilon: float
-    learning_rate: float
-    moving_average: float
-    is_best: bool
-    loss: float | None = None
-    value: float | None = None
-    gradient_norm: float | None = None
+_OF_ROWS: dict[str, Any] = {
+    **dict.fromkeys(("tick", "uav_slots", "updates"), Number),
+    **dict.fromkeys(("seconds", "epsilon", "learning_rate", "moving_average"), float),
+    **{"phase": Name, "is_best": bool},
+    **{f"evaluation_{name}": float for name in METRICS},
+}
+_OF_LATER_ROWS = ("loss", "value", "gradient_norm", *(f"training_{name}" for name in METRICS))
 
-
-# A row of the curve: the metrics of an evaluation and, once missions have ended, of the training.
+# A row of the curve: the metrics of an evaluation and, if there are any since the last one, of
+# updates and of missions that have ended.
 Row: Any = create_model(
     "Row",
-    __base__=_Row,
-    **{f"evaluation_{name}": (float, ...) for name in METRICS},
-    **{f"training_{name}": (float | None, None) for name in METRICS},
+    __base__=Document,
+    **{name: (kind, ...) for name, kind in _OF_ROWS.items()},
+    **dict.fromkeys(_OF_LATER_ROWS, (float | None, None)),
 )  # type: ignore[call-overload]
 
 
@@ -90,6 +85,11 @@ class Header(Document):
     sha256: Sha256 = Field(description="checksum of all else")
 
 
+def new_training(config: TrainingConfig, device: torch.device) -> Training:
+    """A new training, by the algorithm of its config."""
+    return (DQNTraining if config.algorithm == "dqn" else ProximalTraining)(config, device)
+
+
 def save_training(path: Path, training: Training) -> None:
     """Write a checkpoint from which a training continues as if it had not been interrupted.
 
@@ -97,7 +97,7 @@ def save_training(path: Path, training: Training) -> None:
         InputError: If it cannot be written.
     """
     values = _arrays(training)
-    for optimizer, of_optimizer in training.learner.optimizers().items():
+    for optimizer, of_optimizer in training.learner.optimizers.items():
         for index, state in of_optimizer.state_dict()["state"].items():
             values |= {f"{optimizer}.{index}.{key}": value for key, value in state.items()}
     if training.finished:
@@ -109,14 +109,15 @@ def save_training(path: Path, training: Training) -> None:
         "config": training.config.model_dump(mode="json"),
         "scenario": training.space.model_dump(mode="json"),
         "observation_version": training.observation.version,
-        "progress": training.progress(),
+        "progress": {name: getattr(training, name) for name in Progress.model_fields},
         "random": training.generator.bit_generator.state,
-        "stepper": [
-            n for sea in training.seas for n in (sea.stepper.seed, sea.stepper.replication)
-        ],
-        "replay": _slots_held(training),
+        "stepper": [],
+        "replay": None,
         "curve": training.curve,
     }
+    if isinstance(training, DQNTraining):
+        header["stepper"] = [training.stepper.seed, training.stepper.replication]
+        header["replay"] = training.replay.count if training.config.checkpoint_replay else None
     header["sha256"] = tensors.digest(header, values)
     tensors.write(path, values, {"dess": json.dumps(header)})
 
@@ -142,7 +143,7 @@ def load_training(
         raise InputError(f"{path}: no checkpoint of a training; allowed: {CHECKPOINT} of one")
     header = Header.parse(metadata["dess"], str(path), fixed={"format": FORMAT})
     raw = parse_json(metadata["dess"], str(path))
-    training = training_of(config, device)
+    training = new_training(config, device)
     settings = config.model_dump(mode="json") | {"scenario": training.space.model_dump(mode="json")}
     held = header.config.model_dump(mode="json") | {"scenario": header.scenario}
     if different := [key for key in settings if settings[key] != held[key]]:
@@ -151,64 +152,49 @@ def load_training(
             "allowed: the one it began with"
         )
     require_version(header.observation_version, training.observation, path)
-    _check_progress(header.progress, training, path)
-    training.restore(raw["progress"])
-    finished = len(values.get("finished", ())) // MISSION_RECORD.itemsize
-    tensors.require_forms(values, _forms(training, finished), str(path))
     if tensors.digest({k: v for k, v in raw.items() if k != "sha256"}, values) != header.sha256:
         raise InputError(
             f"{path}: damaged: its content has not the checksum of its header; allowed: {_WHOLE}"
         )
     try:
+        training.enter_phase(header.progress.phase_index)
+        for name, value in raw["progress"].items():
+            setattr(training, name, value)
+        finished = len(values.get("finished", ())) // MISSION_RECORD.itemsize
+        tensors.require_forms(values, _forms(training, finished), str(path))
         _restore(training, values, raw)
     except (LookupError, ValueError, TypeError, RuntimeError, OverflowError) as error:
-        problem = str(error).partition("; allowed:")[0]
+        problem = str(error).removeprefix(f"{path}: ").partition("; allowed:")[0]
         raise InputError(
             f"{path}: damaged, or of another scenario: {problem}; allowed: {_WHOLE}"
         ) from None
     return training
 
 
-def _check_progress(now: Progress, training: Training, path: Path) -> None:
-    """Refuse a phase that the config does not have, and a tick that is not in the phase."""
-    phases = training.config.phases
-    starts = np.cumsum([0, *(phase.ticks for phase in phases)]).tolist()
-    index = min(now.phase_index, len(phases) - 1)
-    is_phase = (now.phase_index, now.phase_start) == (index, starts[index])
-    if not is_phase or not starts[index] <= now.tick <= starts[index + 1]:
-        raise InputError(
-            f"{path}: its tick {now.tick} is not in a phase of the config; "
-            "allowed: an undamaged file"
-        )
-
-
 def _restore(training: Training, values: Tensors, header: dict[str, Any]) -> None:
     """Restore the state of a saved training in a new training that is in the same phase."""
-    learner = training.learner
     with torch.no_grad():
         for name, network in _networks(training).items():
             for key, value in part(values, name).items():
                 network[key].copy_(value)
-    for optimizer, of_optimizer in learner.optimizers().items():
+    for optimizer, of_optimizer in training.learner.optimizers.items():
         states: dict[int, Tensors] = {}
         for key, value in part(values, optimizer).items():
             index, _, field = key.partition(".")
             states.setdefault(int(index), {})[field] = value
         groups = of_optimizer.state_dict()["param_groups"]
         of_optimizer.load_state_dict({"state": states, "param_groups": groups})
-    for sea in training.seas:
-        sea.stepper.start_at(*header["stepper"])
-        sea.early[...] = values["early"].numpy()
-        stored_state = part(values, "stepper")
-        for name, array in sea.stepper.state._asdict().items():
-            array[...] = array_of(stored_state[name], array.dtype).reshape(array.shape)
-        _check_state(sea.stepper.state, sea.space)
+    if isinstance(training, DQNTraining):
+        training.stepper.start_at(*header["stepper"])
+        for name, array in _missions(training).items():
+            held = values[name]
+            is_bytes = name.startswith("stepper.")
+            restored = array_of(held, array.dtype) if is_bytes else held.numpy()
+            array[...] = restored.reshape(array.shape)
+        _check_state(training.stepper.state, training.stepper.space)
         if training.config.checkpoint_replay:
-            sea.replay.count = int(header["replay"])
-            stored_replay = part(values, "replay")
-            for name, array in sea.replay.arrays.items():
-                array[...] = stored_replay[name].numpy()
-            _check_replay(sea.replay.arrays, max(sea.space.size))
+            training.replay.count = int(header["replay"])
+            _check_replay(training.replay.arrays, max(training.space.size))
     if "finished" in values:
         training.finished = [array_of(values["finished"], MISSION_RECORD)]
     losses = {key: value.to(training.device) for key, value in part(values, "losses").items()}
@@ -227,7 +213,7 @@ def _forms(training: Training, finished: int) -> Tensors:
         finished: The number of missions that ended since the last evaluation.
     """
     config, forms = training.config, _arrays(training)
-    for optimizer, of_optimizer in training.learner.optimizers().items():
+    for optimizer, of_optimizer in training.learner.optimizers.items():
         if training.tick - training.phase_start <= training.learner.waits(optimizer):
             continue
         for index, weight in enumerate(of_optimizer.param_groups[0]["params"]):
@@ -251,25 +237,26 @@ def _arrays(training: Training) -> Tensors:
     arrays: Tensors = {"random.torch": torch.get_rng_state()}
     for name, network in _networks(training).items():
         arrays |= {f"{name}.{key}": value for key, value in network.items()}
-    for sea in training.seas:
-        arrays["early"] = torch.from_numpy(sea.early)
-        for name, array in sea.stepper.state._asdict().items():
-            arrays[f"stepper.{name}"] = bytes_of(array)
-        if training.config.checkpoint_replay:
-            for name, array in sea.replay.arrays.items():
-                arrays[f"replay.{name}"] = torch.from_numpy(array)
+    for name, array in _missions(training).items():
+        is_bytes = name.startswith("stepper.")
+        arrays[name] = bytes_of(array) if is_bytes else torch.from_numpy(array)
     return arrays
 
 
-def _slots_held(training: Training) -> int | None:
-    """The slots that were added to the replay memory, if the checkpoint holds it."""
-    is_held = training.seas and training.config.checkpoint_replay
-    return training.replay.count if is_held else None
+def _missions(training: Training) -> dict[str, np.ndarray]:
+    """The arrays of the missions in progress and of the replay memory, if a training has them."""
+    if not isinstance(training, DQNTraining):
+        return {}
+    arrays = {"early": training.early}
+    arrays |= {f"stepper.{k}": array for k, array in training.stepper.state._asdict().items()}
+    if training.config.checkpoint_replay:
+        arrays |= {f"replay.{k}": array for k, array in training.replay.arrays.items()}
+    return arrays
 
 
 def _networks(training: Training) -> dict[str, Tensors]:
     """The weights of all networks of a training, by name."""
-    networks = {name: of.state_dict() for name, of in training.learner.networks().items()}
+    networks = {name: of.state_dict() for name, of in training.learner.networks.items()}
     return networks | {"best": training.best}
 
 

@@ -41,11 +41,13 @@ MOST_EVALUATIONS = 50_000
 # Settings that are newer than some policies, whose identifiers do not have them.
 _LATER = {"set", "seas", "seas_per_tick", "evaluation_seas", "short_ranges"}
 
-# Settings that only one of the two ways to learn has.
-_OF_PROXIMAL_LEARNING = {"seas", "evaluation_seas", "seas_per_tick", "short_ranges"}
-_OF_DOUBLE_DQN = {
-    *("low_battery_starts", "early_returns", "replay", "n_step", "reward_scale", "loss"),
-    *("target_rate", "discount", "checkpoint_replay", "epsilon", "epsilon_decay"),
+# Settings that only one of the algorithms has: double DQN and proximal policy optimization.
+_SETTINGS_OF = {
+    "dqn": {
+        *("low_battery_starts", "early_returns", "replay", "n_step", "reward_scale", "loss"),
+        *("target_rate", "discount", "checkpoint_replay", "epsilon", "epsilon_decay"),
+    },
+    "ppo": {"seas", "evaluation_seas", "seas_per_tick", "short_ranges"},
 }
 
 Count = Annotated[int, Field(strict=True, ge=1)]
@@ -61,16 +63,6 @@ def _in_one_line(text: str) -> str:
     if not text.isprintable():
         raise ValueError(f"{shown(text)} has control characters; allowed: printable characters")
     return text
-
-
-def _in_lists_of_lists(value: Any, levels: int = 3) -> Any:
-    """Refuse what is nested more deeply than any field of a scenario, and so cannot be copied."""
-    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
-    for part in parts:
-        if not levels:
-            raise ValueError("is nested too deeply; allowed: fields of the scenario")
-        _in_lists_of_lists(part, levels - 1)
-    return value
 
 
 Place = Annotated[str, Field(min_length=1, max_length=4096)]  # a scenario, or a set of seas
@@ -123,9 +115,7 @@ class TrainingConfig(_Settings):
         description="scenarios in place of the one scenario; FAMILY:FIRST..LAST are generated "
         "seas, and train, validation and test are sets of them",
     )
-    set: Annotated[dict[str, Any], AfterValidator(_in_lists_of_lists)] = Field(
-        {}, description="fields of the scenario, in all missions"
-    )
+    set: dict[str, Any] = Field({}, description="fields of the scenario, in all missions")
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = Field(
         1, description="of the training: weights, exploration, missions"
     )
@@ -219,8 +209,8 @@ class TrainingConfig(_Settings):
         return self
 
     @model_validator(mode="after")
-    def _suits_its_learner(self) -> "TrainingConfig":
-        unused = _OF_DOUBLE_DQN if self.is_proximal else _OF_PROXIMAL_LEARNING
+    def _suits_its_algorithm(self) -> "TrainingConfig":
+        unused = _SETTINGS_OF["dqn" if self.algorithm == "ppo" else "ppo"]
         for part in (self, *self.phases):
             fields = type(part).model_fields
             for name in fields:
@@ -229,7 +219,7 @@ class TrainingConfig(_Settings):
                         f"{name}: {shown(getattr(part, name))} has no effect with the observation "
                         f"{self.observation}; allowed: to leave it out"
                     )
-        if self.is_proximal:
+        if self.algorithm == "ppo":
             if len(self.hidden) != 3:
                 raise ValueError(f"hidden: {list(self.hidden)} are not three; allowed: three")
             for phase in self.phases:
@@ -248,9 +238,9 @@ class TrainingConfig(_Settings):
         return self
 
     @property
-    def is_proximal(self) -> bool:
-        """Whether the policy learns by proximal policy optimization, and not by double DQN."""
-        return self.observation == "sets"
+    def algorithm(self) -> Literal["dqn", "ppo"]:
+        """Double DQN or, with sets, proximal policy optimization."""
+        return "ppo" if self.observation == "sets" else "dqn"
 
     @property
     def ticks(self) -> int:

@@ -1,7 +1,10 @@
-"""Double DQN: the replay memory, shared by all UAVs, and the update (eq. 26-29)."""
+"""Double DQN: Algorithm 1, the replay memory, shared by all UAVs, and the update (eq. 26-29).
+
+Missions run in parallel, and all UAVs train one network from one replay memory. A *tick* is one
+mission slot of all environments, followed by the updates.
+"""
 
 import copy
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,9 +12,23 @@ import torch
 from torch import nn
 
 from dess.code.kernels import kernel
+from dess.env.stepper import MissionStepper
 from dess.errors import InputError
+from dess.observations import states as column
 from dess.observations.states import CompactStates, empty_states, masks
-from policies.learner.config import TrainingConfig
+from dess.sea.chart import FAR, spread
+from dess.state import HOVER, STEP_X, STEP_Y
+from policies.learner.config import MISSION_SEED, TrainingConfig
+from policies.learner.training import (
+    MISSIONS_PER_PHASE,
+    Learner,
+    Training,
+    acting,
+    between,
+    check_finite,
+    just_ended,
+    soft_update,
+)
 
 
 class Batch(NamedTuple):
@@ -174,71 +191,27 @@ def double_dqn_target(
     return reward + discount * target.gather(1, choice).squeeze(1)
 
 
-@torch.no_grad()
-def soft_update(target: nn.Module, online: nn.Module, rate: float) -> None:
-    """Move the weights of the target network towards the online weights (eq. 28).
-
-    Args:
-        target: The target network, changed in place.
-        online: The online network.
-        rate: The share of the way, tau in the paper; 1 copies the weights.
-    """
-    torch._foreach_lerp_(list(target.parameters()), list(online.parameters()), rate)
-
-
-class DivergenceError(ArithmeticError):
-    """The loss or its gradient is no finite number any more: one line that says so."""
-
-
-class Learner:
-    """The networks and the optimizer of a training.
+class DQNLearner(Learner):
+    """The networks of double DQN, and the optimizer Adam.
 
     Attributes:
-        online: The network that is trained.
         target: The target network, whose weights follow those of ``online`` slowly.
-        average: A copy that follows still more slowly, and that is evaluated and saved; None if
-            ``average_rate`` is 1.
-        optimizer: The optimizer Adam.
-        device: The device on which all of them are.
     """
 
     def __init__(
-        self, network: nn.Module, observation: Any, settings: TrainingConfig, device: torch.device
+        self, network: nn.Module, observation: Any, config: TrainingConfig, device: torch.device
     ):
-        self.online = network.to(device)
-        self.target = copy.deepcopy(self.online).requires_grad_(False)
-        self.average = copy.deepcopy(self.target) if settings.average_rate < 1.0 else None
-        self.observation, self.settings, self.device = observation, settings, device
-        self.restart()
-
-    def restart(self) -> None:
-        """Reset the optimizer."""
-        self.optimizer = torch.optim.Adam(self.online.parameters(), fused=True)
-
-    def networks(self) -> dict[str, nn.Module]:
-        """The networks, by name."""
-        found = {"online": self.online, "target": self.target}
-        return found if self.average is None else found | {"average": self.average}
-
-    def optimizers(self) -> dict[str, torch.optim.Optimizer]:
-        """The optimizers, each by the name under which a checkpoint has it."""
-        return {"optimizer": self.optimizer}
-
-    def waits(self, optimizer: str) -> int:
-        """The ticks of a phase before an optimizer makes its first step."""
-        return 0
-
-    @property
-    def evaluated(self) -> nn.Module:
-        """The network that is evaluated: ``average`` or, without one, ``online``."""
-        return self.online if self.average is None else self.average
+        self.observation = observation
+        self.target = copy.deepcopy(network).requires_grad_(False)
+        average = copy.deepcopy(self.target) if config.average_rate < 1.0 else None
+        super().__init__(config, device, online=network, target=self.target, average=average)
 
     def values(
         self, network: nn.Module, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> torch.Tensor:
         """The (R, 5) action values of UAV ``uavs[r]`` in state ``missions[r]``."""
         parts = self.observation.encode(states, missions, uavs)
-        return network(*map(self._tensor, parts))
+        return network(*map(self.tensor, parts))
 
     def update(self, batch: Batch, learning_rate: float) -> dict[str, torch.Tensor]:
         """Make one gradient step on a minibatch; return loss, mean Q-value and gradient norm.
@@ -250,56 +223,163 @@ class Learner:
         Raises:
             DivergenceError: If one of them is not finite; the weights are then as before.
         """
-        settings = self.settings
         loss, chosen = self.loss(batch)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
-        norm = nn.utils.clip_grad_norm_(self.online.parameters(), settings.gradient_norm)
+        norm = nn.utils.clip_grad_norm_(self.online.parameters(), self.config.gradient_norm)
         done = {"loss": loss.detach(), "value": chosen.detach().mean(), "gradient_norm": norm}
         check_finite(done)
-        for group in self.optimizer.param_groups:
-            group["lr"] = learning_rate
-        self.optimizer.step()
-        soft_update(self.target, self.online, settings.target_rate)
-        if self.average is not None:
-            soft_update(self.average, self.online, settings.average_rate)
+        self.step(learning_rate)
+        soft_update(self.target, self.online, self.config.target_rate)
         return done
 
     def loss(self, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
         """The loss of the TD error on a minibatch, and the (B,) values of the actions in it."""
-        settings = self.settings
         values = self.values(self.online, batch.state, batch.rows, batch.uav)
-        allowed = self._tensor(masks(batch.state, batch.later, batch.uav))
         with torch.no_grad():
-            later = [
-                *map(self._tensor, self.observation.encode(batch.state, batch.later, batch.uav))
-            ]
+            parts = self.observation.encode(batch.state, batch.later, batch.uav)
+            later = [*map(self.tensor, parts)]
             q_target = double_dqn_target(
-                self._tensor(batch.reward) * settings.reward_scale,
-                self._tensor(batch.discount),
+                self.tensor(batch.reward) * self.config.reward_scale,
+                self.tensor(batch.discount),
                 self.online(*later),
                 self.target(*later),
-                allowed,
+                self.tensor(masks(batch.state, batch.later, batch.uav)),
             )
-        chosen = values.gather(1, self._tensor(batch.action)[:, None]).squeeze(1)
-        return _LOSSES[settings.loss](chosen, q_target), chosen
-
-    def _tensor(self, array: np.ndarray) -> torch.Tensor:
-        return torch.from_numpy(array).to(self.device)
-
-
-def check_finite(done: Mapping[str, torch.Tensor]) -> None:
-    """Refuse an update whose loss, value or gradient is no finite number.
-
-    Raises:
-        DivergenceError: If one of them is not finite.
-    """
-    for name, value in done.items():
-        if not torch.isfinite(value):
-            raise DivergenceError(
-                f"the training diverged: its {name} is {float(value)}; the best policy so far "
-                "is kept; allowed: a smaller learning_rate, reward_scale or reward"
-            )
+        chosen = values.gather(1, self.tensor(batch.action)[:, None]).squeeze(1)
+        return _LOSSES[self.config.loss](chosen, q_target), chosen
 
 
 _LOSSES = {"huber": nn.functional.smooth_l1_loss, "mse": nn.functional.mse_loss}
+
+
+class DQNTraining(Training):
+    """A training by double DQN in progress.
+
+    Attributes:
+        stepper: The missions in progress.
+        early: (N, I) which UAVs return early.
+        replay: What has happened in the missions of the present phase.
+        home: (H + 2, W + 2) cells to the nearest zone, with a border around the grid.
+    """
+
+    learner: DQNLearner
+
+    def _learner(self, network: nn.Module) -> DQNLearner:
+        return DQNLearner(network, self.observation, self.config, self.device)
+
+    def _begin_missions(self) -> None:
+        config, fleet, zones = self.config, self.space.uavs[1], self.space.chart.zones
+        seed = MISSION_SEED + config.seed
+        self.stepper = MissionStepper(self._in_phase(self.space), config.num_envs, seed)
+        self.stepper.start_at(seed, self.phase_index * MISSIONS_PER_PHASE)
+        self.early = np.zeros((config.num_envs, fleet), bool)
+        self.replay = ReplayMemory(config.replay, config.num_envs, fleet, len(self.space.nodes))
+        home = spread(zones, self.space.chart.parking)[0].reshape(zones.shape)
+        self.home = np.pad(home, 1, constant_values=FAR)
+        self._launch(self.stepper.indices)
+
+    def _learn(self, share: float) -> None:
+        config = self.config
+        epsilon = between(self.phase.epsilon, share / self.phase.epsilon_decay)
+        if self.replay.count == 0:
+            for _ in range(config.learning_starts):
+                self._collect(1.0 if self.tick == 0 else epsilon)
+        self._collect(epsilon)
+        rate = between(self.phase.learning_rate, share)
+        for _ in range(config.updates):
+            batch = self.replay.sample(config.batch, config.n_step, config.discount, self.generator)
+            self.losses.append(self.learner.update(batch, rate))
+            self.updates += 1
+
+    def _launch(self, environments: np.ndarray) -> None:
+        """Start new missions, some of them with a low battery; draw which UAVs return early."""
+        self.stepper.launch(environments)
+        draws = self.generator.random((len(environments), self.early.shape[1]))
+        self.early[environments] = draws < self.config.early_returns
+        if self.config.low_battery_starts > 0 and len(environments):
+            low = environments[
+                self.generator.random(len(environments)) < self.config.low_battery_starts
+            ]
+            draws = self.generator.random((len(low), 2 + len(self.space.nodes)))
+            state = self.stepper.state
+            _lower_batteries(state.missions, state.uavs, state.residual, low, draws)
+
+    def _collect(self, epsilon: float) -> None:
+        """Run one slot of all environments with the exploring policy, and store it."""
+        state = self.stepper.state
+        over = np.nonzero(state.missions["active"] == 0)[0]
+        states, missions, uavs = acting(self.stepper, self.config.guard)
+        actions = np.full(state.uavs.shape, HOVER)
+        if len(missions):
+            actions[missions, uavs] = self._explore(states, missions, uavs, epsilon)
+        outcome = self.stepper.step(actions)
+        self.replay.add(
+            states, actions, outcome["reward"],
+            *(outcome[n] for n in ("acted", "terminated", "truncated")),
+        )  # fmt: skip
+        self.uav_slots += int(outcome["acted"].sum())
+        ended = just_ended(self.stepper, outcome)
+        if len(ended):
+            self.finished.append(self.stepper.records(ended).missions)
+        self._launch(over)
+
+    def _explore(
+        self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray, epsilon: float
+    ) -> np.ndarray:
+        """Epsilon-greedy or softmax actions among the allowed ones."""
+        allowed = masks(states, missions, uavs)
+        noise = self.generator.random(allowed.shape)
+        random = np.where(allowed, noise, -1.0).argmax(1)
+        if epsilon >= 1.0:
+            return random
+        with torch.no_grad():
+            learner = self.learner
+            values = learner.values(learner.online, states, missions, uavs).cpu().numpy()
+        if self.phase.temperature > 0.0:  # Gumbel noise samples from the softmax
+            values = values / self.phase.temperature - np.log(-np.log(noise))
+        choice = np.where(allowed, values, -np.inf).argmax(1)
+        if self.config.early_returns > 0.0:
+            homeward = allowed & self._homeward(states, missions, uavs)
+            choice = np.where(homeward.any(1), np.where(homeward, noise, -1.0).argmax(1), choice)
+        return np.where(self.generator.random(len(choice)) < epsilon, random, choice)
+
+    def _homeward(
+        self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
+    ) -> np.ndarray:
+        """The (R, 5) mask of the actions of UAVs that return early, to arrive with C_S left.
+
+        The actions lead nearer to the zone; in the zone, a latched UAV hovers.
+        """
+        rows = states.uavs[missions, uavs]
+        x, y = rows[:, column.X] + 1, rows[:, column.Y] + 1  # the table has a border
+        home = self.home[y, x]
+        reserve = rows[:, column.BATTERY] - states.missions[missions, column.CHARGE_START]
+        due = self.early[missions, uavs] & (rows[:, column.MUST_CHARGE] > 0) & (reserve <= home)
+        steps = zip(STEP_X, STEP_Y, strict=True)
+        nearer = np.stack([self.home[y + south, x + east] < home for east, south in steps], 1)
+        nearer[:, HOVER] = (home == 0) & (rows[:, column.LATCH] > 0)
+        return nearer & due[:, None]
+
+
+@kernel
+def _lower_batteries(missions, uavs, residual, environments, draws):
+    """Let new missions start as if the UAVs had just returned: with a low battery, and latched.
+
+    The battery is drawn uniformly from 5 % to C_S and is the same for the whole team. The number of
+    communications fits the battery that was used, and a random share of the nodes is empty.
+    """
+    for n in range(len(environments)):
+        mission, data = missions[environments[n]], residual[environments[n]]
+        span = mission.charge_start - 5 + 1
+        battery = min(5 + int(draws[n, 0] * span), mission.charge_start)
+        slots_flown = max(mission.flying_time - battery, 0)
+        for i in range(mission.uavs):
+            u = uavs[environments[n], i]
+            u.battery = battery
+            u.communications = min(slots_flown * mission.communication_slots, u.quota - 1)
+            u.latch = True
+        for k in range(mission.nodes):
+            if draws[n, 2 + k] < draws[n, 1]:
+                mission.initial -= data[k]
+                data[k] = 0.0

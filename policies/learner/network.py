@@ -1,4 +1,4 @@
-"""The Q-networks: the paper's for maps, a dueling one for vectors, and one for rows per node.
+"""The Q-networks: the paper's for maps, a dueling one for vectors, and one for sets.
 
     values = DuelingNetwork(inputs=454, hidden=(512, 512))(vector)     # (R, 5)
 
@@ -67,20 +67,7 @@ class PaperNetwork(nn.Module):
         return self.values(hidden.to(self.values.weight.dtype))
 
 
-class _Dueling(nn.Module):
-    """The end of a dueling network: a value V and advantages A; ``Q = V + A - mean A``."""
-
-    def _make_end(self, width: int) -> None:
-        self.value = nn.Linear(width, 1)
-        self.advantage = nn.Linear(width, ACTIONS)
-
-    def _values(self, hidden: Tensor) -> Tensor:
-        hidden = hidden.to(self.value.weight.dtype)
-        advantage = self.advantage(hidden)
-        return self.value(hidden) + advantage - advantage.mean(1, keepdim=True)
-
-
-class DuelingNetwork(_Dueling):
+class DuelingNetwork(nn.Module):
     """A dueling network: dense layers, then a value V and advantages A; ``Q = V + A - mean A``.
 
     Source: Z. Wang et al., Dueling network architectures for deep reinforcement learning, ICML
@@ -101,13 +88,15 @@ class DuelingNetwork(_Dueling):
         self.precision = precision
         sizes = [inputs, *hidden]
         self.hidden = _dense(sizes)
-        self._make_end(sizes[-1])
+        self.value, self.advantage = nn.Linear(sizes[-1], 1), nn.Linear(sizes[-1], ACTIONS)
 
     def forward(self, vector: Tensor) -> Tensor:
         """The values (R, 5) of the actions, from vectors (R, inputs)."""
         with _hidden_precision(self, self.precision, vector):
             hidden = self.hidden(vector)
-        return self._values(hidden)
+        hidden = hidden.to(self.value.weight.dtype)
+        advantage = self.advantage(hidden)
+        return self.value(hidden) + advantage - advantage.mean(1, keepdim=True)
 
 
 class SetNetwork(nn.Module):

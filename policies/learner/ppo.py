@@ -22,19 +22,26 @@ from torch import nn
 from dess.code.kernels import kernel
 from dess.env.stepper import MissionStepper
 from dess.errors import InputError
-from dess.observations import states as column
 from dess.observations.observer import encoder_of
 from dess.observations.sets import Sets
-from dess.observations.states import CompactStates, compact_states, masks
+from dess.observations.states import CompactStates, masks
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import spread
 from dess.state import HOVER
 from policies.learner.config import MISSION_SEED, TrainingConfig
-from policies.learner.dqn import check_finite, soft_update
 from policies.learner.network import SetNetwork
 from policies.learner.policy import ROWS
-from policies.learner.training import MISSIONS_PER_PHASE, SELECT_BY, Training, between
+from policies.learner.training import (
+    MISSIONS_PER_PHASE,
+    SELECT_BY,
+    Learner,
+    Training,
+    acting,
+    between,
+    check_finite,
+    just_ended,
+)
 
 TRACE = 0.98  # lambda of generalized advantage estimation
 CLIP = 0.2  # by which share an action may become more likely or less before it gains no more
@@ -72,51 +79,35 @@ class Decisions(NamedTuple):
         return Decisions(self.encoder, self.states, *(part[rows] for part in self[2:]))
 
 
-class ProximalLearner:
-    """The networks and the optimizers of a training.
+class ProximalLearner(Learner):
+    """The networks of proximal policy optimization and their optimizers.
+
+    The values of the network ``online`` are the logits of the actions.
 
     Attributes:
-        online: The network that is trained, and whose values are the logits of the actions.
         critic: The network that learns returns, as values of states.
-        average: A copy of ``online`` that follows it slowly, and that is evaluated and saved.
     """
 
-    def __init__(self, network: SetNetwork, settings: TrainingConfig, device: torch.device):
-        self.online = network.to(device)
-        self.critic = copy.deepcopy(self.online)
-        self.average = copy.deepcopy(self.online).requires_grad_(False)
-        self.settings, self.device = settings, device
-        self.restart()
+    def __init__(self, network: SetNetwork, config: TrainingConfig, device: torch.device):
+        self.critic = copy.deepcopy(network)
+        average = copy.deepcopy(network).requires_grad_(False)
+        super().__init__(config, device, online=network, critic=self.critic, average=average)
 
     def restart(self) -> None:
         """Reset the optimizers."""
-        self.optimizer = torch.optim.Adam(self.online.parameters(), fused=True)
-        self.critic_optimizer = torch.optim.Adam(
-            self.critic.parameters(), lr=CRITIC_RATE, fused=True
-        )
-
-    def networks(self) -> dict[str, nn.Module]:
-        """The networks, by name."""
-        return {"online": self.online, "critic": self.critic, "average": self.average}
-
-    def optimizers(self) -> dict[str, torch.optim.Optimizer]:
-        """The optimizers, each by the name under which a checkpoint has it."""
-        return {"optimizer": self.optimizer, "critic_optimizer": self.critic_optimizer}
+        super().restart()
+        critic = torch.optim.Adam(self.critic.parameters(), lr=CRITIC_RATE, fused=True)
+        self.optimizers["critic_optimizer"] = critic
 
     def waits(self, optimizer: str) -> int:
         """The ticks of a phase before an optimizer makes its first step."""
-        return self.settings.learning_starts if optimizer == "optimizer" else 0
-
-    @property
-    def evaluated(self) -> nn.Module:
-        """The network that is evaluated."""
-        return self.average
+        return self.config.learning_starts if optimizer == "optimizer" else 0
 
     def judged(
         self, seen: Sequence[np.ndarray], allowed: np.ndarray, temperature: float
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """The (R, 5) logarithms of the probabilities of actions, and the (R,) values of states."""
-        inputs = [*map(self._tensor, seen)]
+        inputs = [*map(self.tensor, seen)]
         return self._likelihoods(inputs, allowed, temperature), self.critic.of_state(*inputs)
 
     def update(
@@ -147,17 +138,14 @@ class ProximalLearner:
         for weight, gradient in zip(learns, gradients, strict=True):
             weight.grad = gradient
         norms = [
-            nn.utils.clip_grad_norm_(network.parameters(), self.settings.gradient_norm)
+            nn.utils.clip_grad_norm_(network.parameters(), self.config.gradient_norm)
             for network in (self.critic, self.online)[: 1 + decides]
         ]
         done = {"loss": loss, "value": mean, "gradient_norm": norms[-1]}
         check_finite(done)
-        self.critic_optimizer.step()
+        self.optimizers["critic_optimizer"].step()
         if decides:
-            for group in self.optimizer.param_groups:
-                group["lr"] = rate
-            self.optimizer.step()
-            soft_update(self.average, self.online, self.settings.average_rate)
+            self.step(rate)
         return done
 
     def _loss(
@@ -165,16 +153,16 @@ class ProximalLearner:
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """The loss of decisions, summed, and the (R,) values of their states."""
         seen = part.encoder.encode(part.states, part.missions, part.uavs)
-        inputs = [*map(self._tensor, seen)]
+        inputs = [*map(self.tensor, seen)]
         values = self.critic.of_state(*inputs)
-        loss = (values - self._tensor(part.returns)).pow(2).sum()
+        loss = (values - self.tensor(part.returns)).pow(2).sum()
         if not decides:
             return loss, values
         allowed = masks(part.states, part.missions, part.uavs)
         likelihoods = self._likelihoods(inputs, allowed, temperature)
-        chosen = likelihoods.gather(1, self._tensor(part.actions)[:, None]).squeeze(1)
-        ratio = (chosen - self._tensor(part.likelihoods)).exp()
-        advantage = self._tensor(part.advantages)
+        chosen = likelihoods.gather(1, self.tensor(part.actions)[:, None]).squeeze(1)
+        ratio = (chosen - self.tensor(part.likelihoods)).exp()
+        advantage = self.tensor(part.advantages)
         gain = torch.min(ratio * advantage, ratio.clamp(1 - CLIP, 1 + CLIP) * advantage)
         return loss - gain.sum(), values
 
@@ -182,10 +170,7 @@ class ProximalLearner:
         self, inputs: Sequence[torch.Tensor], allowed: np.ndarray, temperature: float
     ) -> torch.Tensor:
         logits = self.online(*inputs) / temperature
-        return torch.log_softmax(logits.masked_fill(~self._tensor(allowed), -1e9), 1)
-
-    def _tensor(self, array: np.ndarray) -> torch.Tensor:
-        return torch.from_numpy(array).to(self.device)
+        return torch.log_softmax(logits.masked_fill(~self.tensor(allowed), -1e9), 1)
 
 
 class ProximalTraining(Training):
@@ -195,23 +180,23 @@ class ProximalTraining(Training):
         shares: Of the seas in the missions, on average.
     """
 
-    def _learner(self, network: Any) -> ProximalLearner:
+    learner: ProximalLearner
+
+    def _learner(self, network: SetNetwork) -> ProximalLearner:
         return ProximalLearner(network, self.config, self.device)
 
     def _begin_missions(self) -> None:
-        self.seas = []
         # A UAV more makes more decisions in a mission, so large fleets have fewer missions.
         weights = np.array([1 / np.mean(space.uavs) for space in self.spaces])
         self.shares = weights / weights.sum()
-        self._sea = lru_cache(SEAS)(
-            lambda number: (self._space(number), encoder_of("sets", self._space(number)))
-        )
+        self._sea = lru_cache(SEAS)(self._encoded)
 
-    def _space(self, number: int) -> ScenarioSpace:
-        return ScenarioSpace.of(self.spaces[number], flight_cost=1 if self.phase.battery else 0)
+    def _encoded(self, number: int) -> tuple[ScenarioSpace, Sets]:
+        """A sea by its number, and the encoder of its states."""
+        space = self._in_phase(self.spaces[number])
+        return space, encoder_of("sets", space)
 
     def _learn(self, share: float) -> None:
-        """Simulate missions on some seas from beginning to end, and update."""
         config, generator = self.config, self.generator
         seas = config.seas_per_tick
         numbers = generator.choice(len(self.spaces), seas, len(self.spaces) < seas, self.shares)
@@ -255,17 +240,14 @@ class ProximalTraining(Training):
         seen: list[CompactStates] = []
         decided: list[tuple[np.ndarray, ...]] = []
         while missions["active"].any():
-            states = compact_states(stepper.state, stepper.world.chart, config.guard)
-            at, uavs = np.nonzero(
-                states.uavs[..., column.ACTIVE] > states.uavs[..., column.CHARGING]
-            )
+            states, at, uavs = acting(stepper, config.guard)
             actions = np.full(states.uavs.shape[:2], HOVER)
             actions[at, uavs], *known = self._drawn(encoder, states, at, uavs, generator)
             decided.append((np.full(len(at), len(seen)), at, uavs, actions[at, uavs], *known))
             seen.append(states)
             outcome = stepper.step(actions)
             collected.append(collected[-1] + outcome["team_collected"].max(1))
-            ended = np.nonzero((missions["active"] == 0) & outcome["acted"].any(1))[0]
+            ended = just_ended(stepper, outcome)
             records[ended] = stepper.records(ended).missions
         states = CompactStates(*(np.concatenate(parts) for parts in zip(*seen, strict=True)))
         columns = [np.concatenate(parts) for parts in zip(*decided, strict=True)]
@@ -357,8 +339,3 @@ def _advantages(missions, uavs, earned, values, products, fleet):
         out[r] = of_uav[2] - earned[r] + of_uav[1] - values[r] + TRACE * of_uav[0]
         of_uav[0], of_uav[1], of_uav[2] = out[r], values[r], earned[r]
     return out
-
-
-def training_of(config: TrainingConfig, device: torch.device) -> Training:
-    """A new training: of a policy for any sea by this module, of others by double DQN."""
-    return (ProximalTraining if config.is_proximal else Training)(config, device)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import ceil
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 import torch
@@ -25,17 +25,16 @@ from dess.files.reading import paths_in
 from dess.files.tables import write_table
 from dess.files.writing import check_folder, locked, writable
 from dess.observations.observer import encoder_of
-from dess.observations.states import layout_of
 from dess.record import MISSION_RECORD
+from dess.scenario import ScenarioSpace
 from dess.state import MISSION, UAV
-from policies.learner.checkpoint import load_training, save_training
+from policies.learner.checkpoint import load_training, new_training, save_training
 from policies.learner.config import CHECKPOINT, TrainingConfig
 from policies.learner.description import MODEL
 from policies.learner.dqn import ReplayMemory
 from policies.learner.network import units_of
-from policies.learner.ppo import training_of
-from policies.learner.trained import load_policy, save_policy
-from policies.learner.training import Training, build
+from policies.learner.trained import build, load_policy, save_policy
+from policies.learner.training import Training
 
 CURVE, EVENTS, LOCK = "training.parquet", "tensorboard", ".lock"
 CHECKPOINT_EVERY = 240.0  # seconds between checkpoints
@@ -66,39 +65,38 @@ def device_of(name: str) -> torch.device:
     return torch.device("cuda" if name != "cpu" and torch.cuda.is_available() else "cpu")
 
 
-def memory_of(config: TrainingConfig) -> int:
-    """The size of the replay memory or, without one, of the states of a tick [bytes]."""
-    if not config.is_proximal:
-        space = config.space
-        slots = config.replay, config.num_envs
-        return ReplayMemory.bytes_for(*slots, space.uavs[1], len(space.nodes))
-    missions = config.num_envs * config.seas_per_tick
-    return max(
-        ReplayMemory.bytes_for(
-            # Missions with charging last about twice as long as it takes to fill the quota.
-            min(2 * ceil(space.quota / space.communication_slots), space.max_slots),
-            missions,
-            space.uavs[1],
-            len(space.nodes),
-        )
-        for space in config.spaces()
-    )
+class Sizes(NamedTuple):
+    """About the memory that a training takes.
+
+    Attributes:
+        missions: Of the replay memory or, without one, of the states of a tick [bytes].
+        total: Of all, most of it for what a checkpoint holds [bytes].
+    """
+
+    missions: int
+    total: int
 
 
-def size_of(config: TrainingConfig) -> int:
-    """About the memory that a training takes, most of it for what a checkpoint holds [bytes].
+def sizes_of(config: TrainingConfig) -> Sizes:
+    """The memory that a training takes.
 
     A checkpoint is written from a copy, so what it holds counts twice.
     """
-    spaces = config.spaces()
+    spaces, has_replay = config.spaces(), config.algorithm == "dqn"
+
+    def memory(space: ScenarioSpace) -> int:
+        # Missions with charging last about twice as long as it takes to fill the quota.
+        flown = min(2 * ceil(space.quota / space.communication_slots), space.max_slots)
+        slots, missions = config.replay if has_replay else flown, config.num_envs
+        missions *= config.seas_per_tick
+        return ReplayMemory.bytes_for(slots, missions, space.uavs[1], len(space.nodes))
+
+    missions = max(map(memory, spaces))
     fleet, nodes = (max(n) for n in zip(*((s.uavs[1], len(s.nodes)) for s in spaces), strict=True))
-    layout = None if config.is_proximal else layout_of(spaces[0])
+    largest = max(spaces, key=lambda space: len(space.nodes))
     with torch.device("meta"):  # the sizes of the network, without its memory
-        observation, network = build(config, layout)
-    shapes = observation.shapes
-    if layout is None:
-        largest = max(spaces, key=lambda space: len(space.nodes))
-        shapes = encoder_of("sets", largest).shapes
+        _, _, network = build(config, spaces[0])
+    shapes = encoder_of(config.observation, largest).shapes
     weights = sum(weight.numel() for weight in network.parameters())
     rows = max(2 * config.batch, config.num_envs * fleet, BATCH_SIZE * fleet)
     row = 3 * units_of(network, shapes)  # outputs, their gradients, the later state
@@ -106,10 +104,9 @@ def size_of(config: TrainingConfig) -> int:
     evaluation = config.evaluation_missions * (MISSION_RECORD.itemsize + fleet * 8 * 8)
     losses = _LOSS * config.updates * min(config.evaluate_every, config.ticks)
     held = 6 * 4 * weights + len(spaces) * config.num_envs * state
-    is_held = config.checkpoint_replay and not config.is_proximal
-    held += memory_of(config) if is_held else 0
-    others = 0 if is_held else memory_of(config)
-    return 2 * held + others + 4 * weights + 4 * rows * row + evaluation + losses
+    times = 2 if config.checkpoint_replay and has_replay else 1
+    held = 2 * held + times * missions
+    return Sizes(missions, held + 4 * weights + 4 * rows * row + evaluation + losses)
 
 
 def train(
@@ -138,7 +135,7 @@ def train(
         accept_size: Whether to train even if that takes more memory than is available.
         start: The folder of a trained policy whose weights a new training begins with; one that is
             resumed goes on with its own.
-        announce: Called before any large allocation with ``memory_of(config)``.
+        announce: Called before any large allocation with the memory of the missions [bytes].
         progress: Called after each tick with the training and the ticks since the last call.
 
     Returns:
@@ -153,18 +150,19 @@ def train(
     """
     path, place = out / CHECKPOINT, device_of(device)
     _check_folder(out, resume)
+    sizes = sizes_of(config)
     if not accept_size:
         allowed = "a smaller network, replay memory or batch, fewer environments, or --yes"
-        check_memory(f"training {config.name}", size_of(config), allowed)
+        check_memory(f"training {config.name}", sizes.total, allowed)
     with locked(out / LOCK, _BUSY):
         _check_folder(out, resume)  # again, as another training may have ended in the meantime
         if announce:
-            announce(memory_of(config))
+            announce(sizes.missions)
         try:
             if resume:
-                training = load_training(path, config, place, size_of(config))
+                training = load_training(path, config, place, sizes.total)
             else:
-                training = training_of(config, place)
+                training = new_training(config, place)
                 if start:
                     training.begin_with(load_policy(Path(start)).network.state_dict())
                 save_training(path, training)
@@ -172,7 +170,7 @@ def train(
             if isinstance(error, RuntimeError) and "alloc" not in str(error):
                 raise  # torch has no error of its own for memory
             raise InputError(
-                f"training {config.name}: about {size_of(config) / 2**30:.1f} GiB of memory are "
+                f"training {config.name}: about {sizes.total / 2**30:.1f} GiB of memory are "
                 "too much for this machine; allowed: fewer environments or slots"
             ) from error
         _run(training, out, progress)

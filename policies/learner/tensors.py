@@ -63,7 +63,8 @@ def digest(content: Any, tensors: Mapping[str, torch.Tensor]) -> str:
     hashed = hashlib.sha256(json.dumps(content).encode())
     for name in sorted(tensors):
         hashed.update(name.encode() + b"\0")
-        hashed.update(tensors[name].detach().cpu().contiguous().numpy().data)
+        content = tensors[name].detach().cpu().contiguous().reshape(-1)
+        hashed.update(content.view(torch.uint8).numpy().data)
     return hashed.hexdigest()
 
 

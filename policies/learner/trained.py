@@ -16,12 +16,15 @@ from typing import Any
 import torch
 from safetensors import SafetensorError
 from safetensors.torch import load, save
+from torch import nn
 
 from dess.errors import InputError
 from dess.files.reading import Missing, read_bytes
 from dess.files.writing import write_file
+from dess.observations.maps import POOL
 from dess.observations.observer import ENCODERS
-from dess.observations.states import layout_of
+from dess.observations.sets import Sets
+from dess.observations.states import Layout, layout_of
 from dess.scenario import ScenarioSpace
 from policies.learner import tensors
 from policies.learner.config import TrainingConfig, config_names, learner_of, resume_command
@@ -34,11 +37,35 @@ from policies.learner.description import (
     Run,
     read_description,
 )
+from policies.learner.network import NARROWEST, DuelingNetwork, PaperNetwork, SetNetwork
 from policies.learner.policy import LearnedPolicy
-from policies.learner.training import build
 
 # The largest file of weights that is read [bytes]; the largest network of a config is half of it.
 MODEL_LIMIT = 2**30
+
+
+def build(config: TrainingConfig, space: ScenarioSpace) -> tuple[Layout | None, Any, nn.Module]:
+    """What a policy of a config is made of, for missions of a scenario.
+
+    Returns:
+        The layout that it learns, None if it learns to fly on any sea; the encoder of its
+        observations, or the kind of it for any sea; and a new network.
+
+    Raises:
+        InputError: If the observation cannot be made of the scenario.
+    """
+    precision = getattr(torch, config.precision)
+    if config.algorithm == "ppo":
+        return None, Sets, SetNetwork(Sets.shapes, config.hidden, precision)
+    layout = layout_of(space)
+    if config.observation == "maps" and (2 * layout.grid - 1) // POOL < NARROWEST:
+        raise InputError(
+            f"observation: a grid of {layout.grid} is too small for maps; allowed: vector, sets"
+        )
+    observation = ENCODERS[config.observation](layout)
+    if config.observation == "maps":
+        return layout, observation, PaperNetwork(observation.shapes, precision)
+    return layout, observation, DuelingNetwork(observation.shapes[0][0], config.hidden, precision)
 
 
 def save_policy(
@@ -63,7 +90,7 @@ def save_policy(
     Raises:
         InputError: If a file cannot be written.
     """
-    layout = None if config.is_proximal else layout_of(space)
+    layout = None if config.algorithm == "ppo" else layout_of(space)
     description = Description(
         format=FORMAT,
         name=config.name,
@@ -107,11 +134,9 @@ def load_policy(folder: Path) -> LearnedPolicy:
         )
     values = description.layout and description.layout.model_dump()
     try:
-        layout = None
-        if not config.is_proximal:
-            layout = layout_of(ScenarioSpace.of(uavs=1, **(values or {})))
         with torch.device("meta"):  # the forms of the weights, without their memory
-            observation, network = build(config, layout)
+            space = ScenarioSpace.of(uavs=1, **(values or {}))
+            layout, observation, network = build(config, space)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     require_version(description.observation_version, observation, where)

@@ -61,13 +61,13 @@ def train(
             f"--from: {shown(start)} is no trained policy; allowed: one, or its folder"
         )
     needs("learning", "dess train")
-    from policies.learner.dqn import DivergenceError
     from policies.learner.session import EVENTS, train
+    from policies.learner.training import DivergenceError
 
     def announce(memory: int) -> None:
         """Print how much memory [bytes] the missions take, and how to see the curves."""
         view = missing("tensorboard", "a live view of the curves")
-        what = "missions of a tick" if config.is_proximal else "replay memory"
+        what = "replay memory" if config.algorithm == "dqn" else "missions of a tick"
         console.say(f"{what}: {memory / 2**20:,.0f} MiB", sys.stderr)
         console.say(view or f"curves: tensorboard --logdir {out / EVENTS}", sys.stderr)
 

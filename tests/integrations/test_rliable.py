@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from analysis import rliable_scores, run_study
-from analysis.results.tables import Results
 from tests.analysis.small import grid, small_study
 
 pytest.importorskip("rliable")
@@ -18,14 +17,10 @@ pytest.importorskip("rliable")
 EXAMPLE = Path(__file__).parents[2] / "examples" / "rliable_iqm.py"
 
 
-@pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
-    """Two policies at two design points."""
-    folder = tmp_path_factory.mktemp("rliable")
-    return run_study(small_study(folder, missions=40, design=grid(quota=[30, 60])), folder / "out")
-
-
-def test_iqm_lies_in_its_interval_and_ranks_the_policies(results: Results) -> None:
+def test_contract(tmp_path: Path) -> None:
+    """The example computes its means from the scores of a study, prints them and draws."""
+    study = small_study(tmp_path, missions=40, design=grid(quota=[30, 60]))
+    results = run_study(study, tmp_path / "out")
     scores = rliable_scores(results)
     estimates = runpy.run_path(str(EXAMPLE))["iqm"](scores, reps=200)
     for name, (mean, low, high) in estimates.items():
@@ -35,8 +30,6 @@ def test_iqm_lies_in_its_interval_and_ranks_the_policies(results: Results) -> No
         assert low < high
     assert estimates["greedy"][0] > estimates["random"][0]
 
-
-def test_the_example_prints_every_policy_and_draws(results: Results, tmp_path: Path) -> None:
     picture = tmp_path / "profiles.png"
     command = [sys.executable, str(EXAMPLE), str(results.store.folder), str(picture)]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "MPLBACKEND": "agg"}

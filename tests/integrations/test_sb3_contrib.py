@@ -16,56 +16,31 @@ masking = pytest.importorskip("sb3_contrib.common.maskable.utils")
 sb3 = pytest.importorskip("dess.integrations.sb3")
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "sb3_maskable_ppo.py"
-QUICK = ScenarioSpace.of(uavs=[1, 3], flying_time=[5, 30], quota=60, max_slots=25)
-FLEET = ScenarioSpace.of(QUICK, uavs=3)
+FLEET = ScenarioSpace.of(uavs=3, flying_time=[5, 30], quota=60, max_slots=25)
 MISSIONS, ROWS = 4, 12
 
 
-def harvest(scenario=QUICK, **options):
-    """A small environment."""
-    return sb3.SB3VecEnv(dess.vector_env(scenario, MISSIONS, **options))
-
-
-def flown(env, steps: int, seed: int = 1) -> list[tuple]:
-    """The masks, active rows, actions and outcomes of an untrained network, step by step."""
-    model = sb3_contrib.MaskablePPO("MlpPolicy", env, n_steps=8, batch_size=8, seed=seed)
-    env.seed(seed)
-    observations, story = env.reset(), []
-    for _ in range(steps):
+def test_contract(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its actions are allowed, UAVs that have ended hover, and the example is a policy."""
+    env, waits = sb3.SB3VecEnv(dess.vector_env(FLEET, MISSIONS)), 0
+    model = sb3_contrib.MaskablePPO("MlpPolicy", env, n_steps=8, batch_size=8, seed=1)
+    env.seed(1)
+    observations, forbidden = env.reset(), 0
+    assert masking.is_masking_supported(env)
+    for _ in range(60):
         masks, active = masking.get_action_masks(env), env.env.state.uavs["active"].ravel()
         actions, _ = model.predict(observations, action_masks=masks)
-        observations, *outcome = env.step(actions)
-        story.append((masks, active, actions, observations, *outcome))
-    return story
-
-
-def test_agents_that_end() -> None:
-    waits = 0
-    for masks, active, actions, _, rewards, *_ in flown(harvest(FLEET), 60):
-        assert (masks[~active] == np.eye(5, dtype=bool)[HOVER]).all()
-        assert (actions[~active] == HOVER).all()
-        assert not rewards[~active].any()
+        observations, rewards, *_ = env.step(actions)
         assert masks[range(ROWS), actions].all()
-        waits += (~active).sum()
-    assert waits
+        assert (masks[~active] == np.eye(5, dtype=bool)[HOVER]).all()
+        assert not rewards[~active].any()
+        waits, forbidden = waits + (~active).sum(), forbidden + (~masks[active]).sum()
+    assert waits and forbidden
 
-
-@pytest.fixture(scope="module")
-def trained(tmp_path_factory):
-    """The example after one update, and the folder with its file."""
-    folder = tmp_path_factory.mktemp("trained")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        return runpy.run_path(str(EXAMPLE))["train"](minutes=0, missions=4), folder
-
-
-def test_training_step(trained, monkeypatch: pytest.MonkeyPatch) -> None:
-    model, folder = trained
-    assert model.num_timesteps == 32 * 12
-    assert model._n_updates == 4
-    monkeypatch.chdir(folder)
-    policy = policies.load(f"{EXAMPLE}:MaskablePPOPolicy")
-    paper = dess.load_scenario("paper")
+    monkeypatch.chdir(tmp_path)
+    model = runpy.run_path(str(EXAMPLE))["train"](minutes=0, missions=4)
+    assert (model.num_timesteps, model._n_updates) == (32 * 12, 4)
+    policy, paper = policies.load(f"{EXAMPLE}:MaskablePPOPolicy"), dess.load_scenario("paper")
     records = dess.simulate_batch(paper, policy, 0, 5)
     assert dess.simulate(paper, policy, 0, 3).metrics == records.missions[3]
     model.learn(1)

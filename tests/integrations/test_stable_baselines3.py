@@ -8,7 +8,6 @@ import pytest
 
 import dess
 from dess import ScenarioSpace
-from dess.state import HOVER
 
 stable_baselines3 = pytest.importorskip("stable_baselines3")
 vec_env = pytest.importorskip("stable_baselines3.common.vec_env")
@@ -26,23 +25,14 @@ def harvest(scenario=QUICK, **options):
     return sb3.SB3VecEnv(dess.vector_env(scenario, MISSIONS, **options))
 
 
-def fleet_of(uavs: int) -> ScenarioSpace:
-    """The small scenario with a fleet of fixed size."""
-    return ScenarioSpace.of(QUICK, uavs=uavs)
-
-
-def test_reset() -> None:
-    env = harvest()
-    env.set_options({"replication": 5})
-    fifth = env.reset()
-    expected, _ = dess.vector_env(QUICK, MISSIONS).reset(options={"replication": 5})
-    assert np.array_equal(fifth, expected)
-    assert not np.array_equal(env.reset(), fifth)  # an option holds for one reset
-
-
-def test_step() -> None:
-    env, plain = vec_env.VecMonitor(harvest()), dess.vector_env(QUICK, MISSIONS)
+def test_contract() -> None:
+    """Steps are those of ``vector_env``, and ends are told as its wrappers expect it."""
+    env, plain = harvest(), dess.vector_env(QUICK, MISSIONS)
     generator, copies = np.random.default_rng(1), []
+    env.set_options({"replication": 5})
+    fifth, _ = plain.reset(options={"replication": 5})
+    assert np.array_equal(env.reset(), fifth)
+    env = vec_env.VecMonitor(env)
     env.seed(2)
     copies.append((held := env.reset(), held.copy()))
     plain.reset(seed=2)
@@ -68,30 +58,8 @@ def test_step() -> None:
     # A rollout buffer reads an observation after the next step, so steps must not overwrite it.
     assert all(np.array_equal(held, copy) for held, copy in copies)
 
-
-def test_agents_that_end() -> None:
-    env, waits = harvest(fleet_of(3)), 0
-    env.reset()
-    generator, totals = np.random.default_rng(1), np.zeros(ROWS)
-    for _ in range(60):
-        waiting = ~env.env.state.uavs["active"].ravel()
-        masks = np.stack(env.env_method("action_masks"))
-        assert (masks[waiting] == np.eye(5, dtype=bool)[HOVER]).all()
-        observations, rewards, over, infos = env.step(generator.integers(0, 5, ROWS))
-        assert not rewards[waiting].any()
-        assert not observations[waiting & ~over].any()
-        totals += rewards
-        for row in np.flatnonzero(over):
-            assert infos[row]["episode"]["r"] == pytest.approx(totals[row])
-        totals[over] = 0.0
-        waits += waiting.sum()
-    assert waits
-
-
-def test_training_step() -> None:
     model = runpy.run_path(str(EXAMPLE))["train"](steps=1, missions=2)
-    assert model.num_timesteps == 32 * 6
-    assert model._n_updates == 4
-    env = harvest(fleet_of(3))
-    rewards, slots = evaluation.evaluate_policy(model, env, 24, return_episode_rewards=True)
+    assert (model.num_timesteps, model._n_updates) == (32 * 6, 4)
+    fleet = harvest(ScenarioSpace.of(QUICK, uavs=3))
+    rewards, slots = evaluation.evaluate_policy(model, fleet, 24, return_episode_rewards=True)
     assert len(rewards) == 24 and max(slots) <= QUICK.max_slots

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import data_equivalence
 
 import dess
 from dess.env.parallel import HarvestEnv
@@ -56,13 +57,17 @@ def legal(infos: Any, generator: np.random.Generator) -> np.ndarray:
 @both_ways
 @every_fleet
 @every_wrapper
-def test_step(wrapper: str, fleet: str, ended: str) -> None:
+def test_wrappers(wrapper: str, fleet: str, ended: str) -> None:
     """Whole episodes have the rewards and the ends of the plain environment."""
     plain, env = team(fleet, ended), WRAPPERS[wrapper](team(fleet, ended))
     generator = np.random.default_rng(0)
     for seed in range(3):
-        plain.reset(seed)
-        env.reset(seed)
+        expected, expected_infos = plain.reset(seed)
+        observations, infos = env.reset(seed)
+        assert data_equivalence(infos, expected_infos, exact=True)
+        for agent, own in observations.items():
+            # What some wrappers add stands behind or before the observation.
+            assert set(expected[agent].tolist()) <= set(own.ravel().tolist())
         while plain.agents:
             actions = {agent: int(generator.integers(5)) for agent in plain.possible_agents}
             _, rewards, *_ = plain.step({agent: actions[agent] for agent in plain.agents})
@@ -76,7 +81,8 @@ def test_step(wrapper: str, fleet: str, ended: str) -> None:
 
 
 @every_fleet
-def test_agents_that_end(fleet: str) -> None:
+def test_contract(fleet: str) -> None:
+    """The UAVs of a copy end together, and stable-baselines3 learns from its rows."""
     env, generator = vectors(fleet), np.random.default_rng(0)
     _, infos = env.reset(seed=1)
     waited = ended = 0
@@ -84,7 +90,7 @@ def test_agents_that_end(fleet: str) -> None:
         waits = np.array([not info["active"] for info in infos])
         observations, rewards, terminated, truncated, infos = env.step(legal(infos, generator))
         over = (terminated | truncated).reshape(COPIES, -1)
-        assert (over.all(1) == over.any(1)).all()  # the UAVs of a mission end together
+        assert (over.all(1) == over.any(1)).all()
         assert not rewards[waits].any()
         assert not observations[waits & ~over.ravel().astype(bool)].any()
         assert all(
@@ -94,9 +100,6 @@ def test_agents_that_end(fleet: str) -> None:
         ended += over.sum()
     assert waited and ended
 
-
-@every_fleet
-def test_training_step(fleet: str) -> None:
     sb3 = pytest.importorskip("stable_baselines3")
     env = vectors(fleet, "stable_baselines3")
     env.venv.reset(seed=1)

@@ -17,6 +17,7 @@ from dess.state import HOVER
 from dess.view import View
 from policies.registry import HEURISTICS
 from tests.drawn import NORTH, SOUTH, Checked, replications, seeds, spaces
+from tests.policies.flown import assert_same_alone, cells_of
 
 NAMES = tuple(name for name in HEURISTICS if name != "random-unguarded")
 heuristics = st.sampled_from(NAMES).map(policies.load)
@@ -62,13 +63,8 @@ def test_heuristics_do_the_same_in_any_batch(
     space: ScenarioSpace, team: list[Any], seed: int, numbers: list[int], batch_size: int
 ) -> None:
     team = team[: space.uavs[1]]
-    records = simulate_batch(
-        space, team, seed, numbers, batch_size=batch_size, workers=1 + batch_size % 2
-    )
-    for job, number in enumerate(numbers):
-        single = simulate(space, team, seed, number)
-        assert single.metrics.tobytes() == records.missions[job].tobytes()
-        assert single.uavs.tobytes() == records.uavs[job, : len(single.uavs)].tobytes()
+    workers = 1 + batch_size % 2
+    assert_same_alone(space, team, seed, numbers, batch_size=batch_size, workers=workers)
 
 
 # --- what each of them goes for ---
@@ -78,10 +74,7 @@ def _path(name: str, slots: int, **scenario: Any) -> list[tuple[float, float]]:
     """The cells of a lone UAV that starts at (8, 8), slot by slot."""
     world = {"grid": 16, "zone": [8, 8, 1, 1], "uavs": 1, "max_slots": slots}
     record = simulate(Scenario.of(**(world | scenario)), policies.load(name), 3, events=True)
-    assert record.events is not None
-    log = record.events.columns()
-    moves = log["event"] == "move"
-    return list(zip(log["x"][moves].tolist(), log["y"][moves].tolist(), strict=True))
+    return cells_of(record)
 
 
 def test_greedy_weighs_data_against_distance() -> None:
@@ -94,7 +87,7 @@ def test_greedy_weighs_data_against_distance() -> None:
         assert record.events is not None
         log = record.events.columns()
         data = log["value"][(log["event"] == "mission_start") & (log["node"] >= 0)]
-        (y,) = log["y"][log["event"] == "move"]
+        ((_, y),) = cells_of(record)
         near = data[0] / (2 + 1) > data[1] / (4 + 1)
         if min(data) > 15:  # both worth a visit
             assert y == (7 if near else 9)

@@ -13,14 +13,13 @@ import dess
 import policies
 from dess import InputError
 from dess.mission import simulate
-from dess.observations.states import layout_of
 from dess.scenario import Scenario, load_scenario, scenario_names
 from policies import registry
 from policies.about import about
 from policies.base import Policy
+from policies.heuristics import Greedy
 from policies.learner.config import config_of
-from policies.learner.trained import save_policy
-from policies.learner.training import build
+from policies.learner.trained import build, save_policy
 from policies.registry import SHIPPED, TypedByUser
 
 ROOT = Path(__file__).parents[2]
@@ -63,7 +62,7 @@ def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, "outside_policies", raising=False)
 
 
-@pytest.mark.parametrize("text", ["gredy", "", "greedy,", "greedy,,tour", "Greedy"])
+@pytest.mark.parametrize("text", ["gredy", "", "greedy,,tour", "Greedy"])
 def test_unknown_names_are_refused(text: str) -> None:
     with pytest.raises(InputError) as error:
         policies.load_team(text)
@@ -79,7 +78,7 @@ def _trained(folder: Path) -> Path:
     """The folder of a policy that is called ``novice`` and has learned nothing."""
     settings = {"name": "novice", "hidden": [8], "phases": [{"name": "none", "ticks": 1}]}
     config, space = config_of(settings, "here"), load_scenario("paper")
-    _, network = build(config, layout_of(space))
+    *_, network = build(config, space)
     save_policy(folder, network.state_dict(), config, space)
     return folder
 
@@ -88,14 +87,28 @@ def test_a_trained_policy_loads_from_its_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = _trained(tmp_path / "runs" / "first")
-    for name in (folder, str(folder)):
-        policy = policies.load(name)
-        assert isinstance(policy, Policy)
-        assert policy.name == "novice"
+    assert policies.load(folder).name == "novice"
     monkeypatch.chdir(tmp_path)
     team = policies.load_team("runs/first, greedy,./runs/first/")
     assert [policy.name for policy in team] == ["novice", "greedy", "novice"]
     assert np.isfinite(simulate(Scenario.of(uavs=3), team, 0).reward)
+    _trained(tmp_path / "greedy")  # a folder does not hide the shipped policy of its name
+    assert isinstance(policies.load("greedy"), Greedy)
+    monkeypatch.chdir(folder)  # no name is not the working folder
+    with pytest.raises(InputError, match="policy: '' is unknown"):
+        policies.load_team("greedy,")
+
+
+@pytest.mark.parametrize("name", registry.trained_names())
+def test_what_is_shipped_loads_by_its_own_name_and_says_what_it_is_for(name: str) -> None:
+    policy = policies.load(name)
+    assert policy.name == name
+    first, _, seed = name.rpartition("-")
+    if seed.isdigit():  # a repetition differs in its seed alone
+        assert registry.descriptions()[name] == f"{first} trained once more, with seed {seed}"
+        original = policies.load(first)
+        assert (policy.learner, policy.weights != original.weights) == (original.learner, True)  # type: ignore[attr-defined]
+    assert registry.descriptions()[name]
 
 
 @pytest.mark.usefixtures("outside")

@@ -19,8 +19,8 @@ from analysis.numbers import why_nan
 from analysis.study.design import Saltelli
 from dess import InputError
 from policies import load
+from policies.learner.dqn import DQNTraining
 from policies.learner.trained import save_policy
-from policies.learner.training import Training
 from reports import cli
 from tests.analysis.small import grid, small_study, write_scenario
 from tests.policies.learner.tiny import CPU, PHASES, tiny
@@ -236,7 +236,7 @@ def trained_twice(tmp_path):
         config = tiny(
             scenario=scenario, seed=seed, discount=discount, learning_starts=5, phases=phases
         )
-        training = Training(config, CPU)
+        training = DQNTraining(config, CPU)
         training.run(2)
         folders.append(str(tmp_path / f"{seed}-{discount}"))
         weights = training.learner.online.state_dict()

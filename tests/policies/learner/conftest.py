@@ -2,10 +2,19 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.policies.learner.tiny import one_thread
+from policies.learner.dqn import DQNTraining
+from tests.policies.learner.tiny import CPU, PHASES, one_thread, tiny
 
 
 @pytest.fixture(autouse=True, scope="module")
 def _one_thread() -> Iterator[None]:
     with one_thread():
         yield
+
+
+@pytest.fixture(scope="module")
+def training() -> DQNTraining:
+    """A training that has just begun."""
+    training = DQNTraining(tiny(learning_starts=5, phases=[PHASES[1] | {"ticks": 3}]), CPU)
+    training.run(2)
+    return training

@@ -14,15 +14,7 @@ from tests.policies.learner.tiny import PHASES, TINY, tiny, tiny_on_seas, write_
 PHASE = PHASES[0]
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"speed": 1}, "speed: unknown key"),
-    ({"phases": [PHASE | {"speed": 1}]}, "phases.0.speed: unknown key"),
-    ({"num_envs": 8.0}, "num_envs: "),
-    ({"batch": True}, "batch: "),
-    ({"name": 3}, "name: "),
-    ({"guard": "perhaps"}, "guard: "),
     ({"observation": "radar"}, "observation: "),
-    ({"precision": "float16"}, "precision: "),
-    ({"phases": []}, "phases: "),
-    ({"phases": [{"ticks": 1}]}, "phases.0.name: "),
     ({"phases": [PHASE | {"epsilon": [0.5, 2]}]}, "phases.0.epsilon.1: "),
     ({"phases": [PHASE, PHASE]}, "phases: ['harvest', 'harvest'] are not distinct"),
     ({"n_step": 60}, "learning_starts: 60 is too few; allowed: more than n_step 60"),
@@ -30,15 +22,11 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"uavs": [2, 3]}, "uavs is a field of the scenario; allowed: --set uavs=[2, 3], or uavs in"),
     ({"set": {"batch": 3}}, "batch is a setting of the training, not a field of the scenario; "),
     ({"set": {"uvs": 3}}, "scenario: scenario paper: uvs: unknown key (did you mean uavs?)"),
-    ({"set": {"uavs": "many"}}, "scenario: scenario paper: uavs: "),
     ({"phases": [PHASE | {"ticks": 10**8}]}, "evaluate_every: 25 makes more than 50,000 evalu"),
     ({"observation": "sets"}, "low_battery_starts: 0.2 has no effect with the observation sets"),
     ({"short_ranges": 0.5}, "short_ranges: 0.5 has no effect with the observation vector; allow"),
     ({"phases": [PHASE | {"temperature": 1e-320}]}, "phases.0: temperature: 1e-320 is too low"),
-    ({"phases": [PHASE | {"name": "a\nb"}]}, "phases.0.name: 'a\\nb' has control characters"),
-    ({"discount": "0.99"}, "discount: "),
     ({"name": "\x1b[2J"}, "name: '\\x1b[2J' has control characters; allowed: printable"),
-    ({"set": {"nodes": [[[[1]]]]}}, "set: is nested too deeply; allowed: fields of the scenario"),
     ({"scenario": "nope"}, "scenario: nope: no such scenario; allowed: bay, "),
 ]
 

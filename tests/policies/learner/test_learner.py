@@ -7,22 +7,21 @@ import torch
 from torch import nn
 
 from dess.observations.states import masks
-from policies.learner.dqn import Batch, Learner
-from policies.learner.training import Training
+from policies.learner.dqn import Batch, DQNLearner, DQNTraining
 from tests.policies.learner.tiny import CPU, PHASES, tiny
 
 LOSSES = {"mse": lambda e: e**2, "huber": lambda e: e**2 / 2 if e < 1 else e - 0.5}
 
 
-def _learner(**changes: Any) -> tuple[Learner, Batch]:
+def _learner(**changes: Any) -> tuple[DQNLearner, Batch]:
     """A new learner, and a batch of what a tiny training has seen."""
     flown = tiny(learning_starts=300, replay=300, phases=PHASES[1:])  # some missions end
-    training = Training(flown, CPU)
+    training = DQNTraining(flown, CPU)
     training.run(1)
     batch = training.replay.sample(1000, flown.n_step, flown.discount, training.generator)
     config = tiny(**changes)
-    network = Training(config, CPU).learner.online
-    return Learner(network, training.observation, config, CPU), batch
+    network = DQNTraining(config, CPU).learner.online
+    return DQNLearner(network, training.observation, config, CPU), batch
 
 
 def _values(network: nn.Module) -> list[torch.Tensor]:
@@ -33,7 +32,7 @@ def _values(network: nn.Module) -> list[torch.Tensor]:
 def test_the_loss_is_that_of_the_differences_to_the_target(loss: str) -> None:
     learner, batch = _learner(loss=loss, reward_scale=0.5)
     assert 0 < (batch.discount == 0).mean() < 0.5
-    learner.target.load_state_dict(Training(tiny(seed=9), CPU).learner.online.state_dict())
+    learner.target.load_state_dict(DQNTraining(tiny(seed=9), CPU).learner.online.state_dict())
     with torch.no_grad():
         values = learner.values(learner.online, batch.state, batch.rows, batch.uav)
         later = learner.values(learner.online, batch.state, batch.later, batch.uav)

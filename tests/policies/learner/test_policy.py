@@ -24,6 +24,7 @@ from dess.state import constants_of
 from policies.learner.network import DuelingNetwork, SetNetwork
 from policies.learner.policy import LearnedPolicy
 from tests.drawn import PLAIN_SEA, Checked, Recorder, Wanderer, replications, seeds, spaces
+from tests.policies.flown import assert_same_alone, cells_of
 
 PAPER = load_scenario("paper")
 
@@ -72,21 +73,14 @@ def test_what_is_not_allowed_is_never_chosen(
     event(f"charged {(record.uavs['slots_charging'] > 0).any()}")
 
 
-def _assert_same_records(policy: Any, seed: int, missions: int, batch_size: int) -> None:
-    records = simulate_batch(PAPER, policy, seed, missions, batch_size=batch_size)
-    for number in range(missions):
-        single = simulate(PAPER, policy, seed, number)
-        assert single.metrics.tobytes() == records.missions[number].tobytes()
-        assert single.uavs.tobytes() == records.uavs[number, : len(single.uavs)].tobytes()
-
-
 @pytest.mark.parametrize("guarded", [True, False])
 def test_both_engines_give_the_same_records(guarded: bool) -> None:
     recorder = Recorder(_random(layout_of(PAPER), guarded))
     simulate(PAPER, recorder, 61)
     assert len(set(recorder.asked.values())) > 1  # the network does tell situations apart
-    _assert_same_records(_random(layout_of(PAPER), guarded), 61, 6, 4)
-    _assert_same_records([_random(layout_of(PAPER), guarded), Wanderer()], 62, 3, 3)
+    policy = _random(layout_of(PAPER), guarded)
+    assert_same_alone(PAPER, policy, 61, range(6), batch_size=4)
+    assert_same_alone(PAPER, [policy, Wanderer()], 62, range(3), batch_size=3)
 
 
 def _path(values: list[float], slots: int) -> list[tuple[float, float]]:
@@ -94,11 +88,7 @@ def _path(values: list[float], slots: int) -> list[tuple[float, float]]:
     space = ScenarioSpace.of(
         grid=4, zone=[2, 2, 1, 1], nodes=[[0, 0]], uavs=1, max_slots=slots, initial_data=1e6
     )
-    log = simulate(space, _fixed(values, space), events=True).events
-    assert log is not None
-    columns = log.columns()
-    moves = columns["event"] == "move"
-    return list(zip(columns["x"][moves].tolist(), columns["y"][moves].tolist(), strict=True))
+    return cells_of(simulate(space, _fixed(values, space), events=True))
 
 
 def test_it_takes_the_allowed_action_of_the_highest_value() -> None:
@@ -150,12 +140,7 @@ def _any(seed: int = 1) -> LearnedPolicy:
 def test_on_any_sea_a_mission_does_not_depend_on_those_beside_it(
     space: ScenarioSpace, seed: int, batch_size: int
 ) -> None:
-    policy, missions = _any(), 5
-    records = simulate_batch(space, policy, seed, missions, batch_size=batch_size)
-    for number in range(missions):
-        single = simulate(space, policy, seed, number)
-        assert single.metrics.tobytes() == records.missions[number].tobytes()
-        assert single.uavs.tobytes() == records.uavs[number, : len(single.uavs)].tobytes()
+    assert_same_alone(space, _any(), seed, range(5), batch_size=batch_size)
 
 
 def test_missions_with_other_fleets_pads_and_data_beside_it_change_nothing() -> None:

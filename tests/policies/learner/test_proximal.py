@@ -8,7 +8,7 @@ import torch
 
 from dess.observations.states import layout_of, masks
 from dess.scenario import load_scenario
-from policies.learner.checkpoint import load_training, save_training
+from policies.learner.checkpoint import load_training, new_training, save_training
 from policies.learner.ppo import (
     CLIP,
     TRACE,
@@ -16,13 +16,12 @@ from policies.learner.ppo import (
     ProximalTraining,
     _advantages,
     _with_range,
-    training_of,
 )
 from tests.policies.learner.tiny import CPU, assert_same, tiny_on_seas, weights_of
 
 
 def _training(ticks: int = 0, **changes: object) -> ProximalTraining:
-    training = training_of(tiny_on_seas(**changes), CPU)
+    training = new_training(tiny_on_seas(**changes), CPU)
     assert isinstance(training, ProximalTraining)
     training.run(ticks)
     return training

@@ -13,8 +13,9 @@ from dess.record import empty_records
 from dess.scenario import ScenarioSpace
 from policies.learner import training as module
 from policies.learner.checkpoint import load_training, save_training
-from policies.learner.dqn import Batch
-from policies.learner.training import MISSION_SEED, SELECT_BY, Training
+from policies.learner.config import MISSION_SEED
+from policies.learner.dqn import Batch, DQNTraining
+from policies.learner.training import SELECT_BY, Training
 from tests.policies.learner.tiny import (
     CPU,
     PHASES,
@@ -41,7 +42,7 @@ def _trained(training: Training, ticks: int) -> Training:
 @pytest.fixture(scope="module")
 def whole() -> Training:
     """The tiny training in one go."""
-    return _trained(Training(tiny(), CPU), 1000)
+    return _trained(DQNTraining(tiny(), CPU), 1000)
 
 
 @pytest.mark.parametrize(
@@ -51,7 +52,7 @@ def whole() -> Training:
 def test_a_stopped_training_goes_on_as_if_nothing_had_been(
     stops: tuple[int, ...], whole: Training, tmp_path: Path
 ) -> None:
-    training = Training(tiny(), CPU)
+    training = DQNTraining(tiny(), CPU)
     for stop in stops:
         training.run(stop - training.tick)
         training = _stopped(training, tmp_path / "checkpoint")
@@ -69,15 +70,15 @@ def test_a_stopped_training_goes_on_as_if_nothing_had_been(
 )
 def test_so_do_others(changes: dict[str, Any], tmp_path: Path) -> None:
     config = tiny(**changes, phases=[phase | {"ticks": 20} for phase in PHASES], evaluate_every=15)
-    parts = _stopped(_trained(Training(config, CPU), 17), tmp_path / "checkpoint")
-    assert_same(_trained(parts, 100), _trained(Training(config, CPU), 100))
+    parts = _stopped(_trained(DQNTraining(config, CPU), 17), tmp_path / "checkpoint")
+    assert_same(_trained(parts, 100), _trained(DQNTraining(config, CPU), 100))
 
 
 def test_without_its_memory_a_stopped_training_fills_a_new_one(tmp_path: Path) -> None:
     config = tiny(checkpoint_replay=False)
-    training = _trained(Training(config, CPU), 90)
+    training = _trained(DQNTraining(config, CPU), 90)
     path, full = tmp_path / "checkpoint", tmp_path / "full"
-    save_training(full, _trained(Training(tiny(), CPU), 90))
+    save_training(full, _trained(DQNTraining(tiny(), CPU), 90))
     resumed = _stopped(training, path)
     memory = sum(array.nbytes for array in training.replay.arrays.values())
     assert full.stat().st_size - path.stat().st_size > 0.9 * memory
@@ -93,7 +94,7 @@ def test_without_its_memory_a_stopped_training_fills_a_new_one(tmp_path: Path) -
 
 
 def test_the_first_phase_spends_no_battery() -> None:
-    training = _trained(Training(tiny(low_battery_starts=0.0), CPU), 40)
+    training = _trained(DQNTraining(tiny(low_battery_starts=0.0), CPU), 40)
     state = training.stepper.state
     active = state.uavs["active"]
     start = np.broadcast_to(state.missions["flying_time"][:, None], active.shape)
@@ -108,7 +109,7 @@ def test_the_first_phase_spends_no_battery() -> None:
 
 
 def test_a_phase_begins_with_missions_and_a_memory_of_its_own() -> None:
-    training = _trained(Training(tiny(), CPU), 79)
+    training = _trained(DQNTraining(tiny(), CPU), 79)
     flown = training.stepper.replication
     assert training.phase.name == "harvest"
     assert training.replay.count == training.config.learning_starts + 79
@@ -155,7 +156,7 @@ def test_the_second_phase_begins_with_the_best_weights_of_the_first(
     _scripted(monkeypatch, [*scores, 0.0, 0.1])
     # Four evaluations: after 6, 12 and 18 ticks, and at the end of the phase.
     phases = [phase | {"ticks": 20} for phase in PHASES]
-    training = Training(tiny(window=window, phases=phases, evaluate_every=6), CPU)
+    training = DQNTraining(tiny(window=window, phases=phases, evaluate_every=6), CPU)
     guesses = []
     for ticks in (6, 6, 6, 1):
         guesses.append(weights_of(_trained(training, ticks)))
@@ -187,7 +188,7 @@ def test_rates_move_over_their_phase(monkeypatch: pytest.MonkeyPatch) -> None:
         PHASES[0] | {"epsilon": [0.1, 0.1], "learning_rate": [1e-3, 1e-4]},
         PHASES[1] | {"epsilon": [0.5, 0.01], "epsilon_decay": 0.5, "learning_rate": [1e-4, 1e-4]},
     ]
-    training = Training(tiny(phases=phases, evaluate_every=20), CPU)
+    training = DQNTraining(tiny(phases=phases, evaluate_every=20), CPU)
     collect, update = training._collect, training.learner.update
     epsilons_used: list[float] = []
     learned: list[float] = []
@@ -216,7 +217,7 @@ def test_rates_move_over_their_phase(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [row["learning_rate"] for row in rows] == pytest.approx(rates)
 
 
-def _acting(training: Training) -> tuple[Any, np.ndarray, np.ndarray]:
+def _acting(training: DQNTraining) -> tuple[Any, np.ndarray, np.ndarray]:
     """Compact states of the environments, and their UAVs that act, many times over."""
     stepper = training.stepper
     states = compact_states(stepper.state, stepper.world.chart, training.config.guard)
@@ -224,9 +225,9 @@ def _acting(training: Training) -> tuple[Any, np.ndarray, np.ndarray]:
     return states, np.tile(missions, 2000), np.tile(uavs, 2000)
 
 
-def _explorer(monkeypatch: pytest.MonkeyPatch, values: list[float], **phase: Any) -> Training:
+def _explorer(monkeypatch: pytest.MonkeyPatch, values: list[float], **phase: Any) -> DQNTraining:
     """A training whose network gives every UAV these values."""
-    training = _trained(Training(tiny(phases=[PHASES[1] | phase]), CPU), 30)
+    training = _trained(DQNTraining(tiny(phases=[PHASES[1] | phase]), CPU), 30)
 
     def give(_: Any, __: Any, rows: np.ndarray, ___: Any) -> torch.Tensor:
         return torch.tensor(values).expand(len(rows), 5)
@@ -280,7 +281,7 @@ def _reserves(early_returns: float) -> np.ndarray:
         "low_battery_starts": 0.0,
         "evaluate_every": 100,
     }
-    training = Training(tiny(**settings, early_returns=early_returns, phases=[phase]), CPU)
+    training = DQNTraining(tiny(**settings, early_returns=early_returns, phases=[phase]), CPU)
     missions, uavs, *_ = training.stepper.state
     begun = []
     for _ in range(74):
@@ -303,7 +304,7 @@ def test_early_returns_come_home_as_soon_as_they_may_charge() -> None:
 
 
 def test_low_starts_are_low_latched_and_near_their_quota() -> None:
-    training = Training(tiny(low_battery_starts=1.0, num_envs=200), CPU)
+    training = DQNTraining(tiny(low_battery_starts=1.0, num_envs=200), CPU)
     missions, uavs, residual, *_ = training.stepper.state
     present = uavs["active"]
     start = np.broadcast_to(missions["charge_start"][:, None], present.shape)

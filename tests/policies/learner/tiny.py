@@ -1,13 +1,16 @@
 """A training that takes next to no time."""
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
 import tomli_w
 import torch
 
+from dess import InputError
 from policies.learner.config import TrainingConfig, config_of
 from policies.learner.training import Training
 
@@ -66,7 +69,7 @@ def one_thread() -> Iterator[None]:
 
 def weights_of(training: Training) -> dict[str, torch.Tensor]:
     """A copy of all weights of a training: those of its networks, and the best."""
-    networks = {name: of.state_dict() for name, of in training.learner.networks().items()}
+    networks = {name: of.state_dict() for name, of in training.learner.networks.items()}
     networks["best"] = training.best
     return {
         f"{name}.{key}": value.clone()
@@ -89,3 +92,28 @@ def assert_same(one: Training, other: Training) -> None:
     for name, value in weights_of(one).items():
         assert torch.equal(value, theirs.pop(name)), name
     assert not theirs
+
+
+def refusal_of(load: Callable[..., Any], *arguments: Any, **options: Any) -> str:
+    """The one line with which something is refused."""
+    with pytest.raises(InputError) as error:
+        load(*arguments, **options)
+    line = str(error.value)
+    assert line.isprintable() and len(line) < 1000  # the console cuts it
+    return line
+
+
+class Killed(BaseException):
+    """The process is killed here."""
+
+
+def kill_after(monkeypatch: pytest.MonkeyPatch, files: int) -> None:
+    """Kill the process when it puts the next file after so many in its place."""
+    left, replace = iter(range(files)), os.replace
+
+    def dying(*paths: Any) -> None:
+        if next(left, None) is None:
+            raise Killed
+        replace(*paths)
+
+    monkeypatch.setattr(os, "replace", dying)

@@ -10,9 +10,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dess.env.stepper import MissionStepper
 from dess.scenario import Scenario
-from dess.view import View, acting_rows
 from policies.planner.fluid import CRAFT, MOST_SLOTS, Flight, begin, empty_flight, fly
 from policies.planner.plan import CHARGE, MOST_WAYPOINTS, NEVER, Plan, empty_plan, insert
 from policies.planner.rates import rates_of
@@ -36,6 +34,7 @@ from policies.planner.search import (
     improve,
 )
 from tests.drawn import reached, scenarios, seeds
+from tests.policies.flown import first_view
 
 Waypoint = tuple[int, int, int, int]
 X, Y, STAY, TURNED = range(4)
@@ -53,10 +52,8 @@ class Sea:
 
     def __init__(self, scenario: Scenario, lengths: list[int], seed: int):
         self.rng, self.slots = np.random.default_rng(seed), scenario.max_slots
-        stepper = MissionStepper(scenario, 1, seed)
-        stepper.launch(stepper.indices)
-        state, self.nodes = stepper.state, stepper.world.nodes
-        view = View(state, stepper.world, *acting_rows(state.missions, state.uavs, 1, 0))
+        view = first_view(scenario, seed)
+        state, self.nodes = view.state, view.world.nodes
         self.rates, self.mission = rates_of(view), state.missions[0]
         self.uavs, self.residual = state.uavs[0], state.residual[0]
         self.uavs["active"] = self.rng.random(scenario.uavs) < 0.9

@@ -4,23 +4,14 @@ import numpy as np
 import pytest
 
 from dess import Scenario, ScenarioSpace, load_scenario, simulate
-from dess.env.stepper import MissionStepper
-from dess.view import View, acting_rows
+from dess.view import View
 from policies.planner.fluid import MOST_SLOTS, begin, empty_flight, fly
 from policies.planner.plan import CHARGE, NEVER, Plan, empty_plan, insert
 from policies.planner.rates import rates_of
 from policies.planner.search import BEST, TRIED, empty_workspace, improve
+from tests.policies.flown import first_view
 
 CALM = {"shadowing_variance": 0.0, "arrival_rate": 0.0}
-
-
-def _view(scenario: Scenario | ScenarioSpace, seed: int = 1, replication: int = 0) -> View:
-    """The first slot of a mission."""
-    stepper = MissionStepper(scenario, 1, seed)
-    stepper.start_at(seed, replication)
-    stepper.launch(stepper.indices)
-    state = stepper.state
-    return View(state, stepper.world, *acting_rows(state.missions, state.uavs, 1, 0))
 
 
 def _plan(uavs: int, *routes: list[tuple[int, int, int]]) -> Plan:
@@ -77,7 +68,7 @@ def _improved(view: View, plan: Plan, steps: int, most: int = 10_000) -> float:
 def test_a_flight_is_the_engines_where_nothing_is_random(uavs: int, quota: int) -> None:
     """Cells, batteries, the quota, charging; data within 2 %, as rates are means of a slot."""
     scenario = ScenarioSpace.of(load_scenario("fig4"), uavs=uavs, quota=quota, **CALM)
-    view, plan = _view(scenario, 5), empty_plan(uavs)
+    view, plan = first_view(scenario, 5), empty_plan(uavs)
     for i in range(uavs):
         insert(plan, i, 0, 26 + i % 4, 2 + i // 4, CHARGE, 0)
     _improved(view, plan, 3000)
@@ -99,7 +90,7 @@ def test_a_flight_is_the_engines_where_nothing_is_random(uavs: int, quota: int) 
 @pytest.mark.parametrize("replication", range(4))
 def test_more_search_is_never_worse(replication: int) -> None:
     """The value that is returned is that of the plan, and each search keeps the best it finds."""
-    view = _view(load_scenario("paper"), 777001, replication)
+    view = first_view(load_scenario("paper"), 777001, replication)
     plan, values = empty_plan(view.state.uavs.shape[1]), []
     for i in range(int(view.state.missions[0]["uavs"])):
         insert(plan, i, 0, 26 + i, 5, CHARGE, 0)
@@ -110,7 +101,7 @@ def test_more_search_is_never_worse(replication: int) -> None:
 
 
 def test_a_search_in_pieces_is_the_whole_search() -> None:
-    view, found = _view(load_scenario("paper"), 777001, 1), []
+    view, found = first_view(load_scenario("paper"), 777001, 1), []
     for most in (10_000, 700, 333):
         plan = empty_plan(view.state.uavs.shape[1])
         value = _improved(view, plan, 1000, most)
@@ -128,7 +119,7 @@ ALONE = {
 
 def test_an_emptied_node_has_data_again_when_half_a_packet_has_gathered() -> None:
     scenario = Scenario.of(**ALONE, shadowing_variance=0.0, arrival_rate=0.1)
-    view = _view(scenario)
+    view = first_view(scenario)
     empty = empty_plan(1)
     _, value, _ = _flown(view, empty, 1)
     assert value == pytest.approx(10.0 * 10.0 / 10.1)  # it hovers at the node and empties it
@@ -139,7 +130,7 @@ def test_an_emptied_node_has_data_again_when_half_a_packet_has_gathered() -> Non
 
 @pytest.mark.parametrize("rate", [0.0, 5e-324, 1e-300])
 def test_where_next_to_nothing_arrives_an_empty_node_stays_empty(rate: float) -> None:
-    view = _view(Scenario.of(**ALONE, arrival_rate=rate))
+    view = first_view(Scenario.of(**ALONE, arrival_rate=rate))
     (mission,), uavs = view.state.missions, view.state.uavs[0]
     flight = empty_flight(MOST_SLOTS, 1, 1)
     begin(mission, uavs, np.zeros(1), flight)
@@ -149,7 +140,7 @@ def test_where_next_to_nothing_arrives_an_empty_node_stays_empty(rate: float) ->
 def test_a_uav_charges_at_its_waypoint_once_its_latch_is_set() -> None:
     scenario = Scenario.of(**ALONE, **CALM)
     plan = _plan(1, [(2, 2, CHARGE), (4, 2, 0)])
-    crafts, _, _ = _flown(_view(scenario), plan, 28)
+    crafts, _, _ = _flown(first_view(scenario), plan, 28)
     batteries = [int(craft["battery"][0]) for craft in crafts]
     # 20 slots until C_S = 10, five slots to C_C = 60, and then two cells to the east.
     assert batteries == [*range(30, 9, -1), 20, 30, 40, 50, 60, 59, 58, 57]

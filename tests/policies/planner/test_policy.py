@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 import policies
 from dess import load_scenario, simulate, simulate_batch
-from dess.env.stepper import MissionStepper
 from dess.guard import guard
 from dess.scenario import ScenarioSpace
-from dess.view import View, acting_rows
+from dess.view import View
 from policies.planner import Planner, plan_of
 from policies.planner import policy as module
 from policies.planner.policy import _MEMORIES, Budget, memory_of
 from tests.drawn import Checked, extended_spaces, replications, seeds, spaces
+from tests.policies.flown import assert_same_alone, cells_of, first_view
 
 
 class Quick(Planner):
@@ -28,11 +28,6 @@ class Quick(Planner):
 
 
 QUICK = Quick()
-
-
-def _same(one: Any, records: Any, job: int) -> None:
-    assert one.metrics.tobytes() == records.missions[job].tobytes()
-    assert one.uavs.tobytes() == records.uavs[job, : len(one.uavs)].tobytes()
 
 
 @given(
@@ -47,9 +42,7 @@ def test_the_planner_does_the_same_in_any_engine_and_batch(
     space: ScenarioSpace, team: list[Any], seed: int, numbers: list[int], batch_size: int
 ) -> None:
     team = team[: space.uavs[1]]
-    records = simulate_batch(space, team, seed, numbers, batch_size=batch_size)
-    for job, number in enumerate(numbers):
-        _same(simulate(space, team, seed, number), records, job)
+    assert_same_alone(space, team, seed, numbers, batch_size=batch_size)
 
 
 def test_the_planner_does_the_same_in_two_processes() -> None:
@@ -115,11 +108,9 @@ def test_plans_go_with_the_missions_that_they_belong_to() -> None:
 
 def test_a_mission_departs_from_its_plan_by_a_node_or_by_a_uav() -> None:
     """Small surprises add up, and cancel out; those of nodes count over several slots."""
-    stepper = MissionStepper(load_scenario("paper", uavs=2), 1, 1)
-    stepper.start_at(1, 0)
-    stepper.launch(stepper.indices)
-    state = stepper.state
-    QUICK.act(View(state, stepper.world, *acting_rows(state.missions, state.uavs, 1, 0)))
+    view = first_view(load_scenario("paper", uavs=2))
+    QUICK.act(view)
+    state = view.state
     mission, memory = state.missions[0], memory_of(state, QUICK.budget)
     uavs, expected = state.uavs[0], memory.sea[0] + mission["arrival_rate"]
     for name in ("x", "y", "charging"):
@@ -167,10 +158,7 @@ def test_a_plan_is_drawn_as_it_is_flown() -> None:
     space = load_scenario("paper", uavs=1)
     plans = plan_of(space, 777001, 3, QUICK)
     record = simulate(space, QUICK, 777001, 3, events=True)
-    assert record.events is not None
-    log = record.events.columns()
-    moves = log["event"] == "move"
-    cells = [*zip(log["x"][moves].tolist(), log["y"][moves].tolist(), strict=True)]
+    cells = cells_of(record)
     assert set(plans) <= set(range(len(cells))) and 0 in plans
     kept = 0
     for slot, (course,) in plans.items():

@@ -19,8 +19,8 @@ from dess.code import memory
 from policies.learner import session
 from policies.learner.checkpoint import load_training
 from policies.learner.config import load_config
+from policies.learner.dqn import DQNTraining
 from policies.learner.ppo import ProximalTraining
-from policies.learner.training import Training
 from reports.cli import train
 from tests.analysis.small import files_of
 from tests.policies.learner.tiny import (
@@ -164,7 +164,7 @@ def test_ctrl_c_in_a_long_tick_keeps_all_ticks_before_it(kind, dess, tmp_path, m
     if "--from" in arguments:
         assert dess("train", "tiny.toml", "--device", "cpu", "--seed", 7, "--out", "begun")[0] == 0
     assert dess(*arguments, "undisturbed")[0] == 0
-    learn = Training._learn if kind == "double DQN" else ProximalTraining._learn
+    learn = DQNTraining._learn if kind == "double DQN" else ProximalTraining._learn
 
     def interrupted(training, share):
         learn(training, share)
@@ -175,7 +175,7 @@ def test_ctrl_c_in_a_long_tick_keeps_all_ticks_before_it(kind, dess, tmp_path, m
 
     with monkeypatch.context() as patch:
         patch.setattr(session, "TICK_END", 0.0)
-        patch.setattr(Training, "_learn", interrupted)
+        patch.setattr(DQNTraining, "_learn", interrupted)
         patch.setattr(ProximalTraining, "_learn", interrupted)
         code, out, err = dess(*arguments, "out")
     assert (code, out) == (130, "")
