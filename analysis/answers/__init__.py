@@ -1,1 +1,1 @@
-"""Answers from results, one subject per module; its functions return tidy tables and sentences."""
+"""Answers from results, one subject per module: its tidy tables, sentences and figures."""

@@ -1,4 +1,4 @@
-"""Policies compared: wins, regions of the parameters, times of a decision."""
+"""Two policies in the same missions: wins, regions of the parameters, times of a decision."""
 
 import platform
 from collections.abc import Callable, Iterable, Mapping
@@ -9,17 +9,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 from scipy import stats
 from threadpoolctl import threadpool_limits
 
 from analysis import numbers
 from analysis.answers.missions import FOLDER
 from analysis.answers.summary import learners, ranked_policies
+from analysis.figures import Drawing, style
+from analysis.figures.comparison import middle
 from analysis.names import METRICS, PARAMETERS, PRODUCT, RATIO, SUCCESS, parameter, value_text
 from analysis.results.tables import Results
 from analysis.stats.choices import on_front
 from analysis.stats.differences import compare, for_choice, paired, with_adjusted
-from analysis.stats.intervals import by_replication, values_within, wilson
+from analysis.stats.intervals import LEVEL, by_replication, values_within, wilson
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
 from analysis.study.stopping import Text
 from dess import InputError, simulate, simulate_batch
@@ -48,6 +51,11 @@ class Pair(NamedTuple):
     policy: str
     baseline: str
     candidates: int
+
+    @property
+    def title(self) -> str:
+        """The two policies, as in the title of their difference."""
+        return f"{self.policy} − {self.baseline}"
 
 
 def pair_of(results: Results, learned: str | None = None, heuristic: str | None = None) -> Pair:
@@ -129,6 +137,50 @@ def duels(results: Results, pair: Pair) -> pd.DataFrame:
     both = of_policy.merge(of_baseline, on="replication", suffixes=("", OF_BASELINE))
     difference = both[PRODUCT] - both[PRODUCT + OF_BASELINE]
     return both.assign(difference=difference.where(difference.abs() > _ROUNDING, 0.0))
+
+
+def distribution(missions: pd.DataFrame, pair: Pair) -> Drawing:
+    """The distribution function of the difference: the share of the missions up to each value.
+
+    The 95 % band is for the complete curve (Dvoretzky, Kiefer and Wolfowitz). A share of ``EDGE``
+    of the missions is beyond each end of the axis.
+
+    Args:
+        missions: Rows of ``duels``.
+        pair: The policies.
+    """
+    values = np.sort(missions["difference"].to_numpy(float))
+    lowest, highest = (numbers.difference(end, 0) for end in values[[0, -1]])
+    caption = (
+        f"Share of the missions (n = {len(values):,}) with at most the difference on the axis, "
+        f"with a 95 % band for the whole curve; from {lowest} to {highest} points."
+    )
+    title = f"Distribution of the difference {pair.title} of the product over the missions"
+    return Drawing(_distribution(values, pair), title, caption)
+
+
+def _distribution(values: np.ndarray, pair: Pair) -> Figure:
+    half = float(np.sqrt(np.log(2 / (1 - LEVEL)) / (2 * len(values))))
+    low, high = middle([pd.Series(values)], EDGE)
+    x = np.array([min(values[0], low) - 1, *values, max(values[-1], high) + 1])
+    y = np.array([0, *np.arange(1, len(values) + 1) / len(values), 1])
+    with style.panels(3.9) as (figure, ax):
+        for start, end, outcome in ((x[0], 0, BEHIND), (0, x[-1], AHEAD)):
+            ax.axvspan(start, end, color=COLOURS[outcome], alpha=0.11, linewidth=0, zorder=0)
+        band = np.clip([y - half, y + half], 0, 1)
+        ax.fill_between(x, *band, step="post", color=style.INK, alpha=0.2, linewidth=0, gid="band")
+        ax.step(x, y, where="post", color=style.INK, linewidth=1.8, gid="shares")
+        shares = {BEHIND: (values < 0).mean(), AHEAD: (values > 0).mean()}
+        for place, (outcome, share) in enumerate(shares.items()):
+            ax.annotate(f"{pair.policy} {outcome}: {share:.1%}", (place, 1.03),
+                        ha=("left", "right")[place], xycoords="axes fraction",
+                        color=COLOURS[outcome], gid=outcome)  # fmt: skip
+        ax.set_title("Difference in every mission", pad=22)
+        ax.set(xlim=(low, high), ylim=(0, 1), ylabel="share of the missions")
+        ax.set_xlabel(f"{pair.title}, at most [points]")
+        style.in_units(ax.xaxis, "points", 7)
+        style.in_units(ax.yaxis, "%")
+    return figure
 
 
 def overall(results: Results, pair: Pair) -> pd.DataFrame:
@@ -227,9 +279,10 @@ def _ends(results: Results, policy: str, replications: Iterable[int]) -> pd.Data
 
 
 BINS = 5  # largest number of bins of a parameter
-
+EDGE = 0.005  # share of the missions that is beyond each end of the distribution's axis
 AHEAD, BEHIND = "ahead", "behind"
 VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}
+COLOURS = {AHEAD: style.BETTER, BEHIND: style.WORSE, INCONCLUSIVE: style.MUTED}
 
 
 def varied(missions: pd.DataFrame) -> list[str]:
@@ -263,15 +316,58 @@ def along(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
         A row per parameter and bin; a parameter has at most ``BINS`` bins of about equally many
         missions. The columns are ``field``, ``position``, ``value`` in words, and those of a
         comparison: ``mean``, ``low``, ``high`` (by ``paired``, 95 %), ``p``, ``p_adjusted``
-        (Holm over all rows, Bonferroni for the choice of the pair), ``verdict``, ``n``, and
-        ``behind``, the share of missions in which the policy is worse, with ``behind_low`` and
-        ``behind_high``.
+        (Holm over all rows, Bonferroni for the choice of the pair), ``n`` and ``verdict``.
     """
-    parts = [missions[:0].assign(field="", position=0, value="")]
+    rows = []
     for field in varied(missions):
-        part = _binned(missions, field).assign(field=field)
-        parts.append(part.sort_values("position", kind="stable"))
-    return _compared(pd.concat(parts), ["field", "position", "value"], candidates)
+        bin_of, names = bins(missions[field])
+        for position, value in enumerate(names):
+            part = missions[bin_of == position]
+            ours, theirs = (values_within(part, PRODUCT + end, ()) for end in ("", OF_BASELINE))
+            found = paired(ours, theirs, metric=PRODUCT)
+            rows.append((field, position, value, *found[:4], found.n))
+    columns = ["field", "position", "value", "mean", "low", "high", "p", "n"]
+    table = with_adjusted(pd.DataFrame(rows, columns=columns), "holm")
+    table = for_choice(table, candidates)
+    sides = zip(table["mean"], table["p_adjusted"], strict=True)
+    return table.assign(verdict=[VERDICTS[position_by_test(*side)] for side in sides])
+
+
+def leads(missions: pd.DataFrame, lead: pd.DataFrame, pair: Pair, note: str = "") -> list[Drawing]:
+    """The mean difference along each parameter: for each bin a dot with its interval.
+
+    All have the same axis; the mean difference over all missions is a dashed line.
+
+    Args:
+        missions: Rows of ``duels``.
+        lead: Rows of ``along``.
+        pair: The policies.
+        note: The beginning of the captions.
+    """
+    overall = missions["difference"].mean()
+    return [
+        Drawing(
+            _lead(rows, overall, style.ends(lead, zero=True)),
+            f"Mean difference {pair.title} against {field}",
+            f"{note}n = {numbers.span(rows['n'])} missions per dot.",
+        )
+        for field, rows in lead.groupby("field", sort=False)
+    ]
+
+
+def _lead(rows: pd.DataFrame, overall: float, ends: tuple[float, float]) -> Figure:
+    with style.panels(3.5, values="y") as (figure, ax):
+        ax.axhline(0, **style.ZERO)
+        ax.axhline(overall, color=style.MUTED, linestyle="--", zorder=1, gid="overall")
+        for verdict, part in rows.groupby("verdict"):
+            fillstyle = "none" if verdict == INCONCLUSIVE else "full"
+            ax.errorbar(part["position"], part["mean"], yerr=style.arms(part), linestyle="",
+                        **style.dot((COLOURS[verdict], "o")), fillstyle=fillstyle)  # fmt: skip
+        ax.set_title(parameter(rows["field"].iloc[0]).label, parse_math=True)
+        ax.set(ylabel="mean difference [points]", ylim=ends)
+        ax.set_xticks(rows["position"], rows["value"])
+        style.in_units(ax.yaxis, "points")
+    return figure
 
 
 def dependence(missions: pd.DataFrame) -> pd.DataFrame:
@@ -311,29 +407,6 @@ def spread(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFrame:
         lines.append((parameter(row.field).name, bins_[0], bins_[-1], *shown))
     heads = ["Parameter", "Lowest difference", "Highest difference", "Variance explained"]
     return pd.DataFrame(lines, columns=[*heads, "p, adjusted"])
-
-
-def _compared(missions: pd.DataFrame, columns: list[str], candidates: int) -> pd.DataFrame:
-    """A row for every group of missions with the same labels: the labels and the comparison."""
-    rows = []
-    for labels, part in missions.groupby(columns, sort=False):
-        of_policy, of_baseline = (
-            values_within(part, PRODUCT + end, ()) for end in ("", OF_BASELINE)
-        )
-        pair = paired(of_policy, of_baseline, metric=PRODUCT)
-        behind = wilson(int((part["difference"] < 0).sum()), len(part))
-        rows.append((*labels, pair.difference, pair.low, pair.high, pair.p, len(part), *behind))
-    names = ["mean", "low", "high", "p", "n", "behind", "behind_low", "behind_high"]
-    table = pd.DataFrame(rows, columns=[*columns, *names])
-    table = for_choice(with_adjusted(table, "holm"), candidates)
-    sides = zip(table["mean"], table["p_adjusted"], strict=True)
-    return table.assign(verdict=[VERDICTS[position_by_test(*side)] for side in sides])
-
-
-def _binned(missions: pd.DataFrame, field: str) -> pd.DataFrame:
-    """The missions with ``position`` and ``value``, the number and the name of a field's bin."""
-    codes, names = bins(missions[field])
-    return missions.assign(position=codes, value=np.array(names)[codes])
 
 
 def _equal_means(groups: Any) -> float:

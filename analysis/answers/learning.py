@@ -1,9 +1,10 @@
 """Training: its curves, what a choice of the trainer is worth, and trained policies."""
 
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,7 @@ from scipy import stats
 
 from analysis import numbers
 from analysis.answers.summary import learners, settings
+from analysis.figures import Drawing
 from analysis.names import MEANS, METRICS, PRODUCT, RATIO, SHARES, SUCCESS
 from analysis.results.tables import Results
 from analysis.stats.differences import adjust
@@ -24,8 +26,13 @@ from dess.files.tables import read_table
 from policies.learner.config import TrainingConfig, learner_of
 from policies.learner.description import read_description
 
+if TYPE_CHECKING:  # figures need the extra reports
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 BASELINE = "quick"  # the variant with which the others of the shipped curves are compared
 SHIPPED = "ddqn"  # the variant of the shipped policy, which is trained longer
+FINAL = f"final_{PRODUCT}"  # the product of the weights that a training has selected
 LEARNED = 0.5  # a training with at least this success has learned to charge
 # From the paper's methods to the shipped policy: variants, by what each adds to the one before.
 LADDER = {
@@ -56,33 +63,30 @@ def ladder(last: pd.DataFrame) -> pd.DataFrame:
     return named.sort_values("variant", key=lambda names: names.map([*LADDER].index), kind="stable")
 
 
-def ablation(last: pd.DataFrame, metric: str, baseline: str, level: float = LEVEL) -> pd.DataFrame:
-    """The final metric of every variant, and its difference from the baseline.
+def ablation(last: pd.DataFrame, baseline: str) -> pd.DataFrame:
+    """The final product of every variant, and its difference from the baseline.
 
     Args:
         last: Rows of ``finals``.
-        metric: The column of the final metric.
         baseline: The variant with which the others are compared.
-        level: Confidence level.
 
     Returns:
         A row per variant, the highest mean first: ``variant``, ``n`` trainings; ``mean``, ``low``,
         ``high`` of the expected result; ``new_low`` and ``new_high`` of one new training (nan with
-        one training; the ends for metrics from 0 to 1 are cut there); ``difference``,
+        one training; the ends are cut at 0 and 1); ``difference``,
         ``difference_low``, ``difference_high``, ``p`` and ``p_adjusted`` (Holm), of ``difference``;
         nan for the baseline.
     """
-    values = {v: part[metric].to_numpy() for v, part in last.groupby("variant", sort=False)}
-    limits = (0.0, 1.0) if metric.removeprefix("final_") in METRICS else (-np.inf, np.inf)
+    values = {v: part[FINAL].to_numpy() for v, part in last.groupby("variant", sort=False)}
     rows = []
     for variant, sample in values.items():
-        mean, _, high = mean_interval(sample, level)
+        mean, _, high = mean_interval(sample)
         alone, half = len(sample) == 1, high - mean
         room = np.array([-half, half, *(np.sqrt(len(sample) + 1) * np.array([-half, half]))])
-        ends = np.full(4, np.nan) if alone else np.clip(mean + room, *limits)
+        ends = np.full(4, np.nan) if alone else np.clip(mean + room, 0.0, 1.0)
         gap, p = Interval(np.nan, np.nan, np.nan), np.nan
         if variant != baseline:
-            gap, p = difference(sample, values[baseline], level)
+            gap, p = difference(sample, values[baseline])
         rows.append((variant, len(sample), mean, *ends, *gap, p))
     columns = ["variant", "n", "mean", "low", "high", "new_low", "new_high"]
     columns += ["difference", "difference_low", "difference_high", "p"]
@@ -92,6 +96,70 @@ def ablation(last: pd.DataFrame, metric: str, baseline: str, level: float = LEVE
     return table.sort_values("mean", ascending=False, kind="stable", ignore_index=True)
 
 
+# A variant is off the axis if all of its trainings reach less than this share of the baseline.
+OFF = 0.5
+
+
+def methods(rungs: pd.DataFrame) -> Drawing:
+    """The product that trainings reach with each further method.
+
+    Args:
+        rungs: Rows of ``ladder``.
+    """
+    order = rungs["variant"].unique()
+    table = ablation(rungs, order[-1]).set_index("variant").loc[order].reset_index()
+    return variants(table, rungs, order[-1], "The product that trainings reach, method by method")
+
+
+def variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str, alt: str) -> Drawing:
+    """The product of every variant: trainings as dots, their mean with interval as a diamond.
+
+    Args:
+        table: Rows of ``ablation``.
+        last: Rows of ``finals``.
+        baseline: The variant whose mean is drawn as a line. Variants of which no training reaches
+            ``OFF`` times as much are an arrow at the edge, unless another has some that do.
+        alt: What the figure shows.
+    """
+    caption = (
+        "A dot is a training; a diamond is the mean of n trainings with its 95 % interval "
+        f"(Student's t). Dashed: the mean of {baseline}. An arrow: all trainings are left of the "
+        "axis."
+    )
+    return Drawing(_variants(table, last, baseline), alt, caption)
+
+
+def _variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> "Figure":
+    from analysis.figures import style
+
+    values = last.groupby("variant")[FINAL]
+    level = table.loc[table["variant"] == baseline, "mean"].item()
+    drawn = pd.concat([last[FINAL], table["low"], table["high"]])
+    split = ((values.min() < OFF * level) & (values.max() >= OFF * level)).any()
+    ends = drawn[drawn >= (0 if split else OFF * level)].agg(["min", "max"])
+    room = 0.06 * (ends["max"] - ends["min"]) or 0.01
+    left, right = max(ends["min"] - room, -0.02), min(ends["max"] + room, 1.02)
+    with style.panels(0.9 + 0.42 * len(table), values="x") as (figure, ax):
+        ax.axvline(level, color=style.INK, linestyle="--", linewidth=1, zorder=1, gid="baseline")
+        for y, (_, row) in enumerate(table.iterrows()):
+            name, reached = row["variant"], values.get_group(row["variant"])
+            if reached.max() < left:
+                ax.plot(left, y, "<", color=style.INK, markersize=7, clip_on=False, gid=name)
+            else:
+                ax.scatter(reached, np.full(len(reached), y + 0.18 * (row["n"] > 1)), s=18,
+                           color=style.MUTED, zorder=3, gid=name)  # fmt: skip
+                if row["n"] > 1:
+                    look = style.dot((style.palette()[0], "D"))
+                    ax.errorbar(row["mean"], y - 0.14, xerr=style.arms(row), **look)
+            style.note_at_right(f"{row['mean']:.1%}, n = {row['n']}", y, ax)
+        names = ["\n".join(textwrap.wrap(variant, 22)) for variant in table["variant"]]
+        ax.set_yticks(range(len(table)), names)
+        ax.set(title=METRICS[PRODUCT], ylim=(len(table) - 0.4, -0.6))
+        style.in_units(ax.xaxis, "%", 5)
+        ax.set_xlim(left, right)
+    return figure
+
+
 def answer(rungs: pd.DataFrame) -> str:
     """What the methods add up to, and which adds most, in a sentence.
 
@@ -99,7 +167,7 @@ def answer(rungs: pd.DataFrame) -> str:
         rungs: Rows of ``ladder``.
     """
     by_rung = rungs.groupby("variant", sort=False)
-    means = by_rung[f"final_{PRODUCT}"].mean()
+    means = by_rung[FINAL].mean()
     reached = [f"{numbers.percent(mean)} ({rung})" for rung, mean in means.items()]
     if len(reached) == 1:
         return f"Trainings reach a product of {reached[0]}."
@@ -139,7 +207,7 @@ def difference(
 
 
 def ablation_table(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> pd.DataFrame:
-    """The rows of ``ablation`` for product, as a table of text.
+    """The rows of ``ablation`` as a table of text.
 
     Args:
         table: Rows of ``ablation``.
@@ -173,11 +241,9 @@ def _interval(mean: float, low: float, high: float) -> str:
     return numbers.interval(mean, low, high) if low < high else numbers.percent(mean)
 
 
-# The metric that is evaluated while training.
-LEARNED_REWARD, LEARNED_PRODUCT = (
-    "evaluation_reward",
-    "evaluation_collection_ratio_and_communication",
-)
+# The metrics that are evaluated while training, and their names.
+LEARNED_REWARD, LEARNED_PRODUCT = "evaluation_reward", f"evaluation_{PRODUCT}"
+SHOWN = {LEARNED_REWARD: "Cumulative reward", LEARNED_PRODUCT: METRICS[PRODUCT]}
 # Pairs of variants of the shipped curves, with and without transfer learning, by what both have in
 # common otherwise.
 PAIRS = {
@@ -189,10 +255,18 @@ PAIRS = {
         "none of the three, no transfer, long",
     ),
 }
+_SIDES = ("with transfer", "without")
 # Weight of the newest evaluation in the exponential moving average.
 ALPHA = 0.5
 # Level of the intervals of the paper's Fig. 3.
 BAND = 0.99
+
+
+# What holds for all figures of trainings.
+TRAININGS = (
+    "A line is the exponential moving average of a training, n = 1 (weight of the newest "
+    f"evaluation {ALPHA:g}); dotted: phase I."
+)
 
 
 @dataclass(frozen=True)
@@ -245,6 +319,72 @@ def pairs_in(curves: pd.DataFrame) -> dict[str, tuple[str, str]]:
     return {name: pair for name, pair in PAIRS.items() if {*pair} <= variants}
 
 
+def transfer_drawings(curves: pd.DataFrame) -> list[Drawing]:
+    """Trainings with transfer learning and without it, as in Fig. 3: the first and the last pair.
+
+    Args:
+        curves: Rows of ``read_curves``.
+    """
+    pairs = pairs_in(curves)
+    return [
+        Drawing(
+            trainings(curves, metric, dict(zip(pairs[name], _SIDES, strict=True))),
+            f"{SHOWN[metric]} against training step, {name}, with and without transfer",
+            f"Trainings with {name}.",
+        )
+        for name in dict.fromkeys([[*pairs][0], [*pairs][-1]])
+        for metric in SHOWN
+    ]
+
+
+def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> "Figure":
+    """A metric against the training step, a line for each training: Fig. 3.
+
+    Phases before the last one are dotted, and a vertical line marks the beginning of the last
+    phase. The axis at the top shows the UAV-slots that have been simulated.
+
+    Args:
+        curves: Rows of ``read_curves``, or of ``curves_by_learner``.
+        metric: One of ``SHOWN``.
+        labels: The variants to draw, with their names in the legend.
+    """
+    from analysis.figures import style
+
+    drawn = curves[curves["variant"].isin(labels)]
+    averages = smoothed(drawn, metric)
+    looks = zip(labels.items(), style.palette(), style.LINES, strict=False)
+    with style.panels(3.9, values="y", legend=2) as (figure, ax):
+        for (variant, label), colour, line in looks:
+            of_variant = averages[averages["variant"] == variant]
+            last, n = of_variant["phase"].iloc[-1], of_variant["seed"].nunique()
+            names = {last: f"{label}, n = {n}"}
+            for (_, phase), curve in of_variant.groupby(["seed", "phase"], sort=False):
+                ax.plot(curve["updates"], curve["value"], line if phase == last else ":",
+                        color=colour, linewidth=1.6, label=names.pop(phase, ""))  # fmt: skip
+            start = of_variant.loc[of_variant["phase"] != last, "updates"].max()
+            if start > 0:  # not if it is nan
+                ax.axvline(start, color=style.MUTED, linewidth=1, zorder=1, gid="last phase")
+                ax.annotate("phase II", (start, 0), xycoords=("data", "axes fraction"),
+                            xytext=(4, 12), textcoords="offset points", fontsize=8.5,
+                            **style.OUTLINED)  # fmt: skip
+        low, high = averages["value"].min(), averages["value"].max()
+        room = 0.12 * (high - low) or 0.1
+        style.in_units(ax.yaxis, "%" if metric == LEARNED_PRODUCT else "")
+        ax.set(title=SHOWN[metric], ylim=(low - room, high + room))
+        _steps_axis(drawn, ax)
+    return figure
+
+
+def _steps_axis(curves: pd.DataFrame, ax: "Axes") -> None:
+    """The training step below the axes, and the UAV-slots simulated until then above them."""
+    longest = curves.sort_values("updates").iloc[-1]
+    ax.set(xlim=(0, longest["updates"] * 1.02), xlabel="training step [1000 updates]")
+    ax.xaxis.set_major_formatter(lambda x, _: f"{x / 1000:g}")
+    slots = longest["uav_slots"] / longest["updates"] / 1e6
+    top = ax.secondary_xaxis("top", (lambda x: x * slots, lambda x: x / slots))
+    top.set_xlabel("UAV-slots [millions]")
+
+
 def last_phase(averages: pd.DataFrame, variant: str) -> pd.DataFrame:
     """The (steps, trainings) averages of a variant in its last phase, at their common steps."""
     curves = averages[averages["variant"] == variant]
@@ -252,9 +392,7 @@ def last_phase(averages: pd.DataFrame, variant: str) -> pd.DataFrame:
     return curves.pivot(index="updates", columns="seed", values="value").dropna()
 
 
-def transfer(
-    averages: pd.DataFrame, using: str, without: str, shortest: int, level: float = BAND
-) -> Transfer:
+def transfer(averages: pd.DataFrame, using: str, without: str, shortest: int) -> Transfer:
     """Whether a variant with transfer learning overtakes the one without it and ends higher.
 
     They are compared in the last phase of both, in which both train in missions with battery
@@ -265,7 +403,6 @@ def transfer(
         using: The variant with transfer learning.
         without: The variant without it.
         shortest: Trainings of fewer steps are inconclusive.
-        level: Confidence level of the last difference.
     """
     a, b = (last_phase(averages, variant) for variant in (using, without))
     steps = a.index.intersection(b.index)
@@ -273,7 +410,7 @@ def transfer(
     behind = np.flatnonzero(lead <= 0)
     first = behind[-1] + 1 if len(behind) else 0
     since = int(steps[first]) if first < len(steps) else None
-    last = difference(a.loc[steps[-1]].to_numpy(), b.loc[steps[-1]].to_numpy(), level)[0]
+    last = difference(a.loc[steps[-1]].to_numpy(), b.loc[steps[-1]].to_numpy(), BAND)[0]
     length = int(steps[-1])
     verdict = judged(above(last)) if length >= shortest else INCONCLUSIVE
     return Transfer(verdict, since, not len(behind), last, length, (a.shape[1], b.shape[1]))
@@ -490,6 +627,16 @@ def curves_by_learner(policies: Iterable[Trained]) -> pd.DataFrame:
         for group in learners.values()
         for policy in group
     )
+
+
+def shipped_drawings(policies: Iterable[Trained]) -> list[Drawing]:
+    """The trainings of policies: their curves in the metrics that are evaluated."""
+    curves = curves_by_learner(policies)
+    labels = {name: name for name in curves["variant"].unique()}
+    return [
+        Drawing(trainings(curves, metric, labels), f"{SHOWN[metric]} of the shipped policies")
+        for metric in SHOWN
+    ]
 
 
 def course_in_words(policy: Trained, margin: float) -> str:

@@ -10,6 +10,7 @@ import pandas as pd
 import pyarrow as pa
 
 from analysis import numbers
+from analysis.figures import Drawing
 from analysis.names import PRODUCT, RATIO
 from analysis.results import parquet
 from analysis.results.event_log import Events, causes
@@ -167,6 +168,37 @@ def estimate(results: Results, policy: str, metric: str = PRODUCT, point: int | 
     if point is not None:
         missions = missions[missions["point"] == point]
     return summary(missions, by=["policy"]).query("metric == @metric").iloc[0]
+
+
+def drawing(mission: LoggedMission, alt: str, caption: str) -> Drawing:
+    """The map of a mission and its curves over time.
+
+    Args:
+        mission: The mission.
+        alt: What the figure shows.
+        caption: The text below it.
+    """
+    from analysis.figures.missions import mission_figure  # figures need the extra reports
+
+    return Drawing(mission_figure(mission.log, mission.scenario), alt, caption)
+
+
+def beside_paper(results: Results, mission: LoggedMission, printed: float) -> Drawing:
+    """A mission, with the mean collection ratio of its policy and the paper's number.
+
+    Args:
+        results: The study of the mission.
+        mission: The mission.
+        printed: The collection ratio that the paper prints.
+    """
+    row = mission.row
+    mean = estimate(results, row["policy"], RATIO, row["point"])
+    caption = (
+        f"n = 1 mission of {row['slots']} slots; {mission.collected}. The mean of this policy, "
+        f"n = {mean['n']:,}, is {numbers.estimate(mean)}, the paper's {numbers.percent(printed)}."
+    )
+    alt = f"Map of the mission with {mission.fleet}; battery, residual data and charging"
+    return drawing(mission, alt, caption)
 
 
 def outcome_table(missions: Sequence[LoggedMission]) -> pd.DataFrame:

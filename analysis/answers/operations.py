@@ -12,11 +12,14 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.answers import settings
-from analysis.names import AGE, PRODUCT, value_text
+from analysis.figures import Drawing
+from analysis.figures.missions import courses
+from analysis.figures.settings import lines
+from analysis.names import AGE, PRODUCT, metric_name, value_text
 from analysis.results.event_log import duration
 from analysis.results.tables import Results
 from analysis.stats.differences import column_tests, relative_change
-from analysis.stats.intervals import by_replication, check_share
+from analysis.stats.intervals import LEVEL, by_replication, check_share
 from dess import InputError
 
 # The published changes of the average age of information, from one UAV to this number, in another
@@ -45,6 +48,32 @@ def means(results: Results, metrics: Iterable[str]) -> pd.DataFrame:
     fields = [*settings.varied(results)]
     tables = [settings.averaged(results, fields, m).assign(metric=m) for m in metrics]
     return pd.concat(tables, ignore_index=True)[["metric", "policy", *fields, *_ENDS, "n"]]
+
+
+def drawings(
+    means: pd.DataFrame, x: str, line: str, panel: str, against: str, linked: bool = False
+) -> dict[str, Drawing]:
+    """The means of metrics against a field, by metric.
+
+    Args:
+        means: Rows of ``means``.
+        x: The field.
+        line: The field with a curve for each value.
+        panel: The column with a panel for each value.
+        against: The two fields in words.
+        linked: Whether pages link to the data.
+    """
+    counted = numbers.span(means["n"])
+    caption = f"n = {counted} missions per dot; bars are {numbers.level(LEVEL)} intervals."
+    return {
+        str(metric): Drawing(
+            lines(rows, x, line, str(metric), panel),
+            f"{metric_name(str(metric))} against {against}",
+            caption,
+            rows if linked else None,
+        )
+        for metric, rows in means.groupby("metric", sort=False)
+    }
 
 
 def changes(
@@ -235,6 +264,21 @@ def queues(results: Results, policy: str, points: Iterable[int]) -> pd.DataFrame
         rows = pd.concat([fields.reset_index(), rows], axis=1)
         tables.append(rows.assign(n=len(logged)))
     return pd.concat(tables, ignore_index=True)
+
+
+def waits(results: Results, margin: float) -> Drawing:
+    """The queues with the fewest pads, and with one pad less than is enough, by fleet."""
+    rows = queues(results, results.policies[0], short_of_pads(results, margin))
+    titles = {uavs: f"UAVs that wait for a pad: {uavs} UAVs" for uavs in rows["uavs"].unique()}
+    panels = rows.assign(panel=rows["uavs"])
+    low, high = map(numbers.level, BAND)
+    return Drawing(
+        courses(panels, "pads", "", titles, "Number of charging pads"),
+        "The number of UAVs that wait for a pad over the slots of the mission",
+        f"Mean of n = {rows['n'].min()} missions; the band is from the {low} to the {high} "
+        "quantile.",
+        rows,
+    )
 
 
 def _pairs(table: pd.DataFrame, field: str, reference: Any) -> Iterator[tuple[int, int]]:

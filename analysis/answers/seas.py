@@ -8,12 +8,16 @@
 The seas are the sampling units: what a policy reaches on a sea is its mean over the missions there.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 
 from analysis import numbers
 from analysis.answers import comparison
 from analysis.answers.comparison import Times
+from analysis.figures import Drawing, style
+from analysis.figures.settings import decision_times
 from analysis.names import BOUND, PRODUCT, SUCCESS
 from analysis.results.tables import Results
 from analysis.stats.differences import column_tests, relative_change
@@ -27,6 +31,7 @@ _NODES_IN_WORDS = ("1 to 15", "16 to 30", "31 to 60", "61 and more")
 ALL = "all"
 REFERENCES = ("planner", "planner-long")  # the slow policies that others are compared with
 GROUPS = {"family": "Family", "nodes": "Nodes", "uavs": "UAVs"}
+_ENDS = ["mean", "low", "high"]
 
 
 def missions(results: Results) -> pd.DataFrame:
@@ -35,7 +40,7 @@ def missions(results: Results) -> pd.DataFrame:
     Raises:
         InputError: If the design of the study is not a set of seas.
     """
-    names = [str(values.get(SEA, "")) for values in results.store.manifest.values]
+    names = _names(results)
     if not all(":" in name for name in names):
         raise InputError(f"{results.store.folder}: no study of seas; allowed: one whose design is")
     counts = np.array([len(space.nodes) for space in results.store.manifest.scenarios])
@@ -60,13 +65,8 @@ def quality(results: Results, by: str = ALL, metric: str = PRODUCT) -> pd.DataFr
         A row per group and policy: ``by``, ``policy``, ``metric``, ``mean``, ``low``, ``high`` and
         ``n`` seas.
     """
-    tables = []
-    for group, values in _by_sea(results, by, metric):
-        means = column_intervals(values).reset_index(names="policy")
-        tables.append(means.assign(**{by: group}, metric=metric))
-    return pd.concat(tables, ignore_index=True)[
-        [by, "policy", "metric", "mean", "low", "high", "n"]
-    ]
+    table = _of_groups(results, by, metric, column_intervals)
+    return table.assign(metric=metric)[[by, "policy", "metric", *_ENDS, "n"]]
 
 
 def gains(results: Results, baseline: str, by: str = ALL) -> pd.DataFrame:
@@ -76,12 +76,11 @@ def gains(results: Results, baseline: str, by: str = ALL) -> pd.DataFrame:
         A row per group and policy: ``by``, ``policy``, ``difference`` with ``low``, ``high`` and
         ``p``, and ``n`` seas.
     """
-    tables = []
-    for group, values in _by_sea(results, by, PRODUCT):
-        others = values.drop(columns=baseline)
-        tests = column_tests(others, values[baseline]).reset_index(names="policy")
-        tables.append(tests.assign(**{by: group}))
-    return pd.concat(tables, ignore_index=True)
+
+    def compared(values: pd.DataFrame) -> pd.DataFrame:
+        return column_tests(values.drop(columns=baseline), values[baseline])
+
+    return _of_groups(results, by, PRODUCT, compared)
 
 
 def shares(results: Results, reference: str, by: str = ALL) -> pd.DataFrame:
@@ -90,24 +89,45 @@ def shares(results: Results, reference: str, by: str = ALL) -> pd.DataFrame:
     Returns:
         A row per group and policy: ``by``, ``policy``, ``mean``, ``low``, ``high`` and ``n`` seas.
     """
-    rows = []
-    for group, values in _by_sea(results, by, PRODUCT):
+
+    def compared(values: pd.DataFrame) -> pd.DataFrame:
         known = values[reference].to_numpy()
-        for policy in values:
-            ends = 1 + np.array(relative_change(values[policy].to_numpy(), known))
-            rows.append((group, policy, *ends, len(values)))
-    return pd.DataFrame(rows, columns=[by, "policy", "mean", "low", "high", "n"])
+        changes = {name: relative_change(of.to_numpy(), known) for name, of in values.items()}
+        return (1 + pd.DataFrame(changes, index=_ENDS).T).assign(n=len(values))
+
+    return _of_groups(results, by, PRODUCT, compared)[[by, "policy", *_ENDS, "n"]]
 
 
-def front(results: Results, times: Times) -> pd.DataFrame:
-    """The product over all seas and the time of a decision of every policy that was timed.
+def by_group(results: Results, reference: str) -> list[Drawing]:
+    """What every policy reaches in groups of seas, as a share of what a reference does."""
+    drawings = []
+    for by, name in GROUPS.items():
+        table = shares(results, reference, by)
+        looks = style.policy_colours(table["policy"])
+        with style.panels(4.2) as (figure, ax):
+            style.along(style.placed(table, by), looks, "%", ax, linestyle="")
+            ax.set(ylabel=f"product, share of {reference}")
+            ax.legend(loc="lower left", ncols=4)
+        alt = f"The product as a share of that of {reference}, by {name.lower()}"
+        caption = f"n = {table['n'].min()} seas and more per dot; bars are 95 % intervals."
+        drawings.append(Drawing(figure, alt, caption, table))
+    return drawings
 
-    Returns:
-        A row per policy, the fastest first: ``policy``, ``mean``, ``low``, ``high``, ``n``,
-        ``seconds`` (of a decision for a UAV, in batches), and ``on_front``.
+
+def front(results: Results, times: Times) -> Drawing:
+    """The product over all seas against the time of a decision of every policy that was timed.
+
+    Its data have a row per policy, the fastest first: ``policy``, ``mean``, ``low``, ``high``,
+    ``n``, ``seconds`` (of a decision for a UAV, in batches), and ``on_front``.
     """
-    seconds = {cost.policy: cost.batch for cost in times.costs}
-    return comparison.front(quality(results), seconds)
+    points = comparison.front(quality(results), {c.policy: c.batch for c in times.costs})
+    return Drawing(
+        decision_times(points),
+        "Time of a decision against the product over all seas, and the Pareto front",
+        f"n = {points['n'].max()} seas; bars are 95 % intervals over seas. Times are those of a "
+        "decision for a UAV on one core, many missions side by side.",
+        points,
+    )
 
 
 def summary(results: Results, times: Times) -> pd.DataFrame:
@@ -154,7 +174,7 @@ def answer(results: Results, times: Times, policy: str, reference: str, baseline
     seconds = {cost.policy: cost.batch for cost in times.costs}
     slow, fast = seconds.get(reference), seconds.get(policy)
     faster = f" in 1/{slow / fast:,.0f} of its time" if slow and fast else ""
-    reached = numbers.interval(*share[["mean", "low", "high"]])
+    reached = numbers.interval(*share[_ENDS])
     more = numbers.points(*gain[["difference", "low", "high"]])
     return (
         f"On {share['n']} unseen seas, {policy} reaches {reached} of the product of "
@@ -163,7 +183,18 @@ def answer(results: Results, times: Times, policy: str, reference: str, baseline
 
 
 def _names(results: Results) -> list[str]:
-    return [str(values[SEA]) for values in results.store.manifest.values]
+    return [str(values.get(SEA, "")) for values in results.store.manifest.values]
+
+
+def _of_groups(
+    results: Results, by: str, metric: str, estimate: Callable[[pd.DataFrame], pd.DataFrame]
+) -> pd.DataFrame:
+    """What is estimated of every group: the group and ``policy``, then the estimates."""
+    tables = [
+        estimate(values).reset_index(names="policy").assign(**{by: group})
+        for group, values in _by_sea(results, by, metric)
+    ]
+    return pd.concat(tables, ignore_index=True)
 
 
 def _by_sea(results: Results, by: str, metric: str) -> list[tuple[object, pd.DataFrame]]:
@@ -173,6 +204,8 @@ def _by_sea(results: Results, by: str, metric: str) -> list[tuple[object, pd.Dat
     groups = [*means[by].unique()]
     if by in ("uavs", "nodes"):  # by the first number
         groups.sort(key=lambda group: int(str(group).partition(" ")[0]))
-    wide = [means[means[by] == group].pivot(index="sea", columns="policy", values=metric)
-            for group in groups]  # fmt: skip
-    return [(g, w[results.policies]) for g, w in zip(groups, wide, strict=True)]
+    return [
+        (group, rows.pivot(index="sea", columns="policy", values=metric)[results.policies])
+        for group in groups
+        for rows in [means[means[by] == group]]
+    ]

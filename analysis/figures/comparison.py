@@ -1,46 +1,16 @@
-"""Figures that compare policies: wins, regions, gaps to the bound, families of seas."""
+"""Figures that compare policies: paired differences, means, gaps to the bound, claims."""
 
 from collections.abc import Mapping, Sequence
 from textwrap import fill
 
-import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.answers.comparison import AHEAD, BEHIND, Pair
-from analysis.answers.optimality import ALL
 from analysis.figures import style
-from analysis.names import BOUND, METRICS, PRODUCT, metric_label, parameter
+from analysis.names import BOUND, METRICS, PRODUCT, metric_label
 from analysis.numbers import counted
-from analysis.stats.intervals import LEVEL
-from analysis.stats.verdict import INCONCLUSIVE
 
-COLOURS = {AHEAD: style.BETTER, BEHIND: style.WORSE, INCONCLUSIVE: style.MUTED}
-EDGE = 0.005  # share of the missions that is beyond each end of the distribution's axis
-TAIL = 0.05  # the same of the second panel of ``spread``
-
-
-def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
-    """The mean difference along a parameter: for each bin a dot with its interval.
-
-    Args:
-        table: All rows of ``answers.comparison.along``, so that all figures have the same axis.
-        field: The parameter.
-        overall: The mean difference over all missions, drawn as a dashed line.
-    """
-    rows = table[table["field"] == field]
-    with style.panels(3.5, values="y") as (figure, ax):
-        ax.axhline(0, **style.ZERO)
-        ax.axhline(overall, color=style.MUTED, linestyle="--", zorder=1, gid="overall")
-        for verdict, part in rows.groupby("verdict"):
-            fillstyle = "none" if verdict == INCONCLUSIVE else "full"
-            ax.errorbar(part["position"], part["mean"], yerr=style.arms(part), linestyle="",
-                        **style.dot((COLOURS[verdict], "o")), fillstyle=fillstyle)  # fmt: skip
-        ax.set_title(parameter(field).label, parse_math=True)
-        ax.set(ylabel="mean difference [points]", ylim=style.ends(table, zero=True))
-        ax.set_xticks(rows["position"], rows["value"])
-        style.in_units(ax.yaxis, "points")
-    return figure
+TAIL = 0.05  # share of the missions that is beyond each end of the second panel of ``spread``
 
 
 def claims(table: pd.DataFrame, width: int = 60) -> Figure:
@@ -65,40 +35,6 @@ def claims(table: pd.DataFrame, width: int = 60) -> Figure:
         ax.set_yticks(range(len(names)), lines)
         ax.set(ylim=(len(names) - 0.5, -0.5), xlabel="ours minus the paper's [points]")
         style.in_units(ax.xaxis, "points")
-    return figure
-
-
-def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
-    """The distribution function of the difference: the share of the missions up to each value.
-
-    The 95 % band is for the complete curve (Dvoretzky, Kiefer and Wolfowitz). A share of ``EDGE``
-    of the missions is beyond each end of the axis.
-
-    Args:
-        missions: Rows of ``answers.comparison.duels``.
-        pair: The policies.
-    """
-    values = np.sort(missions["difference"].to_numpy(float))
-    half = float(np.sqrt(np.log(2 / (1 - LEVEL)) / (2 * len(values))))
-    low, high = _middle([missions["difference"]], EDGE)
-    x = np.array([min(values[0], low) - 1, *values, max(values[-1], high) + 1])
-    y = np.array([0, *np.arange(1, len(values) + 1) / len(values), 1])
-    with style.panels(3.9) as (figure, ax):
-        for start, end, outcome in ((x[0], 0, BEHIND), (0, x[-1], AHEAD)):
-            ax.axvspan(start, end, color=COLOURS[outcome], alpha=0.11, linewidth=0, zorder=0)
-        band = np.clip([y - half, y + half], 0, 1)
-        ax.fill_between(x, *band, step="post", color=style.INK, alpha=0.2, linewidth=0, gid="band")
-        ax.step(x, y, where="post", color=style.INK, linewidth=1.8, gid="shares")
-        shares = {BEHIND: (values < 0).mean(), AHEAD: (values > 0).mean()}
-        for place, (outcome, share) in enumerate(shares.items()):
-            ax.annotate(f"{pair.policy} {outcome}: {share:.1%}", (place, 1.03),
-                        ha=("left", "right")[place], xycoords="axes fraction",
-                        color=COLOURS[outcome], gid=outcome)  # fmt: skip
-        ax.set_title("Difference in every mission", pad=22)
-        ax.set(xlim=(low, high), ylim=(0, 1), ylabel="share of the missions")
-        ax.set_xlabel(f"{pair.policy} − {pair.baseline}, at most [points]")
-        style.in_units(ax.xaxis, "points", 7)
-        style.in_units(ax.yaxis, "%")
     return figure
 
 
@@ -129,17 +65,7 @@ def gains(answers: pd.DataFrame) -> Figure:
     """
     names = {metric: name.replace(" and ", "\nand ") for metric, name in METRICS.items()}
     rows = answers[answers["metric"].isin([*names])]
-    return _differences(rows, rows["metric"].map(names), "Variation − baseline")
-
-
-def differences(table: pd.DataFrame) -> Figure:
-    """Paired differences from a baseline, by number of UAVs.
-
-    Args:
-        table: Rows of ``optimality.planner.differences``.
-    """
-    names = table["uavs"].map(lambda uavs: uavs if uavs == ALL else counted(uavs, "UAV"))
-    return _differences(table, names, f"Difference from {table['baseline'].iloc[0]}")
+    return differences(rows, rows["metric"].map(names), "Variation − baseline")
 
 
 def spread(differences: Mapping[str, pd.Series]) -> Figure:
@@ -156,7 +82,7 @@ def spread(differences: Mapping[str, pd.Series]) -> Figure:
             ax.axhline(0.5, color=style.MUTED, linewidth=0.9, linestyle=":", zorder=1)
             ax.set_title(title)
             style.in_units(ax.xaxis, "points", 7)
-        axes[1].set(xlim=_middle([*differences.values()], TAIL), xlabel="percentage points")
+        axes[1].set(xlim=middle([*differences.values()], TAIL), xlabel="percentage points")
     return figure
 
 
@@ -164,9 +90,9 @@ def gaps(table: pd.DataFrame) -> Figure:
     """The product of every policy and the upper bound, in a panel per number of UAVs.
 
     Args:
-        table: Rows of ``optimality.gap.by_fleet``.
+        table: Rows of ``answers.optimality.useful``.
     """
-    fleets = [*table[table["uavs"] != ALL].groupby("uavs", sort=False)]
+    fleets = [*table.groupby("uavs", sort=False)]
     height = (0.75 + 0.22 * table["policy"].nunique()) * len(fleets) + 0.6
     with style.panels(height, len(fleets), "x", sharex=True, squeeze=False) as (figure, axes):
         for ax, (uavs, rows) in zip(axes.flat, fleets, strict=True):
@@ -180,8 +106,14 @@ def gaps(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _differences(rows: pd.DataFrame, names: pd.Series, title: str) -> Figure:
-    """Paired differences of every policy by what has these names, in their order."""
+def differences(rows: pd.DataFrame, names: pd.Series, title: str) -> Figure:
+    """Paired differences of every policy by what has these names, in their order.
+
+    Args:
+        rows: Rows with ``policy``, ``difference``, ``low`` and ``high``.
+        names: The name of what each row is about.
+        title: The title of the figure.
+    """
     rows = style.placed(rows.assign(mean=rows["difference"], name=names), "name")
     with style.panels(3.6, values="y") as (figure, ax):
         ax.axhline(0, **style.ZERO)
@@ -192,25 +124,9 @@ def _differences(rows: pd.DataFrame, names: pd.Series, title: str) -> Figure:
     return figure
 
 
-def _middle(values: Sequence[pd.Series], tail: float) -> tuple[float, float]:
-    """The ends of an axis with 0 that leaves out a share of the values at each side."""
+def middle(values: Sequence[pd.Series], tail: float) -> tuple[float, float]:
+    """The ends of an axis with 0 that leaves out a share ``tail`` of the values at each side."""
     low = min(0.0, *(of.quantile(tail) for of in values))
     high = max(0.0, *(of.quantile(1 - tail) for of in values))
     room = max(0.04 * (high - low), 0.01)
     return low - room, high + room
-
-
-def groups(table: pd.DataFrame, by: str, title: str) -> Figure:
-    """What every policy reaches in groups of seas, with intervals.
-
-    Args:
-        table: Rows of ``analysis.answers.seas.quality`` or ``shares``.
-        by: The column of the groups.
-        title: Of the vertical axis.
-    """
-    looks = style.policy_colours(table["policy"])
-    with style.panels(4.2) as (figure, ax):
-        style.along(style.placed(table, by), looks, "%", ax, linestyle="")
-        ax.set(ylabel=title)
-        ax.legend(loc="lower left", ncols=4)
-    return figure

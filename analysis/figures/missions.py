@@ -1,25 +1,23 @@
-"""Figures of one mission: its map, batteries, residual data, age and charging zone; maps of nodes.
+"""Figures of one mission: its map, batteries, residual data, age, charging zone; mean courses.
 
 Each function of a panel takes the event log of the mission (a data frame, or the columns, of
 ``dess.record.EventLog``), its ``dess.Scenario`` and the axes to draw on; ``mission_figure`` puts
 them together. Nothing touches pyplot's state.
 """
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
 
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
-import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from analysis import numbers
 from analysis.figures import style
+from analysis.names import value_text
 from analysis.results.event_log import (
     Events,
     battery_levels,
@@ -29,9 +27,6 @@ from analysis.results.event_log import (
     uav_slots,
 )
 from dess.scenario import Scenario, ScenarioSpace
-
-if TYPE_CHECKING:
-    from policies.planner import Course
 
 # Width [cells] over which UAVs on the same path are drawn side by side.
 SPREAD = 0.4
@@ -187,56 +182,31 @@ def sea_figure(space: ScenarioSpace) -> Figure:
     return figure
 
 
-def node_map(
-    space: ScenarioSpace,
-    title: str,
-    values: np.ndarray,
-    signed: bool = False,
-    write: Callable[[float], str] = "{:.0%}".format,
+def courses(
+    rows: pd.DataFrame, line: str, unit: str, titles: Mapping[object, str], heading: str = ""
 ) -> Figure:
-    """A map with the nodes of a scenario in the colours of values, which are written at them.
+    """Means over the slots of the mission: a curve for each value of a column, with its band.
 
     Args:
-        space: The scenario.
-        title: The title.
-        values: (K,) values, from 0 to 1; or, if ``signed``, differences of any size.
-        signed: Whether blue means above 0 and orange below 0, in percentage points.
-        write: How other values are written.
+        rows: Rows with ``panel``, ``slot``, ``mean``, ``low`` and ``high``.
+        line: The column.
+        unit: The unit of the means, as for ``style.in_units``.
+        titles: The titles of the panels, by ``panel``.
+        heading: The title of the legend.
     """
-    colours = ["white", style.BETTER] if not signed else [style.WORSE, "white", style.BETTER]
-    most = max(float(np.abs(values).max()), 0.01) if signed else 1.0
-    with style.panels(5.4) as (figure, ax):
-        chart(space, ax)
-        ax.scatter(*np.transpose(space.nodes), c=values, s=420, zorder=3, edgecolors=style.MUTED,
-                   cmap=sns.blend_palette(colours, as_cmap=True), linewidths=0.8,
-                   vmin=-most if signed else 0.0, vmax=most)  # fmt: skip
-        for cell, value in zip(space.nodes, values, strict=True):
-            text = numbers.difference(value, 0) if signed else write(value)
-            ax.annotate(text, cell, ha="center", va="center", fontsize=8.5, zorder=4,
-                        **style.OUTLINED)  # fmt: skip
-        ax.set_title(title)
-    return figure
-
-
-def plan(events: Events, scenario: Scenario, courses: "Sequence[Course]") -> Figure:
-    """The plan of the first slot, as dashed lines over the mission as simulated.
-
-    Args:
-        events: The event log of the mission.
-        scenario: Its scenario.
-        courses: What the plan has each UAV do.
-    """
-    with style.panels(6.0) as (figure, ax):
-        trajectories(events, scenario, ax)
-        for uav, course in enumerate(courses):
-            colour = style.uav_colours(len(courses))[uav]
-            ax.plot(*course.path.T, color=colour, linestyle=(0, (3, 1.5)), linewidth=1.6, zorder=7,
-                    gid=f"plan-{uav}", label=f"plan of UAV {uav + 1}")  # fmt: skip
-            for number, cell in enumerate(course.waypoints, 1):
-                ax.annotate(str(number), cell, xytext=(6, 6), textcoords="offset points",
-                            color=colour, fontsize=8, fontweight="bold", zorder=10,
-                            **style.OUTLINED)  # fmt: skip
-        ax.set_title("The first plan (dashed), and the mission as simulated")
+    values = sorted(rows[line].unique()) if line != "policy" else rows[line].unique()
+    looks = style.policy_colours(values) if line == "policy" else style.graded(values)
+    height, shape = 1.9 * len(titles) + 1.3, {"sharex": True, "squeeze": False}
+    with style.panels(height, len(titles), "y", 4, heading, **shape) as (figure, axes):
+        for ax, (panel, title) in zip(axes.flat, titles.items(), strict=True):
+            for value, course in rows[rows["panel"] == panel].groupby(line, sort=False):
+                colour = looks[value_text(value)][0]
+                ax.fill_between(course["slot"], course["low"], course["high"], step="post",
+                                color=colour, alpha=0.25, linewidth=0)  # fmt: skip
+                ax.plot(course["slot"], course["mean"], color=colour, label=value_text(value))
+            ax.set(title=title, ylim=(0, None), xlim=(0, rows["slot"].max()))
+            style.in_units(ax.yaxis, unit, 4)
+        axes.flat[-1].set_xlabel("mission slot")
     return figure
 
 
@@ -260,7 +230,6 @@ def _grid(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
 @mpl.rc_context({"text.parse_math": True})  # an arrow is a symbol in TeX
 def _map_legend(ax: Axes) -> None:
     """The symbols of the map (Table I)."""
-
     served, arrow = style.node_colours(2)[1], r"$\rightarrow$"
     marks = (
         ("s", "start and charging zone", style.ZONE_EDGE, style.ZONE, 9),

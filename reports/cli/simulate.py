@@ -12,14 +12,6 @@ import typer
 from dess.errors import InputError, one_of, shown
 from reports.cli import console, options
 from reports.cli.console import YesOption
-from reports.cli.options import (
-    JsonOption,
-    ScenarioOption,
-    SeedOption,
-    SetOption,
-    command,
-    load_space,
-)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,29 +24,23 @@ FIGURES = (".png", ".pdf", ".svg")
 ANIMATIONS = (".gif", ".mp4", ".html")
 # Metrics of ``--json``, between the names and the UAVs.
 METRICS = (
-    "slots",
-    "success",
-    "collection_ratio",
-    "collection_ratio_and_communication",
-    "initial",
-    "arrived",
-    "collected",
-    "residual",
+    *("slots", "success", "collection_ratio", "collection_ratio_and_communication"),
+    *("initial", "arrived", "collected", "residual"),
 )
 
 T = TypeVar("T")
 app = typer.Typer()
 
 
-@command(app)
+@options.command(app)
 def simulate(
     context: typer.Context,
-    scenario: ScenarioOption = "paper",
-    settings: SetOption = None,
+    scenario: options.ScenarioOption = "paper",
+    settings: options.SetOption = None,
     policy: Annotated[
         str | None, typer.Option(metavar="P[,P...]", autocompletion=options.policies)
     ] = None,
-    seed: SeedOption = 0,
+    seed: options.SeedOption = 0,
     replication: int | None = None,
     of: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     point: int | None = None,
@@ -62,7 +48,7 @@ def simulate(
     figure: Annotated[Path | None, typer.Option(metavar="FILE.png")] = None,
     animation: Annotated[Path | None, typer.Option(metavar="FILE.gif")] = None,
     yes: YesOption = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Simulate one mission with the SimPy model.
 
@@ -90,7 +76,7 @@ def simulate(
     elif point is not None:
         raise InputError("--point: belongs to a study; allowed: with --of DIR")
     else:
-        space = load_space(scenario, settings)
+        space = options.load_space(scenario, settings)
         policy = TypedByUser(policy or "greedy")
         asked = _Asked(space, policy, load_team(policy), seed, replication or 0, scenario)
     if not yes:

@@ -19,24 +19,19 @@ learned = None  # the learned policy to show; None for the best of the study
 heuristic = None  # the policy to compare it with; None for the best that is not learned
 
 # %%
-from pathlib import Path
-
 from IPython.display import display
 
-from analysis import load_results, numbers
+from analysis import load_results
 from analysis.answers import comparison as answers
+from analysis.answers import missions as logged
 from analysis.answers import summary
-from analysis.answers.missions import kept_missions
-from analysis.figures import comparison as figures
-from analysis.figures.missions import mission_figure
 from reports import tables
 from reports.pages import html
 
 # %%
-study = load_results(Path(results) / "comparison")
+study = load_results(f"{results}/comparison")
 times = answers.read(results, study)
 pair = answers.pair_of(study, learned, heuristic)
-policy, title = pair.policy, f"{pair.policy} − {pair.baseline}"
 missions = answers.duels(study, pair)
 comparison = answers.overall(study, pair)
 worst = answers.worst(missions, 5)
@@ -46,13 +41,7 @@ lost = answers.most_lost(missions.drop(worst.index), 5)
 html.answer(answers.answer(comparison, missions, pair))
 
 # %%
-lowest, highest = (numbers.difference(end, 0) for end in missions["difference"].agg(["min", "max"]))
-html.lead(
-    figures.distribution(missions, pair),
-    f"Distribution of the difference {title} of the product over the missions",
-    f"Share of the missions (n = {len(missions):,}) with at most the difference on the axis, with "
-    f"a 95 % band for the whole curve; from {lowest} to {highest} points.",
-)
+html.lead(*answers.distribution(missions, pair))
 
 # %% [markdown]
 # ## Why: where it is better
@@ -62,17 +51,7 @@ html.lead(
 
 # %%
 lead = answers.along(missions, pair.candidates)
-html.gallery(
-    [
-        (
-            figures.lead(lead, field, missions["difference"].mean()),
-            f"Mean difference {title} against {field}",
-            f"n = {numbers.span(bins['n'])} missions per dot.",
-        )
-        for field, bins in lead.groupby("field", sort=False)
-    ],
-    f"{title}; bars are 95 % intervals.",
-)
+html.gallery(answers.leads(missions, lead, pair), f"{pair.title}; bars are 95 % intervals.")
 
 # %% [markdown]
 # ## Its worst missions
@@ -80,16 +59,14 @@ html.gallery(
 # The two missions with the lowest product of the learned policy, with both policies.
 
 # %%
-kept = kept_missions(study, answers.drawn(missions, pair), results)
+kept = logged.kept_missions(study, answers.drawn(missions, pair), results)
 html.gallery(
-    [
-        (
-            mission_figure(mission.log, mission.scenario),
-            f"Map of mission {mission.row['replication']} by {mission.row['policy']}",
-            mission.caption,
-        )
-        for mission in kept
-    ]
+    logged.drawing(
+        mission,
+        f"Map of mission {mission.row['replication']} by {mission.row['policy']}",
+        mission.caption,
+    )
+    for mission in kept
 )
 
 # %% [markdown]
@@ -116,7 +93,7 @@ for caption, rows in found.items():
 # ## Tables
 
 # %%
-depleted = answers.depleted(study, policy, worst["replication"])
+depleted = answers.depleted(study, pair.policy, worst["replication"])
 html.table(answers.outcomes(missions, pair), "Outcomes of the missions")
 
 # %%
@@ -129,7 +106,7 @@ html.table(
 # %%
 html.table(
     answers.outcome_table(worst, study, pair),
-    f"The worst missions of {policy}; {depleted} of its UAVs run out of battery in these",
+    f"The worst missions of {pair.policy}; {depleted} of its UAVs run out of battery in these",
 )
 
 # %%
@@ -142,7 +119,7 @@ html.table(answers.time_table(times), "Time of a decision for the UAVs of a miss
 # ## How this page was made
 
 # %%
-lines = answers.commands(study, policy, [*worst["replication"], *lost["replication"]])
+lines = answers.commands(study, pair.policy, [*worst["replication"], *lost["replication"]])
 html.say(
     "{times} These commands simulate missions of the tables again:\n\n{lines}",
     times=answers.remarks(times, study, pair),

@@ -19,38 +19,23 @@ trained = None  # folder with curves.parquet and a folder per policy; None for t
 # %%
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from analysis import numbers
 from analysis.answers import learning as answers
-from analysis.answers.learning import read_curves
-from analysis.figures import learning as figures
-from analysis.names import PRODUCT
 from analysis.paper import measures, scorecard, values
 from policies.registry import TRAINED
 from reports.pages import html
 
 # %%
 folder = Path(str(trained or TRAINED))
-trainings = read_curves(folder / "curves.parquet")
-last, final = answers.finals(trainings), f"final_{PRODUCT}"
-baseline, pairs = answers.BASELINE, answers.pairs_in(trainings)
-
+trainings = answers.read_curves(folder / "curves.parquet")
+last, baseline = answers.finals(trainings), answers.BASELINE
 rungs, equal = answers.ladder(last), answers.of_equal_budget(last, baseline)
 
 # %%
 html.answer(answers.answer(rungs))
 
 # %%
-DOTS = (
-    "A dot is a training; a diamond is the mean of n trainings with its 95 % interval (Student's "
-    "t). Dashed: the mean of {}. An arrow: all trainings are left of the axis."
-)
-top = rungs["variant"].iloc[-1]
-steps = answers.ablation(rungs, final, top).set_index("variant")
-steps = steps.loc[rungs["variant"].unique()].reset_index()
-drawing = figures.ablation(steps, rungs, final, top)
-html.lead(drawing, "The product that trainings reach, method by method", DOTS.format(top))
+html.lead(*answers.methods(rungs))
 
 # %% [markdown]
 # ## Why: the effect of each method
@@ -62,9 +47,8 @@ html.lead(drawing, "The product that trainings reach, method by method", DOTS.fo
 # paper's network.
 
 # %%
-table = answers.ablation(equal, final, baseline)
-drawing = figures.ablation(table, equal, final, baseline)
-html.figure(drawing, "The product that every variant reaches", DOTS.format(baseline))
+table = answers.ablation(equal, baseline)
+html.figure(*answers.variants(table, equal, baseline, "The product that every variant reaches"))
 
 # %% [markdown]
 # ## <a id="fig-3"></a>Transfer learning: the paper's Fig. 3
@@ -73,34 +57,15 @@ html.figure(drawing, "The product that every variant reaches", DOTS.format(basel
 # alone most trainings do not learn to charge: hardly a UAV enters the zone with a low battery and
 # waits there, so the replay memory has no transition that shows what a charge is worth.
 
-
 # %%
-def with_and_without(name: str, metric: str) -> tuple[Figure, str, str]:
-    labels = dict(zip(pairs[name], ("with transfer", "without"), strict=True))
-    alt = f"{figures.NAMES[metric]} against training step, {name}, with and without transfer"
-    caption = f"Trainings with {name}."
-    return figures.trainings(trainings, metric, labels), alt, caption
-
-
-metrics = (answers.LEARNED_REWARD, answers.LEARNED_PRODUCT)
-drawn = dict.fromkeys([[*pairs][0], [*pairs][-1]])
-drawings = [with_and_without(name, metric) for name in drawn for metric in metrics]
-html.gallery(drawings, figures.TRAININGS)
+html.gallery(answers.transfer_drawings(trainings), answers.TRAININGS)
 
 # %% [markdown]
 # ## The shipped policies
 
 # %%
 shipped = answers.trained_policies(folder)
-curves = answers.curves_by_learner(shipped)
-labels = {name: name for name in curves["variant"].unique()}
-html.gallery(
-    [
-        (figures.trainings(curves, m, labels), f"{figures.NAMES[m]} of the shipped policies")
-        for m in metrics
-    ],
-    figures.TRAININGS,
-)
+html.gallery(answers.shipped_drawings(shipped), answers.TRAININGS)
 
 # %% [markdown]
 # ## How far to trust it
@@ -109,12 +74,11 @@ html.gallery(
 # P-values are corrected for the number of tests (Holm).
 
 # %%
-transfers = answers.transfers(trainings, metrics, shortest=values.CROSSING)
-by_metric = dict(
-    zip(metrics, (scorecard.RULES["throughout"], scorecard.RULES["passes"]), strict=True)
-)
-verdicts = {key: by_metric[key[1]].judge(compared) for key, compared in transfers.items()}
-best = last.groupby("variant")[final].max().map(numbers.percent)
+transfers = answers.transfers(trainings, answers.SHOWN, shortest=values.CROSSING)
+rules = dict(zip(answers.SHOWN, ("throughout", "passes"), strict=True))
+verdicts = {key: scorecard.RULES[rules[key[1]]].judge(t) for key, t in transfers.items()}
+best = last.groupby("variant")[answers.FINAL].max().map(numbers.percent)
+pair, variants = [*answers.pairs_in(trainings).items()][-1]
 
 # %%
 html.say(
@@ -123,8 +87,8 @@ html.say(
     "a product of {ends[0]}, the best without {ends[1]}.",
     steps=max(compared.length for compared in transfers.values()),
     paper=values.CROSSING,
-    name=[*pairs][-1],
-    ends=[best[variant] for variant in pairs[[*pairs][-1]]],
+    name=pair,
+    ends=[best[variant] for variant in variants],
 )
 
 # %% [markdown]

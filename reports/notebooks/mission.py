@@ -20,27 +20,21 @@ policy = None  # the policy to show; None for the best by product
 replication = 0  # the replication to show; the study must have stored its event log
 
 # %%
-from pathlib import Path
-
 from IPython.display import display
-from matplotlib.figure import Figure
 
 from analysis import load_results, numbers
-from analysis.answers import missions
-from analysis.answers.summary import best_policy, ranked_policies
-from analysis.figures.missions import mission_figure
+from analysis.answers import missions, summary
 from analysis.names import RATIO
 from analysis.paper import values
 from reports.pages import html
 from reports.player import READING, library, player, together
 
 # %%
-fig1, fig4 = (load_results(Path(results) / name) for name in ("fig1", "fig4"))
-shown_policy, best = policy or best_policy(fig4.missions), best_policy(fig1.missions)
-seed = fig4.manifest["seed"]
+fig1, fig4 = (load_results(f"{results}/{name}") for name in ("fig1", "fig4"))
+ranked, best = summary.ranked_policies(fig4.missions), summary.best_policy(fig1.missions)
+shown_policy, seed = policy or ranked[0], fig4.manifest["seed"]
 points = range(len(fig4.manifest["points"]))
 shown = [missions.logged_mission(fig4, shown_policy, point, replication) for point in points]
-printed = [values.FIG_4[mission.scenario.uavs][RATIO] for mission in shown]
 example = missions.logged_mission(fig1, best, 0, replication)
 
 # %%
@@ -79,7 +73,7 @@ html.say("{reading}", reading=READING)
 # The same mission with the best policy and with the next one.
 
 # %%
-second = next((p for p in ranked_policies(fig4.missions) if p != shown_policy), shown_policy)
+second = next((other for other in ranked if other != shown_policy), shown_policy)
 other = missions.logged_mission(fig4, second, points[-1], replication)
 together([played(shown[-1], "player-first"), played(other, "player-second")])
 
@@ -94,20 +88,11 @@ display(*(played(mission, f"player-{mission.scenario.uavs}") for mission in show
 #
 # The missions have the same initial data, arrivals and shadowing; only the number of UAVs differs.
 
-
 # %%
-def captioned(point: int) -> tuple[Figure, str, str]:
-    mission, mean = shown[point], missions.estimate(fig4, shown_policy, RATIO, point)
-    caption = (
-        f"n = 1 mission of {mission.row['slots']} slots; {mission.collected}. The mean of this "
-        f"policy, n = {mean['n']:,}, is {numbers.estimate(mean)}, the paper's "
-        f"{numbers.percent(printed[point])}."
-    )
-    alt = f"Map of the mission with {mission.fleet}; battery, residual data and charging"
-    return mission_figure(mission.log, mission.scenario), alt, caption
-
-
-html.gallery([captioned(point) for point in points])
+html.gallery(
+    missions.beside_paper(fig4, mission, values.FIG_4[mission.scenario.uavs][RATIO])
+    for mission in shown
+)
 
 # %% [markdown]
 # ## The paper's Fig. 1
@@ -121,7 +106,7 @@ caption = (
     f"{example.row['slots']} mission slots, {example.collected}. {example.causes}"
 )
 alt = "Map of the mission; battery, residual data and charging"
-html.gallery([(mission_figure(example.log, example.scenario), alt, caption)])
+html.gallery([missions.drawing(example, alt, caption)])
 
 # %% [markdown]
 # ## How far to trust it

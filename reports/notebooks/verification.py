@@ -22,10 +22,10 @@ block = 100  # missions of a block, for the coverage of confidence intervals
 from IPython.display import Markdown, display
 
 from analysis import numbers
-from analysis.figures import verification as drawings
 from analysis.names import parameter
 from analysis.stats.intervals import LEVEL
 from analysis.verification import checks, draws
+from analysis.verification import figures as drawings
 from analysis.verification.suite import Suite
 from reports.pages import html, stress_des
 

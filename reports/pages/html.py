@@ -40,7 +40,9 @@ SHORT = 12  # characters of a hash that are shown
 PART = "application/vnd.dess.part+json"  # type of the output of a cell that contains a ``Part``
 
 # A figure, its alternative text, its caption and, if the page links to them, its data.
-Drawing = tuple[Figure, str] | tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame]
+Drawing = (
+    tuple[Figure, str] | tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame | None]
+)
 
 LEAD = (10.2, 4.4)  # the size of the figure that shows the answer [inches]
 LEAD_ON_PHONE = (4.3, 4.4)  # at least so high

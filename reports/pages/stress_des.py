@@ -36,7 +36,7 @@ class Description(NamedTuple):
         sections: The sections as Markdown, by their number: ``"1"`` to ``"6"``.
         studies: The studies, the table of item 1.3.
         overview: The order of events in a slot (Section III-C of the paper, item 2.1 of the
-            checklist), which ``figures.verification.slot`` draws.
+            checklist), which ``verification.figures.slot`` draws.
         parameters: All input parameters with their values, the table of item 3.3.
     """
 

@@ -120,6 +120,7 @@ def test_the_status_says_what_is_left_and_who_charges_and_waits(
 AGED: dict[str, dict[str, Any]] = {
     "slotted": {"uavs": 2, "age.measured": True},
     "packets": {"uavs": 2, "age.measured": True, "arrivals.process": "continuous"},
+    "unmeasured": {"uavs": 2},
 }
 
 
@@ -127,16 +128,12 @@ AGED: dict[str, dict[str, Any]] = {
 def test_ages_are_shown_where_the_scenario_measures_them(case: str) -> None:
     log, scenario = simulated(**AGED[case])
     shown = data_in(player(log, scenario, "aged").data)
+    assert (AGE_READING in reading(scenario)) == scenario.age.measured
+    if not scenario.age.measured:
+        assert shown["ages"] is shown["meanAge"] is None
+        return
     assert np.allclose(shown["ages"], ages(log), atol=0.0051, rtol=0)
     assert np.allclose(shown["meanAge"], mean_age(log), atol=0.0051, rtol=0)
-    assert AGE_READING in reading(scenario)
-
-
-def test_without_measured_ages_nothing_tells_of_them(
-    mission: Logged, shown: dict[str, Any]
-) -> None:
-    assert AGE_READING not in reading(mission.scenario)
-    assert shown["ages"] is shown["meanAge"] is None
 
 
 def test_the_cases_cover_waiting_charging_and_short_missions(queue: Logged) -> None:
@@ -179,9 +176,8 @@ def document(queue: Logged, tmp_path_factory: pytest.TempPathFactory) -> Path:
     alone = simulated(**CASES["alone"])
     parts = [library(), player(*queue, "first", "I = 3"), player(*alone, "second", "I = 1")]
     path = tmp_path_factory.mktemp("page") / "page.html"
-    head = (
-        '<!DOCTYPE html><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-    )
+    head = '<!DOCTYPE html><meta charset="utf-8">'
+    head += '<meta name="viewport" content="width=device-width">'
     path.write_text(head + "".join(part.data for part in parts), "utf-8")
     return path
 

@@ -17,38 +17,22 @@
 results = "../../results"  # folder with the results folder of the study age
 
 # %%
-from pathlib import Path
-
 from analysis import load_results, names, numbers
 from analysis.answers import operations
-from analysis.figures.settings import lines
-from analysis.stats.intervals import LEVEL
 from reports import tables
 from reports.pages import html
 
 # %%
-study = load_results(Path(results) / "age")
-ages = [names.AGE, "peak_age", "age_p99"]
-means = operations.means(study, [*ages, names.RATIO])
-
-# %%
-caption = (
-    f"n = {numbers.span(means['n'])} missions per dot; bars are {numbers.level(LEVEL)} intervals."
-)
-drawn = [
-    (
-        lines(rows, "uavs", "arrival_rate", str(metric), "policy"),
-        f"{names.metric_name(str(metric))} against the number of UAVs, by arrival rate",
-        caption,
-    )
-    for metric, rows in means.groupby("metric", sort=False)
-]
+study = load_results(f"{results}/age")
+means = operations.means(study, [names.AGE, "peak_age", "age_p99", names.RATIO])
+against = "the number of UAVs, by arrival rate"
+lead, *others = operations.drawings(means, "uavs", "arrival_rate", "policy", against).values()
 
 # %%
 html.answer(operations.age(study))
 
 # %%
-html.lead(*drawn[0])
+html.lead(*lead)
 
 # %% [markdown]
 # ## Why
@@ -57,7 +41,7 @@ html.lead(*drawn[0])
 # low rates no fleet can keep the age below the mean time between arrivals.
 
 # %%
-html.gallery(drawn[1:])
+html.gallery(others)
 
 # %% [markdown]
 # ## How far to trust it

@@ -17,44 +17,27 @@
 results = "../../results"  # folder with the results folder of the study failures
 
 # %%
-from pathlib import Path
-
 from IPython.display import display
 
 from analysis import load_results, names, numbers
 from analysis.answers import operations
-from analysis.figures.settings import lines
-from analysis.stats.intervals import LEVEL
 from reports import tables
 from reports.pages import html
 
 # %%
-study = load_results(Path(results) / "failures")
-columns = [c for c in ("failures", "slots_grounded", "lost") if c in study.missions]
-counts = [c for c in columns if study.missions[c].max() > 0]
+study, rate, repair = load_results(f"{results}/failures"), operations.RATE, operations.REPAIR
 metrics = [names.PRODUCT, names.SUCCESS, names.RATIO]
-means = operations.means(study, [*metrics, *counts])
-rate, repair = operations.RATE, operations.REPAIR
-
-# %%
-caption = (
-    f"n = {numbers.span(means.loc[means['metric'].isin(metrics), 'n'])} missions per dot; bars are "
-    f"{numbers.level(LEVEL)} intervals."
-)
-drawn = [
-    (
-        lines(means[means["metric"] == metric], rate, "uavs", metric, repair),
-        f"{names.metric_name(metric)} against the failure rate, by number of UAVs",
-        caption,
-    )
-    for metric in metrics
-]
+counts = [c for c in ("failures", "slots_grounded", "lost") if c in study.missions]
+counts = [c for c in counts if study.missions[c].max() > 0]
+means = operations.means(study, metrics)
+against = "the failure rate, by number of UAVs"
+lead, *others = operations.drawings(means, rate, "uavs", repair, against).values()
 
 # %%
 html.answer(operations.failures(study))
 
 # %%
-html.lead(*drawn[0])
+html.lead(*lead)
 
 # %% [markdown]
 # ## Why
@@ -63,7 +46,7 @@ html.lead(*drawn[0])
 # collected still counts in the collection ratio, which shows how far the others make up for it.
 
 # %%
-html.gallery(drawn[1:])
+html.gallery(others)
 
 # %% [markdown]
 # ## How far to trust it
@@ -94,7 +77,7 @@ display(
             f"{names.metric_label(metric)} per mission, by failure rate; empty: nothing can fail",
         )
         for metric in counts
-        for rows in [means[means["metric"] == metric]]
+        for rows in [operations.means(study, [metric])]
     )
 )
 

@@ -18,36 +18,19 @@ results = "../../results"  # folder with the results folder of the study pads
 margin = 0.02  # a loss of the product that does not matter, as a share
 
 # %%
-from pathlib import Path
-
 from IPython.display import display
 
 from analysis import load_results, names, numbers
 from analysis.answers import operations
-from analysis.figures.learning import courses
-from analysis.figures.settings import lines
-from analysis.stats.intervals import LEVEL
 from reports import tables
 from reports.pages import html
 
 # %%
-study = load_results(Path(results) / "pads")
+study = load_results(f"{results}/pads")
 uses = ["waiting", "queue", names.UTILISATION]
 means = operations.means(study, [names.PRODUCT, names.SUCCESS, *uses])
-
-# %%
-caption = (
-    f"n = {numbers.span(means['n'])} missions per dot; bars are {numbers.level(LEVEL)} intervals."
-)
-drawn = {
-    metric: (
-        lines(rows, "pads", "uavs", str(metric), "policy"),
-        f"{names.metric_name(str(metric))} against the number of pads, by number of UAVs",
-        caption,
-        rows,
-    )
-    for metric, rows in means.groupby("metric", sort=False)
-}
+against = "the number of pads, by number of UAVs"
+drawn = operations.drawings(means, "pads", "uavs", "policy", against, linked=True)
 
 # %%
 html.answer(operations.pads(study, margin))
@@ -63,15 +46,7 @@ html.lead(*drawn[names.PRODUCT])
 # and sends UAVs home earlier, so few pads cost data rather than success.
 
 # %%
-waves = operations.queues(study, study.policies[0], operations.short_of_pads(study, margin))
-low, high = map(numbers.level, operations.BAND)
-titles = {uavs: f"UAVs that wait for a pad: {uavs} UAVs" for uavs in waves["uavs"].unique()}
-html.figure(
-    courses(waves.assign(panel=waves["uavs"]), "pads", "", titles, "Number of charging pads"),
-    "The number of UAVs that wait for a pad over the slots of the mission",
-    f"Mean of n = {waves['n'].min()} missions; the band is from the {low} to the {high} quantile.",
-    waves,
-)
+html.figure(*operations.waits(study, margin))
 
 # %%
 html.gallery([drawn[metric] for metric in (*uses, names.SUCCESS)])

@@ -20,36 +20,28 @@ longer = "planner-long"  # the same with a longer search, if the study has it
 learner = "ddqn"  # the policy that has learned
 
 # %%
-from pathlib import Path
-
 from analysis import load_results, numbers
-from analysis.answers import comparison as answers
-from analysis.answers import optimality
-from analysis.figures import comparison, learning, settings
-from analysis.figures import missions as maps
-from analysis.names import PRODUCT
+from analysis.answers import comparison, optimality
+from analysis.answers import planner as answers
+from analysis.figures import Drawing
+from analysis.figures.comparison import gaps
 from reports import tables
 from reports.pages import html
 
 # %%
-study = load_results(Path(results) / "gap")
-times = answers.read(results, study)
+study = load_results(f"{results}/gap")
+times = comparison.read(results, study)
 planners = [planner, *(name for name in [longer] if name in study.policies)]
-differences = optimality.differences(study, planners, learner)
-pair = answers.pair_of(study, planner, learner)
-missions = answers.duels(study, pair)
+differences = answers.differences(study, planners, learner)
+pair = comparison.pair_of(study, planner, learner)
+missions = comparison.duels(study, pair)
 logged = study.manifest["study"]["logged"]
 
 # %%
-html.answer(optimality.answer(differences, planner), optimality.ahead(differences, planner))
+html.answer(*answers.answer(differences, planner))
 
 # %%
-by_product = differences[differences["metric"] == PRODUCT]
-html.lead(
-    comparison.differences(by_product),
-    f"Paired differences from {learner} in the product, by number of UAVs",
-    f"n = {numbers.span(by_product['n'])} missions; bars are 95 % intervals.",
-)
+html.lead(*answers.by_fleet(differences))
 
 # %% [markdown]
 # ## Why: where each of them wins
@@ -58,49 +50,19 @@ html.lead(
 # bins); dashed is the mean of all missions.
 
 # %%
-lead = answers.along(missions, pair.candidates)
-html.gallery(
-    [
-        (
-            comparison.lead(lead, field, missions["difference"].mean()),
-            f"Mean difference {planner} − {learner} against {field}",
-            f"{planner} − {learner}, n = {numbers.span(bins['n'])} missions per dot.",
-        )
-        for field, bins in lead.groupby("field", sort=False)
-    ]
-)
+lead = comparison.along(missions, pair.candidates)
+html.gallery(comparison.leads(missions, lead, pair, f"{pair.title}, "))
 
 # %%
-first, second = (optimality.coverage(study, policy) for policy in (planner, learner))
-collected = {f"Collected by {planner}": first, f"Collected by {learner}": second}
-shown = collected | {f"{planner} − {learner}": first - second}
-counted = f"means over n = {logged} missions, in percent of the node's data."
-nodes = study.scenario()
-html.gallery(
-    [
-        (maps.node_map(nodes, title, values, title not in collected), title, f"{title}: {counted}")
-        for title, values in shown.items()
-    ]
-)
+html.gallery(answers.coverages(study, planner, learner))
 
 # %%
-home = optimality.at_home(study, [planner, learner])
-rows = home.assign(panel=0, **dict.fromkeys(("mean", "low", "high"), home["share"]))
-zone = learning.courses(rows, "policy", "%", {0: "Share of the UAVs in the charging zone"})
-mission = optimality.example(study, planner)
-replication = int(mission.row["replication"])
-plan = maps.plan(mission.log, mission.scenario, optimality.plan(study, planner, replication))
-values, title = optimality.node_prices(study, replication), "Price of a node's data"
-prices = maps.node_map(nodes, title, values, write="{:.2f}".format)
-
-# %%
-counted = f"n = {logged} missions. A UAV that has filled its quota has left the mission."
-paid = f"n = 1, mission {replication}: what one more data unit would add to the upper bound."
+mission = answers.example(study, planner)
 html.gallery(
     [
-        (zone, "The share of the UAVs in the charging zone over the slots", counted, home),
-        (plan, "The plan of the first slot, over the mission as simulated", mission.caption),
-        (prices, "The price of every node's data in the upper bound", paid),
+        answers.at_home(study, [planner, learner]),
+        answers.plan(study, mission),
+        answers.prices(study, int(mission.row["replication"])),
     ]
 )
 
@@ -114,47 +76,42 @@ html.gallery(
 html.say("{gap}", gap=html.composed(optimality.in_words(study, planners[-1])))
 
 # %%
-points, gaps = optimality.front(study, times), optimality.by_fleet(study)
-useful = optimality.useful(gaps)
-alt = "Decision time against the product of all policies, and their Pareto front"
-caption = "No policy is both faster and better than one on the line. Medians on one core."
-drawn: list[html.Drawing] = [(settings.decision_times(points), alt, caption, points)]
-if len(useful):
+bounded = optimality.by_fleet(study)
+drawn = [answers.front(study, times)]
+if len(useful := optimality.useful(bounded)):
     alt = "The product of every policy and the upper bound, by number of UAVs"
-    drawn.append((comparison.gaps(useful), alt, "The band is the 95 % interval of the bound."))
+    drawn.append(Drawing(gaps(useful), alt, "The band is the 95 % interval of the bound."))
 html.gallery(drawn, f"n = {len(missions):,} missions per policy; bars are 95 % intervals.")
 
 # %% [markdown]
 # ## Tables
 
 # %%
+means = differences.assign(mean=differences["difference"])
 html.table(
-    tables.estimates(
-        differences.assign(mean=differences["difference"]),
-        ["policy", "uavs", "n"],
-        write=numbers.points,
-    ),
+    tables.estimates(means, ["policy", "uavs", "n"], write=numbers.points),
     f"Paired differences from {learner} in points, with 95 % intervals",
     data=differences,
 )
 
 # %%
-html.table(optimality.listed(gaps), "Means, the upper bound, and the gap in points", data=gaps)
+caption = "Means, the upper bound, and the gap in points"
+html.table(optimality.listed(bounded), caption, data=bounded)
 
 # %%
 html.table(
-    optimality.returns(study, [planner, learner]),
+    answers.returns(study, [planner, learner]),
     f"Means over charging sessions of the same {logged} missions",
 )
 
 # %%
-html.table(answers.time_table(times), "Time of a decision for the UAVs of a mission")
+html.table(comparison.time_table(times), "Time of a decision for the UAVs of a mission")
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.say("{remarks}", remarks=answers.remarks(times, study, pair))
+html.say("{remarks}", remarks=comparison.remarks(times, study, pair))
 
 # %%
 html.provenance([study])

@@ -20,52 +20,29 @@ reference = "planner"  # a slow policy that is hard to beat
 heuristic = "greedy"  # a fast policy without learning
 
 # %%
-from pathlib import Path
-
 from analysis import load_results
-from analysis.answers import comparison as answers
-from analysis.answers import seas
-from analysis.figures import comparison, settings
-from analysis.names import METRICS, PRODUCT, SUCCESS
+from analysis.answers import comparison, seas
+from analysis.names import METRICS, SUCCESS
 from reports import tables
 from reports.pages import html
 
 # %%
-study = load_results(Path(results) / "seas")
+study = load_results(f"{results}/seas")
 for name in (policy, reference, heuristic):
     study.check_policy(name)
-times = answers.read(results, study)
-shares = {by: seas.shares(study, reference, by) for by in seas.GROUPS}
-gains = {by: seas.gains(study, heuristic, by) for by in seas.GROUPS}
+times = comparison.read(results, study)
 
 # %%
 html.answer(seas.answer(study, times, policy, reference, heuristic))
 
 # %%
-points = seas.front(study, times)
-html.lead(
-    settings.decision_times(points),
-    "Time of a decision against the product over all seas, and the Pareto front",
-    f"n = {points['n'].max()} seas; bars are 95 % intervals over seas. Times are those of a "
-    "decision for a UAV on one core, many missions side by side.",
-    points,
-)
+html.lead(*seas.front(study, times))
 
 # %% [markdown]
 # ## Why: what each family asks for
 
 # %%
-html.gallery(
-    [
-        (
-            comparison.groups(shares[by], by, f"product, share of {reference}"),
-            f"The product as a share of that of {reference}, by {name.lower()}",
-            f"n = {shares[by]['n'].min()} seas and more per dot; bars are 95 % intervals.",
-            shares[by],
-        )
-        for by, name in seas.GROUPS.items()
-    ]
-)
+html.gallery(seas.by_group(study, reference))
 
 # %% [markdown]
 # ## How far to trust it
@@ -89,15 +66,6 @@ html.table(
 )
 
 # %%
-for by, name in seas.GROUPS.items():
-    rows = seas.quality(study, by)
-    html.table(
-        tables.estimates(rows, [by], "policy"),
-        f"{METRICS[PRODUCT]} by {name.lower()}: means over seas with 95 % intervals",
-        data=rows,
-    )
-
-# %%
 rows = seas.quality(study, "family", SUCCESS)
 html.table(
     tables.estimates(rows, ["family"], "policy"),
@@ -106,11 +74,12 @@ html.table(
 )
 
 # %%
-differences = gains["family"].assign(mean=gains["family"]["difference"])
+gains = seas.gains(study, heuristic, "family")
+gains = gains.assign(mean=gains["difference"])
 html.table(
-    tables.estimates(differences, ["family"], "policy", tables.numbers.points),
+    tables.estimates(gains, ["family"], "policy", tables.numbers.points),
     f"Points of the product more than {heuristic}, paired, with 95 % intervals",
-    data=differences,
+    data=gains,
 )
 
 # %% [markdown]

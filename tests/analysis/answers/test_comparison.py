@@ -1,4 +1,7 @@
-"""Two policies in the same missions: how they differ, where, and how long they take to decide."""
+"""Two policies in the same missions: how they differ, where, and how long they take to decide.
+
+Figures show what is in their tables.
+"""
 
 import numpy as np
 import pandas as pd
@@ -6,14 +9,15 @@ import pytest
 
 from analysis import run_study
 from analysis.answers import comparison
-from analysis.answers.comparison import AHEAD, BEHIND, CALLS, OF_BASELINE, Pair
+from analysis.answers.comparison import AHEAD, BEHIND, CALLS, COLOURS, OF_BASELINE, Pair
 from analysis.names import METRICS, PARAMETERS, PRODUCT
 from analysis.stats.differences import adjust, paired
-from analysis.stats.intervals import wilson
 from analysis.stats.verdict import INCONCLUSIVE
 from dess import InputError, simulate
 from policies import load
 from tests.analysis.small import grid, small_study
+
+PAIR = Pair("ours", "theirs", 1)
 
 
 @pytest.fixture(scope="module")
@@ -23,41 +27,30 @@ def results(tmp_path_factory):
     return run_study(study, folder / "out")
 
 
-@pytest.fixture
-def taught(monkeypatch):
-    """Make policies pass for learned ones: of every learner its trainings."""
-
-    def teach(*learners):
-        named = {f"learner {n}": names for n, names in enumerate(learners)}
-        monkeypatch.setattr(comparison, "learners", lambda results: named)
-
-    return teach
-
-
-def ranked(results):
+@pytest.mark.parametrize(
+    ("learners", "named", "pair"),
+    [
+        ([[1]], {}, (1, 0, 2)),
+        ([[2], [1]], {}, (1, 0, 2)),
+        ([], {}, (0, 1, 3)),  # the best two, and of three, any two
+        ([[0]], {"heuristic": 2}, (0, 2, 1)),
+        ([[0]], {"learned": 2}, (2, 1, 1)),
+        ([[0]], {"learned": 2, "heuristic": 0}, (2, 0, 1)),
+    ],
+)
+def test_the_pair_is_the_best_learned_policy_and_the_best_other(
+    results, monkeypatch, learners, named, pair
+):
+    """Policies are numbers, from the best to the worst; those of a learner are trainings."""
     means = results.missions.groupby("policy")[PRODUCT].mean()
-    return means.sort_values(ascending=False).index.tolist()
-
-
-def test_the_pair_is_the_best_learned_policy_and_the_best_other(results, taught):
-    first, second, third = ranked(results)
-    taught([second])
-    assert comparison.pair_of(results) == Pair(second, first, 2)
-    taught([third], [second])
-    assert comparison.pair_of(results) == Pair(second, first, 2)
-
-
-def test_without_a_learned_policy_the_best_two_are_the_pair(results):
-    first, second, _ = ranked(results)
-    assert comparison.pair_of(results) == Pair(first, second, 3)  # of three, any two
-
-
-def test_policies_may_be_named(results, taught):
-    first, second, third = ranked(results)
-    taught([first])
-    assert comparison.pair_of(results, heuristic=third) == Pair(first, third, 1)
-    assert comparison.pair_of(results, learned=third) == Pair(third, second, 1)
-    assert comparison.pair_of(results, third, first) == Pair(third, first, 1)
+    ranked = means.sort_values(ascending=False).index.tolist()
+    taught = {f"learner {n}": [ranked[k] for k in of] for n, of in enumerate(learners)}
+    monkeypatch.setattr(comparison, "learners", lambda results: taught)
+    asked = {name: ranked[k] for name, k in named.items()}
+    policy, baseline, candidates = pair
+    assert comparison.pair_of(results, **asked) == Pair(
+        ranked[policy], ranked[baseline], candidates
+    )
 
 
 def test_what_is_no_pair_is_refused(results, tmp_path):
@@ -77,11 +70,12 @@ def test_duels_of_several_design_points_are_refused(tmp_path):
         comparison.duels(results, Pair("greedy", "random", 1))
 
 
-def test_common_missions_are_worth_the_variance_that_they_save():
-    gains = pd.DataFrame({"metric": [*METRICS], "variance_reduction": [0.0, 0.5, 8 / 9]})
-    assert comparison.pairing(gains) == "9 times as many"
-    always = gains.assign(variance_reduction=1.0)
-    assert comparison.pairing(always) == "infinitely many"
+@pytest.mark.parametrize(
+    ("reduction", "words"), [(8 / 9, "9 times as many"), (1.0, "infinitely many")]
+)
+def test_common_missions_are_worth_the_variance_that_they_save(reduction, words):
+    gains = pd.DataFrame({"metric": [*METRICS], "variance_reduction": reduction})
+    assert comparison.pairing(gains) == words
 
 
 def test_missions_are_won_tied_lost_and_failed():
@@ -90,7 +84,7 @@ def test_missions_are_won_tied_lost_and_failed():
         success=[1] * 8 + [0, 0],
         success_baseline=[0] + [1] * 8 + [0],
     )
-    table = comparison.outcomes(missions, Pair("ours", "theirs", 1))
+    table = comparison.outcomes(missions, PAIR)
     assert dict(zip(table["Outcome"], table["Missions"], strict=True)) == {
         "ours ahead": "5",
         "level": "3",
@@ -108,7 +102,7 @@ def test_the_worst_missions_and_the_most_lost():
         difference=[-0.9, 0.1, -0.2, -0.3],
     )
     assert comparison.worst(missions, 3)["replication"].tolist() == [2, 0, 1]
-    assert comparison.drawn(missions, Pair("ours", "theirs", 1)) == [
+    assert comparison.drawn(missions, PAIR) == [
         *(("ours", 2), ("theirs", 2)),
         *(("ours", 0), ("theirs", 0)),
     ]
@@ -163,8 +157,6 @@ def test_along_a_parameter_the_difference_is_that_of_its_missions():
     sides = (part[PRODUCT + end].to_numpy() for end in ("", OF_BASELINE))
     ends = paired(*sides, metric=PRODUCT)[:3]
     assert by_uavs.loc["3", ["mean", "low", "high"]].tolist() == pytest.approx([*ends])
-    lost = wilson(int((part["difference"] < 0).sum()), len(part))
-    assert tuple(by_uavs.loc["3", ["behind", "behind_low", "behind_high"]]) == lost
     expected = np.minimum(1, 2 * adjust(table["p"].to_numpy(), "holm"))
     assert table["p_adjusted"].tolist() == expected.tolist()
 
@@ -186,6 +178,63 @@ def test_dependence_finds_what_the_difference_depends_on():
     assert (table.drop("uavs")["p_adjusted"] > 0.05).all()
     none = comparison.dependence(missions_of(lambda t: 0).assign(difference=0.1))
     assert (none["p"] == 1).all() and (none["explained"] == 0).all()
+
+
+def drawn_interval(bar, axis):
+    """(N, 2) the ends of error bars."""
+    return np.array([segment[:, axis] for segment in bar.lines[2][0].get_segments()])
+
+
+def test_a_dot_per_bin_with_its_interval_and_its_verdict():
+    missions = missions_of(lambda t: 0.05 * (2 - t["uavs"]))  # ahead, level, behind
+    table = comparison.along(missions)
+    axes = [drawing.figure.axes[0] for drawing in comparison.leads(missions, table, PAIR)]
+    ((low, high),) = {ax.get_ylim() for ax in axes}
+    assert low < table["low"].min() < 0 < table["high"].max() < high
+    assert axes[-1].get_title(loc="left") == "Flying time [mission slots]"
+    rows = table[table["field"] == "uavs"]
+    for bar, (verdict, own) in zip(axes[0].containers, rows.groupby("verdict"), strict=True):
+        dot = bar.lines[0]
+        assert dot.get_xdata().tolist() == own["position"].tolist()
+        assert dot.get_ydata() == pytest.approx(own["mean"])
+        assert drawn_interval(bar, 1) == pytest.approx(own[["low", "high"]].to_numpy())
+        assert dot.get_color() == COLOURS[verdict]
+        assert (dot.get_fillstyle() == "none") == (verdict == INCONCLUSIVE)
+    assert [label.get_text() for label in axes[0].get_xticklabels()] == ["1", "2", "3"]
+    mean = missions["difference"].mean()
+    assert {(0, 0), (mean, mean)} <= {tuple(line.get_ydata()) for line in axes[0].lines}
+
+
+def test_the_curve_is_the_share_of_missions_up_to_a_difference():
+    missions = missions_of(lambda t: 0.05 * (2 - t["uavs"]))
+    (ax,) = comparison.distribution(missions, PAIR).figure.axes
+    (curve,) = (line for line in ax.lines if line.get_gid() == "shares")
+    x, y = curve.get_data()
+    for value in (-0.05, 0.0, 0.03):
+        at = y[np.searchsorted(x, value, side="right") - 1]
+        assert at == pytest.approx((missions["difference"] <= value).mean())
+    assert {text.get_gid(): text.get_text() for text in ax.texts} == {
+        BEHIND: f"ours behind: {(missions['difference'] < 0).mean():.1%}",
+        AHEAD: f"ours ahead: {(missions['difference'] > 0).mean():.1%}",
+    }
+
+
+def test_the_band_holds_the_whole_curve():
+    """Of many samples, at most about 5 % leave the band of the distribution that they are of."""
+    generator, outside = np.random.default_rng(1), 0
+    for _ in range(40):
+        sample = pd.DataFrame({"difference": generator.uniform(-0.2, 0.2, 60)})
+        (ax,) = comparison.distribution(sample, PAIR).figure.axes
+        (band,) = (c for c in ax.collections if c.get_gid() == "band")
+        vertices = band.get_paths()[0].vertices
+        half = len(vertices) // 2
+        truth = np.clip((vertices[:, 0] + 0.2) / 0.4, 0, 1)
+        middle = np.abs(vertices[:, 0]) < 0.19
+        low, high = vertices[:half], vertices[half:]
+        outside += (low[middle[:half], 1] > truth[:half][middle[:half]] + 1e-9).any() or (
+            high[middle[half:], 1] < truth[half:][middle[half:]] - 1e-9
+        ).any()
+    assert outside <= 6
 
 
 TICK = 2.0**-10  # seconds, so that no sum of ticks is rounded
@@ -219,9 +268,11 @@ def measured(timed_study):
     return comparison.measure(timed_study, Ticks(TICK, 2 * TICK))
 
 
-def test_times_are_those_of_the_calls_alone(measured):
-    for cost in measured.costs:
-        assert cost.median == cost.slow == 2 * TICK
+def test_times_are_those_of_the_calls_alone(measured, timed_study):
+    assert {(cost.median, cost.slow) for cost in measured.costs} == {(2 * TICK, 2 * TICK)}
+    clock = Ticks(*([0.0, TICK] * 9), 0.0, 9 * TICK)  # of ten calls, one takes 9 ticks
+    slow = comparison.measure(timed_study, clock).costs[0]
+    assert (slow.median, slow.slow) == (TICK, 9 * TICK)
 
 
 def test_calls_are_those_of_whole_missions(measured, timed_study):
@@ -241,13 +292,6 @@ def test_calls_are_those_of_whole_missions(measured, timed_study):
         if calls < CALLS:
             simulate(timed_study.scenario(), Counting(), 7, replication)
     assert measured.costs[0].calls == calls >= CALLS
-
-
-def test_slow_calls_make_the_upper_quantile(timed_study):
-    """Of ten calls one takes 9 ticks, the others one."""
-    clock = Ticks(*([0.0, TICK] * 9), 0.0, 9 * TICK)
-    cost = comparison.measure(timed_study, clock).costs[0]
-    assert (cost.median, cost.slow) == (TICK, 9 * TICK)
 
 
 def test_they_are_measured_once_for_the_same_results(timed_study, tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""Trainings: curves, comparisons of variants, and the files of trained policies."""
+"""Trainings: curves, comparisons of variants, their figures, and the files of policies."""
 
 import json
 from collections.abc import Callable
@@ -12,14 +12,8 @@ from scipy import stats
 
 from analysis import load_results, marl_eval_data, rliable_scores, run_study
 from analysis.answers import learning
-from analysis.answers.learning import (
-    CURVE,
-    CURVES,
-    ablation,
-    difference,
-    read_curve,
-    read_curves,
-)
+from analysis.answers.learning import CURVE, CURVES, FINAL, difference, read_curve, read_curves
+from analysis.names import METRICS
 from analysis.results.tables import Results
 from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess import InputError
@@ -46,28 +40,40 @@ def test_a_single_training_is_held_against_the_spread_of_the_others():
     assert p == pytest.approx(2 * stats.t.sf(3.0 / np.sqrt(4 / 3), 2))
 
 
-@pytest.fixture
-def last() -> pd.DataFrame:
-    """Final metrics of three variants: one is worse than the baseline, one was trained once."""
-    products = {"base": [0.7, 0.72, 0.74], "worse": [0.1, 0.11, 0.12], "once": [0.73]}
-    rows = [
-        (variant, seed, value, 1.0, value + 0.1)
-        for variant, values in products.items()
-        for seed, value in enumerate(values)
-    ]
-    metrics = [
-        "final_collection_ratio_and_communication",
-        "final_success",
-        "final_collection_ratio",
-    ]
-    return pd.DataFrame(rows, columns=["variant", "seed", *metrics])
+def finals(**products: list[float]) -> pd.DataFrame:
+    """The final products of the trainings of variants."""
+    rows = [(variant, value) for variant, values in products.items() for value in values]
+    table = pd.DataFrame(rows, columns=["variant", FINAL])
+    return table.assign(seed=range(len(table)))
 
 
-def test_intervals_of_shares_end_where_these_do(last: pd.DataFrame) -> None:
-    far = last.assign(final_success=last["seed"].map({0: 1.0, 1: 0.9, 2: 0.2}))
-    table = ablation(far, "final_success", "base").set_index("variant").loc["base"]
-    assert (table["low"], table["high"]) == (0.0, 1.0)
-    assert (table["new_low"], table["new_high"]) == (0.0, 1.0)
+def test_intervals_of_shares_end_where_these_do() -> None:
+    table = learning.ablation(finals(base=[1.0, 0.9, 0.2], once=[0.73]), "base")
+    base = table.set_index("variant").loc["base"]
+    assert (base["low"], base["high"]) == (0.0, 1.0)
+    assert (base["new_low"], base["new_high"]) == (0.0, 1.0)
+
+
+def test_the_ablation_shows_trainings_means_and_intervals() -> None:
+    """Of three trainings, of one, and of two that came to nothing."""
+    ended = finals(base=[0.7, 0.8, 0.75], once=[0.6], lost=[0.0, 0.0])
+    table = learning.ablation(ended, "base")
+    (ax,) = learning.variants(table, ended, "base", "").figure.axes
+    dots = {a.get_gid(): a.get_offsets()[:, 0].tolist() for a in ax.collections if a.get_gid()}
+    assert dots == {"base": [0.7, 0.8, 0.75], "once": [0.6]}
+    (bar,) = ax.containers  # one training has no interval
+    base = table.iloc[0]
+    assert bar.lines[0].get_xdata() == pytest.approx([base["mean"]])
+    ends = bar.lines[2][0].get_segments()[0][:, 0]
+    assert ends == pytest.approx([base["low"], base["high"]])
+    marks = {line.get_gid(): line for line in ax.lines if line.get_gid()}
+    assert {*marks} == {"lost", "baseline"} and marks["lost"].get_marker() == "<"
+    assert set(marks["baseline"].get_xdata()) == {base["mean"]}
+    left, right = ax.get_xlim()
+    assert 0 < left < base["low"] < base["high"] < right
+    notes = [text.get_text() for text in ax.texts]
+    assert notes == ["75.0%, n = 3", "60.0%, n = 1", "0.0%, n = 2"]
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["base", "once", "lost"]
 
 
 METRIC = "evaluation_reward"
@@ -91,6 +97,33 @@ def several(variant, ends, level=0.0, before=0):
     )
 
 
+@pytest.fixture(scope="module")
+def drawn():
+    """Three trainings of one variant, in two phases, and two of another."""
+    parts = [several("one", [0.5, 0.6, 0.7], 0.2, before=2), several("two", [0.55, 0.9], 0.2)]
+    name = learning.LEARNED_PRODUCT
+    return pd.concat(parts, ignore_index=True).rename(columns={METRIC: name})
+
+
+def test_fig_3_shows_every_training_and_its_phases(drawn):
+    averages = learning.smoothed(drawn, learning.LEARNED_PRODUCT)
+    labels = {"one": "with", "two": "without"}
+    (ax,) = learning.trainings(drawn, learning.LEARNED_PRODUCT, labels).axes
+    expected = [own["value"].tolist() for _, own in averages.groupby(["variant", "seed", "phase"])]
+    lines = [line for line in ax.lines if line.get_gid() is None]
+    assert sorted(line.get_ydata().tolist() for line in lines) == sorted(expected)
+    assert [line.get_linestyle() for line in lines] == [":", "-"] * 3 + ["--"] * 2
+    names = [text.get_text() for text in ax.figure.legends[0].get_texts()]
+    assert names == ["with, n = 3", "without, n = 2"]
+    (begun,) = [line for line in ax.lines if line.get_gid() == "last phase"]
+    assert set(begun.get_xdata()) == {2000}
+    assert ax.get_title(loc="left") == METRICS["collection_ratio_and_communication"]
+    ax.figure.draw_without_rendering()
+    (slots,) = ax.child_axes  # the axis at the top
+    assert slots.get_xlim() == pytest.approx([500e-6 * end for end in ax.get_xlim()])
+    assert averages["value"].between(*ax.get_ylim()).all()
+
+
 def compared(using, without, **options):
     both = pd.concat([several("with", using, **options), several("without", without)])
     return learning.transfer(learning.smoothed(both, METRIC), "with", "without", STEPS[-1])
@@ -101,11 +134,6 @@ def test_an_average_weighs_the_newest_and_begins_anew_with_every_phase():
     a = learning.ALPHA
     assert table["value"].tolist() == [4.0, 4.0 * (1 - a), 8.0, 8.0 * (1 - a) + 16.0 * a]
     assert table["updates"].tolist() == STEPS
-
-
-def test_transfer_is_judged_in_the_last_phase_alone():
-    result = compared([9.0, 9.1, 9.2], [5.0, 5.1, 5.2], level=1.0, before=2)
-    assert result.throughout and result.since == STEPS[2]
 
 
 def test_a_curve_has_settled_where_it_stays_near_its_end():
@@ -136,28 +164,19 @@ def test_transfer_is_judged_by_the_interval_of_the_end(using, without, level, ve
     result = compared(using, without, level=level)
     assert (result.verdict, result.since) == (verdict, since)
     assert result.throughout == (since == STEPS[0])
+    late = compared(using, without, level=level, before=2)  # only the last phase counts
+    assert late.since is None or late.since >= STEPS[2]
     both = pd.concat([several("with", using), several("without", without)])
     averages = learning.smoothed(both, METRIC)
     short = learning.transfer(averages, "with", "without", shortest=STEPS[-1] + 1)
     assert (short.verdict, short.length) == (INCONCLUSIVE, STEPS[-1])
 
 
-def test_comparisons_are_rows_of_text():
-    ends = {"all means": ([900.0, 910.0], [500.0, 510.0]), "equal": ([0.5, 0.5], [0.5, 0.5])}
-    keys = [("all means", learning.LEARNED_REWARD), ("equal", learning.LEARNED_PRODUCT)]
-    table = learning.transfer_table(
-        {key: compared(*ends[key[0]]) for key in keys}, dict.fromkeys(keys, HOLDS)
-    )
-    first, second = table.to_numpy().tolist()
-    # of four even steps the last average is 17 / 24 on the way: 400 x 17 / 24
-    assert first.pop().startswith("+283 [")
-    assert first == ["All means", "2 and 2", "Reward", HOLDS, "is above from step 2,000 on"]
-    assert second[2:] == [
-        "Product",
-        HOLDS,
-        "ends below, or level",
-        "0.0, the same in all trainings",
-    ]
+def test_trainings_that_all_agree_have_no_interval():
+    key, equal = ("equal", learning.LEARNED_PRODUCT), compared([0.5, 0.5], [0.5, 0.5])
+    (row,) = learning.transfer_table({key: equal}, {key: HOLDS}).to_numpy().tolist()
+    assert row[:2] == ["Equal", "2 and 2"]
+    assert row[4:] == ["ends below, or level", "0.0, the same in all trainings"]
 
 
 Change = Callable[[pd.DataFrame], Any]

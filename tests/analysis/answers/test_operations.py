@@ -68,7 +68,6 @@ def test_the_lower_end_decides_and_one_pad_may_be_enough(pads):
     noisy = planted(
         pads, PRODUCT, lambda row: 0.5 + (row["pads"] < 3) * (row["replication"] % 2 - 0.55) / 2
     )
-    assert operations.enough_pads(noisy, 0.1)["open"].tolist() == [[1, 2], [1, 2]]
     assert "3 are enough for 2 UAVs, 1 and 2 open" in operations.pads(noisy, 0.1)
     found = operations.enough_pads(planted(pads, PRODUCT, lambda row: 0.9), 0.1)
     assert found["pads"].tolist() == [1, 1]

@@ -12,12 +12,10 @@ from matplotlib.quiver import Quiver
 
 import dess
 import policies
-from analysis import numbers
 from analysis.figures import missions
 from analysis.figures.style import MUTED, node_colours
 from analysis.results.event_log import uav_slots
 from dess.state import sample_scenario
-from policies.planner import Course
 
 
 @pytest.fixture(scope="module")
@@ -46,29 +44,22 @@ def colours(artist: Any) -> list[str]:
     return [to_hex(c) for c in artist.get_facecolor()]
 
 
-def test_every_move_is_an_arrow_in_the_colour_of_its_node(mission: Any, parts: Any) -> None:
+def test_moves_and_crosses_have_the_colour_of_the_node_that_is_served(
+    mission: Any, parts: Any
+) -> None:
     _, log, scenario = mission
-    slots = uav_slots(log)
     palette = [*node_colours(len(scenario.nodes)), MUTED]
-    arrows = drawn(parts[0], "moves")
-    assert len(arrows) == scenario.uavs
-    for uav, arrow in enumerate(arrows):
-        moves = slots[(slots["uav"] == uav) & slots["moved"]]
+    of_uavs = [slots for _, slots in uav_slots(log).groupby("uav")]
+    marks = drawn(parts[0], "moves"), drawn(parts[0], "hovers")
+    assert any(len(cross.get_offsets()) for cross in marks[1])
+    for slots, arrow, cross in zip(of_uavs, *marks, strict=True):
+        moves, hovers = slots[slots["moved"]], slots[~slots["moved"] & ~slots["charging"]]
         assert isinstance(arrow, Quiver)
         assert arrow.N == len(moves) > 0
         assert colours(arrow) == [palette[node] for node in moves["node"]]
         assert np.array_equal(arrow.U, moves["x"] - moves["from_x"])
         assert np.array_equal(arrow.V, moves["y"] - moves["from_y"])
-
-
-def test_crosses_hover_in_the_colour_of_their_node(mission: Any, parts: Any) -> None:
-    _, log, scenario = mission
-    slots = uav_slots(log)
-    palette = [*node_colours(len(scenario.nodes)), MUTED]
-    hovers = slots[~slots["moved"] & ~slots["charging"]]
-    seen = [c for cross in drawn(parts[0], "hovers") for c in colours(cross)]
-    assert seen == [palette[node] for node in hovers["node"]]
-    assert len(seen) > 0
+        assert colours(cross) == [palette[node] for node in hovers["node"]]
 
 
 def test_stars_are_the_charging_slots(mission: Any, parts: Any) -> None:
@@ -124,25 +115,9 @@ def test_occupancy_counts_charging_and_waiting_uavs(mission: Any, parts: Any) ->
     assert max(busy.values()) <= scenario.pads
 
 
-def test_the_plan_is_drawn_over_the_mission() -> None:
-    space = dess.load_scenario("paper", uavs=1)
-    record = dess.simulate(space, policies.load("greedy"), 3, 1, events=True)
-    log = pd.DataFrame(record.events.columns())
-    scenario = sample_scenario(space, 3, 1)
-    course = Course(np.array([[8, 10]]), np.array([2]), np.array([[26, 5], [25, 5], [24, 5]]))
-    figure = missions.plan(log, scenario, [course])
-    (line,) = (line for line in figure.axes[0].lines if line.get_gid() == "plan-0")
-    assert np.array_equal(line.get_xydata(), course.path)
-    assert "1" in [text.get_text() for text in figure.axes[0].texts if tuple(text.xy) == (8, 10)]
-
-
-@pytest.mark.parametrize("signed", [False, True])
-def test_values_are_written_at_the_nodes_in_the_colour_of_their_sign(signed: bool) -> None:
-    space, values = dess.load_scenario("paper"), np.linspace(-1.0 * signed, 0.96, 25)
-    (ax,) = missions.node_map(space, "Values", values, signed, "{:.2f}".format).axes
-    shown = [numbers.difference(v, 0) if signed else f"{v:.2f}" for v in values]
-    assert [text.get_text() for text in ax.texts] == shown
-    assert [text.xy for text in ax.texts] == [*space.nodes]
-    (nodes,) = ax.collections
-    red, _, blue, _ = np.transpose(nodes.to_rgba(nodes.get_array()))
-    assert np.array_equal(blue > red, values > 0) or not signed
+def test_a_course_is_a_line_per_value_in_the_panel_of_its_rows():
+    rows = {"policy": [*"aabb"], "slot": [0, 1] * 2, "panel": [1, 1, 2, 2]}
+    rows |= dict.fromkeys(("mean", "low", "high"), [1.0, 0.5, 1.0, 0.0])
+    drawing = missions.courses(pd.DataFrame(rows), "policy", "%", {1: "One", 2: "Two"})
+    drawn = {ax.get_title(loc="left"): ax.lines[0].get_ydata().tolist() for ax in drawing.axes}
+    assert drawn == {"One": [1.0, 0.5], "Two": [1.0, 0.0]}

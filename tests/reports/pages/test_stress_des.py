@@ -4,9 +4,9 @@ import re
 from typing import Any
 
 from analysis import load_study
-from analysis.figures import verification as drawings
 from analysis.results.manifest import Manifest
 from analysis.stats.intervals import LEVEL
+from analysis.verification import figures as drawings
 from dess.scenario import GEOMETRY, SECTIONS, Scenario
 from reports.pages import stress_des
 

@@ -1,0 +1,263 @@
+"""Whether planning beats learning: a planner and a learner in the same missions of a study."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pandas as pd
+import seaborn as sns
+from matplotlib.figure import Figure
+
+from analysis import numbers
+from analysis.answers import comparison
+from analysis.answers.comparison import Times
+from analysis.answers.missions import LoggedMission, collected, held, logged_mission
+from analysis.answers.optimality import ALL
+from analysis.figures import Drawing, style
+from analysis.figures import comparison as figures
+from analysis.figures import missions as maps
+from analysis.figures.settings import decision_times
+from analysis.names import PRODUCT, SUCCESS
+from analysis.results.event_log import uav_slots
+from analysis.results.tables import Results
+from analysis.stats.differences import compare
+from analysis.stats.intervals import summary
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
+from dess.scenario import ScenarioSpace
+from policies.planner import Course, Planner, first_plan
+from policies.registry import load
+
+_CLAIMS = {
+    ABOVE: "The planner is better",
+    BELOW: "The learner is better",
+    INCONCLUSIVE: "The missions do not tell which is better",
+}
+
+
+def differences(results: Results, planners: Sequence[str], learner: str) -> pd.DataFrame:
+    """Planners compared with a learner on the same missions, by number of UAVs and over all.
+
+    Returns:
+        A row per policy, number of UAVs (or ``ALL``) and metric (product, success), as
+        ``analysis.compare`` returns it, with the column ``uavs``.
+
+    Raises:
+        InputError: If the study lacks one of the policies.
+    """
+    for policy in (*planners, learner):
+        results.check_policy(policy)
+    missions = results.missions[results.missions["policy"].isin([*planners, learner])]
+    metrics = [PRODUCT, SUCCESS]
+    by_fleet = compare(missions, learner, metrics, by=["uavs"])
+    table = pd.concat([by_fleet, compare(missions, learner, metrics).assign(uavs=ALL)])
+    order = {"kind": "stable", "key": lambda names: names.map(planners.index)}
+    return table.sort_values("policy", ignore_index=True, **order)
+
+
+def answer(table: pd.DataFrame, planner: str) -> tuple[str, str]:
+    """Whether the planner is better than the learner, and by how many points over all missions.
+
+    Args:
+        table: Rows of ``differences``.
+        planner: The planner.
+    """
+    rows = table[(table["policy"] == planner) & (table["metric"] == PRODUCT)]
+    (overall,) = rows[rows["uavs"] == ALL].itertuples()
+    points = numbers.points(overall.difference, overall.low, overall.high)
+    sentence = (
+        f"{_CLAIMS[position(overall)]}: the product of {planner} minus that of {overall.baseline} "
+        f"is {points} points over {overall.n:,} missions."
+    )
+    return sentence, f"{numbers.difference(overall.difference, 0)} points"
+
+
+def by_fleet(table: pd.DataFrame) -> Drawing:
+    """The differences of the product by number of UAVs.
+
+    Args:
+        table: Rows of ``differences``.
+    """
+    rows = table[table["metric"] == PRODUCT]
+    names = rows["uavs"].map(lambda uavs: uavs if uavs == ALL else numbers.counted(uavs, "UAV"))
+    baseline = rows["baseline"].iloc[0]
+    return Drawing(
+        figures.differences(rows, names, f"Difference from {baseline}"),
+        f"Paired differences from {baseline} in the product, by number of UAVs",
+        f"n = {numbers.span(rows['n'])} missions; bars are 95 % intervals.",
+    )
+
+
+def front(results: Results, times: Times) -> Drawing:
+    """The product against the decision time of every policy whose decisions were timed.
+
+    Its data have a row per policy, the fastest first: ``policy``, ``mean``, ``low`` and ``high`` of
+    the product, ``seconds`` (median time of a call for one mission), and ``on_front``: whether no
+    other policy is at least as fast and as good, and better in one of the two.
+    """
+    means = summary(results.missions, by=["policy"]).query("metric == @PRODUCT")
+    seconds = {cost.policy: cost.median for cost in times.costs}
+    points = comparison.front(means[["policy", "mean", "low", "high"]], seconds)
+    return Drawing(
+        decision_times(points),
+        "Decision time against the product of all policies, and their Pareto front",
+        "No policy is both faster and better than one on the line. Medians on one core.",
+        points,
+    )
+
+
+def coverage(results: Results, policy: str) -> np.ndarray:
+    """The (K,) mean shares of their data that the nodes lose to a policy, over kept event logs."""
+    nodes = len(results.scenario().nodes)
+    data = [(collected(log, _uavs(log), nodes), held(log, nodes)) for log in _logs(results, policy)]
+    return np.mean([of_uavs.sum(axis=0) / of_nodes for of_uavs, of_nodes in data], axis=0)
+
+
+def coverages(results: Results, planner: str, learner: str) -> list[Drawing]:
+    """Maps of what two policies collect from every node, and of the difference."""
+    first, second = (coverage(results, policy) for policy in (planner, learner))
+    single = {f"Collected by {planner}": first, f"Collected by {learner}": second}
+    shown = single | {f"{planner} − {learner}": first - second}
+    counted = f"means over n = {len(_logged(results, planner))} missions"
+    return [
+        Drawing(
+            node_map(results.scenario(), title, values, signed=title not in single),
+            title,
+            f"{title}: {counted}, in percent of the node's data.",
+        )
+        for title, values in shown.items()
+    ]
+
+
+def node_map(
+    space: ScenarioSpace,
+    title: str,
+    values: np.ndarray,
+    signed: bool = False,
+    write: Callable[[float], str] = "{:.0%}".format,
+) -> Figure:
+    """A map with the nodes of a scenario in the colours of values, which are written at them.
+
+    Args:
+        space: The scenario.
+        title: The title.
+        values: (K,) values, from 0 to 1; or, if ``signed``, differences of any size.
+        signed: Whether blue means above 0 and orange below 0, in percentage points.
+        write: How other values are written.
+    """
+    colours = ["white", style.BETTER] if not signed else [style.WORSE, "white", style.BETTER]
+    most = max(float(np.abs(values).max()), 0.01) if signed else 1.0
+    with style.panels(5.4) as (figure, ax):
+        maps.chart(space, ax)
+        ax.scatter(*np.transpose(space.nodes), c=values, s=420, zorder=3, edgecolors=style.MUTED,
+                   cmap=sns.blend_palette(colours, as_cmap=True), linewidths=0.8,
+                   vmin=-most if signed else 0.0, vmax=most)  # fmt: skip
+        for cell, value in zip(space.nodes, values, strict=True):
+            text = numbers.difference(value, 0) if signed else write(value)
+            ax.annotate(text, cell, ha="center", va="center", fontsize=8.5, zorder=4,
+                        **style.OUTLINED)  # fmt: skip
+        ax.set_title(title)
+    return figure
+
+
+def at_home(results: Results, policies: Sequence[str]) -> Drawing:
+    """The share of the UAVs in the charging zone in every slot, over kept event logs.
+
+    Its data have a row per policy and slot: ``policy``, ``slot``, ``share``, and ``n``, the number
+    of UAVs whose mission is not over. Slots with less than half of the UAVs of slot 0 have no row.
+    """
+    zones, tables = results.scenario().chart.zones, []
+    for policy in policies:
+        slots = pd.concat([uav_slots(events) for events in _logs(results, policy)])
+        inside = pd.Series(zones[slots["y"], slots["x"]] >= 0, slots.index)
+        rows = inside.groupby(slots["slot"]).agg(share="mean", n="size").reset_index()
+        tables.append(rows[rows["n"] >= rows["n"].iloc[0] / 2].assign(policy=policy))
+    table = pd.concat(tables, ignore_index=True)
+    rows = table.assign(panel=0, **dict.fromkeys(("mean", "low", "high"), table["share"]))
+    logged = len(_logged(results, policies[0]))
+    return Drawing(
+        maps.courses(rows, "policy", "%", {0: "Share of the UAVs in the charging zone"}),
+        "The share of the UAVs in the charging zone over the slots",
+        f"n = {logged} missions. A UAV that has filled its quota has left the mission.",
+        table,
+    )
+
+
+def returns(results: Results, policies: Sequence[str]) -> pd.DataFrame:
+    """When and how UAVs go home: their charging sessions in kept event logs, as a table of text.
+
+    Returns:
+        A row per policy: the sessions per UAV, mean slot and battery at the beginning of a session,
+        and the number of UAVs.
+    """
+    rows = []
+    for policy in policies:
+        logs = _logs(results, policy)
+        begun = pd.concat([events[events["event"] == "charge_start"] for events in logs])
+        uavs, (slot, battery) = sum(map(_uavs, logs)), begun[["time", "battery"]].mean()
+        sessions = f"{len(begun) / uavs:.2f}"
+        rows.append((policy, sessions, f"{slot:.1f}", f"{battery:.1f} %", uavs))
+    heads = ["Policy", "Sessions per UAV", "Begin in slot", "Battery then", "UAVs"]
+    return pd.DataFrame(rows, columns=heads)
+
+
+def example(results: Results, policy: str) -> LoggedMission:
+    """The first mission of the smallest fleet whose event log is kept."""
+    missions = results.missions[results.missions["policy"] == policy].set_index("replication")
+    replication = int(missions.loc[[*_logged(results, policy)], "uavs"].idxmin())
+    return logged_mission(results, policy, 0, replication)
+
+
+def plan(results: Results, mission: LoggedMission) -> Drawing:
+    """What a planner plans in the first slot of a mission, over the mission as simulated.
+
+    Nothing is simulated. If the policy is no planner, no plan is drawn.
+    """
+    planner, courses = load(mission.row["policy"]), list[Course]()
+    if isinstance(planner, Planner):
+        place = results.store.manifest.seed, int(mission.row["replication"])
+        courses = first_plan(results.scenario(), *place, planner)
+    with style.panels(6.0) as (figure, ax):
+        maps.trajectories(mission.log, mission.scenario, ax)
+        for uav, course in enumerate(courses):
+            colour = style.uav_colours(len(courses))[uav]
+            ax.plot(*course.path.T, color=colour, linestyle=(0, (3, 1.5)), linewidth=1.6, zorder=7,
+                    gid=f"plan-{uav}", label=f"plan of UAV {uav + 1}")  # fmt: skip
+            for number, cell in enumerate(course.waypoints, 1):
+                ax.annotate(str(number), cell, xytext=(6, 6), textcoords="offset points",
+                            color=colour, fontsize=8, fontweight="bold", zorder=10,
+                            **style.OUTLINED)  # fmt: skip
+        ax.set_title("The first plan (dashed), and the mission as simulated")
+    alt = "The plan of the first slot, over the mission as simulated"
+    return Drawing(figure, alt, mission.caption)
+
+
+def node_prices(results: Results, replication: int) -> np.ndarray:
+    """What one more initial data unit at each of the K nodes would add to the bound [data units].
+
+    It is the sum of the prices of the node over all cuts, since data of the first slot count in
+    every cut, and at most 1.
+    """
+    return results.bounds[0, replication].prices.sum(axis=0)
+
+
+def prices(results: Results, replication: int) -> Drawing:
+    """A map of the prices of the nodes' data in the upper bound of a mission."""
+    values = node_prices(results, replication)
+    return Drawing(
+        node_map(results.scenario(), "Price of a node's data", values, write="{:.2f}".format),
+        "The price of every node's data in the upper bound",
+        f"n = 1, mission {replication}: what one more data unit would add to the upper bound.",
+    )
+
+
+def _logged(results: Results, policy: str) -> range:
+    """The replications whose event logs are kept."""
+    first = results.cell(policy, 0).first
+    return range(first, first + results.manifest["study"]["logged"])
+
+
+def _logs(results: Results, policy: str) -> list[pd.DataFrame]:
+    return [results.events(policy, 0, number) for number in _logged(results, policy)]
+
+
+def _uavs(events: pd.DataFrame) -> int:
+    return int(events["uav"].max()) + 1

@@ -1,0 +1,124 @@
+"""A planner beside a learner: differences, and what each collects, plans and would pay."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import numbers, run_study
+from analysis.answers import planner
+from analysis.answers.optimality import ALL
+from analysis.bound import Bound
+from analysis.execution import jobs
+from analysis.names import PRODUCT
+from analysis.results.event_log import uav_slots
+from dess import load_scenario
+from policies.planner import Budget, Planner
+from tests.analysis.small import small_study
+
+LOGGED = 3
+
+
+def one(space, seed, replication, **_):
+    """A bound of 1, with prices that are the number of the mission and of the node."""
+    prices = np.array([[0.1, 0.2, 0.3], [replication / 100] * 3])
+    return Bound(1.0, prices, np.array([9, 30]), 1)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("planner")
+    policies = ["greedy", "tour", "random"]
+    study = small_study(folder, policies=policies, missions=30, bounds=True, logged=LOGGED)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(jobs, "upper_bound", one)
+        return run_study(study, folder / "out")
+
+
+def test_the_answer_says_which_is_better_and_by_how_much(results):
+    table = planner.differences(results, ["greedy"], "random")
+    text, number = planner.answer(table, "greedy")
+    difference = table[(table["uavs"] == ALL) & (table["metric"] == PRODUCT)].iloc[0]
+    points = f"+{100 * difference['difference']:.1f} ["
+    assert text.startswith(
+        f"The planner is better: the product of greedy minus that of random is {points}"
+    )
+    assert text.endswith("over 30 missions.")
+    assert number == f"{points[:-2]} points"
+    turned = table.assign(low=-table["high"], high=-table["low"], difference=-table["difference"])
+    assert planner.answer(turned, "greedy")[0].startswith("The learner is better: the product")
+    text, _ = planner.answer(table.assign(low=-0.01), "greedy")
+    assert text.startswith("The missions do not tell which is better")
+
+
+def test_differences_are_beside_each_other_by_fleet() -> None:
+    table = pd.DataFrame(
+        {"policy": [*"aabb"], "uavs": [1, ALL] * 2, "baseline": "c", "metric": PRODUCT, "n": 9}
+        | {"difference": [0.1, 0.2, 0.3, 0.4], "low": 0.0, "high": 0.5}
+    )
+    (ax,) = planner.by_fleet(table).figure.axes
+    drawn = [bar.lines[0].get_ydata().tolist() for bar in ax.containers]
+    assert drawn == [[0.1, 0.2], [0.3, 0.4]]
+    assert [label.get_text() for label in ax.get_xticklabels()] == ["1 UAV", "all"]
+    assert ax.get_title(loc="left") == "Difference from c (paired)"
+
+
+def test_coverage_is_what_the_logs_say_was_collected(results):
+    shares = []
+    for replication in range(LOGGED):
+        log = results.events("greedy", 0, replication)
+        by_node = log[log["node"] >= 0].groupby(["event", "node"])["value"].sum()
+        had = by_node["mission_start"].add(by_node.get("arrival", 0.0), fill_value=0.0)
+        shares.append(by_node["communication"].reindex(range(3), fill_value=0.0) / had)
+    expected = np.mean(shares, axis=0)
+    np.testing.assert_allclose(planner.coverage(results, "greedy"), expected)
+    assert 0 < expected.min() <= expected.max() <= 1
+
+
+def test_the_share_at_home_is_that_of_uavs_in_the_zone(results):
+    """The zone has the cells x 5..7, y 0..1."""
+    table = planner.at_home(results, ["greedy"]).data.set_index("slot")
+    inside = total = 0
+    for replication in range(LOGGED):
+        slots = uav_slots(results.events("greedy", 0, replication)).query("slot == 2")
+        inside += ((slots["x"] >= 5) & (slots["y"] <= 1)).sum()
+        total += len(slots)
+    assert table.loc[2, ["share", "n"]].tolist() == pytest.approx([inside / total, total])
+
+
+def test_the_example_is_the_first_of_the_smallest_fleets_with_a_log(results):
+    example = planner.example(results, "greedy")
+    fleets = results.missions.query("policy == 'greedy'")["uavs"].to_numpy()[:LOGGED]
+    assert example.row["replication"] == int(np.argmin(fleets))
+
+
+def test_the_price_of_a_node_is_the_sum_over_cuts(results):
+    np.testing.assert_allclose(planner.node_prices(results, 7), [0.17, 0.27, 0.37])
+
+
+def test_the_plan_begins_where_the_uavs_start(results, monkeypatch):
+    monkeypatch.setattr(Planner, "budget", Budget(500, 0))
+    mission = planner.example(results, "greedy")
+    planned = replace(mission, row=mission.row.replace("greedy", "planner"))
+    (ax,) = planner.plan(results, planned).figure.axes
+    ways = [line.get_xydata() for line in ax.lines if "plan" in str(line.get_gid())]
+    log = mission.log
+    starts = log[(log["event"] == "mission_start") & (log["uav"] >= 0)]
+    assert [way[0].tolist() for way in ways] == starts[["x", "y"]].to_numpy().tolist()
+    cells = np.array([text.xy for text in ax.texts if text.get_position() == (6, 6)])
+    assert len(cells) and cells.min() >= 0 and cells.max() < 8
+    unplanned = planner.plan(results, mission)
+    assert not any("plan" in str(line.get_gid()) for line in unplanned.figure.axes[0].lines)
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_values_are_written_at_the_nodes_in_the_colour_of_their_sign(signed):
+    space, values = load_scenario("paper"), np.linspace(-1.0 * signed, 0.96, 25)
+    (ax,) = planner.node_map(space, "Values", values, signed, "{:.2f}".format).axes
+    shown = [numbers.difference(v, 0) if signed else f"{v:.2f}" for v in values]
+    assert [text.get_text() for text in ax.texts] == shown
+    assert [text.xy for text in ax.texts] == [*space.nodes]
+    (nodes,) = ax.collections
+    red, _, blue, _ = np.transpose(nodes.to_rgba(nodes.get_array()))
+    assert np.array_equal(blue > red, values > 0) or not signed
