@@ -10,7 +10,7 @@ import pandas as pd
 import pyarrow as pa
 
 from analysis import numbers
-from analysis.names import PRODUCT, RATIO
+from analysis.metrics import PRODUCT, RATIO
 from analysis.results import parquet
 from analysis.results.event_log import Events, causes
 from analysis.results.resimulate import resimulate

@@ -12,7 +12,8 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.answers import settings
-from analysis.names import AGE, PRODUCT, value_text
+from analysis.metrics import AGE, PRODUCT
+from analysis.names import value_text
 from analysis.results.event_log import duration
 from analysis.results.tables import Results
 from analysis.stats.differences import column_tests, relative_change

@@ -11,7 +11,7 @@ from analysis import numbers
 from analysis.answers import comparison, summary
 from analysis.answers.comparison import Times
 from analysis.answers.missions import LoggedMission, collected, held, logged_mission
-from analysis.names import BOUND, GAP, PRODUCT, SUCCESS
+from analysis.metrics import BOUND, GAP, PRODUCT, SUCCESS
 from analysis.results.chunks import MANIFEST
 from analysis.results.event_log import uav_slots
 from analysis.results.tables import Results, load_results

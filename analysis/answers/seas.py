@@ -14,7 +14,7 @@ import pandas as pd
 from analysis import numbers
 from analysis.answers import comparison
 from analysis.answers.comparison import Times
-from analysis.names import BOUND, PRODUCT, SUCCESS
+from analysis.metrics import BOUND, PRODUCT, SUCCESS
 from analysis.results.tables import Results
 from analysis.stats.differences import column_tests, relative_change
 from analysis.stats.intervals import column_intervals

@@ -17,7 +17,7 @@ from analysis.execution.effort import (
 )
 from analysis.execution.jobs import CHUNK, Job, MissionsJob, Problem, Progress, simulate_missions
 from analysis.execution.workers import Here, Pool
-from analysis.names import MEANS, SHARES
+from analysis.metrics import ALWAYS
 from analysis.results.chunks import Part, split
 from analysis.results.manifest import Cell
 from analysis.stats.intervals import Moments
@@ -29,7 +29,7 @@ from dess.streams import MAX_REPLICATION
 from dess.view import check_team
 from policies.registry import TypedByUser, load_team
 
-METRICS = (*SHARES, *MEANS)
+METRICS = ALWAYS
 
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
 # sums depend on it.

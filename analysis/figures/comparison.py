@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from analysis.answers.comparison import AHEAD, BEHIND, Pair
 from analysis.answers.optimality import ALL
 from analysis.figures import style
-from analysis.names import BOUND, METRICS, PRODUCT, metric_label, parameter
+from analysis.metrics import BOUND, METRICS, PRODUCT, metric_of
+from analysis.names import parameter
 from analysis.numbers import counted
 from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import INCONCLUSIVE
@@ -113,8 +114,8 @@ def means(table: pd.DataFrame, metric: str, sides: Sequence[str]) -> Figure:
     rows = table[table["metric"] == metric].dropna(subset="mean")
     rows = rows.assign(position=rows["point"], value=rows["point"].map(dict(enumerate(sides))))
     with style.panels(4.1, values="y") as (figure, ax):
-        style.along(rows, style.policy_colours(rows["policy"]), style.unit_of(metric), ax)
-        ax.set(title=metric_label(metric), xlim=(-0.45, 1.45))
+        style.along(rows, style.policy_colours(rows["policy"]), metric_of(metric).axis, ax)
+        ax.set(title=metric_of(metric).label, xlim=(-0.45, 1.45))
         ax.set_xticks((0, 1), sides)
         if metric in METRICS:
             ax.set_ylim(style.ends(rows, 0.05))

@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from analysis.answers.learning import ALPHA, smoothed
 from analysis.answers.learning import LEARNED_REWARD as REWARD
 from analysis.figures import style
-from analysis.names import METRICS, value_text
+from analysis.metrics import METRICS
+from analysis.names import value_text
 
 EVALUATED = {f"evaluation_{metric}": name for metric, name in METRICS.items()}
 # The metrics that are evaluated while training, and their names.

@@ -12,7 +12,8 @@ import pandas as pd
 from analysis.answers import learning, main_effects, missions, summary
 from analysis.answers.learning import Transfer, last_phase, settled
 from analysis.answers.main_effects import Shape
-from analysis.names import RATIO, parameter, value_text
+from analysis.metrics import RATIO
+from analysis.names import parameter, value_text
 from analysis.paper import values
 from analysis.paper.values import CROSSING
 from analysis.results.tables import Results

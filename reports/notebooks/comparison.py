@@ -23,13 +23,12 @@ from pathlib import Path
 
 from IPython.display import display
 
-from analysis import load_results, numbers
+from analysis import load_results, numbers, tables
 from analysis.answers import comparison as answers
 from analysis.answers import summary
 from analysis.answers.missions import kept_missions
 from analysis.figures import comparison as figures
 from analysis.figures.missions import mission_figure
-from reports import tables
 from reports.pages import html
 
 # %%

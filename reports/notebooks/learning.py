@@ -25,7 +25,7 @@ from analysis import numbers
 from analysis.answers import learning as answers
 from analysis.answers.learning import read_curves
 from analysis.figures import learning as figures
-from analysis.names import PRODUCT
+from analysis.metrics import PRODUCT
 from analysis.paper import measures, scorecard, values
 from policies.registry import TRAINED
 from reports.pages import html

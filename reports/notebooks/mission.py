@@ -29,7 +29,7 @@ from analysis import load_results, numbers
 from analysis.answers import missions
 from analysis.answers.summary import best_policy, ranked_policies
 from analysis.figures.missions import mission_figure
-from analysis.names import RATIO
+from analysis.metrics import RATIO
 from analysis.paper import values
 from reports.pages import html
 from reports.player import READING, library, player, together

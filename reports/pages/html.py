@@ -29,6 +29,7 @@ from analysis.numbers import span
 from analysis.results.resimulate import Evidence, learned_files
 from analysis.results.tables import Results
 from analysis.study.study import budget_of
+from analysis.tables import Table
 from dess.errors import printable
 
 SHORT = 12  # characters of a hash that are shown
@@ -189,16 +190,16 @@ def _weights(evidence: Evidence) -> Iterator[str]:
 
 
 def table(
-    frame: pd.DataFrame, caption: str = "", wrap: bool = False, data: pd.DataFrame | None = None
+    frame: pd.DataFrame, caption: str = "", data: pd.DataFrame | None = None, wrap: bool = False
 ) -> HTML:
     """A table below its caption, without its index; a wide table scrolls.
 
     Args:
         frame: The table.
         caption: The text above the table.
-        wrap: Whether long cells are broken into several lines.
         data: The complete numbers of the table. If given, links below the table save them as CSV
             and the shown table as LaTeX.
+        wrap: Whether long cells are broken into several lines.
     """
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
@@ -264,6 +265,12 @@ def gallery(drawings: Iterable[Drawing], note: str = "") -> HTML:
     below = f'<p class="note">{escape(note)}</p>' if note else ""
     figures = "".join(_figure(*parts) for parts in drawings)
     return HTML(f'<div class="gallery">{figures}</div>{below}')
+
+
+def blocks(*parts: Table | Iterable[Drawing]) -> HTML:
+    """Tables, and galleries of figures, one below the other."""
+    shown = [table(*p) if isinstance(p, Table) else gallery(p) for p in parts]
+    return HTML("".join(part.data for part in shown))
 
 
 def svg(drawing: Figure) -> bytes:

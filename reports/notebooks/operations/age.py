@@ -19,17 +19,17 @@ results = "../../results"  # folder with the results folder of the study age
 # %%
 from pathlib import Path
 
-from analysis import load_results, names, numbers
+from analysis import load_results, numbers, tables
 from analysis.answers import operations
 from analysis.figures.settings import lines
+from analysis.metrics import AGE, RATIO, metric_of
 from analysis.stats.intervals import LEVEL
-from reports import tables
 from reports.pages import html
 
 # %%
 study = load_results(Path(results) / "age")
-ages = [names.AGE, "peak_age", "age_p99"]
-means = operations.means(study, [*ages, names.RATIO])
+ages = [AGE, "peak_age", "age_p99"]
+means = operations.means(study, [*ages, RATIO])
 
 # %%
 caption = (
@@ -38,7 +38,7 @@ caption = (
 drawn = [
     (
         lines(rows, "uavs", "arrival_rate", str(metric), "policy"),
-        f"{names.metric_name(str(metric))} against the number of UAVs, by arrival rate",
+        f"{metric_of(str(metric)).name} against the number of UAVs, by arrival rate",
         caption,
     )
     for metric, rows in means.groupby("metric", sort=False)
@@ -77,10 +77,10 @@ html.table(
 # ## Tables
 
 # %%
-of_age = means[means["metric"] == names.AGE]
+of_age = means[means["metric"] == AGE]
 html.table(
     tables.estimates(of_age, ["policy", "uavs", "n"], "arrival_rate", numbers.quantities),
-    f"{names.metric_label(names.AGE)}, by arrival rate",
+    f"{metric_of(AGE).label}, by arrival rate",
     data=means,
 )
 

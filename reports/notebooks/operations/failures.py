@@ -21,18 +21,18 @@ from pathlib import Path
 
 from IPython.display import display
 
-from analysis import load_results, names, numbers
+from analysis import load_results, numbers, tables
 from analysis.answers import operations
 from analysis.figures.settings import lines
+from analysis.metrics import PRODUCT, RATIO, SUCCESS, metric_of
 from analysis.stats.intervals import LEVEL
-from reports import tables
 from reports.pages import html
 
 # %%
 study = load_results(Path(results) / "failures")
 columns = [c for c in ("failures", "slots_grounded", "lost") if c in study.missions]
 counts = [c for c in columns if study.missions[c].max() > 0]
-metrics = [names.PRODUCT, names.SUCCESS, names.RATIO]
+metrics = [PRODUCT, SUCCESS, RATIO]
 means = operations.means(study, [*metrics, *counts])
 rate, repair = operations.RATE, operations.REPAIR
 
@@ -44,7 +44,7 @@ caption = (
 drawn = [
     (
         lines(means[means["metric"] == metric], rate, "uavs", metric, repair),
-        f"{names.metric_name(metric)} against the failure rate, by number of UAVs",
+        f"{metric_of(metric).name} against the failure rate, by number of UAVs",
         caption,
     )
     for metric in metrics
@@ -75,7 +75,7 @@ display(
     *(
         html.table(
             tables.estimates(change, ["policy", "uavs", repair, "n"], rate, numbers.points),
-            f"{names.metric_name(metric)} minus that without failures, in points, by failure rate",
+            f"{metric_of(metric).name} minus that without failures, in points, by failure rate",
             data=change,
         )
         for metric in metrics
@@ -91,7 +91,7 @@ display(
     *(
         html.table(
             tables.estimates(rows, ["policy", "uavs", repair, "n"], rate, numbers.quantities),
-            f"{names.metric_label(metric)} per mission, by failure rate; empty: nothing can fail",
+            f"{metric_of(metric).label} per mission, by failure rate; empty: nothing can fail",
         )
         for metric in counts
         for rows in [means[means["metric"] == metric]]

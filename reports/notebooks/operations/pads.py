@@ -22,18 +22,18 @@ from pathlib import Path
 
 from IPython.display import display
 
-from analysis import load_results, names, numbers
+from analysis import load_results, numbers, tables
 from analysis.answers import operations
 from analysis.figures.learning import courses
 from analysis.figures.settings import lines
+from analysis.metrics import PRODUCT, SUCCESS, metric_of
 from analysis.stats.intervals import LEVEL
-from reports import tables
 from reports.pages import html
 
 # %%
 study = load_results(Path(results) / "pads")
-uses = ["waiting", "queue", names.UTILISATION]
-means = operations.means(study, [names.PRODUCT, names.SUCCESS, *uses])
+uses = ["waiting", "queue", "utilisation"]
+means = operations.means(study, [PRODUCT, SUCCESS, *uses])
 
 # %%
 caption = (
@@ -42,7 +42,7 @@ caption = (
 drawn = {
     metric: (
         lines(rows, "pads", "uavs", str(metric), "policy"),
-        f"{names.metric_name(str(metric))} against the number of pads, by number of UAVs",
+        f"{metric_of(str(metric)).name} against the number of pads, by number of UAVs",
         caption,
         rows,
     )
@@ -53,7 +53,7 @@ drawn = {
 html.answer(operations.pads(study, margin))
 
 # %%
-html.lead(*drawn[names.PRODUCT])
+html.lead(*drawn[PRODUCT])
 
 # %% [markdown]
 # ## Why
@@ -74,7 +74,7 @@ html.figure(
 )
 
 # %%
-html.gallery([drawn[metric] for metric in (*uses, names.SUCCESS)])
+html.gallery([drawn[metric] for metric in (*uses, SUCCESS)])
 
 # %% [markdown]
 # ## How far to trust it
@@ -88,7 +88,7 @@ html.say(
 )
 
 # %%
-lost = operations.changes(study, "pads", study.missions["pads"].max(), names.PRODUCT)
+lost = operations.changes(study, "pads", study.missions["pads"].max(), PRODUCT)
 html.table(
     tables.estimates(lost, ["policy", "pads", "n"], "uavs", numbers.points),
     "Product minus that with the most pads: paired differences in points, by number of UAVs",
@@ -102,8 +102,8 @@ html.table(
 display(
     *(
         html.table(
-            tables.estimates(rows, ["policy", "pads", "n"], "uavs", numbers.written(metric)),
-            f"{names.metric_label(metric)}, by number of UAVs",
+            tables.estimates(rows, ["policy", "pads", "n"], "uavs", metric_of(metric).written),
+            f"{metric_of(metric).label}, by number of UAVs",
         )
         for metric in uses
         for rows in [means[means["metric"] == metric]]

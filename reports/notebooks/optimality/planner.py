@@ -22,13 +22,12 @@ learner = "ddqn"  # the policy that has learned
 # %%
 from pathlib import Path
 
-from analysis import load_results, numbers
+from analysis import load_results, numbers, tables
 from analysis.answers import comparison as answers
 from analysis.answers import optimality
 from analysis.figures import comparison, learning, settings
 from analysis.figures import missions as maps
-from analysis.names import PRODUCT
-from reports import tables
+from analysis.metrics import PRODUCT
 from reports.pages import html
 
 # %%

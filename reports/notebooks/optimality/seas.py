@@ -22,12 +22,11 @@ heuristic = "greedy"  # a fast policy without learning
 # %%
 from pathlib import Path
 
-from analysis import load_results
+from analysis import load_results, tables
 from analysis.answers import comparison as answers
 from analysis.answers import seas
 from analysis.figures import comparison, settings
-from analysis.names import METRICS, PRODUCT, SUCCESS
-from reports import tables
+from analysis.metrics import METRICS, PRODUCT, SUCCESS
 from reports.pages import html
 
 # %%

@@ -236,7 +236,7 @@ def test_marl_eval_has_the_same_scores_at_every_level(results, monkeypatch) -> N
     data = json.loads(json.dumps(marl_eval_data(results, ["success", OF_RUNS])))
     scores = rliable_scores(results, OF_RUNS)
     [[study, tasks]] = data.items()
-    assert (study, [*tasks]) == ("trial", ["quota 30", "quota 60"])
+    assert (study, [*tasks]) == ("trial", [f"communication quota {n}" for n in (30, 60)])
     for task, algorithms in enumerate(tasks.values()):
         assert [*algorithms] == ["a+b", "greedy"]
         for name, of_runs in algorithms.items():

@@ -9,7 +9,7 @@ from analysis.answers import optimality
 from analysis.answers.optimality import ALL
 from analysis.bound import Bound
 from analysis.execution import jobs
-from analysis.names import BOUND, GAP, PRODUCT
+from analysis.metrics import BOUND, GAP, PRODUCT
 from analysis.results.event_log import uav_slots
 from policies.planner import Budget, Planner
 from tests.analysis.small import small_study

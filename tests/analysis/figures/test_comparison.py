@@ -9,7 +9,8 @@ from analysis.answers.comparison import AHEAD, BEHIND, Pair
 from analysis.ask import what_if
 from analysis.figures import comparison
 from analysis.figures.comparison import COLOURS
-from analysis.names import BOUND, GAP, METRICS, PARAMETERS, PRODUCT
+from analysis.metrics import BOUND, GAP, METRICS, PRODUCT
+from analysis.names import PARAMETERS
 from analysis.stats.verdict import INCONCLUSIVE
 from tests.analysis.answers.test_comparison import missions_of
 from tests.analysis.small import asked

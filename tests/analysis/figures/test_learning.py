@@ -6,7 +6,7 @@ import pytest
 
 from analysis.answers import learning as ablation
 from analysis.figures import learning as learning_figures
-from analysis.names import METRICS
+from analysis.metrics import METRICS
 from tests.analysis.answers.test_learning import training
 
 METRIC = "evaluation_collection_ratio_and_communication"

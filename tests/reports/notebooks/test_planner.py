@@ -6,7 +6,7 @@ import pytest
 
 from analysis import load_results, load_study, numbers, run_study
 from analysis.answers import comparison, optimality
-from analysis.names import BOUND
+from analysis.metrics import BOUND
 from tests.reports.small import quick, run_small_studies, said_by, words
 
 NAMES = {"planner": "tour", "longer": "greedy", "learner": "random"}
