@@ -29,8 +29,6 @@ from dess.streams import MAX_REPLICATION
 from dess.view import check_team
 from policies.registry import TypedByUser, load_team
 
-METRICS = ALWAYS
-
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
 # sums depend on it.
 MEMORY = 2**24
@@ -169,7 +167,7 @@ def means(asked: Asked, progress: Progress | None = None) -> Means:
 
 def _metrics(records: Records) -> dict[str, np.ndarray]:
     """The values of every metric that some of the missions have measured."""
-    values = {metric: records.missions[metric] for metric in METRICS}
+    values = {metric: records.missions[metric] for metric in ALWAYS}
     if len(records.operations):
         values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
     return {metric: of.astype(float) for metric, of in values.items()}

@@ -51,18 +51,18 @@ def performance(summary: pd.DataFrame, metric: str, printed: float | None = None
 
     Args:
         summary: Rows of ``analysis.summary`` by ``policy``.
-        metric: One of ``METRICS``.
+        metric: The metric.
         printed: The paper's number.
     """
-    rows = summary[summary["metric"] == metric]
+    rows, of = summary[summary["metric"] == metric], metric_of(metric)
     with style.panels(1.3 + 0.42 * len(rows), values="x") as (figure, ax):
         style.in_rows(rows, ax)
         for y, mean in enumerate(rows["mean"]):
-            style.note_at_right(f"{mean:.1%}", y, ax)
+            style.note_at_right(of.write(mean), y, ax)
         if printed is not None:
-            ax.axvline(printed, **_PRINTED, label=f"paper {printed:.1%}", zorder=1)
-        ax.set(title=METRICS[metric], xlim=(-0.02, 1.02))
-        style.in_units(ax.xaxis, "%", 5)
+            ax.axvline(printed, **_PRINTED, label=f"paper {of.write(printed)}", zorder=1)
+        ax.set(title=of.name, xlim=(-0.02, 1.02) if of.is_bounded else None)
+        style.in_units(ax.xaxis, of.axis, 5)
     return figure
 
 
@@ -420,7 +420,7 @@ def leading(results: Results, metric: str) -> Drawn:
     if kind == "saltelli":
         return next(index_figures(results, metric))
     if not fields:
-        return means(results, metric if metric in METRICS else PRODUCT)
+        return means(results, metric)
     if len(fields) == 1 or (len(fields) == 2 and kind in ("grid", "table")):
         return plot(results, fields[0], next(iter(fields[1:]), None), metric)
     if kind == "one-at-a-time":

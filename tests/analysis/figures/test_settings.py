@@ -12,6 +12,7 @@ from analysis.answers import settings
 from analysis.figures import settings as figures
 from analysis.figures import style
 from analysis.metrics import METRICS, PRODUCT, SUCCESS
+from analysis.numbers import percent
 from analysis.study.design import NOISE
 from dess import InputError
 from tests.analysis.answers.test_main_effects import pairs_of
@@ -150,10 +151,10 @@ def test_performance_shows_means_intervals_and_the_printed_figure(metric: str = 
         assert bar.lines[0].get_xdata() == pytest.approx([row["mean"]])
         (arm,) = bar.lines[2]
         assert arm.get_segments()[0][:, 0] == pytest.approx([row["low"], row["high"]])
-    (printed,) = (line for line in ax.lines if line.get_label() == "paper 55.0%")
+    (printed,) = (line for line in ax.lines if line.get_label() == "paper 55.0 %")
     assert list(printed.get_xdata()) == [0.55, 0.55]
     assert ax.get_title(loc="left") == METRICS[metric]
-    assert [note.get_text() for note in ax.texts] == [f"{mean:.1%}" for mean in rows["mean"]]
+    assert [note.get_text() for note in ax.texts] == [*map(percent, rows["mean"])]
     assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first on top
 
 
