@@ -1,87 +1,36 @@
-"""The names of metrics and parameters, as code, figures and pages use them."""
+"""The names of the fields of a scenario, and their values in words."""
 
 import re
-from collections.abc import Container
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dess.errors import form_of, kind_of
-from dess.record import OPERATIONS
 from dess.scenario import SAMPLED, ZONE_PADS, Scenario, ScenarioSpace, fields_of
-
-SUCCESS, RATIO = "success", "collection_ratio"
-PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
-
-# The paper's metrics, in its order (Section VI-A). It calls them successful communication,
-# collection ratio, and collection ratio and communication; the last is here the product of each
-# mission.
-METRICS = {SUCCESS: "Success", RATIO: "Collection ratio", PRODUCT: "Product"}
-# Their names for the terminal.
-SHORT_METRICS = {metric: name.lower() for metric, name in METRICS.items()}
 
 # The description of the studies of sweeps, and the folder of their results folders.
 SWEEP, SWEEPS = "a sweep: every combination of the values", "sweeps"
 
-# Short names of metrics on the command line.
-ALIASES = {"ratio": RATIO, "product": PRODUCT}
 
-
-class Measure(NamedTuple):
-    """What pages call a column of ``OPERATIONS``, which only extended scenarios measure.
+@dataclass(frozen=True)
+class Field:
+    """A field of a scenario: what figures and pages call it, and its values in words.
 
     Attributes:
-        name: The name.
-        unit: The unit; empty for shares and counts.
-        less_is_better: Whether a lower value is better.
+        key: The field, as in ``--set``.
+        name: Its name.
+        short: Its name where there is little room.
+        unit: The unit; empty for counts and for what is no number.
+        counted: What it counts, in the singular.
     """
 
-    name: str
-    unit: str = ""
-    less_is_better: bool = True
-
-    @property
-    def label(self) -> str:
-        """The name with its unit."""
-        return f"{self.name} [{self.unit}]".removesuffix(" []")
-
-
-_SLOTS = "mission slots"
-AGE, UTILISATION = "age", "utilisation"
-MEASURES = {
-    AGE: Measure("Age of information", _SLOTS),
-    "peak_age": Measure("Peak age of information", _SLOTS),
-    "age_p99": Measure("99th percentile of the age", _SLOTS),
-    "latency": Measure("Latency", _SLOTS),
-    "latency_p99": Measure("99th percentile of the latency", _SLOTS),
-    "generated": Measure("Packets generated", less_is_better=False),
-    "delivered": Measure("Packets delivered", less_is_better=False),
-    "lost_packets": Measure("Packets lost"),
-    "lost": Measure("Data lost", "data units"),
-    "queue": Measure("UAVs waiting for a pad"),
-    "waiting": Measure("Waiting time for a pad", _SLOTS),
-    "pad_requests": Measure("Requests for a pad", less_is_better=False),
-    UTILISATION: Measure("Utilisation of the pads", less_is_better=False),
-    "failures": Measure("Failures of UAVs"),
-    "slots_grounded": Measure("Time under repair", _SLOTS),
-}
-
-# All metrics of a mission: shares of missions, and means over missions.
-SHARES = (SUCCESS,)
-MEANS = (RATIO, PRODUCT, REWARD)
-COST = "cost"  # of a study with prices
-# Of a study with bounds: the bound, and the bound minus the product.
-BOUND, GAP = "upper_bound", "optimality_gap"
-BOUNDED = (RATIO, PRODUCT, UTILISATION)  # those whose values lie between 0 and 1
-LESS_IS_BETTER = (COST, GAP, *(name for name, of in MEASURES.items() if of.less_is_better))
-
-
-class Parameter(NamedTuple):
-    """What figures and pages call a parameter of a scenario."""
-
+    key: str
     name: str
     short: str
     unit: str = ""
+    counted: str = ""
 
     @property
     def within(self) -> str:
@@ -103,35 +52,60 @@ class Parameter(NamedTuple):
         """The short name in a figure, with indices in TeX (``parse_math``)."""
         return _tex(self.short)
 
+    def words(self, value: Any) -> str:
+        """A value in words: ``3 UAVs``, ``failed UAVs lost for good``, ``arrival rate 0.02``."""
+        text = value_text(value)
+        if self.key == "failures.uav_repair":
+            return f"failed UAVs {f'repaired in {text} slots' if value else 'lost for good'}"
+        if self.counted:
+            return f"{text} {self.counted}{'' if text == '1' else 's'}"
+        return f"{self.within} {text}"
+
+    def comparable(self, values: Sequence[Any]) -> list[Any]:
+        """Values that are to be compared: unchanged if all are numbers, otherwise as text."""
+        if self.key == "nodes":
+            maps = [*dict.fromkeys(map(str, values))]
+            return [f"{len(v)} cells (map {maps.index(str(v)) + 1})" for v in values]
+        if self.key == ZONE_PADS:
+            return [" + ".join(map(str, v)) if isinstance(v, list | tuple) else v for v in values]
+        if self.key == "zone":
+            return [f"{width} x {height} at ({x}, {y})" for x, y, width, height in values]
+        plain = [
+            v[0] if isinstance(v, list | tuple) and v and all(item == v[0] for item in v) else v
+            for v in values
+        ]
+        is_text = any(isinstance(value, bool | list | tuple | dict) for value in plain)
+        return [*map(value_text, plain)] if is_text else plain
+
 
 # The parameters of the paper's Fig. 5; the record of every mission has their values.
-PARAMETERS = {
-    "uavs": Parameter("Number of UAVs", "UAVs"),
-    "charge_start": Parameter("Charging start capacity C_S", "C_S", "%"),
-    "charge_complete": Parameter("Charging complete capacity C_C", "C_C", "%"),
-    "initial_data": Parameter("Initial data per node", "Initial data", "data units"),
-    "flying_time": Parameter("Flying time", "Flying time", "mission slots"),
-}
-# Other parameters that studies vary.
-_OTHERS = {
-    "scenario": Parameter("Sea", "Sea"),
-    "pads": Parameter("Number of charging pads", "Pads"),
-    "zone": Parameter("Start and charging zone", "Zone"),
-    "zones": Parameter("Further charging zones", "Zones"),
-    ZONE_PADS: Parameter("Pads of each further zone", "Further pads"),
-    "nodes": Parameter("Sensor nodes", "Nodes"),
-    "quota": Parameter("Communication quota", "Quota", "communication slots"),
-    "arrival_rate": Parameter("Arrival rate", "Arrivals", "data units per node and slot"),
-    "arrivals.buffer": Parameter("Buffer of a node", "Buffer", "packets"),
-    "charging.order": Parameter("Order of the queue for pads", "Order"),
-    "charging.power": Parameter("Power limit of all pads", "Power", "% per slot"),
-    "failures.uav_rate": Parameter("Failure rate of a UAV", "Failures", "per mission slot"),
-    "failures.uav_repair": Parameter("Mean time of a repair", "Repair", "mission slots"),
-    "failures.pad_rate": Parameter("Failure rate of a pad", "Pad failures", "per mission slot"),
-    "failures.node_rate": Parameter("Failure rate of a node", "Node failures", "per mission slot"),
-    "wind.strength": Parameter("Wind", "Wind", "% battery per move"),
-}
-
+_PAPER = (
+    Field("uavs", "Number of UAVs", "UAVs", counted="UAV"),
+    Field("charge_start", "Charging start capacity C_S", "C_S", "%"),
+    Field("charge_complete", "Charging complete capacity C_C", "C_C", "%"),
+    Field("initial_data", "Initial data per node", "Initial data", "data units"),
+    Field("flying_time", "Flying time", "Flying time", "mission slots"),
+)
+_OTHERS = (  # that studies vary
+    Field("scenario", "Sea", "Sea"),
+    Field("pads", "Number of charging pads", "Pads", counted="pad"),
+    Field("zone", "Start and charging zone", "Zone"),
+    Field("zones", "Further charging zones", "Zones"),
+    Field(ZONE_PADS, "Pads of each further zone", "Further pads"),
+    Field("nodes", "Sensor nodes", "Nodes"),
+    Field("quota", "Communication quota", "Quota", "communication slots"),
+    Field("arrival_rate", "Arrival rate", "Arrivals", "data units per node and slot"),
+    Field("arrivals.buffer", "Buffer of a node", "Buffer", "packets"),
+    Field("charging.order", "Order of the queue for pads", "Order"),
+    Field("charging.power", "Power limit of all pads", "Power", "% per slot"),
+    Field("failures.uav_rate", "Failure rate of a UAV", "Failures", "per mission slot"),
+    Field("failures.uav_repair", "Mean time of a repair", "Repair", "mission slots"),
+    Field("failures.pad_rate", "Failure rate of a pad", "Pad failures", "per mission slot"),
+    Field("failures.node_rate", "Failure rate of a node", "Node failures", "per mission slot"),
+    Field("wind.strength", "Wind", "Wind", "% battery per move"),
+)
+_KNOWN = {field.key: field for field in (*_PAPER, *_OTHERS)}
+PARAMETERS = {field.key: field for field in _PAPER}
 
 # The fields that an operator decides on. All other fields are conditions that a fleet has to meet.
 DECISIONS = (
@@ -140,12 +114,12 @@ DECISIONS = (
 )
 
 
-def parameter(field: str) -> Parameter:
-    """The parameter that belongs to a field of a scenario; without one, named after the field."""
-    return (PARAMETERS | _OTHERS).get(field, Parameter(field, field))
+def parameter(field: str) -> Field:
+    """The field of this key; one that nothing is known of is named after it."""
+    return _KNOWN.get(field) or Field(field, field, field)
 
 
-class Field(NamedTuple):
+class Declared(NamedTuple):
     """A field of a scenario, as the model declares it, and its value in a scenario.
 
     Attributes:
@@ -165,11 +139,11 @@ class Field(NamedTuple):
     value: Any
 
 
-def fields(space: ScenarioSpace) -> list[Field]:
+def fields(space: ScenarioSpace) -> list[Declared]:
     """Every field of a scenario, in the order of the model."""
     default = ScenarioSpace.of()
     return [
-        Field(
+        Declared(
             name,
             *_meaning(name),
             _allowed(space, name),
@@ -200,29 +174,6 @@ def _single(value: Any) -> Any:
     """A range of one value as this value."""
     is_range = isinstance(value, list) and len(value) == 2
     return value[0] if is_range and value[0] == value[1] else value
-
-
-def metric_name(metric: str) -> str:
-    """The name of a metric on pages."""
-    if metric in MEASURES:
-        return MEASURES[metric].name
-    return METRICS.get(metric, metric.replace("_", " ").capitalize())
-
-
-def metric_label(metric: str) -> str:
-    """The name of a metric with its unit, in figures."""
-    return MEASURES[metric].label if metric in MEASURES else metric_name(metric)
-
-
-def measured_in(missions: Container[str]) -> list[str]:
-    """The metrics of extended scenarios that a table of missions, or a row of it, has."""
-    return [name for name in OPERATIONS.names or () if name in missions]
-
-
-def metrics_in(missions: Container[str]) -> list[str]:
-    """The metrics that a table of missions has: those of the paper, then all others."""
-    of_bounds = [name for name in (BOUND, GAP) if name in missions]
-    return [*SHARES, *MEANS, *of_bounds, *measured_in(missions)]
 
 
 def value_text(value: object) -> str:

@@ -5,8 +5,6 @@ from collections.abc import Callable, Iterable, Sequence
 
 import pandas as pd
 
-from analysis.names import METRICS
-
 # What a spreadsheet takes as the beginning of a formula.
 _FORMULA = re.compile(r"^[=+\-@\t\r]")
 _NAN = re.compile(r"\bnan\b")
@@ -63,11 +61,6 @@ def quantity(value: float) -> str:
 def quantities(mean: float, low: float, high: float) -> str:
     """An estimate and its interval as ``1,042 [1,010, 1,074]``."""
     return with_ends(quantity, mean, low, high)
-
-
-def written(metric: str) -> Callable[[float, float, float], str]:
-    """The function that writes an estimate of a metric and its interval."""
-    return interval if metric in METRICS else quantities
 
 
 def estimates(

@@ -22,7 +22,7 @@ import numpy as np
 import torch
 
 import policies
-from analysis.names import PRODUCT
+from analysis.metrics import PRODUCT
 from analysis.stats.intervals import mean_interval
 from benchmarks.recorded import Recorded, Recorder
 from dess import load_scenario, simulate_batch

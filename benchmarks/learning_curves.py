@@ -21,7 +21,7 @@ import pandas as pd
 import pyarrow as pa
 
 from analysis.answers.learning import SHIPPED, read_curves, trained_policies
-from analysis.names import METRICS, PRODUCT
+from analysis.metrics import METRICS, PRODUCT
 from dess import simulate_batch
 from dess.files.reading import paths_in
 from dess.files.tables import read_table, write_table

@@ -14,7 +14,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from analysis import load_study, numbers
 from analysis.answers.learning import read_curve
-from analysis.names import METRICS, PRODUCT
+from analysis.metrics import METRICS, PRODUCT
 from analysis.paper import values
 from analysis.stats.differences import paired
 from analysis.stats.intervals import interval_of, post_stratified

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 from IPython.display import HTML
 
-from analysis import names, numbers
+from analysis import metrics, names, numbers
 from analysis.answers import summary
 from analysis.answers.settings import points, varied
 from analysis.figures import style
@@ -37,7 +37,7 @@ class Slider(NamedTuple):
         return len(self.values) // 2
 
     @property
-    def parameter(self) -> names.Parameter:
+    def parameter(self) -> names.Field:
         """The name of the field and its unit."""
         return names.parameter(self.field)
 
@@ -87,7 +87,7 @@ class Grid:
         Design points are in the order of the sliders; the value of the last slider varies fastest.
         """
         table = summary.means(self.results)
-        table = table[table["metric"].isin([*names.METRICS])]
+        table = table[table["metric"].isin([*metrics.METRICS])]
         order = {point: number for number, point in enumerate(self._places.index)}
         return table.sort_values("point", key=lambda p: p.map(order), kind="stable")
 
@@ -98,7 +98,7 @@ class Grid:
     def answer(self) -> str:
         """The policies at the design point ``start``, the best first."""
         rows = self.at_start()
-        best = rows[rows["metric"] == names.PRODUCT].sort_values("mean", ascending=False)
+        best = rows[rows["metric"] == metrics.PRODUCT].sort_values("mean", ascending=False)
         parts = [f"{row.policy} {numbers.percent(row.mean)}" for row in best.itertuples()]
         return f"In the middle of all ranges the product is {numbers.words(parts)}; move a slider."
 
@@ -148,7 +148,7 @@ def explorer(results: Results) -> HTML:
             [*map(_tenths, ends), n] for *ends, n in grid.means[columns].itertuples(index=False)
         ],
     }
-    shown = {"sliders": grid.sliders, "policies": looks, "metrics": names.METRICS, "texts": texts}
+    shown = {"sliders": grid.sliders, "policies": looks, "metrics": metrics.METRICS, "texts": texts}
     return HTML(template("explorer.html").render(data=data, **shown))
 
 

@@ -19,11 +19,12 @@ FLOORS = ("dess", "policies", "analysis", "reports")  # from the ground up
 # The rooms of a floor; each imports only from those before it.
 ROOMS = {
     "analysis": (
-        *("names", "numbers", "stats", "bound", "study", "results", "execution", "figures"),
-        *("answers.settings", "figures.settings", "answers", "paper", "verification", "ask"),
+        *("names", "numbers", "metrics", "stats", "tables", "bound", "study", "results"),
+        *("execution", "figures", "answers.settings", "answers.costs", "answers.summary"),
+        *("answers.main_effects", "figures.settings", "answers", "paper", "verification", "ask"),
     ),
     "reports": (
-        *("folders", "tables", "tools", "pages", "player", "explorer", "crate"),
+        *("folders", "tools", "pages", "player", "explorer", "crate"),
         *("interrupts", "cli", "__main__"),
     ),
 }

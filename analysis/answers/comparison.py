@@ -18,7 +18,8 @@ from analysis.answers.missions import FOLDER
 from analysis.answers.summary import learners, ranked_policies
 from analysis.figures import Drawing, style
 from analysis.figures.comparison import middle
-from analysis.names import METRICS, PARAMETERS, PRODUCT, RATIO, SUCCESS, parameter, value_text
+from analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
+from analysis.names import PARAMETERS, parameter, value_text
 from analysis.results.tables import Results
 from analysis.stats.choices import on_front
 from analysis.stats.differences import compare, for_choice, paired, with_adjusted

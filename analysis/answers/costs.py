@@ -10,7 +10,7 @@ which the fleet has to work. Fleets are compared under one condition at a time, 
 conditions together by ``everywhere``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -19,11 +19,13 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from analysis import numbers
-from analysis.answers.settings import edge, ends, points, ranked, value_in_words
-from analysis.names import COST, DECISIONS, METRICS, SUCCESS
+from analysis.answers.settings import edge, ends, points, ranked
+from analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of
+from analysis.names import DECISIONS, parameter
 from analysis.results.tables import Results, once
 from analysis.stats.choices import membership, on_front
 from analysis.study.cheapest import PARTS, Answer, Cheapest, CheapestChoice, Costs
+from analysis.tables import CHECKED, INTERVALS, MOST_ROWS, Table, counts
 from dess import InputError
 from dess.errors import one_of
 from dess.scenario import ZONE_PADS
@@ -76,6 +78,7 @@ def parts(results: Results) -> pd.DataFrame:
     return table.groupby(["policy", "point"], sort=False, as_index=False)[[*PARTS, COST]].mean()
 
 
+@once
 def front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
     """The Pareto front of cost and a metric: the settings that no other one dominates.
 
@@ -171,17 +174,16 @@ def answers(results: Results, table: pd.DataFrame, policies: int = 1) -> list[st
         table: The result of ``judged``.
         policies: Of how many policies the answer is the cheapest, for its confidence.
     """
-    rule, currency = results.store.manifest.selection, _prices(results).currency
-    wanted = rule.requirements if isinstance(rule, Cheapest) else {}
+    currency, wanted = _prices(results).currency, required(results)
     together = everywhere(results, table).assign(condition=f"{EVERYWHERE} together")
     sentences, conditions = [], [*dict.fromkeys(_conditions(results))]
-    for rows, required in ((table, wanted), (together, {})):
+    for rows, needed in ((table, wanted), (together, {})):
         for (condition, policy), part in rows.groupby(["condition", "policy"], sort=False):
             where = f"{condition}, `{policy}`" if condition else f"`{policy}`"
             choice = _choice(results, str(policy))
-            found = choice.answers[conditions.index(condition) if required else -1]
+            found = choice.answers[conditions.index(condition) if needed else -1]
             trust = _trust(results, choice, found, policies)
-            text = _answer(part, required, currency, trust)
+            text = _answer(part, needed, currency, trust)
             sentences.append(f"{where[:1].upper()}{where[1:]}: {text}")
     return sentences
 
@@ -365,10 +367,10 @@ def _fleets(results: Results) -> list[str]:
         space, words = results.scenario(point), []
         if prices.uav or prices.lost_uav or "uavs" in table:
             low, high = space.uavs
-            words.append(value_in_words("uavs", low if low == high else [low, high]))
+            words.append(parameter("uavs").words(low if low == high else [low, high]))
         if prices.pad or {"pads", ZONE_PADS} & {*table}:
             for zone, pads in enumerate(space.zone_pads, 1):
-                words.append(value_in_words("pads", pads) + f" in zone {zone}" * (zone > 1))
+                words.append(parameter("pads").words(pads) + f" in zone {zone}" * (zone > 1))
         fleets.append(numbers.words([*words, *others]) or "the fleet of the scenario")
     return fleets
 
@@ -384,9 +386,81 @@ def _words(results: Results, decisions: bool) -> list[list[str]]:
     rows = points(results).to_dict("records")
     return [
         [
-            value_in_words(str(f), v)
+            parameter(str(f)).words(v)
             for f, v in r.items()
             if (f in DECISIONS) == decisions and f not in COUNTED
         ]
         for r in rows
     ]
+
+
+CERTAIN = 0.01  # settings with a lower probability of being on a front are not in the table
+
+
+def required(results: Results) -> Mapping[str, float]:
+    """The requirements of a study that selects the cheapest setting; empty for any other one."""
+    rule = results.store.manifest.selection
+    given = rule.requirements if isinstance(rule, Cheapest) else {}
+    return {str(metric): least for metric, least in given.items()}
+
+
+def fronts_of(results: Results) -> dict[str, pd.DataFrame]:
+    """The fronts of the required metrics, or of success and the product."""
+    metrics = [*required(results)] or [SUCCESS, PRODUCT]
+    return {metric: front(results, metric) for metric in metrics}
+
+
+def cells(rows: pd.DataFrame, metrics: Iterable[str]) -> pd.DataFrame:
+    """Rows of ``priced`` as text: condition, fleet, policy, cost and metrics of settings."""
+    columns = {"Condition": rows["condition"]} if rows["condition"].any() else {}
+    columns |= {"Fleet": rows["fleet"], "Policy": rows["policy"]}
+    for of in map(metric_of, (COST, *metrics)):
+        columns[of.name] = numbers.estimates(rows, of.column, of.written)
+    return pd.DataFrame(columns)
+
+
+def front_table(results: Results) -> Table:
+    """The settings that may be on one of the fronts, with the probabilities."""
+    fronts = fronts_of(results)
+    first = next(iter(fronts.values()))
+    shares = pd.DataFrame({metric: front["probability"] for metric, front in fronts.items()})
+    top = first[(shares >= CERTAIN).any(axis=1)].head(MOST_ROWS)
+    shown = cells(top, fronts)
+    for metric in fronts:
+        head = f"On the front of {metric_of(metric).within}"
+        shown[head] = shares.loc[top.index, metric].map(numbers.percent)
+    caption = (
+        f"Settings that may be on a front: mean cost [{_prices(results).currency}] and metrics "
+        f"with {INTERVALS}, and the probability that they are on it"
+    )
+    data = first.drop(columns=["on_front", "probability"])
+    return Table(shown, caption, data.join(shares.add_prefix("on_front_of_")))
+
+
+def parts_table(results: Results) -> Table:
+    """The parts of the settings' costs."""
+    rows = priced(results).merge(parts(results).drop(columns=COST), on=["policy", "point"])
+    top = rows.head(MOST_ROWS)
+    shown = cells(top, [])
+    for part in PARTS:
+        shown[part.capitalize()] = top[part].map("{:,.0f}".format)
+    caption = f"The mean cost of the settings [{_prices(results).currency}], and its parts"
+    return Table(shown, caption, rows)
+
+
+def judged_table(results: Results) -> Table:
+    """The settings and whether they meet the requirements."""
+    rows = judged(results)
+    top = rows.head(MOST_ROWS)
+    shown = cells(top, required(results))
+    shown["Requirements"] = top["verdict"].map(VERDICTS)
+    shown["Selected"] = top["selected"].map({True: "yes", False: ""})
+    shown["Missions"] = counts(top["n"])
+    return Table(shown, f"The settings, the cheapest first; means with {INTERVALS}", rows)
+
+
+def checked_table(results: Results) -> Table:
+    """The check of the selected settings on independent missions."""
+    rows = checks(results)
+    shown = cells(rows, METRICS).assign(Missions=counts(rows["n"]))
+    return Table(shown, CHECKED, rows)

@@ -14,8 +14,8 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
-from analysis.answers.summary import settings
-from analysis.names import METRICS, PRODUCT, RATIO, REWARD
+from analysis.answers.settings import in_words
+from analysis.metrics import METRICS, PRODUCT, RATIO, REWARD
 from analysis.results.chunks import check_parts
 from analysis.results.provenance import differing
 from analysis.results.tables import Results
@@ -230,7 +230,7 @@ def _alone(
     found = missions[_KEYS].merge(others[_KEYS], how="left", indicator="found")["found"]
     rows = missions[found.to_numpy() != "both"]
     scenario = f"the scenario of study {results.manifest['study']['name']}"
-    words = pd.Series([setting or scenario for setting in settings(results)])
+    words = pd.Series([setting or scenario for setting in in_words(results)])
     points, no_policy = rows["point"].map(words), ~rows["team"].isin(others["team"])
     no_point = ~rows["scenario"].isin(others["scenario"])
     cells = "policy " + rows["policy"] + " at " + points

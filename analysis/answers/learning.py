@@ -12,9 +12,10 @@ import pyarrow as pa
 from scipy import stats
 
 from analysis import numbers
-from analysis.answers.summary import learners, settings
+from analysis.answers.settings import in_words
+from analysis.answers.summary import learners
 from analysis.figures import Drawing
-from analysis.names import MEANS, METRICS, PRODUCT, RATIO, SHARES, SUCCESS
+from analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS
 from analysis.results.tables import Results
 from analysis.stats.differences import adjust
 from analysis.stats.intervals import LEVEL, Interval, mean_interval
@@ -515,8 +516,8 @@ def rliable_scores(results: Results, metric: str = PRODUCT) -> dict[str, np.ndar
         InputError: If there is no such metric, a policy has fewer missions than there are runs, or
             learners have different numbers of trainings.
     """
-    if metric not in (*SHARES, *MEANS):
-        raise InputError(f"metric: {metric!r} is unknown{one_of(metric, [*SHARES, *MEANS])}")
+    if metric not in ALWAYS:
+        raise InputError(f"metric: {metric!r} is unknown{one_of(metric, ALWAYS)}")
     algorithms, points = _policies_of_runs(results), range(len(results.store.manifest.points))
     runs = len(next(iter(algorithms.values())))
     cells = results.missions.groupby(["policy", "point"], sort=False)[metric]
@@ -566,7 +567,7 @@ def marl_eval_data(results: Results, metrics: Sequence[str] = (*METRICS,)) -> di
                 name.replace(",", "+"): {f"run_{r + 1}": steps(name, r, task) for r in runs[name]}
                 for name in runs
             }
-            for task, setting in enumerate(settings(results))
+            for task, setting in enumerate(in_words(results))
         }
     }
 

@@ -16,7 +16,8 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.answers import summary
-from analysis.names import PRODUCT, parameter, value_text
+from analysis.metrics import PRODUCT
+from analysis.names import parameter, value_text
 from analysis.results.tables import Results
 from analysis.stats.differences import paired, with_adjusted
 from analysis.stats.intervals import LEVEL, by_replication

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from analysis import numbers
 from analysis.figures import Drawing
-from analysis.names import PRODUCT, RATIO
+from analysis.metrics import PRODUCT, RATIO
 from analysis.results import parquet
 from analysis.results.event_log import Events, causes
 from analysis.results.resimulate import resimulate

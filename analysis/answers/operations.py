@@ -15,7 +15,8 @@ from analysis.answers import settings
 from analysis.figures import Drawing
 from analysis.figures.missions import courses
 from analysis.figures.settings import lines
-from analysis.names import AGE, PRODUCT, metric_name, value_text
+from analysis.metrics import AGE, PRODUCT, metric_of
+from analysis.names import value_text
 from analysis.results.event_log import duration
 from analysis.results.tables import Results
 from analysis.stats.differences import column_tests, relative_change
@@ -68,7 +69,7 @@ def drawings(
     return {
         str(metric): Drawing(
             lines(rows, x, line, str(metric), panel),
-            f"{metric_name(str(metric))} against {against}",
+            f"{metric_of(str(metric)).name} against {against}",
             caption,
             rows if linked else None,
         )

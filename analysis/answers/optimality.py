@@ -6,7 +6,7 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.answers import summary
-from analysis.names import BOUND, GAP, PRODUCT
+from analysis.metrics import BOUND, GAP, PRODUCT
 from analysis.results.chunks import MANIFEST
 from analysis.results.tables import Results, load_results
 from analysis.stats.intervals import summary as means_of

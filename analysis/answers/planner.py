@@ -16,7 +16,7 @@ from analysis.figures import Drawing, style
 from analysis.figures import comparison as figures
 from analysis.figures import missions as maps
 from analysis.figures.settings import decision_times
-from analysis.names import PRODUCT, SUCCESS
+from analysis.metrics import PRODUCT, SUCCESS
 from analysis.results.event_log import uav_slots
 from analysis.results.tables import Results
 from analysis.stats.differences import compare

@@ -18,7 +18,7 @@ from analysis.answers import comparison
 from analysis.answers.comparison import Times
 from analysis.figures import Drawing, style
 from analysis.figures.settings import decision_times
-from analysis.names import BOUND, PRODUCT, SUCCESS
+from analysis.metrics import BOUND, PRODUCT, SUCCESS
 from analysis.results.tables import Results
 from analysis.stats.differences import column_tests, relative_change
 from analysis.stats.intervals import column_intervals

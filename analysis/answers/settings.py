@@ -16,17 +16,17 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from analysis import numbers
-from analysis.names import COST, LESS_IS_BETTER, METRICS, PRODUCT, metrics_in, parameter, value_text
+from analysis.metrics import COST, METRICS, PRODUCT, metric_of, metrics_in
+from analysis.names import parameter, value_text
 from analysis.results.tables import Results, once
 from analysis.stats.choices import may_be_best
 from analysis.stats.differences import column_tests, with_adjusted
 from analysis.stats.intervals import by_replication, column_intervals, stratified
+from analysis.tables import INTERVALS, MOST_ROWS, YES, Table, counts
 from dess import InputError
 from dess.errors import one_of
-from dess.scenario import ZONE_PADS
 
-AS_IT_IS = "the scenario"  # a design point in words, if the design varies nothing
-_UNITS = {"uavs": "UAV", "pads": "pad"}  # fields that are counts
+MOST_NAMES = 3  # the largest number of settings that are named because they may be as good
 MOST_VALUES, BINS = 12, 5  # a field with more than MOST_VALUES numbers is divided into BINS bins
 
 
@@ -55,18 +55,74 @@ def points(results: Results) -> pd.DataFrame:
         values = [of_point[field] for of_point in manifest.values]
         if field == "pads":  # without a number, it depends on the zone
             values = [results.scenario(number).zone_pads[0] for number in range(len(values))]
-        texts = _texts(field, values)
+        texts = parameter(field).comparable(values)
         if len({*texts}) > 1:
             columns[field] = texts
     return pd.DataFrame(columns, index=range(len(manifest.points)))
 
 
 def in_words(results: Results) -> list[str]:
-    """Every design point in words, as ``3 UAVs, arrival rate 0.02``."""
+    """Every design point in words, as ``3 UAVs, arrival rate 0.02``; empty if nothing varies."""
     rows = points(results).to_dict("records")
-    return [
-        ", ".join(value_in_words(str(f), v) for f, v in row.items()) or AS_IT_IS for row in rows
-    ]
+    return [", ".join(parameter(str(f)).words(v) for f, v in row.items()) for row in rows]
+
+
+def setting_of(results: Results, policy: str, point: int) -> str:
+    """A setting in words: ``greedy with 3 UAVs``; the policy alone if nothing varies."""
+    words = in_words(results)[point]
+    return f"{policy} with {words}" if words else policy
+
+
+def baseline(results: Results, point: int) -> str:
+    """The design point with which all others are compared, in words.
+
+    Raises:
+        InputError: If there is no such design point.
+    """
+    words = in_words(results)
+    if point not in range(len(words)):
+        raise InputError(f"baseline: {point!r} is not a design point; allowed: 0..{len(words) - 1}")
+    return words[point]
+
+
+def ranking_metric(results: Results, metric: str | None = None) -> str:
+    """The metric that ranks the settings: the given one, the one of the selection, or the product.
+
+    Raises:
+        InputError: If there is no such metric.
+    """
+    if metric is not None:
+        check_metric(results, metric)
+        return metric
+    return (results.manifest["study"]["selection"] or {}).get("metric", PRODUCT)
+
+
+def answer(results: Results, table: pd.DataFrame, metric: str) -> str:
+    """The best setting, and how many settings may be as good.
+
+    Args:
+        results: The study.
+        table: The result of ``ranked`` for the metric.
+        metric: The metric.
+    """
+    of, best, others, tied = metric_of(metric), table.iloc[0], len(table) - 1, table[table["tied"]]
+    value = of.written(*best[[metric, f"{metric}_low", f"{metric}_high"]])
+    names = [setting_of(results, row.policy, row.point) for row in tied.itertuples()]
+    what, many = "setting" if varied(results) else "policy", len(names) - 1
+    if others == 1:
+        rest = f" The other {what} {'may be as good' if many else 'is significantly worse'}."
+    elif not many:
+        rest = f" All {others:,} others are significantly worse." if others else ""
+    else:
+        named = f" ({'; '.join(names[1:])})" * (many <= MOST_NAMES)
+        rest = (
+            f" Of the {others:,} others, {many:,} may be as good{named}; the rest are "
+            "significantly worse."
+        )
+    best_one = f"The best {what} is {names[0]}: {of.within} {value}, "
+    policies = dependence(results, table, metric) if len(results.policies) == 2 else []
+    lies = edge(results, best["point"], ends(results, best["point"]))
+    return " ".join([f"{best_one}n = {best['n']:,}.{rest}{lies}", *policies])
 
 
 def dependence(results: Results, ranked: pd.DataFrame, metric: str) -> list[str]:
@@ -82,7 +138,7 @@ def dependence(results: Results, ranked: pd.DataFrame, metric: str) -> list[str]
     ends = others[[metric, f"{metric}_low", f"{metric}_high"]].to_numpy()
     named = zip(others["policy"], others["point"], ends, strict=True)
     return [
-        f"With {policy}, it would be {words[point]}: {numbers.written(metric)(*of_metric)}."
+        f"With {policy}, it would be {words[point]}: {metric_of(metric).written(*of_metric)}."
         for policy, point, of_metric in named
         if len(words) > 1
     ]
@@ -124,20 +180,10 @@ def edge(
         better: What may lie beyond.
     """
     values = points(results).loc[point]
-    named = [f"{value_in_words(f, values[f])} is the {word}" for f, word in found.items()]
+    named = [f"{parameter(f).words(values[f])} is the {word}" for f, word in found.items()]
     return f" Of the values asked for, {numbers.words(named)}; {better} may lie beyond." * bool(
         named
     )
-
-
-def value_in_words(field: str, value: Any) -> str:
-    """``3 UAVs``, ``failed UAVs lost for good``, or ``arrival rate 0.02``."""
-    text = value_text(value)
-    if field == "failures.uav_repair":
-        return f"failed UAVs {f'repaired in {text} slots' if value else 'lost for good'}"
-    if unit := _UNITS.get(field):
-        return f"{text} {unit}{'' if text == '1' else 's'}"
-    return f"{parameter(field).within} {text}"
 
 
 @once
@@ -169,7 +215,7 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
     # By the ranking metric, which was computed last.
     table["tied"] = may_be_best(wide.to_numpy(float), metric)
-    less = metric in LESS_IS_BETTER
+    less = metric_of(metric).less_is_better
     table = table.sort_values(metric, ascending=less, kind="stable", ignore_index=True)
     table.insert(0, "rank", np.arange(1, len(table) + 1))
     return table
@@ -272,9 +318,7 @@ def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) 
     Raises:
         InputError: If there is no such point or metric.
     """
-    count = len(results.store.manifest.points)
-    if not 0 <= point < count:
-        raise InputError(f"baseline: {point} is not a design point; allowed: 0..{count - 1}")
+    baseline(results, point)
     tables = []
     for metric in metrics:
         parts = []
@@ -373,18 +417,79 @@ def _binned(values: pd.Series) -> pd.Series:
     return places.map(dict(enumerate(names))).astype(pd.CategoricalDtype(names, ordered=True))
 
 
-def _texts(field: str, values: Sequence[Any]) -> list[Any]:
-    """The values unchanged if all are numbers, otherwise as text."""
-    if field == "nodes":
-        maps, _ = pd.factorize(pd.Series(map(str, values)))
-        return [f"{len(nodes)} cells (map {n})" for nodes, n in zip(values, maps + 1, strict=True)]
-    if field == ZONE_PADS:
-        return [" + ".join(map(str, v)) if isinstance(v, list | tuple) else v for v in values]
-    if field == "zone":
-        return [f"{width} x {height} at ({x}, {y})" for x, y, width, height in values]
-    plain = [
-        v[0] if isinstance(v, list | tuple) and v and all(item == v[0] for item in v) else v
-        for v in values
-    ]
-    is_text = any(isinstance(value, bool | list | tuple | dict) for value in plain)
-    return [*map(value_text, plain)] if is_text else plain
+def best_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
+    """The best settings.
+
+    Args:
+        results: The study.
+        rows: Its ``ranked``.
+        metric: The metric that ranks them.
+    """
+    top = rows.head(MOST_ROWS)
+    cells = _cells(results, top, metric)
+    cells.insert(0, "Rank", top["rank"])
+    cells.insert(1, "May be the best", top["tied"].map(YES))
+    caption = (
+        f"The first {len(top)} of {len(rows):,} settings by {metric_of(metric).within}: "
+        f"means with {INTERVALS}"
+    )
+    return Table(cells, caption, rows)
+
+
+def best_of_policies(results: Results, metric: str) -> Table:
+    """The best setting of every policy, and how many of its settings may be as good."""
+    own = [ranked(results, metric, policy) for policy in results.policies]
+    best = pd.concat([rows.head(1) for rows in own], ignore_index=True)
+    cells = _cells(results, best, metric)
+    cells["May be its best"] = [f"{rows['tied'].sum():,} of {len(rows):,} settings" for rows in own]
+    caption = f"The best setting of every policy by {metric_of(metric).within}"
+    return Table(cells, caption, best.drop(columns=["rank", "tied"]))
+
+
+def effect_table(results: Results, metric: str) -> Table:
+    """The size of the effect of every field on a metric."""
+    effects, of, rows = main_effects(results, metric), metric_of(metric), []
+    for (field, policy), part in effects.groupby(["field", "policy"], sort=False):
+        low, high = part.loc[part["mean"].idxmin()], part.loc[part["mean"].idxmax()]
+        both = [f"{of.write(row['mean'])} at {row['value']}" for row in (low, high)]
+        span = of.write(high["mean"] - low["mean"]).replace(" %", " points")
+        rows.append((parameter(str(field)).name, policy, *both, span))
+    heads = ["Field", "Policy", "Lowest mean", "Highest mean", "Difference"]
+    caption = f"The effect of each field on {of.within}, averaged over the others"
+    return Table(pd.DataFrame(rows, columns=heads), caption, effects.drop(columns="tied"))
+
+
+def baseline_table(results: Results, point: int, metric: str) -> Table:
+    """Every design point compared with a baseline point."""
+    data, of = against(results, point, shown_metrics(metric)), metric_of(metric)
+    rows = data[data["metric"] == metric]
+    order = rows["difference"].abs().sort_values(ascending=False, kind="stable").index
+    top = rows.loc[order[:MOST_ROWS]].sort_values("difference", ascending=False, kind="stable")
+    cells = _named(results, top)
+    cells["Difference"] = [of.change(*row) for row in top[["difference", "low", "high"]].to_numpy()]
+    cells["p (Holm)"] = top["p_adjusted"].map(numbers.p_value)
+    cells["Pairs"] = counts(top["n"])
+    caption = (
+        f"{of.name}: paired difference from the baseline{' in percentage points' * of.in_percent} "
+        f"with {INTERVALS}; the {len(top):,} largest of {len(rows):,} differences"
+    )
+    return Table(cells, caption, data)
+
+
+def shown_metrics(metric: str) -> list[str]:
+    """The metrics on the page of a study: the one that ranks the settings, and the paper's."""
+    return [*dict.fromkeys((metric, *METRICS))]
+
+
+def _cells(results: Results, rows: pd.DataFrame, metric: str) -> pd.DataFrame:
+    """Rows of ``ranked`` as text."""
+    cells = _named(results, rows)
+    for of in map(metric_of, shown_metrics(metric)):
+        cells[of.name] = numbers.estimates(rows, of.column, of.written)
+    return cells.assign(Missions=counts(rows["n"]))
+
+
+def _named(results: Results, rows: pd.DataFrame) -> pd.DataFrame:
+    """The policy, the number of the design point and its varied fields as text."""
+    fields = {parameter(f).name: rows[f].map(value_text) for f in varied(results)}
+    return pd.DataFrame({"Policy": rows["policy"], "Point": rows["point"]} | fields)

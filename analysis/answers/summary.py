@@ -10,18 +10,9 @@ from scipy import stats
 
 from analysis import numbers
 from analysis.answers import costs
-from analysis.answers.settings import edge, ends
-from analysis.names import (
-    LESS_IS_BETTER,
-    MEANS,
-    METRICS,
-    PRODUCT,
-    RATIO,
-    SHARES,
-    SUCCESS,
-    parameter,
-    value_text,
-)
+from analysis.answers.settings import edge, ends, in_words
+from analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS, metric_of
+from analysis.names import parameter, value_text
 from analysis.results.chunks import parts_of
 from analysis.results.provenance import study_of
 from analysis.results.tables import Results
@@ -33,14 +24,14 @@ from analysis.stats.learners import compare_learners
 from analysis.stats.verdict import MARKS, position
 from analysis.study.cheapest import Cheapest
 from analysis.study.design import NOISE, Saltelli
+from analysis.tables import INTERVALS, MOST_ROWS, YES, Table, compared, counts
 from dess import InputError
 
-ANALYSED = (*SHARES, *MEANS)
 RESAMPLES = 1000  # bootstrap resamples of the blocks of the design; every metric has the same
 
 
 def sensitivity(
-    design: Saltelli, missions: pd.DataFrame, metrics: Sequence[str] = ANALYSED
+    design: Saltelli, missions: pd.DataFrame, metrics: Sequence[str] = ALWAYS
 ) -> pd.DataFrame:
     """First-order and total Sobol indices of each metric to each parameter and to the noise.
 
@@ -90,21 +81,39 @@ def sensitivity(
     return pd.concat(tables, names=["metric"]).reset_index("metric").reset_index(drop=True)
 
 
-def index_table(indices: pd.DataFrame) -> pd.DataFrame:
-    """Sobol indices as text, with their intervals.
+def index_table(indices: pd.DataFrame) -> Table:
+    """Sobol indices with their intervals.
 
     Args:
-        indices: Rows of ``answers.summary.sensitivities``.
+        indices: Rows of ``sensitivities``.
     """
-    rows = indices
-    columns = {
-        "Policy": rows["policy"],
-        "Metric": rows["metric"].map(METRICS),
-        "Parameter": rows["parameter"].map(lambda p: "noise" if p == NOISE else parameter(p).name),
-        "Alone": numbers.estimates(rows, "first"),
-        "With all interactions": numbers.estimates(rows, "total"),
+    names = indices["parameter"].map(lambda p: "noise" if p == NOISE else parameter(p).name)
+    cells = {
+        "Policy": indices["policy"],
+        "Metric": indices["metric"].map(METRICS),
+        "Parameter": names,
+        "Alone": numbers.estimates(indices, "first"),
+        "With all interactions": numbers.estimates(indices, "total"),
     }
-    return pd.DataFrame(columns)
+    caption = f"Sobol indices as shares of the variance, with {INTERVALS}"
+    return Table(pd.DataFrame(cells), caption, indices)
+
+
+def of_variance(results: Results, metric: str) -> str:
+    """Which fields explain most of the variance of a metric for the first policy, in a sentence."""
+    rows, called = sensitivities(results), metric_of(metric).within
+    rows = rows[(rows["metric"] == metric) & (rows["policy"] == results.policies[0])].dropna()
+    parts = [
+        f"{parameter(row.parameter).within if row.parameter != NOISE else 'the replication'} "
+        f"{numbers.percent(row.total)}"
+        for row in rows.nlargest(3, "total").itertuples()
+    ]
+    if not parts:
+        return f"The {called} is the same in all missions: no variance."
+    return (
+        f"Of the variance of the {called} of {results.policies[0]}, with all interactions: "
+        f"{numbers.words(parts)}."
+    )
 
 
 def ranges_in_words(ranges: Mapping[str, Sequence[float]]) -> str:
@@ -159,7 +168,7 @@ def meeting(means: pd.DataFrame, targets: Mapping[str, float]) -> pd.DataFrame:
         targets: Metric -> the least mean, or the largest of a metric of which less is better.
     """
     for metric, end in targets.items():
-        met = means["high"] <= end if metric in LESS_IS_BETTER else means["low"] >= end
+        met = means["high"] <= end if metric_of(metric).less_is_better else means["low"] >= end
         passed = means[(means["metric"] == metric) & met]
         means = means.merge(passed[["policy", "point"]])
     return means
@@ -303,17 +312,6 @@ def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> s
     return ranked_policies(missions, among)[0]
 
 
-def settings(results: Results) -> list[str]:
-    """Every design point in words: the fields that the design sets, with their values."""
-    return [
-        ", ".join(
-            f"{field} {value_text(value).replace('–', '..')}"
-            for field, value in point.values.items()
-        )
-        for point in results.store.manifest.points
-    ]
-
-
 def worst(
     results: Results,
     policy: str,
@@ -339,10 +337,29 @@ def worst(
     if point is not None:
         of_policy = of_policy[of_policy["point"] == point]
     table = of_policy.sort_values([PRODUCT, RATIO], kind="stable", ignore_index=True)[:missions]
-    table = table[["policy", "point", "replication", *SHARES, *MEANS]]
+    table = table[["policy", "point", "replication", *ALWAYS]]
     keys = zip(table["point"], table["replication"], strict=True)
     folder = folder or results.usual_folder
     return table.assign(command=[results.command(policy, *key, folder) for key in keys])
+
+
+def worst_table(results: Results, rows: pd.DataFrame) -> Table:
+    """The worst missions of a policy.
+
+    Args:
+        results: The study.
+        rows: The result of ``worst``.
+    """
+    cells = {
+        "Replication": rows["replication"],
+        "Success": rows["success"].astype(bool).map(YES),
+        "Collection ratio": rows["collection_ratio"].map(numbers.percent),
+        "Reward": rows["reward"].map(numbers.quantity),
+    }
+    policy, point = rows["policy"].iloc[0], {*rows["point"]}
+    words = in_words(results)[point.pop()] if len(point) == 1 else ""
+    caption = f"The worst missions of {policy}{', ' * bool(words)}{words}"
+    return Table(pd.DataFrame(cells), caption, rows)
 
 
 def comparisons(results: Results) -> pd.DataFrame:
@@ -357,6 +374,12 @@ def comparisons(results: Results) -> pd.DataFrame:
         return pd.DataFrame()
     table = compare(results.missions, best_policy(results.missions), [*METRICS])
     return for_choice(table, len(results.policies))
+
+
+def comparison_table(results: Results) -> Table:
+    """The ``comparisons``."""
+    data = comparisons(results)
+    return _compared(data, "policy", f"Differences from {data['baseline'].iloc[0]}")
 
 
 def learners(results: Results) -> dict[str, list[str]]:
@@ -393,6 +416,21 @@ def learned_against_heuristic(results: Results) -> pd.DataFrame:
     return for_choice(table, len(heuristics))
 
 
+def learner_table(results: Results) -> Table:
+    """What ``learned_against_heuristic`` finds."""
+    data = learned_against_heuristic(results)
+    caption = f"Learned policies: differences from {data['baseline'].iloc[0]}, the best heuristic"
+    return _compared(data, "learner", caption)
+
+
+def _compared(rows: pd.DataFrame, of: str, caption: str) -> Table:
+    caption = (
+        f"{caption} [percentage points], with {INTERVALS} (▲ better, ▼ worse, ≈ inconclusive); p "
+        "corrected for the number of comparisons and the choice of the best by these data"
+    )
+    return Table(compared(rows, of), caption, rows)
+
+
 def _same_missions(results: Results) -> bool:
     counts = results.store.manifest.missions
     return len({n for of_team in counts for n in of_team}) == 1
@@ -411,6 +449,24 @@ def distributions(results: Results) -> pd.DataFrame:
     return distribution(results.missions, PRODUCT, generator)
 
 
+def spread(rows: pd.DataFrame, metric: str) -> Table:
+    """Quantiles of a metric over the missions, and means of the worst ones.
+
+    Args:
+        rows: Rows of ``analysis.distribution``.
+        metric: The metric.
+    """
+    of, heads = metric_of(metric), []
+    for row in rows.itertuples():
+        share = numbers.level(row.share)
+        heads.append(
+            f"{share} quantile" if row.view == "quantile" else f"Mean of the worst {share}"
+        )
+    long = rows.assign(head=heads).rename(columns={"value": "mean"})
+    cells = numbers.wide(long, "policy", "head", of.written).reset_index(names="Policy")
+    return Table(cells, f"Quantiles of {of.within} over missions, with {INTERVALS}", rows)
+
+
 def precisions(results: Results) -> pd.DataFrame:
     """How narrow the intervals are, for a study with targets.
 
@@ -426,6 +482,27 @@ def precisions(results: Results) -> pd.DataFrame:
         for team, policy in enumerate(results.policies)
     }
     return _by_policy(tables)
+
+
+def precision_table(rows: pd.DataFrame, most: int | None = MOST_ROWS) -> Table:
+    """The precision of each estimate beside its target.
+
+    Args:
+        rows: The ``precisions``.
+        most: The largest number of rows that it has; None: all.
+    """
+    top = rows[:most]
+    cells = {
+        "Policy": top["policy"],
+        "Point": top["point"],
+        "Metric": top["metric"].map(lambda metric: metric_of(metric).name),
+        "Missions": counts(top["missions"]),
+        "Mean": top["mean"].map(numbers.quantity),
+        "Half-width": top["half_width"].map("{:.2g}".format),
+        "Target": top["target"].map("{:.2g}".format),
+        "Reached": top["met"].map({True: "yes", False: "no: the budget ended"}),
+    }
+    return Table(pd.DataFrame(cells), f"Half-widths of {INTERVALS}, and their targets", rows)
 
 
 def sensitivities(results: Results) -> pd.DataFrame:
@@ -458,7 +535,7 @@ def selections(results: Results) -> pd.DataFrame:
     """
     if isinstance(results.store.manifest.selection, Cheapest):
         return costs.selections(results)
-    words, rows = settings(results), []
+    words, rows = in_words(results), []
     for policy in results.policies:
         if (c := results.choice(policy)) is not None:
             found = (policy, c.best, words[c.best], c.missions, len(c.survivors))
@@ -466,6 +543,18 @@ def selections(results: Results) -> pd.DataFrame:
             rows.append((*found, c.guaranteed, f"{c.guarantee}.{lies}" if lies else c.guarantee))
     columns = ["policy", "point", "setting", "missions", "left", "guaranteed", "guarantee"]
     return pd.DataFrame(rows, columns=columns)
+
+
+def selection_table(results: Results) -> Table:
+    """The setting that was selected for every policy."""
+    data = selections(results)
+    cells = {
+        "Policy": data["policy"],
+        "Selected setting": data["setting"],
+        "Missions of the selection": counts(data["missions"]),
+        "Settings not ruled out": data["left"],
+    }
+    return Table(pd.DataFrame(cells), "The setting that was selected for every policy", data)
 
 
 def checks(results: Results) -> pd.DataFrame:

@@ -18,7 +18,8 @@ from analysis.answers import costs, settings
 from analysis.execution.effort import BASELINE, check_run, policies_for
 from analysis.execution.jobs import Progress
 from analysis.execution.runner import Round, run_study
-from analysis.names import ALIASES, METRICS, PRODUCT, SWEEP, SWEEPS
+from analysis.metrics import ALIASES, METRICS, PRODUCT
+from analysis.names import SWEEP, SWEEPS
 from analysis.results.chunks import MANIFEST, short_hash
 from analysis.results.provenance import engine_code, team_of
 from analysis.results.tables import Results
@@ -393,7 +394,7 @@ class Sweep:
             if not self.fields:
                 raise InputError("x: no field is swept; allowed: a sweep of one field or more")
             x, hue = self.fields[0], hue or next(iter(self.fields[1:]), None)
-        return figures.plot(self.results, x, hue, metric)
+        return figures.plot(self.results, x, hue, metric).figure
 
 
 def sweep(

@@ -15,11 +15,11 @@ from scipy import stats
 from analysis import numbers
 from analysis.answers import summary
 from analysis.answers.missions import estimate
-from analysis.answers.settings import value_in_words
 from analysis.execution.effort import check_run, policies_for
 from analysis.execution.jobs import Progress
 from analysis.execution.runner import run_study
-from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_label
+from analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
+from analysis.names import parameter
 from analysis.results.chunks import MANIFEST, short_hash
 from analysis.results.manifest import Manifest
 from analysis.results.resimulate import resimulate
@@ -383,7 +383,7 @@ def sentence(results: Results, table: pd.DataFrame) -> str:
         table: The ``answers``.
     """
     sides = fields(results, results.store.manifest.points[VARIATION].values).itertuples()
-    new = [f"{value_in_words(s.Field, s.Variation)} instead of {s.Baseline}" for s in sides]
+    new = [f"{parameter(s.Field).words(s.Variation)} instead of {s.Baseline}" for s in sides]
     parts = [
         f"that of {row.policy} by {change(row)} points"
         + " (inconclusive)" * (verdict(row) == INCONCLUSIVE)
@@ -445,7 +445,7 @@ def answer_table(table: pd.DataFrame, policy: str) -> pd.DataFrame:
     for row in table[table["policy"] == policy].itertuples():
         write, unit = (numbers.percent, " points") if row.metric in METRICS else (_amount, "")
         sides = ["–" if np.isnan(mean) else write(mean) for mean in (row.before, row.after)]
-        name = (_SHORT | MEASURES).get(row.metric) or metric_label(row.metric)
+        name = (_SHORT | MEASURES).get(row.metric) or metric_of(row.metric).label
         difference = f"{MARKS[verdict(row)]} {change(row)}{unit}" if row.n else ""
         lines.append([name, *sides, difference])
     heads = ["Mean per mission", "Baseline", "Variation", "Paired difference"]

@@ -17,7 +17,7 @@ from analysis.execution.effort import (
 )
 from analysis.execution.jobs import CHUNK, Job, MissionsJob, Problem, Progress, simulate_missions
 from analysis.execution.workers import Here, Pool
-from analysis.names import MEANS, SHARES
+from analysis.metrics import ALWAYS
 from analysis.results.chunks import Part, split
 from analysis.results.manifest import Cell
 from analysis.stats.intervals import Moments
@@ -28,8 +28,6 @@ from dess.state import check_seed
 from dess.streams import MAX_REPLICATION
 from dess.view import check_team
 from policies.registry import TypedByUser, load_team
-
-METRICS = (*SHARES, *MEANS)
 
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
 # sums depend on it.
@@ -169,7 +167,7 @@ def means(asked: Asked, progress: Progress | None = None) -> Means:
 
 def _metrics(records: Records) -> dict[str, np.ndarray]:
     """The values of every metric that some of the missions have measured."""
-    values = {metric: records.missions[metric] for metric in METRICS}
+    values = {metric: records.missions[metric] for metric in ALWAYS}
     if len(records.operations):
         values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
     return {metric: of.astype(float) for metric, of in values.items()}

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from analysis.figures import style
-from analysis.names import BOUND, METRICS, PRODUCT, metric_label
+from analysis.metrics import BOUND, METRICS, PRODUCT, metric_of
 from analysis.numbers import counted
 
 TAIL = 0.05  # share of the missions that is beyond each end of the second panel of ``spread``
@@ -49,8 +49,8 @@ def means(table: pd.DataFrame, metric: str, sides: Sequence[str]) -> Figure:
     rows = table[table["metric"] == metric].dropna(subset="mean")
     rows = rows.assign(position=rows["point"], value=rows["point"].map(dict(enumerate(sides))))
     with style.panels(4.1, values="y") as (figure, ax):
-        style.along(rows, style.policy_colours(rows["policy"]), style.unit_of(metric), ax)
-        ax.set(title=metric_label(metric), xlim=(-0.45, 1.45))
+        style.along(rows, style.policy_colours(rows["policy"]), metric_of(metric).axis, ax)
+        ax.set(title=metric_of(metric).label, xlim=(-0.45, 1.45))
         ax.set_xticks((0, 1), sides)
         if metric in METRICS:
             ax.set_ylim(style.ends(rows, 0.05))

@@ -1,8 +1,11 @@
-"""Figures of the settings of a study: along a field, effects, fronts of two metrics."""
+"""Figures of the settings of a study: along a field, effects, fronts of two metrics.
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+A figure of ``results`` comes with its caption, its alternative text and its data (``Drawing``).
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from math import ceil
+from math import ceil, inf
 from textwrap import fill
 from typing import Any
 
@@ -14,23 +17,31 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator, NullLocator
 
 from analysis import numbers
-from analysis.answers import settings
-from analysis.figures import style
-from analysis.names import (
-    COST,
-    LESS_IS_BETTER,
-    METRICS,
-    PRODUCT,
-    metric_label,
-    metric_name,
-    parameter,
-    value_text,
-)
+from analysis.answers import costs as priced
+from analysis.answers import main_effects as one_field
+from analysis.answers import settings, summary
+from analysis.figures import Drawing, style
+from analysis.metrics import COST, METRICS, PRODUCT, Metric, metric_of
+from analysis.names import parameter, value_text
 from analysis.results.tables import Results
 from analysis.study.design import NOISE
+from analysis.tables import INTERVALS
 
 MOST_PANELS, COLUMNS = 12, 3  # of the values of a third field: panels, and columns of panels
 MARK = "#d55e00"  # colour that marks the best cell and cells that are not significantly worse
+# What the mean of a main effect is taken over, if the design is a sample of single missions or not.
+_MEANT = {
+    False: "all design points with the value, so over the other fields as the design has them, "
+    "replication by replication",
+    True: "the missions with the value, whatever the other fields are",
+}
+_FRAMED = (
+    "The star marks the cell with the best mean of this policy. Orange frames: cells that are not "
+    "significantly worse than any other, so each may be the best."
+)
+_MARKS = (
+    "The larger and darker a mark, the higher the probability that the setting is on the front."
+)
 _PRINTED: dict = {"color": style.INK, "linestyle": "--", "linewidth": 1.3}
 
 
@@ -39,18 +50,18 @@ def performance(summary: pd.DataFrame, metric: str, printed: float | None = None
 
     Args:
         summary: Rows of ``analysis.summary`` by ``policy``.
-        metric: One of ``METRICS``.
+        metric: The metric.
         printed: The paper's number.
     """
-    rows = summary[summary["metric"] == metric]
+    rows, of = summary[summary["metric"] == metric], metric_of(metric)
     with style.panels(1.3 + 0.42 * len(rows), values="x") as (figure, ax):
         style.in_rows(rows, ax)
         for y, mean in enumerate(rows["mean"]):
-            style.note_at_right(f"{mean:.1%}", y, ax)
+            style.note_at_right(of.write(mean), y, ax)
         if printed is not None:
-            ax.axvline(printed, **_PRINTED, label=f"paper {printed:.1%}", zorder=1)
-        ax.set(title=METRICS[metric], xlim=(-0.02, 1.02))
-        style.in_units(ax.xaxis, "%", 5)
+            ax.axvline(printed, **_PRINTED, label=f"paper {of.write(printed)}", zorder=1)
+        ax.set(title=of.name, xlim=(-0.02, 1.02) if of.is_bounded else None)
+        style.in_units(ax.xaxis, of.axis, 5)
     return figure
 
 
@@ -73,13 +84,22 @@ def by_fleet(
     return figure
 
 
+def means(results: Results, metric: str) -> Drawing:
+    """A metric of every policy at the only design point."""
+    table = summary.means(results)
+    data = table[table["metric"] == metric]
+    caption = f"n = {_counted(data)} missions per policy; bars are {INTERVALS}."
+    alt = f"{metric_of(metric).name} of every policy"
+    return Drawing(performance(table, metric), alt, caption, data)
+
+
 def plot(
     results: Results,
     x: str,
     hue: str | None = None,
     metric: str = PRODUCT,
     policy: str | None = None,
-) -> Figure:
+) -> Drawing:
     """A metric against a field, with 95 % intervals: a curve per policy, or per value of ``hue``.
 
     Args:
@@ -92,8 +112,12 @@ def plot(
     Raises:
         InputError: If there is no such field, metric or policy.
     """
-    rows = settings.averaged(results, [x, hue] if hue else [x], metric, policy)
-    return lines(rows, x, hue or "policy", metric, "policy" if hue else None)
+    data = settings.averaged(results, [x, hue] if hue else [x], metric, policy)
+    drawing = lines(data, x, hue or "policy", metric, "policy" if hue else None)
+    each = "dot" if hue else "point"
+    caption = f"n = {_counted(data)} missions per {each}; bars are {INTERVALS}."
+    alt = f"{metric_of(metric).name} against the {parameter(x).within}"
+    return Drawing(drawing, alt, caption, data)
 
 
 def lines(rows: pd.DataFrame, x: str, line: str, metric: str, panel: str | None = None) -> Figure:
@@ -114,10 +138,10 @@ def lines(rows: pd.DataFrame, x: str, line: str, metric: str, panel: str | None 
     height = 2.9 * len(parts) + 0.9
     with style.panels(height, len(parts), "y", 4, heading, **shared) as (figure, axes):
         for ax, (value, part) in zip(axes.flat, parts, strict=True):
-            style.along(part, looks, style.unit_of(metric), ax, line)
-            title = settings.value_in_words(panel, value) if panel else ""
+            style.along(part, looks, metric_of(metric).axis, ax, line)
+            title = parameter(panel).words(value) if panel else ""
             ax.set_title(title[:1].upper() + title[1:], fontsize=10, fontweight="normal")
-        figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
+        figure.suptitle(metric_of(metric).label, fontsize=11, fontweight="bold")
         axes.flat[-1].set_xlabel(parameter(x).label, parse_math=True)
     return figure
 
@@ -129,7 +153,7 @@ def heat_map(
     metric: str = PRODUCT,
     policy: str | None = None,
     facet: str | None = None,
-) -> Figure:
+) -> Drawing:
     """A metric of a policy over two fields: the best cell, and those that may be as good.
 
     A star marks the best cell; framed cells are not significantly worse (``averaged``).
@@ -146,20 +170,21 @@ def heat_map(
         InputError: If there is no such field, metric or policy.
     """
     policy = policy or str(settings.ranked(results, metric)["policy"].iloc[0])
-    rows = settings.averaged(results, [y, x, *filter(None, [facet])], metric, policy)
+    of, named = metric_of(metric), [x, y, *filter(None, [facet])]
+    data = settings.averaged(results, [*named[2:], x, y], metric, policy)
     values = settings.varied(results)
     panels = shown(values[facet]) if facet else [None]
     columns = min(COLUMNS, len(panels))
     has_room = len(values[x]) * columns <= 9 and len(values[y]) * columns <= 12
-    rows = rows.dropna(subset="mean")
+    rows = data.dropna(subset="mean")
     rows = rows.assign(
         row=rows[y].map(values[y].index),
         column=rows[x].map(values[x].index),
-        text=[_short(mean, metric) if has_room else "" for mean in rows["mean"]],
+        text=[_short(mean, of) if has_room else "" for mean in rows["mean"]],
     )
-    best = rows["mean"].idxmin() if metric in LESS_IS_BETTER else rows["mean"].idxmax()
+    best = rows["mean"].idxmin() if of.less_is_better else rows["mean"].idxmax()
     scale = {"vmin": rows["mean"].min(), "vmax": rows["mean"].max(), "cmap": "YlGnBu"}
-    scale |= {"cmap": "YlGnBu_r"} if metric in LESS_IS_BETTER else {}
+    scale |= {"cmap": "YlGnBu_r"} if of.less_is_better else {}
     height = 1.2 + (1.75 if facet else 0.5 * len(values[y])) * ceil(len(panels) / columns)
     with _grid(min(height, 9), len(panels), columns, sharex=True) as (figure, axes):
         for ax, value in zip(axes, panels, strict=True):
@@ -174,15 +199,40 @@ def heat_map(
             title = "" if value is None else f"{parameter(str(facet)).tick} {value_text(value)}"
             ax.set_title(title, fontsize=9, parse_math=True)
         bar = figure.colorbar(mesh, ax=axes, shrink=0.9, aspect=30)
-        style.in_units(bar.ax.yaxis, style.unit_of(metric))
+        style.in_units(bar.ax.yaxis, of.axis)
         figure.supxlabel(parameter(x).label, fontsize=10, parse_math=True)
         figure.supylabel(parameter(y).tick, fontsize=10, parse_math=True)
-        title = f"{metric_label(metric)}: {policy}"
+        title = f"{of.label}: {policy}"
         figure.suptitle(title, fontsize=11, fontweight="bold", x=0.02, ha="left")
-    return figure
+    caption = f"Means of {policy}, {'in percent, ' * of.in_percent}n = {_counted(data)} "
+    caption += f"{'replications' if facet else 'missions'} per cell. "
+    if facet:
+        caption += f"One panel for each value of the {parameter(facet).within}"
+        caption += f"{_left_out(values[facet], panels)}. "
+    fields = settings.by_influence(settings.main_effects(results, metric))
+    if others := [field for field in fields if field not in named]:
+        caption += f"Cells are averaged over {_listed(others)}. "
+    alt = f"{of.name} of {policy} over {_listed(named)}"
+    return Drawing(figure, alt, caption + _FRAMED, data)
 
 
-def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = None) -> Figure:
+def heat_maps(results: Results, metrics: Iterable[str]) -> Iterator[Drawing]:
+    """Every metric of every policy over the two fields that the design varies."""
+    values, metrics = settings.varied(results), [*metrics]
+    y, x = sorted(values, key=lambda field: len(values[field]))
+    for policy in results.policies:
+        for metric in metrics:
+            yield heat_map(results, x, y, metric, policy)
+
+
+def small_multiples(results: Results, metric: str = PRODUCT) -> Iterator[Drawing]:
+    """A metric of every policy over the three fields with the largest effect, in several panels."""
+    x, y, facet = settings.by_influence(settings.main_effects(results, metric))[:3]
+    for policy in results.policies:
+        yield heat_map(results, x, y, metric, policy, facet)
+
+
+def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = None) -> Drawing:
     """The partial dependence of a metric on every varied field, with intervals, in several panels.
 
     Args:
@@ -190,17 +240,22 @@ def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = N
         metric: The metric.
         policy: The policy; by default all policies.
     """
-    effects = settings.main_effects(results, metric, policy)
+    effects, of = settings.main_effects(results, metric, policy), metric_of(metric)
     looks = style.policy_colours(results.policies, effects["policy"])
 
     def draw(field: str, ax: Axes) -> None:
-        rows = effects[effects["field"] == field]
-        style.along(rows, looks, style.unit_of(metric), ax)
+        style.along(effects[effects["field"] == field], looks, of.axis, ax)
 
-    return _panel_per_field(settings.by_influence(effects), metric, draw)
+    drawing = _panel_per_field(settings.by_influence(effects), of, draw)
+    caption = (
+        "One panel for each field, the one with the largest effect first. A dot is the mean over "
+        f"{_MEANT[results.design == 'saltelli']}; n = {_counted(effects)}; bars are {INTERVALS}."
+    )
+    alt = f"{of.name} against each field, averaged over the others"
+    return Drawing(drawing, alt, caption, effects.drop(columns="tied"))
 
 
-def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) -> Figure:
+def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) -> Drawing:
     """The mean of a metric at every design point, against every varied field in several panels.
 
     Args:
@@ -208,7 +263,7 @@ def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) 
         metric: The metric.
         policy: The policy; by default all policies.
     """
-    table = settings.ranked(results, metric, policy)
+    table, of = settings.ranked(results, metric, policy), metric_of(metric)
     looks = style.policy_colours(results.policies, table["policy"])
 
     def draw(field: str, ax: Axes) -> None:
@@ -220,24 +275,37 @@ def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) 
         ticks = rows.drop_duplicates("position").sort_values("position")
         if len(ticks) <= style.MOST_TICKS:
             style.name_ticks(ax.xaxis, [*ticks["value"]], [*ticks["position"]])
-        style.in_units(ax.yaxis, style.unit_of(metric))
+        style.in_units(ax.yaxis, of.axis)
 
-    return _panel_per_field([*settings.varied(results)], metric, draw)
+    caption = (
+        f"One panel for each field. A dot is the mean of a policy at a design point, over "
+        f"n = {_counted(table)} missions. All fields vary at once, so dots above each other "
+        "differ in the other fields."
+    )
+    drawing = _panel_per_field([*settings.varied(results)], of, draw)
+    return Drawing(drawing, f"{of.name} at every design point", caption, table)
 
 
-def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Figure:
+def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Drawing:
     """The share of missions with at most a value of a metric: a curve per policy.
 
     Args:
         missions: A row per mission, with ``policy`` and the metric.
         metric: The metric.
     """
-    values = {str(name): part[metric] for name, part in missions.groupby("policy", sort=False)}
+    of, by_policy = metric_of(metric), missions.groupby("policy", sort=False)
     with style.panels(3.9, legend=4) as (figure, ax):
-        style.distributions(values, ax)
-        ax.set_xlabel(metric_label(metric))
-        style.in_units(ax.xaxis, style.unit_of(metric))
-    return figure
+        style.distributions({str(name): part[metric] for name, part in by_policy}, ax)
+        ax.set_xlabel(of.label)
+        style.in_units(ax.xaxis, of.axis)
+    caption = (
+        "The height of a curve is the share of the missions "
+        f"(n = {numbers.span(by_policy.size())} per policy) with at most the value on the axis. A "
+        "step at 0 shows missions that failed."
+    )
+    columns = ["policy", "point", "replication", metric]
+    data = missions[columns].sort_values(columns[:3], kind="stable")
+    return Drawing(figure, f"Distribution of {of.within} over the missions", caption, data)
 
 
 def effect(
@@ -274,6 +342,19 @@ def effect(
     return figure
 
 
+def one_at_a_time(results: Results) -> Iterator[Drawing]:
+    """The paper's metrics against every field, with all other fields as in the scenario."""
+    table = one_field.effects(results)
+    for field, pairs in one_field.changes_by_field(results, table).items():
+        data = table[table["field"] == field]
+        caption = (
+            f"n = {_counted(data)} missions per point; bars are {INTERVALS}. The lowest panel "
+            "shows the paired difference from the first value, with an axis of its own."
+        )
+        alt = f"The metrics against the {parameter(field).within}"
+        yield Drawing(effect(table, field, pairs, results.policies), alt, caption, data)
+
+
 def one_by_one(table: pd.DataFrame, policies: list[str]) -> Figure:
     """The product against every parameter, in panels side by side with the same axis.
 
@@ -288,7 +369,7 @@ def one_by_one(table: pd.DataFrame, policies: list[str]) -> Figure:
             style.along(rows[rows["field"] == field], looks, "%", ax)
             ax.set_xlabel(fill(parameter(field).label, 24), parse_math=True)
             ax.tick_params(axis="x", labelsize=8)
-        figure.suptitle(metric_label(PRODUCT), fontsize=11, fontweight="bold", x=0.01, ha="left")
+        figure.suptitle(metric_of(PRODUCT).label, fontsize=11, fontweight="bold", x=0.01, ha="left")
     return figure
 
 
@@ -320,6 +401,32 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
     return figure
 
 
+def index_figures(results: Results, metric: str = PRODUCT) -> Iterator[Drawing]:
+    """Sobol indices of every parameter for every policy."""
+    table, called = summary.sensitivities(results), metric_of(metric).within
+    for policy, data in table[table["metric"] == metric].groupby("policy", sort=False):
+        caption = (
+            f"{policy}: n = {data['n'].min():,} missions; lines are {INTERVALS} by bootstrap. "
+            "Below the dotted line is the noise, which no setting removes."
+        )
+        alt = f"Sobol indices of {called} for {policy}"
+        yield Drawing(sensitivity(data, str(policy)), alt, caption, data)
+
+
+def leading(results: Results, metric: str) -> Drawing:
+    """The figure that shows the answer of a study: the metric over all that the design varies."""
+    fields, kind = [*settings.varied(results)], results.design
+    if kind == "saltelli":
+        return next(index_figures(results, metric))
+    if not fields:
+        return means(results, metric)
+    if len(fields) == 1 or (len(fields) == 2 and kind in ("grid", "table")):
+        return plot(results, fields[0], next(iter(fields[1:]), None), metric)
+    if kind == "one-at-a-time":
+        return next(one_at_a_time(results))
+    return (scatter if kind == "latin-hypercube" else main_effects)(results, metric)
+
+
 def shown(values: Sequence[Any]) -> list[Any]:
     """The values of a third field with a panel in ``heat_map``; evenly spaced if there are many."""
     places = np.linspace(0, len(values) - 1, min(MOST_PANELS, len(values)))
@@ -339,7 +446,7 @@ def _grid(
 
 
 def _panel_per_field(
-    fields: Sequence[str], metric: str, draw: Callable[[str, Axes], None]
+    fields: Sequence[str], metric: Metric, draw: Callable[[str, Axes], None]
 ) -> Figure:
     """A panel per field, two in a row, with the same axis of values."""
     columns = min(2, len(fields))
@@ -348,17 +455,34 @@ def _panel_per_field(
         for ax, field in zip(axes, fields, strict=True):
             draw(field, ax)
             ax.set_xlabel(fill(parameter(field).label, 28), parse_math=True)
-        figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
+        figure.suptitle(metric.label, fontsize=11, fontweight="bold")
     return figure
 
 
-def _short(value: float, metric: str) -> str:
+def _short(value: float, metric: Metric) -> str:
     """A value as it is written in a cell."""
-    if metric in METRICS:
+    if metric.in_percent:
         return f"{100 * value:.1f}"
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
+def _counted(table: pd.DataFrame) -> str:
+    return numbers.span(table["n"])
+
+
+def _listed(fields: Sequence[str]) -> str:
+    return numbers.words([parameter(field).within for field in fields])
+
+
+def _left_out(values: Sequence[Any], panels: Sequence[Any]) -> str:
+    """Which values have a panel, if some have none."""
+    if len(panels) == len(values):
+        return ""
+    drawn = ", ".join(map(value_text, panels))
+    return f" ({len(panels)} of {len(values)} values: {drawn}; the others are in the data)"
+
+
+MOST_CONDITIONS = 9  # the largest number of conditions with a figure; the table has all
 WIDE = 20.0  # if the costs differ by this factor, their axis is logarithmic
 MOST_NAMES = 6  # largest number of settings that are named, of all or of those on the front
 FAINT = 0.15  # the opacity of a setting that is not on the front
@@ -404,8 +528,36 @@ def costs(table: pd.DataFrame, metric: str, currency: str, required: float | Non
             ax.xaxis.set_minor_locator(NullLocator())
             ax.xaxis.set_major_formatter("{x:,g}")
         style.in_units(ax.yaxis, "%")
-        ax.set(xlabel=f"cost [{currency}]", ylabel=metric_name(metric).lower())
+        ax.set(xlabel=f"cost [{currency}]", ylabel=metric_of(metric).within)
     return figure
+
+
+def fronts(results: Results) -> Iterator[Drawing]:
+    """The cost against the metrics of the fronts, under every condition."""
+    for metric, front in priced.fronts_of(results).items():
+        for _, rows in [*front.groupby("condition", sort=False)][:MOST_CONDITIONS]:
+            yield _costs(results, rows, metric, _MARKS)
+
+
+def deciding(results: Results) -> Drawing:
+    """The cost against the metric whose requirement asks for the most expensive fleet."""
+    rows, least = priced.judged(results), priced.required(results)
+    rows = rows[rows["policy"] == priced.best_policy(results)].assign(on_front=rows["selected"])
+    rows["probability"] = 0.4 + 0.6 * (rows["verdict"] == priced.MET)
+    parts = [(m, part) for m in least for _, part in rows.groupby("condition", sort=False)]
+    cheapest = [min(part[COST][part[m] >= least[m]], default=inf) for m, part in parts]
+    metric, part = parts[cheapest.index(max(cheapest))]
+    wanted = numbers.words([f"{metric_of(m).within} {numbers.level(q)}" for m, q in least.items()])
+    marks = f"Large, dark marks are shown to meet all requirements ({wanted}); faint ones are not."
+    return _costs(results, part, metric, marks)
+
+
+def _costs(results: Results, rows: pd.DataFrame, metric: str, marks: str) -> Drawing:
+    condition, least = rows["condition"].iloc[0], priced.required(results).get(metric)
+    drawing = costs(rows, metric, results.manifest["study"]["costs"]["currency"], least)
+    alt = f"Cost against {metric_of(metric).within}{', ' * bool(condition)}{condition}"
+    counted = f"{INTERVALS}; n = {_counted(rows)} missions per setting."
+    return Drawing(drawing, alt, f"{alt}. {marks} Bars are {counted}", rows)
 
 
 def decision_times(table: pd.DataFrame) -> Figure:

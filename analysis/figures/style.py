@@ -27,7 +27,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from pandas.api.types import is_numeric_dtype
 
-from analysis.names import METRICS, value_text
+from analysis.names import value_text
 from analysis.numbers import minus
 
 Look: TypeAlias = tuple[str, str]  # a colour and a marker
@@ -202,11 +202,6 @@ def in_units(axis: Axis, unit: str, nbins: int = 6) -> None:
     axis.set_major_locator(MaxNLocator(nbins=nbins, steps=[1, 2, 5, 10]))
     numbers = {"points": signed_points, "": lambda value, _: f"{value:,.6g}"}
     axis.set_major_formatter(PercentFormatter(1) if unit == "%" else numbers[unit])
-
-
-def unit_of(metric: str) -> str:
-    """The unit in which ``in_units`` writes a metric."""
-    return "%" if metric in METRICS else ""
 
 
 def note_at_right(text: str, level: float, ax: Axes, size: float = 9) -> Any:

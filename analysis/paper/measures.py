@@ -11,7 +11,8 @@ import pandas as pd
 from analysis import numbers
 from analysis.answers import learning, main_effects, missions
 from analysis.answers.learning import Transfer, last_phase, settled
-from analysis.names import RATIO, parameter, value_text
+from analysis.metrics import RATIO
+from analysis.names import parameter, value_text
 from analysis.paper import values
 from analysis.paper.rules import MARGIN
 from analysis.results.tables import Results

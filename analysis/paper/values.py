@@ -4,7 +4,8 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.answers import summary
-from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS, parameter, value_text
+from analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
+from analysis.names import parameter, value_text
 from analysis.results.tables import Results
 from analysis.stats.intervals import Interval, wilson
 

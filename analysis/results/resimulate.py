@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from analysis.names import measured_in
+from analysis.metrics import measured_in
 from analysis.results.provenance import Origin
 from analysis.results.tables import Results
 from analysis.study.stopping import Text

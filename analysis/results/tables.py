@@ -12,7 +12,8 @@ import numpy as np
 import pandas as pd
 
 from analysis.bound import Bound
-from analysis.names import BOUND, GAP, PRODUCT, SWEEP, SWEEPS, measured_in
+from analysis.metrics import BOUND, GAP, PRODUCT, measured_in
+from analysis.names import SWEEP, SWEEPS
 from analysis.results.chunks import bound_parts, check_parts, parts_of
 from analysis.results.manifest import Cell, Manifest
 from analysis.results.provenance import Origin

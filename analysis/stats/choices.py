@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import stats
 
-from analysis.names import LESS_IS_BETTER
+from analysis.metrics import metric_of
 from analysis.stats.intervals import LEVEL, check_share, rare_differences
 
 _BATCH = 2**21  # weights at a time, which take some megabytes for every n
@@ -104,8 +104,8 @@ def may_be_best(values: np.ndarray, metric: str = "", level: float = LEVEL) -> n
     Args:
         values: (R, K) values of K settings in R replications; nan means that a setting lacks a
             replication. Two settings are compared on the replications of both.
-        metric: The metric, of which more is better but for those of ``LESS_IS_BETTER``. Its rare
-            differences are added, as in ``analysis.compare``.
+        metric: The metric, by default one of which more is better. Its rare differences are
+            added, as in ``analysis.compare``.
         level: The probability.
 
     Returns:
@@ -117,7 +117,7 @@ def may_be_best(values: np.ndarray, metric: str = "", level: float = LEVEL) -> n
     """
     check_share("level", level)
     present = np.isfinite(values)
-    values = -values if metric in LESS_IS_BETTER else values
+    values = -values if metric_of(metric).less_is_better else values
     means = np.nansum(values, axis=0) / np.maximum(present.sum(axis=0), 1)
     # What a replication adds to all settings cancels in their differences.
     centre = np.nanmean(np.where(present.any(1, keepdims=True), values, 0.0), axis=1, keepdims=True)

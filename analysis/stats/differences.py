@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.names import MEANS, MEASURES, REWARD, SHARES
+from analysis.metrics import ALWAYS, MEASURES, REWARD, metric_of
 from analysis.stats.intervals import (
     LEVEL,
     Interval,
@@ -186,7 +186,7 @@ def difference_test(
     if rare is None or (metric == REWARD and differences.size == 1):
         return t_test(differences, level)
     smooth, p = t_test(smoothed(differences, rare), level)
-    if metric in SHARES and np.isin(differences, (-1, 0, 1)).all():
+    if metric_of(metric).is_outcome and np.isin(differences, (-1, 0, 1)).all():
         p = mcnemar(int(np.sum(differences > 0)), int(np.sum(differences < 0)))
     limit = np.inf if metric == REWARD else 1.0
     mean = float(differences.mean())
@@ -239,7 +239,7 @@ def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") ->
         table.loc[n == 1, ["low", "high", "p"]] = np.nan, np.nan, 1.0
     else:
         table[["low", "high"]] = table[["low", "high"]].clip(-1, 1)
-    if metric in SHARES:
+    if metric_of(metric).is_outcome:
         gains, losses = (differences > 0).sum(), (differences < 0).sum()
         exact = (differences.isin((-1, 0, 1)) | ~present).all() & (n > 0)
         table.loc[exact, "p"] = [*map(mcnemar, gains[exact], losses[exact])]
@@ -330,7 +330,7 @@ def relative_change(values: np.ndarray, reference: np.ndarray, level: float = LE
 def compare(
     missions: pd.DataFrame,
     baseline: str | int,
-    metrics: Sequence[str] = (*SHARES, *MEANS),
+    metrics: Sequence[str] = ALWAYS,
     by: Sequence[str] = (),
     level: float = LEVEL,
     correction: Correction | None = "holm",

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.names import METRICS
+from analysis.metrics import metric_of
 from analysis.stats.intervals import (
     LEVEL,
     Interval,
@@ -80,7 +80,7 @@ def distribution(
         views = [("quantile", q, quantile_interval(values, q, level)) for q in quantiles]
         expanded = expanded_level(level, tail * len(values))
         risk = bootstrap_interval(values, worst_mean, generator, expanded, resamples=resamples)
-        if metric in METRICS and risk.low == risk.high:
+        if metric_of(metric).is_bounded and risk.low == risk.high:
             tail_values = np.full(max(int(tail * len(values)), 1), risk.mean)
             risk = bounded_interval(tail_values, level)
         views.append(("worst mean", tail, risk))

@@ -14,7 +14,7 @@ import pandas as pd
 from scipy import stats
 from scipy.special import ndtri, stdtrit
 
-from analysis.names import BOUNDED, REWARD, SHARES, metrics_in
+from analysis.metrics import REWARD, metric_of, metrics_in
 from dess import InputError
 from dess.errors import one_of
 from dess.scenario import ScenarioSpace
@@ -65,9 +65,10 @@ def rare_differences(metric: str, a: Any, b: Any) -> tuple[Any, Any] | None:
     Returns:
         The (...) highest and the (...) lowest differences; None if they are not known.
     """
-    if metric in SHARES:
+    of = metric_of(metric)
+    if of.is_outcome:
         return 0 * (a - b) + 1, 0 * (a - b) - 1
-    if metric in BOUNDED:
+    if of.is_bounded:
         return np.maximum(a, 1 - b), -np.maximum(b, 1 - a)
     if metric == REWARD:
         return a - b + FAILURE_COST, a - b - FAILURE_COST
@@ -158,10 +159,10 @@ class Moments(NamedTuple):
 
     def interval(self, metric: str, level: float = LEVEL) -> Interval:
         """The mean of a metric with the interval of ``interval_of``."""
-        if metric in SHARES and self._are_outcomes:
+        of = metric_of(metric)
+        if of.is_outcome and self._are_outcomes:
             return wilson(int(self.total), self.n, level)
-        is_bounded = metric in SHARES or metric in BOUNDED
-        return self.bounded(level) if is_bounded else self.student(level)
+        return self.bounded(level) if of.is_bounded else self.student(level)
 
     @property
     def _are_outcomes(self) -> bool:
@@ -258,7 +259,7 @@ def stratified(values: np.ndarray, metric: str, level: float = LEVEL) -> Interva
     residuals = np.where(present, values - means, 0.0)
     mean = float(means.mean())
     common = float(((residuals / n).sum(axis=1) ** 2).sum()) / points**2  # variance of the mean
-    if metric in SHARES or metric in BOUNDED:
+    if metric_of(metric).is_bounded:
         alone = float(((residuals**2).sum(axis=0) / n**2).sum()) / points**2
         missions = points**2 / float((1 / n).sum())
         effect = min(max(common / alone, 1.0), points) if alone else points
@@ -316,11 +317,11 @@ def column_intervals(values: pd.DataFrame, metric: str = "", level: float = LEVE
     n, mean = values.count(), values.mean()
     half = values.sem() * stats.t.isf((1 - level) / 2, np.maximum(n - 1, 1))
     table = pd.DataFrame({"mean": mean, "low": mean - half, "high": mean + half, "n": n})
-    if metric in SHARES or metric in BOUNDED:
+    if metric_of(metric).is_bounded:
         some = n > 0
         ends = bounded_ends(mean[some], values.var(ddof=0)[some], n[some], level)
         table.loc[some, ["low", "high"]] = np.transpose(ends)
-    if metric in SHARES:
+    if metric_of(metric).is_outcome:
         rows = ((values.isin((0, 1)) | values.isna()).all() & (n > 0)).to_numpy()
         pairs = [*zip((mean * n)[rows].round().astype(int), n[rows], strict=True)]
         known = {pair: wilson(*pair, level)[1:] for pair in {*pairs}}  # each takes its time

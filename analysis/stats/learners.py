@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy import optimize, stats
 
-from analysis.names import MEANS, REWARD, SHARES
+from analysis.metrics import ALWAYS, REWARD
 from analysis.stats.differences import (
     Correction,
     check_same_missions,
@@ -112,7 +112,7 @@ def compare_learners(
     missions: pd.DataFrame,
     learners: Mapping[str, Sequence[str]],
     baseline: str,
-    metrics: Sequence[str] = (*SHARES, *MEANS),
+    metrics: Sequence[str] = ALWAYS,
     by: Sequence[str] = (),
     level: float = LEVEL,
     correction: Correction | None = "holm",

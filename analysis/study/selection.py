@@ -41,7 +41,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from analysis.names import BOUNDED, LESS_IS_BETTER, PRODUCT, SHARES
+from analysis.metrics import PRODUCT, SUCCESS, metric_of
 from analysis.study.stopping import MOST, Metric, Samples, StrictTable, values_in
 from dess import InputError
 from dess.scenario import Integer, Number
@@ -152,9 +152,9 @@ class Selection(StrictTable):
 
     @model_validator(mode="after")
     def _fits_the_procedure(self) -> Self:
-        if self.procedure == "kn-bounded" and self.metric not in (*SHARES, *BOUNDED):
+        if self.procedure == "kn-bounded" and not metric_of(self.metric).is_bounded:
             raise ValueError(f"metric: {self.metric} is not bounded; allowed: procedure kn with it")
-        if self.procedure == "kn" and self.metric in (*SHARES, PRODUCT):
+        if self.procedure == "kn" and self.metric in (SUCCESS, PRODUCT):
             raise ValueError(
                 f"metric: {self.metric} falls to 0 in rare failures, for which kn guarantees "
                 "nothing; allowed: procedure kn-bounded with it"
@@ -204,7 +204,7 @@ class Selection(StrictTable):
                 f"selection.metric: {self.metric} is not measured in some missions; "
                 "allowed: a metric that every mission has"
             )
-        sign = -1.0 if self.metric in LESS_IS_BETTER else 1.0
+        sign = -1.0 if metric_of(self.metric).less_is_better else 1.0
         return [sign * values for values in found]
 
     def _guarantee(self, race: "_Race") -> str:

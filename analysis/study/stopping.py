@@ -16,13 +16,13 @@ from pydantic import (
 )
 from scipy.special import ndtri, stdtrit
 
-from analysis.names import BOUNDED, MEANS, MEASURES, SHARES
+from analysis.metrics import ALWAYS, MEASURES, metric_of
 from analysis.stats.intervals import LEVEL, bounded_ends
 from dess import InputError
 from dess.errors import listed, one_of, shown, validation_line
 from dess.scenario import Integer, Number
 
-_METRICS = [*SHARES, *MEANS, *MEASURES]
+_METRICS = [*ALWAYS, *MEASURES]
 
 # For each design point a mapping from metrics to their (n,) values in replications 0..n-1.
 Samples = Sequence[Mapping[str, np.ndarray]]
@@ -282,7 +282,7 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
     means = np.cumsum(shifted) / counts
     before = np.concatenate([[0.0], means[:-1]])[: len(sample)]
     squares = np.cumsum((counts - 1) / counts * (shifted - before) ** 2)  # Welford
-    if metric in BOUNDED:
+    if metric_of(metric).is_bounded:
         low, high = bounded_ends(sample[:1] + means, squares / counts, counts)
         return sample[:1] + means, (high - low) / 2
     freedom = np.maximum(counts - 1, 1)

@@ -18,7 +18,7 @@ from pydantic import (
 )
 
 from analysis.bound import check_scenario
-from analysis.names import BOUND, COST, GAP, metrics_in
+from analysis.metrics import BOUND, COST, GAP, metrics_in
 from analysis.study.cheapest import AnySelection, Cheapest, Costs
 from analysis.study.design import Design, DesignPoint, Saltelli
 from analysis.study.selection import Selection

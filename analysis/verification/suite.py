@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.summary import best_policy
-from analysis.names import METRICS, SUCCESS
+from analysis.metrics import METRICS, SUCCESS
 from analysis.numbers import words
 from analysis.results.tables import load_results
 from analysis.verification import balances, draws, measurements

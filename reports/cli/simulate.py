@@ -255,7 +255,7 @@ def _write_page(mission: _Mission, path: Path) -> None:
 
 
 def _print_mission(mission: _Mission) -> None:
-    from analysis.names import MEASURES
+    from analysis.metrics import MEASURES
     from analysis.results.event_log import causes
 
     record = mission.record

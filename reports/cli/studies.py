@@ -184,7 +184,7 @@ def show(
 
 def _targets(texts: Iterable[str]) -> dict[str, float]:
     """Metric -> the least mean, or the largest of a metric of which less is better."""
-    from analysis.names import ALIASES, MEASURES, METRICS
+    from analysis.metrics import ALIASES, MEASURES, METRICS
 
     targets = {}
     for name, share in all_settings(texts, "--target", TARGET).items():

@@ -83,7 +83,7 @@ def sweep(
     from analysis.ask import sweep as question
     from analysis.ask.sweep import Sweep
     from analysis.execution.effort import plan_study
-    from analysis.names import ALIASES, PRODUCT
+    from analysis.metrics import ALIASES, PRODUCT
 
     study = question.question(
         all_values(settings or []),
@@ -139,15 +139,8 @@ def _print(answer: "Sweep", metric: str) -> None:
 
     from analysis import numbers
     from analysis.answers.settings import varied
-    from analysis.names import (
-        COST,
-        PRODUCT,
-        SHORT_METRICS,
-        SUCCESS,
-        metric_label,
-        metric_name,
-        value_text,
-    )
+    from analysis.metrics import COST, PRODUCT, SUCCESS, metric_of
+    from analysis.names import value_text
 
     table, fields, prices = answer.table(metric), [*varied(answer.results)], answer.study.costs
     top = table.head(SHOWN)
@@ -156,13 +149,13 @@ def _print(answer: "Sweep", metric: str) -> None:
     cells[fields] = top[fields].map(value_text)
     required = getattr(answer.study.selection, "requirements", {})
     for name in [m for m in dict.fromkeys([metric, SUCCESS, *required, PRODUCT]) if m != COST]:
-        head = SHORT_METRICS.get(name) or metric_label(name)
-        cells[head] = numbers.estimates(top, name, numbers.written(name))
+        head = metric_of(name).head
+        cells[head] = numbers.estimates(top, name, metric_of(name).written)
     if prices:
         cells[COST] = [numbers.money(cost, prices.currency) for cost in top[COST]]
     console.print_table([*map(str, cells)], cells.astype(str).to_numpy().tolist())
     first = f", the first {SHOWN} are shown" if len(table) > SHOWN else ""
-    what = SHORT_METRICS.get(metric) or metric_name(metric).lower()
+    what = metric_of(metric).within
     console.say(
         f"{len(table):,} settings{first}; ≈: the {what} may be as good as that of the first"
     )

@@ -7,25 +7,15 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.answers import costs, diff, optimality, summary
-from analysis.answers.summary import index_table, settings
-from analysis.names import (
-    LESS_IS_BETTER,
-    MEASURES,
-    METRICS,
-    PRODUCT,
-    RATIO,
-    SHORT_METRICS,
-    SUCCESS,
-    measured_in,
-    metric_label,
-    metric_name,
-)
+from analysis.answers.settings import in_words, setting_of
+from analysis.metrics import MEASURES, METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
 from analysis.paper import values
 from analysis.results.tables import Results
-from reports import tables
+from analysis.tables import compared, counts
+from analysis.tables import means as means_table
 from reports.cli import console
 
-_SHORT = {METRICS[metric]: name for metric, name in SHORT_METRICS.items()}
+_SHORT = {name: metric_of(metric).head for metric, name in METRICS.items()}
 _QUANTILES = (0.05, 0.5, 0.95)
 MANY_POINTS = 40  # more design points are not listed
 
@@ -40,23 +30,21 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
     if study["selection"]:
         selected = summary.selections(results)
         _print_selections(selected)
-        if results.store.manifest.costs and "condition" in selected:
+        is_search = "condition" in selected
+        if is_search and results.store.manifest.costs:
             for text in costs.sentences(results):
                 console.say(f" {text.translate(str.maketrans('', '', '*`'))}")
         if len(results.checks):
             means, checks = summary.checks(results), study["selection"]["check"]
-            if "condition" in selected:
-                words = [
-                    f"{row.policy} {settings(results)[row.point]}" for row in means.itertuples()
-                ]
-                means = means.assign(policy=words)
+            if is_search:
+                pairs = means[["policy", "point"]].itertuples(index=False)
+                means = means.assign(policy=[setting_of(results, *pair) for pair in pairs])
             _print_means(means, f"{checks} further missions", printed)
-    elif len(settings(results)) == 1:
+    elif len(results.store.manifest.points) == 1:
         _print_means(summary.means(results), "mean, 95 % interval", printed)
     elif short:
-        points = settings(results)
-        means = summary.means(results) if len(points) <= MANY_POINTS else pd.DataFrame()
-        _print_by_point(points, means, [PRODUCT])
+        few = len(results.store.manifest.points) <= MANY_POINTS
+        _print_by_point(results, summary.means(results) if few else pd.DataFrame(), [PRODUCT])
 
 
 def print_details(
@@ -69,20 +57,17 @@ def print_details(
         frames: The tables.
         everything: Whether the means of all metrics are printed, not of the product alone.
     """
-    points, measured = settings(results), measured_in({*frames["means"]["metric"]})
-    metrics = [*SHORT_METRICS, *measured] if everything else [PRODUCT]
+    measured = measured_in({*frames["means"]["metric"]})
+    metrics = [*METRICS, *measured] if everything else [PRODUCT]
     printers = {
         "sensitivities": lambda table: _print_titled(
             "shares of the collection ratio's variance:",
-            index_table(table[table["metric"] == RATIO]).drop(columns="Metric"),
+            summary.index_table(table[table["metric"] == RATIO]).cells.drop(columns="Metric"),
         ),
         "costs": lambda table: _print_costs(table, results.manifest["study"]["costs"]["currency"]),
-        "means": lambda means: _print_by_point(points, means, metrics),
+        "means": lambda means: _print_by_point(results, means, metrics),
         "distributions": _print_distributions,
-        "precisions": lambda table: _print_titled(
-            "precision:",
-            tables.precisions(table).assign(Point=table["point"].map(points.__getitem__)),
-        ),
+        "precisions": lambda table: _print_precisions(results, table),
         "comparisons": _print_comparisons,
         "gaps": lambda table: print_frame(
             "optimality gap", optimality.listed(table).set_index("Policy")
@@ -111,7 +96,7 @@ def _print_selections(selected: pd.DataFrame) -> None:
     """The selected point of every policy, and the guarantee of the procedure."""
     heads = ["condition"] if "condition" in selected and any(selected["condition"]) else []
     cells = selected.set_index("policy")[[*heads, "setting", "missions", "left"]]
-    cells["missions"] = cells["missions"].map("{:,}".format)
+    cells["missions"] = counts(cells["missions"])
     print_frame("selected for", cells)
     for guarantee in dict.fromkeys(selected["guarantee"]):
         console.say(f" {guarantee}")
@@ -122,26 +107,33 @@ def _print_costs(table: pd.DataFrame, currency: str) -> None:
     if len(table) > MANY_POINTS:
         console.say(f"the costs of {len(table)} settings are too many to list; --json has them")
         return
-    cells = tables.priced(table, [SUCCESS])
+    cells = costs.cells(table, [SUCCESS])
     cells["On the front"] = table["probability"].map(numbers.percent)
     _print_titled(f"cost [{currency}] against success:", cells)
 
 
+def _print_precisions(results: Results, table: pd.DataFrame) -> None:
+    """The precision of each estimate beside its target, with the design points in words."""
+    cells, points = summary.precision_table(table, most=None).cells, in_words(results)
+    cells["Point"] = cells["Point"].map(points.__getitem__)
+    _print_titled("precision:", cells)
+
+
 def _print_means(means: pd.DataFrame, title: str, printed: Mapping[str, float]) -> None:
     """A row per policy, and one with the values that the paper prints; a column per metric."""
-    cells = tables.means(means).drop(columns="Missions").set_index("Policy")
+    cells = means_table(means).cells.drop(columns="Missions").set_index("Policy")
     if printed:
-        names = {name: metric for metric, name in METRICS.items()}
-        cells.loc["paper"] = [numbers.percent(printed[names[head]]) for head in cells.columns]
+        cells.loc["paper"] = [numbers.percent(printed[metric]) for metric in METRICS]
     print_frame(title, cells)
     measured = means[means["metric"].isin(MEASURES)]
     if not measured.empty:
         cells = numbers.wide(measured, "metric", "policy", numbers.quantities).fillna("")
-        print_frame(title, cells.rename(index=metric_label))
+        print_frame(title, cells.rename(index=lambda metric: metric_of(metric).label))
 
 
-def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) -> None:
+def _print_by_point(results: Results, means: pd.DataFrame, metrics: list[str]) -> None:
     """A table per metric, a row per design point, if there are several and not too many."""
+    points = in_words(results)
     if len(points) == 1:
         return
     if len(points) > MANY_POINTS:
@@ -149,11 +141,10 @@ def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) 
         return
     for metric in metrics:
         rows = means[means["metric"] == metric]
-        cells = numbers.wide(rows, "point", "policy", numbers.written(metric)).fillna("")
+        cells = numbers.wide(rows, "point", "policy", metric_of(metric).written).fillna("")
         if metric == PRODUCT and "verdict" in rows and len(cells.columns) > 1:
             cells["best"] = _best(rows)
-        title = SHORT_METRICS.get(metric) or metric_label(metric)
-        print_frame(title, cells.rename(index=dict(enumerate(points))))
+        print_frame(metric_of(metric).head, cells.rename(index=dict(enumerate(points))))
         if "best" in cells:
             console.say(
                 " best: significantly better than the others on common replications (95 %, at "
@@ -175,21 +166,20 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
         means: Rows of ``summary.with_verdicts`` of these settings.
         targets: Metric -> the least mean.
     """
-    points, policies = settings(results), len(results.policies)
     asked = [
-        f"{SHORT_METRICS.get(metric) or metric_name(metric).lower()} of {end:g} or "
-        + ("less" if metric in LESS_IS_BETTER else "more")
+        f"{metric_of(metric).within} of {end:g} or "
+        + ("less" if metric_of(metric).less_is_better else "more")
         for metric, end in targets.items()
     ]
     product = means[means["metric"] == PRODUCT].set_index(["policy", "point"])
-    count = f"{len(product):,} of {len(points) * policies:,}"
+    count = f"{len(product):,} of {len(results.store.manifest.points) * len(results.policies):,}"
     meet = "meets" if len(product) == 1 else "meet"
     console.say(f"{count} settings {meet} {numbers.words(asked)}, by the whole interval")
     if product.empty:
         return
-    cells = numbers.wide(means[means["metric"].isin(SHORT_METRICS)], ["policy", "point"])
-    cells = cells.rename(columns=SHORT_METRICS).assign(**{"of these policies": product["verdict"]})
-    names = [f"{policy} {points[point]}".rstrip() for policy, point in cells.index]
+    cells = numbers.wide(means[means["metric"].isin(METRICS)], ["policy", "point"])
+    cells = cells.rename(columns=METRICS).assign(**{"of these policies": product["verdict"]})
+    names = [setting_of(results, *setting) for setting in cells.index]
     print_frame("setting", cells.set_axis(names, axis="index")[:MANY_POINTS])
     if len(cells) > MANY_POINTS:
         console.say(f" {len(cells) - MANY_POINTS:,} more settings; --csv has them")
@@ -198,7 +188,7 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
 def _print_distributions(table: pd.DataFrame) -> None:
     """Quantiles of the product over the missions, and the mean of the worst ones."""
     rows = table[(table["view"] != "quantile") | table["share"].isin(_QUANTILES)]
-    print_frame("spread of the product", tables.spread(rows, PRODUCT).set_index("Policy"))
+    print_frame("spread of the product", summary.spread(rows, PRODUCT).cells.set_index("Policy"))
 
 
 def _print_comparisons(table: pd.DataFrame) -> None:
@@ -218,8 +208,8 @@ def _print_learners(table: pd.DataFrame) -> None:
 
 
 def differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """``tables.compared`` by what is compared, and the rows of the product."""
-    cells = tables.compared(table, who).set_index(who.capitalize())
+    """``compared`` by what is compared, and the rows of the product."""
+    cells = compared(table, who).set_index(who.capitalize())
     return cells, table[table["metric"] == PRODUCT].set_index(who)
 
 
@@ -268,10 +258,10 @@ def _print_effects(found: diff.Diff) -> None:
     """Differences by policy, and by policy and design point if there are several."""
     table = diff.effects(found)
     _print_differences(table.assign(who=table["policy_a"]))
-    if len(points := settings(found.a)) > 1:
+    if len(found.a.store.manifest.points) > 1:
         table = diff.effects(found, ["policy_a", "point_a"])
-        words = table["point_a"].map(dict(enumerate(points)))
-        _print_differences(table.assign(who=table["policy_a"] + " " + words))
+        pairs = table[["policy_a", "point_a"]].itertuples(index=False)
+        _print_differences(table.assign(who=[setting_of(found.a, *pair) for pair in pairs]))
 
 
 def _print_differences(table: pd.DataFrame) -> None:
@@ -290,12 +280,11 @@ def _print_differences(table: pd.DataFrame) -> None:
 
 def _print_most_changed(found: diff.Diff, most: int) -> None:
     """The most changed missions, with the commands that simulate them again."""
-    points = settings(found.a)
     for side, results in (("A", found.a), ("B", found.b)):
         console.say(f" {side}, {results.store.folder}: {diff.at_hand(results)}")
     console.say(" most changed missions:")
     for row in diff.most_changed(found, most).itertuples():
-        where = f"{row.policy_a} {points[row.point_a]}".strip()
+        where = setting_of(found.a, row.policy_a, row.point_a)
         console.say(
             f"   {where}, replication {row.replication}: {_shortened(row.fields.split(', '))}"
         )

@@ -21,11 +21,10 @@ heuristic = None  # the policy to compare it with; None for the best that is not
 # %%
 from IPython.display import display
 
-from analysis import load_results
+from analysis import load_results, tables
 from analysis.answers import comparison as answers
 from analysis.answers import missions as logged
 from analysis.answers import summary
-from reports import tables
 from reports.pages import html
 
 # %%

@@ -20,7 +20,7 @@ results = "../../results"  # folder with the results folder of explorer
 # %%
 from pathlib import Path
 
-from analysis import load_results, names, numbers
+from analysis import load_results, metrics, numbers
 from analysis.answers.settings import in_words
 from reports.explorer import Grid, explorer
 from reports.pages import html
@@ -51,7 +51,7 @@ html.say(
 # ## The setting in the middle
 
 # %%
-table = numbers.wide(start, "policy").rename(columns=names.METRICS).reset_index(names="Policy")
+table = numbers.wide(start, "policy").rename(columns=metrics.METRICS).reset_index(names="Policy")
 html.table(
     table, f"With {in_words(study)[grid.start]}; the CSV file has all settings", data=grid.table()
 )

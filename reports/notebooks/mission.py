@@ -24,7 +24,7 @@ from IPython.display import display
 
 from analysis import load_results, numbers
 from analysis.answers import missions, summary
-from analysis.names import RATIO
+from analysis.metrics import RATIO
 from analysis.paper import values
 from reports.pages import html
 from reports.player import READING, library, player, together

@@ -30,11 +30,12 @@ yes = False  # True if the sweep may take more than an hour
 # %%
 from analysis import sweep
 from analysis.answers import costs
+from analysis.figures import settings as figures
 from analysis.figures.missions import mission_figure, sea_figure
 from analysis.results.resimulate import mission_of
 from dess import load_scenario
 from policies import load_team
-from reports.pages import html, study
+from reports.pages import html
 
 # %%
 sea = load_scenario(scenario)
@@ -46,7 +47,7 @@ answer = sweep(*about, yes=yes, **fields)
 html.answer(costs.answer(answer.results), answer.cheapest() or "none")
 
 # %%
-html.lead(*study.deciding(answer.results))
+html.lead(*figures.deciding(answer.results))
 
 # %% [markdown]
 # ## Why
@@ -79,7 +80,7 @@ html.say("Guarantee: {guarantee}.", guarantee=answer.guarantee)
 # *Not shown* is a requirement where no decision was needed to find the cheapest fleet.
 
 # %%
-study.judged_table(answer.results)
+html.show(costs.judged_table(answer.results))
 
 # %% [markdown]
 # ## With your own sea

@@ -21,7 +21,7 @@ heuristic = None  # the other policy to show; None for the best that is not lear
 # %%
 from pathlib import Path
 
-from analysis import load_results, names, numbers
+from analysis import load_results, metrics, names, numbers
 from analysis.answers import main_effects, summary
 from analysis.figures import settings
 from analysis.paper import scorecard, values
@@ -36,7 +36,7 @@ leading = policies[0]
 effects = main_effects.effects(fig5)
 effects = effects[effects["policy"].isin(policies)]
 changes = main_effects.changes_by_field(fig5, effects)
-ratios = main_effects.changes_by_field(fig5, effects, names.RATIO)
+ratios = main_effects.changes_by_field(fig5, effects, metrics.RATIO)
 level, checks = numbers.level(LEVEL), summary.checks(sweet)
 
 # %%
@@ -95,7 +95,7 @@ html.gallery(
             f"n = {numbers.span(checks['n'])} missions; bars are {level} intervals. Dashed: the "
             "paper.",
         )
-        for metric, name in names.METRICS.items()
+        for metric, name in metrics.METRICS.items()
         if len(checks)
     ]
 )
@@ -109,7 +109,7 @@ html.gallery(
 
 # %%
 indices = summary.sensitivities(sobol)
-of_ratio = indices[indices["metric"] == names.RATIO].dropna()
+of_ratio = indices[indices["metric"] == metrics.RATIO].dropna()
 caption = f"n = {indices['n'].min():,} missions; bars are {level} intervals, bootstrap over blocks."
 html.gallery(
     [
@@ -145,7 +145,7 @@ html.table(
 
 # %%
 html.table(
-    summary.index_table(of_ratio),
+    summary.index_table(of_ratio).cells,
     f"Sobol indices of the collection ratio, with {level} intervals (bootstrap over blocks)",
     data=indices,
 )

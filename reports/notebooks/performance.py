@@ -22,13 +22,12 @@ from pathlib import Path
 
 from IPython.display import display
 
-from analysis import load_results, numbers, summary
+from analysis import load_results, numbers, summary, tables
 from analysis.answers import optimality
 from analysis.answers import summary as questions
 from analysis.figures import comparison, settings
-from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
+from analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from analysis.paper import values
-from reports import tables
 from reports.pages import html
 
 # %%

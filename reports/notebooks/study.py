@@ -22,17 +22,18 @@ baseline = 0  # the number of the design point with which all others are compare
 from pathlib import Path
 
 import numpy as np
-from IPython.display import display
 
-from analysis import distribution, load_results, names
+from analysis import distribution, load_results, tables
 from analysis.answers import costs, settings, summary
+from analysis.figures import settings as figures
+from analysis.metrics import METRICS, metric_of
 from reports.pages import html
 from reports.pages import study as page
 
 # %%
 study = load_results(Path(results))
-by = page.metric_of(study, metric)
-metrics, called = page.metrics_of(by), names.metric_name(by).lower()
+by = settings.ranking_metric(study, metric)
+metrics, called = settings.shown_metrics(by), metric_of(by).within
 
 # %% tags=["if-cheapest"]
 html.answer(costs.answer(study))
@@ -42,13 +43,13 @@ ranked = settings.ranked(study, by)
 best = ranked.iloc[0]
 
 # %% tags=["if-answer"]
-html.answer(page.answer(study, ranked, by))
+html.answer(settings.answer(study, ranked, by))
 
 # %% tags=["if-sensitivity"]
-html.answer(page.of_variance(study, by))
+html.answer(summary.of_variance(study, by))
 
 # %%
-html.lead(*(page.deciding(study) if page.required(study) else page.leading(study, by)))
+html.lead(*(figures.deciding(study) if costs.required(study) else figures.leading(study, by)))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## Why
@@ -57,7 +58,7 @@ html.lead(*(page.deciding(study) if page.required(study) else page.leading(study
 # setting gets no further missions once a cheaper one is known to meet the requirements.
 
 # %% tags=["if-cheapest"]
-display(html.say("{answers}", answers=page.reasons(study)), page.judged_table(study))
+html.show(html.say("{answers}", answers=page.reasons(study)), costs.judged_table(study))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## How far to trust it
@@ -65,7 +66,8 @@ display(html.say("{answers}", answers=page.reasons(study)), page.judged_table(st
 # The check had no part in the selection, so its means are unbiased.
 
 # %% tags=["if-cheapest"]
-page.checked_table(study)
+no_check = html.say("No setting was checked.")
+html.show(no_check if study.checks.empty else costs.checked_table(study))
 
 # %% [markdown] tags=["if-settings"]
 # ## The best settings
@@ -75,10 +77,10 @@ page.checked_table(study)
 # The mean of the first tends to be too high, since it was ranked first for it.
 
 # %% tags=["if-settings"]
-display(page.ranked(study, ranked, by), page.best_of_policies(study, by))
+html.show(settings.best_table(study, ranked, by), settings.best_of_policies(study, by))
 
 # %% tags=["if-one-setting"]
-display(html.gallery(page.mean_figures(study, metrics)), page.means(study))
+html.show((figures.means(study, of) for of in METRICS), tables.means(summary.means(study)))
 
 # %% [markdown] tags=["if-costs"]
 # ## Costs
@@ -87,12 +89,7 @@ display(html.gallery(page.mean_figures(study, metrics)), page.means(study))
 # The probability of being on it comes from a Bayesian bootstrap over common replications.
 
 # %% tags=["if-costs"]
-fronts = page.fronts_of(study)
-display(
-    html.gallery(page.drawn(study, fronts)),
-    page.front_table(study, fronts),
-    page.parts_table(study),
-)
+html.show(figures.fronts(study), costs.front_table(study), costs.parts_table(study))
 
 # %% [markdown] tags=["if-selection"]
 # ## The selection
@@ -101,10 +98,10 @@ display(
 # missions were ruled out early. The check had no part in the selection.
 
 # %% tags=["if-selection"]
-display(
-    page.selected(study),
+html.show(
+    summary.selection_table(study),
     html.say("{guarantees}", guarantees=page.guarantees(study)),
-    page.checked(study),
+    tables.means(summary.checks(study), tables.CHECKED),
 )
 
 # %% [markdown] tags=["if-precision"]
@@ -113,35 +110,36 @@ display(
 # Missions were simulated until the estimates were precise enough, or the budget was spent.
 
 # %% tags=["if-precision"]
-page.precisions(study)
+html.show(summary.precision_table(summary.precisions(study)))
 
 # %% [markdown] tags=["if-fields"]
 # ## Effects of the fields
 
 # %% tags=["if-one-field"]
-html.gallery(page.curves(study, metrics))
+(field,) = settings.varied(study)
+html.gallery(figures.plot(study, field, metric=of) for of in metrics)
 
 # %% tags=["if-two-fields"]
-html.gallery(page.heat_maps(study, metrics))
+html.gallery(figures.heat_maps(study, metrics))
 
 # %% tags=["if-many-fields"]
-html.gallery(page.small_multiples(study, by))
+html.gallery(figures.small_multiples(study, by))
 
 # %% tags=["if-one-at-a-time"]
-html.gallery(page.one_at_a_time(study))
+html.gallery(figures.one_at_a_time(study))
 
 # %% tags=["if-sampled"]
-html.gallery(page.scatter(study, metrics))
+html.gallery(figures.scatter(study, of) for of in metrics)
 
 # %% tags=["if-sensitivity"]
-display(html.gallery(page.index_figures(study, by)), page.sensitivity(study))
+html.show(figures.index_figures(study, by), summary.index_table(summary.sensitivities(study)))
 
 # %% [markdown] tags=["if-sensitivity"]
 # A Sobol index is the share of a metric's variance that a field explains: *alone*, or *with all
 # interactions*. The replication counts as a field: its share is noise that no setting removes.
 
 # %% tags=["if-effects"]
-display(html.gallery(page.effect_figures(study, metrics)), page.main_effects(study, by))
+html.show((figures.main_effects(study, of) for of in metrics), settings.effect_table(study, by))
 
 # %% [markdown] tags=["if-settings"]
 # ## Comparison with a baseline
@@ -151,11 +149,11 @@ html.say(
     "Every policy is compared with itself at design point "
     "{point}: {words}. The parameter `baseline` names another point.",
     point=baseline,
-    words=page.setting(study, baseline),
+    words=settings.baseline(study, baseline),
 )
 
 # %% tags=["if-settings"]
-page.against(study, baseline, by)
+html.show(settings.baseline_table(study, baseline, by))
 
 # %% [markdown] tags=["if-policies"]
 # ## Comparison of the policies
@@ -163,10 +161,10 @@ page.against(study, baseline, by)
 # The differences are means over all design points, computed replication by replication.
 
 # %% tags=["if-policies"]
-page.comparisons(study)
+html.show(summary.comparison_table(study))
 
 # %% tags=["if-learned"]
-page.learners(study)
+html.show(summary.learner_table(study))
 
 # %% [markdown]
 # ## Single missions
@@ -174,10 +172,10 @@ page.learners(study)
 # %% tags=["if-ranked"]
 missions = settings.at_best(study, ranked)
 spread = distribution(missions, by, np.random.default_rng(study.store.manifest.seed))
-display(
+html.show(
     html.say("These figures show every policy at its best setting by {metric}:", metric=called),
-    html.gallery(page.distribution(missions, by)),
-    page.spread(spread, by),
+    [figures.distribution(missions, by)],
+    summary.spread(spread, by),
 )
 worst = summary.worst(study, best["policy"], point=best["point"])
 
@@ -185,8 +183,8 @@ worst = summary.worst(study, best["policy"], point=best["point"])
 worst = summary.worst(study, summary.best_policy(study.missions))
 
 # %%
-display(
-    page.worst(study, worst),
+html.show(
+    summary.worst_table(study, worst),
     html.say("{commands}", commands=page.commands(study, worst)),
 )
 

@@ -25,7 +25,8 @@ yes = False  # True if the missions may take more than an hour
 
 # %%
 from analysis import sweep
-from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
+from analysis.answers import settings
+from analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from reports.pages import html, study
 
 # %%
@@ -39,7 +40,7 @@ drawn = {
 }
 
 # %%
-html.answer(study.answer(answer.results, ranked, PRODUCT))
+html.answer(settings.answer(answer.results, ranked, PRODUCT))
 
 # %%
 html.lead(*drawn[PRODUCT])
@@ -58,13 +59,13 @@ html.gallery([drawn[SUCCESS], drawn[RATIO]])
 # `charging.plan_waits` is false.
 
 # %%
-study.ranked(answer.results, ranked, PRODUCT)
+html.show(settings.best_table(answer.results, ranked, PRODUCT))
 
 # %% [markdown]
 # ## Tables
 
 # %%
-study.best_of_policies(answer.results, PRODUCT)
+html.show(settings.best_of_policies(answer.results, PRODUCT))
 
 # %% [markdown]
 # ## Change the question

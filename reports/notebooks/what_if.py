@@ -28,8 +28,9 @@ shown = None  # the policy whose missions are drawn; None for the best in the va
 # %%
 from IPython.display import display
 
-from analysis import names, what_if
+from analysis import metrics, what_if
 from analysis.ask import what_if as answer
+from analysis.metrics import metric_of
 from reports.pages import html
 
 # %%
@@ -66,8 +67,8 @@ html.gallery(
         (asked.plot_spread(), "Distribution of the paired differences of the product", spread),
         *(
             (asked.plot_means(metric), f"{name}, baseline and variation", f"{name}. {caption}")
-            for metric in (*names.METRICS, *measured)
-            for name in [names.metric_name(metric)]
+            for metric in (*metrics.METRICS, *measured)
+            for name in [metric_of(metric).name]
         ),
     ]
 )

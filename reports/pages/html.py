@@ -22,7 +22,7 @@ from typing import Any
 
 import matplotlib as mpl
 import pandas as pd
-from IPython.display import HTML, Markdown
+from IPython.display import HTML, Markdown, display
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup
 from matplotlib.figure import Figure
@@ -33,6 +33,7 @@ from analysis.numbers import span
 from analysis.results.resimulate import Evidence, learned_files
 from analysis.results.tables import Results
 from analysis.study.study import budget_of
+from analysis.tables import Table
 from dess.errors import printable
 from reports.pages.page import FILES, STUDY, Learned, Page, hidden
 
@@ -242,16 +243,16 @@ def _weights(evidence: Evidence) -> Iterator[str]:
 
 
 def table(
-    frame: pd.DataFrame, caption: str = "", wrap: bool = False, data: pd.DataFrame | None = None
+    frame: pd.DataFrame, caption: str = "", data: pd.DataFrame | None = None, wrap: bool = False
 ) -> HTML:
     """A table below its caption, without its index; a wide table scrolls.
 
     Args:
         frame: The table.
         caption: The text above the table.
-        wrap: Whether long cells are broken into several lines.
         data: The complete numbers of the table. If given, links below the table save them as CSV
             and the shown table as LaTeX.
+        wrap: Whether long cells are broken into several lines.
     """
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
@@ -327,6 +328,15 @@ def figures(values: Sequence[Mapping[str, str]], look: str = "", note: str = "")
         note: What holds for all of them, in a paragraph below.
     """
     return Part(figures=[{**_BARE, **value} for value in values], look=look, note=note)
+
+
+def show(*parts: Table | HTML | Markdown | Iterable[Drawing]) -> None:
+    """Show tables, galleries of figures, and what else there is, one below the other."""
+    for part in parts:
+        if isinstance(part, HTML | Markdown):
+            display(part)
+        else:
+            display(table(*part) if isinstance(part, Table) else gallery(part))
 
 
 def svg(drawing: Figure) -> bytes:

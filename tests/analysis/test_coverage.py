@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.names import PRODUCT, REWARD
+from analysis.metrics import PRODUCT, REWARD
 from analysis.stats.differences import adjust, paired
 from analysis.stats.distribution import quantile_interval
 from analysis.stats.intervals import bounded_ends, mean_interval, stratified

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page
 
 from analysis import run_study
-from analysis.names import METRICS
+from analysis.metrics import METRICS
 from analysis.results.tables import Results
 from analysis.stats.intervals import interval_of
 from dess import InputError

@@ -17,14 +17,14 @@
 results = "../../results"  # folder with the results folder of the study age
 
 # %%
-from analysis import load_results, names, numbers
+from analysis import load_results, numbers, tables
 from analysis.answers import operations
-from reports import tables
+from analysis.metrics import AGE, RATIO, metric_of
 from reports.pages import html
 
 # %%
 study = load_results(f"{results}/age")
-means = operations.means(study, [names.AGE, "peak_age", "age_p99", names.RATIO])
+means = operations.means(study, [AGE, "peak_age", "age_p99", RATIO])
 against = "the number of UAVs, by arrival rate"
 lead, *others = operations.drawings(means, "uavs", "arrival_rate", "policy", against).values()
 
@@ -61,10 +61,10 @@ html.table(
 # ## Tables
 
 # %%
-of_age = means[means["metric"] == names.AGE]
+of_age = means[means["metric"] == AGE]
 html.table(
     tables.estimates(of_age, ["policy", "uavs", "n"], "arrival_rate", numbers.quantities),
-    f"{names.metric_label(names.AGE)}, by arrival rate",
+    f"{metric_of(AGE).label}, by arrival rate",
     data=means,
 )
 

@@ -19,14 +19,14 @@ results = "../../results"  # folder with the results folder of the study failure
 # %%
 from IPython.display import display
 
-from analysis import load_results, names, numbers
+from analysis import load_results, numbers, tables
 from analysis.answers import operations
-from reports import tables
+from analysis.metrics import PRODUCT, RATIO, SUCCESS, metric_of
 from reports.pages import html
 
 # %%
 study, rate, repair = load_results(f"{results}/failures"), operations.RATE, operations.REPAIR
-metrics = [names.PRODUCT, names.SUCCESS, names.RATIO]
+metrics = [PRODUCT, SUCCESS, RATIO]
 counts = [c for c in ("failures", "slots_grounded", "lost") if c in study.missions]
 counts = [c for c in counts if study.missions[c].max() > 0]
 means = operations.means(study, metrics)
@@ -58,7 +58,7 @@ display(
     *(
         html.table(
             tables.estimates(change, ["policy", "uavs", repair, "n"], rate, numbers.points),
-            f"{names.metric_name(metric)} minus that without failures, in points, by failure rate",
+            f"{metric_of(metric).name} minus that without failures, in points, by failure rate",
             data=change,
         )
         for metric in metrics
@@ -74,7 +74,7 @@ display(
     *(
         html.table(
             tables.estimates(rows, ["policy", "uavs", repair, "n"], rate, numbers.quantities),
-            f"{names.metric_label(metric)} per mission, by failure rate; empty: nothing can fail",
+            f"{metric_of(metric).label} per mission, by failure rate; empty: nothing can fail",
         )
         for metric in counts
         for rows in [operations.means(study, [metric])]

@@ -20,15 +20,15 @@ margin = 0.02  # a loss of the product that does not matter, as a share
 # %%
 from IPython.display import display
 
-from analysis import load_results, names, numbers
+from analysis import load_results, numbers, tables
 from analysis.answers import operations
-from reports import tables
+from analysis.metrics import PRODUCT, SUCCESS, metric_of
 from reports.pages import html
 
 # %%
 study = load_results(f"{results}/pads")
-uses = ["waiting", "queue", names.UTILISATION]
-means = operations.means(study, [names.PRODUCT, names.SUCCESS, *uses])
+uses = ["waiting", "queue", "utilisation"]
+means = operations.means(study, [PRODUCT, SUCCESS, *uses])
 against = "the number of pads, by number of UAVs"
 drawn = operations.drawings(means, "pads", "uavs", "policy", against, linked=True)
 
@@ -36,7 +36,7 @@ drawn = operations.drawings(means, "pads", "uavs", "policy", against, linked=Tru
 html.answer(operations.pads(study, margin))
 
 # %%
-html.lead(*drawn[names.PRODUCT])
+html.lead(*drawn[PRODUCT])
 
 # %% [markdown]
 # ## Why
@@ -49,7 +49,7 @@ html.lead(*drawn[names.PRODUCT])
 html.figure(*operations.waits(study, margin))
 
 # %%
-html.gallery([drawn[metric] for metric in (*uses, names.SUCCESS)])
+html.gallery([drawn[metric] for metric in (*uses, SUCCESS)])
 
 # %% [markdown]
 # ## How far to trust it
@@ -63,7 +63,7 @@ html.say(
 )
 
 # %%
-lost = operations.changes(study, "pads", study.missions["pads"].max(), names.PRODUCT)
+lost = operations.changes(study, "pads", study.missions["pads"].max(), PRODUCT)
 html.table(
     tables.estimates(lost, ["policy", "pads", "n"], "uavs", numbers.points),
     "Product minus that with the most pads: paired differences in points, by number of UAVs",
@@ -77,8 +77,8 @@ html.table(
 display(
     *(
         html.table(
-            tables.estimates(rows, ["policy", "pads", "n"], "uavs", numbers.written(metric)),
-            f"{names.metric_label(metric)}, by number of UAVs",
+            tables.estimates(rows, ["policy", "pads", "n"], "uavs", metric_of(metric).written),
+            f"{metric_of(metric).label}, by number of UAVs",
         )
         for metric in uses
         for rows in [means[means["metric"] == metric]]

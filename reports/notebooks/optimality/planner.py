@@ -20,12 +20,11 @@ longer = "planner-long"  # the same with a longer search, if the study has it
 learner = "ddqn"  # the policy that has learned
 
 # %%
-from analysis import load_results, numbers
+from analysis import load_results, numbers, tables
 from analysis.answers import comparison, optimality
 from analysis.answers import planner as answers
 from analysis.figures import Drawing
 from analysis.figures.comparison import gaps
-from reports import tables
 from reports.pages import html
 
 # %%

@@ -20,10 +20,9 @@ reference = "planner"  # a slow policy that is hard to beat
 heuristic = "greedy"  # a fast policy without learning
 
 # %%
-from analysis import load_results
+from analysis import load_results, tables
 from analysis.answers import comparison, seas
-from analysis.names import METRICS, SUCCESS
-from reports import tables
+from analysis.metrics import METRICS, SUCCESS
 from reports.pages import html
 
 # %%

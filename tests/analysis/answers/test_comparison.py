@@ -10,7 +10,8 @@ import pytest
 from analysis import run_study
 from analysis.answers import comparison
 from analysis.answers.comparison import AHEAD, BEHIND, CALLS, COLOURS, OF_BASELINE, Pair
-from analysis.names import METRICS, PARAMETERS, PRODUCT
+from analysis.metrics import METRICS, PRODUCT
+from analysis.names import PARAMETERS
 from analysis.stats.differences import adjust, paired
 from analysis.stats.verdict import INCONCLUSIVE
 from dess import InputError, simulate

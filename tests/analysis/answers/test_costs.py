@@ -54,8 +54,6 @@ def test_each_condition_has_a_front_of_its_own(fixed, metric):
         assert rows["on_front"].tolist() == expected.tolist()
         assert rows["probability"].between(0, 1).all()
         assert rows["probability"].sum() >= 1
-    again = costs.front(fixed, metric)
-    assert again.equals(table)
 
 
 def test_the_answer_says_why_no_cheaper_fleet_will_do(searched, monkeypatch):

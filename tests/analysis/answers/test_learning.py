@@ -13,7 +13,7 @@ from scipy import stats
 from analysis import load_results, marl_eval_data, rliable_scores, run_study
 from analysis.answers import learning
 from analysis.answers.learning import CURVE, CURVES, FINAL, difference, read_curve, read_curves
-from analysis.names import METRICS
+from analysis.metrics import METRICS
 from analysis.results.tables import Results
 from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess import InputError
@@ -255,7 +255,7 @@ def test_marl_eval_has_the_same_scores_at_every_level(results, monkeypatch) -> N
     data = json.loads(json.dumps(marl_eval_data(results, ["success", OF_RUNS])))
     scores = rliable_scores(results, OF_RUNS)
     [[study, tasks]] = data.items()
-    assert (study, [*tasks]) == ("trial", ["quota 30", "quota 60"])
+    assert (study, [*tasks]) == ("trial", [f"communication quota {n}" for n in (30, 60)])
     for task, algorithms in enumerate(tasks.values()):
         assert [*algorithms] == ["a+b", "greedy"]
         for name, of_runs in algorithms.items():

@@ -9,7 +9,7 @@ import pytest
 from analysis import run_study
 from analysis.answers import main_effects
 from analysis.answers.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
-from analysis.names import PRODUCT, SUCCESS
+from analysis.metrics import PRODUCT, SUCCESS
 from analysis.stats.differences import adjust, paired
 from analysis.stats.intervals import by_replication
 from dess import InputError

@@ -8,7 +8,7 @@ import pytest
 
 from analysis import run_study
 from analysis.answers import operations
-from analysis.names import AGE, PRODUCT
+from analysis.metrics import AGE, PRODUCT
 from analysis.stats.differences import relative_change
 from dess import InputError
 from tests.analysis.small import grid, small_study

@@ -8,7 +8,7 @@ from analysis import run_study
 from analysis.answers import optimality
 from analysis.bound import Bound
 from analysis.execution import jobs
-from analysis.names import BOUND, GAP, PRODUCT
+from analysis.metrics import BOUND, GAP, PRODUCT
 from tests.analysis.small import small_study
 
 

@@ -11,7 +11,7 @@ from analysis.answers import planner
 from analysis.answers.optimality import ALL
 from analysis.bound import Bound
 from analysis.execution import jobs
-from analysis.names import PRODUCT
+from analysis.metrics import PRODUCT
 from analysis.results.event_log import uav_slots
 from dess import load_scenario
 from policies.planner import Budget, Planner

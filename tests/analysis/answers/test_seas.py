@@ -9,7 +9,7 @@ import pytest
 from analysis import load_results, numbers, run_study
 from analysis.answers import seas
 from analysis.answers.comparison import Cost, Times
-from analysis.names import BOUND, PRODUCT, SUCCESS
+from analysis.metrics import BOUND, PRODUCT, SUCCESS
 from analysis.results.tables import Results
 from dess import InputError
 from tests.analysis.small import small_study

@@ -7,7 +7,7 @@ import pytest
 
 from analysis import compare, run_study
 from analysis.answers import settings
-from analysis.names import METRICS, PRODUCT
+from analysis.metrics import METRICS, PRODUCT
 from analysis.stats.intervals import bounded_interval
 from dess import InputError
 from tests.analysis.small import grid, small_study
@@ -178,4 +178,5 @@ def test_varied_fields_have_their_values_in_order(results, tmp_path):
     assert settings.in_words(results)[1] == "3 UAVs, initial data per node 10–20"
     single = run(tmp_path)
     assert settings.varied(single) == {} and settings.main_effects(single).empty
-    assert settings.in_words(single) == [settings.AS_IT_IS]
+    assert settings.in_words(single) == [""]
+    assert settings.setting_of(single, "greedy", 0) == "greedy"

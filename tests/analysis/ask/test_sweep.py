@@ -6,7 +6,7 @@ import tqdm.auto
 from matplotlib.figure import Figure
 
 from analysis import sweep
-from analysis.names import PRODUCT
+from analysis.metrics import PRODUCT
 from dess import InputError
 from tests.analysis.small import write_scenario
 

@@ -12,7 +12,7 @@ from scipy import stats
 from analysis import load_study
 from analysis.ask import what_if
 from analysis.ask.what_if import BASELINE, VARIATION
-from analysis.names import PRODUCT
+from analysis.metrics import PRODUCT
 from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE
 from dess import InputError, load_scenario

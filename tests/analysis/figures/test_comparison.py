@@ -6,7 +6,7 @@ import pytest
 
 from analysis.ask import what_if
 from analysis.figures import comparison
-from analysis.names import BOUND, METRICS, PRODUCT
+from analysis.metrics import BOUND, METRICS, PRODUCT
 from tests.analysis.answers.test_comparison import drawn_interval
 from tests.analysis.small import asked
 

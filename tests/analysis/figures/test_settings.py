@@ -11,7 +11,8 @@ from analysis import run_study
 from analysis.answers import settings
 from analysis.figures import settings as figures
 from analysis.figures import style
-from analysis.names import METRICS, PRODUCT, SUCCESS
+from analysis.metrics import METRICS, PRODUCT, SUCCESS
+from analysis.numbers import percent
 from analysis.study.design import NOISE
 from dess import InputError
 from tests.analysis.answers.test_main_effects import pairs_of
@@ -34,7 +35,7 @@ def curves(ax):
 
 
 def test_curves_are_the_means_with_intervals_at_their_places(results):
-    (ax,) = figures.plot(results, "quota", metric=SUCCESS).axes
+    (ax,) = figures.plot(results, "quota", metric=SUCCESS).figure.axes
     table = settings.averaged(results, ["quota"], SUCCESS)
     for policy, (x, y, ends) in zip(results.policies, curves(ax), strict=True):
         own = table[table["policy"] == policy]
@@ -45,7 +46,7 @@ def test_curves_are_the_means_with_intervals_at_their_places(results):
 
 
 def test_a_second_field_has_a_curve_per_value_and_policies_have_panels(results):
-    drawing = figures.plot(results, "initial_data", hue="uavs")
+    drawing = figures.plot(results, "initial_data", hue="uavs").figure
     table = settings.averaged(results, ["initial_data", "uavs"])
     titles = [ax.get_title(loc="left") for ax in drawing.axes]
     assert titles == [f"Policy {name}" for name in results.policies]
@@ -71,8 +72,12 @@ def test_names_of_near_values_are_turned_so_that_they_do_not_touch():
 @pytest.mark.parametrize("facet", [None, "uavs"])
 def test_a_heat_map_frames_what_may_be_the_best_and_marks_the_best(results, facet):
     fields = ["initial_data", "quota", *([facet] if facet else [])]
-    drawing = figures.heat_map(results, "quota", "initial_data", policy="random", facet=facet)
+    drawing, _, caption, data = figures.heat_map(
+        results, "quota", "initial_data", policy="random", facet=facet
+    )
     table = settings.averaged(results, fields, policy="random")
+    assert data["mean"].tolist() == table["mean"].tolist()
+    assert ("Cells are averaged over number of UAVs. " in caption) == (facet is None)
     panels = [ax for ax in drawing.axes if ax.collections and ax.get_label() != "<colorbar>"]
     shown = np.concatenate([np.ravel(ax.collections[0].get_array()) for ax in panels])
     assert sorted(shown) == pytest.approx(sorted(table["mean"]))
@@ -89,7 +94,7 @@ def test_a_heat_map_frames_what_may_be_the_best_and_marks_the_best(results, face
 def test_of_costs_the_lowest_cell_is_marked(results):
     missions = results.missions
     priced = replace(results, missions=missions.assign(cost=1e4 * missions["uavs"]))
-    ax = figures.heat_map(priced, "uavs", "quota", "cost").axes[0]
+    ax = figures.heat_map(priced, "uavs", "quota", "cost").figure.axes[0]
     assert ax.lines[0].get_xdata()[0] == 0.5  # the smaller fleet
     assert {text.get_text() for text in ax.texts} == {"10,000", "20,000"}
 
@@ -97,27 +102,27 @@ def test_of_costs_the_lowest_cell_is_marked(results):
 def test_a_cell_without_missions_stays_empty(tmp_path):
     rows = [{"uavs": 1, "quota": 20}, {"uavs": 2, "quota": 40}]
     study = small_study(tmp_path, design={"kind": "table", "rows": rows}, missions=4)
-    ax = figures.heat_map(run_study(study, tmp_path / "out"), "uavs", "quota").axes[0]
+    ax = figures.heat_map(run_study(study, tmp_path / "out"), "uavs", "quota").figure.axes[0]
     assert np.isnan(np.asarray(ax.collections[0].get_array(), float)).sum() == 2
     assert len(ax.texts) == 2
 
 
 def test_fields_have_panels_the_widest_effect_first_and_every_design_point_is_a_dot(results):
     effects = settings.main_effects(results)
-    panels = [ax for ax in figures.main_effects(results).axes if ax.get_visible()]
+    panels = [ax for ax in figures.main_effects(results).figure.axes if ax.get_visible()]
     for ax, field in zip(panels, settings.by_influence(effects), strict=True):
         for policy, (_, y, _) in zip(results.policies, curves(ax), strict=True):
             own = effects[(effects["field"] == field) & (effects["policy"] == policy)]
             assert y == pytest.approx(own["mean"])
     table = settings.ranked(results)
-    for ax in [ax for ax in figures.scatter(results).axes if ax.get_visible()]:
+    for ax in [ax for ax in figures.scatter(results).figure.axes if ax.get_visible()]:
         for dots, policy in zip(ax.collections, table["policy"].unique(), strict=True):
             means = np.asarray(dots.get_offsets())[:, 1]
             assert means == pytest.approx(table[table["policy"] == policy][PRODUCT])
 
 
 def test_a_distribution_is_the_share_of_missions(results):
-    (ax,) = figures.distribution(results.missions).axes
+    (ax,) = figures.distribution(results.missions).figure.axes
     for line, policy in zip(ax.lines, results.policies, strict=True):
         values = results.missions[results.missions["policy"] == policy][PRODUCT]
         heights = dict(zip(*(list(data)[1:] for data in line.get_data()), strict=True))
@@ -146,10 +151,10 @@ def test_performance_shows_means_intervals_and_the_printed_figure(metric: str = 
         assert bar.lines[0].get_xdata() == pytest.approx([row["mean"]])
         (arm,) = bar.lines[2]
         assert arm.get_segments()[0][:, 0] == pytest.approx([row["low"], row["high"]])
-    (printed,) = (line for line in ax.lines if line.get_label() == "paper 55.0%")
+    (printed,) = (line for line in ax.lines if line.get_label() == "paper 55.0 %")
     assert list(printed.get_xdata()) == [0.55, 0.55]
     assert ax.get_title(loc="left") == METRICS[metric]
-    assert [note.get_text() for note in ax.texts] == [f"{mean:.1%}" for mean in rows["mean"]]
+    assert [note.get_text() for note in ax.texts] == [*map(percent, rows["mean"])]
     assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first on top
 
 
@@ -189,17 +194,6 @@ def table():
 def panels(table):
     changes = CHANGES
     return figures.effect(table, "initial_data", changes, POLICIES).axes
-
-
-def test_a_panel_per_metric_shows_means_and_intervals(table, panels):
-    rows = table[table["field"] == "initial_data"]
-    for ax, (metric, name) in zip(panels, METRICS.items(), strict=False):
-        assert ax.get_title(loc="left") == name
-        for policy, (x, y, ends) in zip(CHANGES, curves(ax), strict=True):
-            means = rows[(rows["metric"] == metric) & (rows["policy"] == policy)]
-            assert y == pytest.approx(means["mean"])
-            assert [round(place) for place in x] == means["position"].tolist()
-            assert ends == pytest.approx(means[["low", "high"]].to_numpy())
 
 
 def test_the_last_panel_shows_the_changes_from_the_first_value(panels):

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from analysis import load_study, run_study
-from analysis.names import PRODUCT
+from analysis.metrics import PRODUCT
 from analysis.paper import values as paper
 from analysis.paper.measures import (
     EXCEEDS,

@@ -9,7 +9,7 @@ import pytest
 
 from analysis import run_study, summary
 from analysis.execution.evaluation import Asked, means
-from analysis.names import MEASURES, measured_in
+from analysis.metrics import MEASURES, measured_in
 from analysis.results.resimulate import difference, recorded, resimulate
 from analysis.stats.differences import compare
 from analysis.stats.intervals import interval_of

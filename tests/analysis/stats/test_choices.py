@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 from scipy import stats
 from scipy.special import ndtri
 
-from analysis.names import SUCCESS
+from analysis.metrics import SUCCESS
 from analysis.stats.choices import may_be_best, membership, on_front
 from analysis.stats.differences import difference_test
 
@@ -169,15 +169,13 @@ def kept_best(generator, trials, spread, missions=30, count=40):
     return kept
 
 
-def test_the_true_best_is_kept():
-    trials = 200
-    assert kept_best(np.random.default_rng(2), trials, 0.02) >= stats.binom.ppf(1e-4, trials, 0.95)
+SLOW = [(2000, spread, count) for spread in (0.0, 0.01, 0.1) for count in (2, 10, 200)]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("spread", [0.0, 0.01, 0.1])
-@pytest.mark.parametrize("count", [2, 10, 200])
-def test_the_true_best_is_kept_as_often_as_promised(spread, count):
-    trials = 2000
+@pytest.mark.parametrize(
+    ("trials", "spread", "count"),
+    [(200, 0.02, 40), *(pytest.param(*case, marks=pytest.mark.slow) for case in SLOW)],
+)
+def test_the_true_best_is_kept_as_often_as_promised(trials, spread, count):
     kept = kept_best(np.random.default_rng(count), trials, spread, count=count)
     assert kept >= stats.binom.ppf(1e-4, trials, 0.95)

@@ -6,8 +6,8 @@ import pytest
 from pandas.testing import assert_frame_equal
 from scipy import stats
 
-from analysis.names import PRODUCT, REWARD, SUCCESS
-from analysis.stats.differences import Paired, adjust, compare, for_choice, paired
+from analysis.metrics import PRODUCT, REWARD, SUCCESS
+from analysis.stats.differences import Paired, adjust, compare, paired
 from dess import InputError
 from tests.analysis.stats.matched_missions import METRIC, STUDY, ratios
 
@@ -21,14 +21,6 @@ def test_adjusted_by_hand():
     assert adjust(p, None) == pytest.approx(p)
     assert adjust(np.array([0.4, 0.9]), "holm") == pytest.approx([0.8, 0.9])
     assert adjust(np.array([0.7, 0.9]), "holm") == pytest.approx([1.0, 1.0])
-
-
-def test_a_chosen_baseline_multiplies_p_values_by_the_number_of_candidates():
-    table = pd.DataFrame({"p_adjusted": [0.01, 0.4]})
-    assert for_choice(table, 3)["p_adjusted"].tolist() == pytest.approx([0.03, 1.0])
-
-
-pytestmark = pytest.mark.filterwarnings("error")
 
 
 def of_lists(a, b, **arguments):

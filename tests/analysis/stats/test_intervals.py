@@ -9,7 +9,7 @@ from scipy import stats
 
 from analysis.answers.summary import best_policy
 from analysis.execution.evaluation import Asked, evaluate, means
-from analysis.names import PRODUCT, RATIO, REWARD, SUCCESS
+from analysis.metrics import PRODUCT, RATIO, REWARD, SUCCESS
 from analysis.stats import intervals
 from analysis.stats.differences import compare
 from analysis.stats.distribution import quantile_interval
@@ -120,23 +120,22 @@ def test_student_of_strata_is_that_of_the_means_of_the_replications():
     assert stratified(values, REWARD) == pytest.approx((units.mean(), low, high))
 
 
-def test_wilson_of_nine_in_ten():
-    # z = 1.95996: centre (0.9 + z^2/20) / (1 + z^2/10) = 0.78899,
-    # half width z sqrt(0.009 + z^2/400) / (1 + z^2/10) = 0.19314
-    assert wilson(9, 10) == pytest.approx((0.9, 0.59585, 0.98213), abs=1e-5)
-
-
-def test_wilson_at_the_ends():
-    # n / (n + z^2) for n of n, and its mirror image for none
-    assert wilson(10, 10) == pytest.approx((1.0, 0.72247, 1.0), abs=1e-5)
-    assert wilson(0, 10) == pytest.approx((0.0, 0.0, 0.27753), abs=1e-5)
-
-
-def test_student_of_three_values():
-    # mean 2, s = 1, t(0.975, 2) = 4.30265: 2 -+ 4.30265 / sqrt(3)
-    assert mean_interval([1.0, 2.0, 3.0]) == pytest.approx((2.0, -0.48414, 4.48414), abs=1e-5)
-    # t(0.95, 2) = 2.91999
-    assert mean_interval([1.0, 2.0, 3.0], 0.9) == pytest.approx((2.0, 0.31414, 3.68586), abs=1e-5)
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        # z = 1.95996: centre (0.9 + z^2/20) / (1 + z^2/10) = 0.78899,
+        # half width z sqrt(0.009 + z^2/400) / (1 + z^2/10) = 0.19314
+        (wilson(9, 10), (0.9, 0.59585, 0.98213)),
+        # n / (n + z^2) for n of n, and its mirror image for none
+        (wilson(10, 10), (1.0, 0.72247, 1.0)),
+        (wilson(0, 10), (0.0, 0.0, 0.27753)),
+        # mean 2, s = 1, t(0.975, 2) = 4.30265: 2 -+ 4.30265 / sqrt(3); t(0.95, 2) = 2.91999
+        (mean_interval([1.0, 2.0, 3.0]), (2.0, -0.48414, 4.48414)),
+        (mean_interval([1.0, 2.0, 3.0], 0.9), (2.0, 0.31414, 3.68586)),
+    ],
+)
+def test_wilson_and_student_by_hand(found, expected):
+    assert found == pytest.approx(expected, abs=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from analysis.names import BOUNDED, MEANS, METRICS, SHARES
+from analysis.metrics import ALWAYS, METRICS, metric_of
 from analysis.stats.intervals import interval_of, mean_interval, wilson
 from analysis.study.stopping import Precision, running_interval
 
@@ -39,7 +39,7 @@ def slow_stop(rule, data):
     def holds(n):
         for metric, target in rule.targets.items():
             values = data[metric][:n]
-            share = metric in SHARES
+            share = metric_of(metric).is_outcome
             interval = wilson(values.sum(), n) if share else mean_interval(values)
             half = (interval.high - interval.low) / 2
             if n == 1 and not share:
@@ -64,12 +64,12 @@ def test_missions_that_measure_nothing_are_left_out_of_running_intervals():
     assert widths.tolist() == [np.inf, *own_widths[[0, 0, 1, 2]]]
 
 
-@pytest.mark.parametrize("metric", SHARES + MEANS)
+@pytest.mark.parametrize("metric", ALWAYS)
 def test_running_intervals_are_those_of_the_statistics(metric):
     generator = np.random.default_rng(1)
-    share = metric in SHARES
+    share = metric_of(metric).is_outcome
     values = generator.integers(0, 2, 300) if share else 1e6 + generator.normal(size=300)
-    values = generator.beta(8, 2, 300) if metric in BOUNDED else values
+    values = generator.beta(8, 2, 300) if metric_of(metric).kind == "share" else values
     means, widths = running_interval(metric, values)
     for n in (1, 2, 3, 10, 300):
         sample = values[:n]

@@ -82,7 +82,7 @@ def test_design_points_and_both_commands_are_shown(dess, tmp_path):
         assert dess("study", "run", "grid.toml", "--policy", policy, "--out", policy)[0] == 0
     code, out, _ = dess("study", "diff", "greedy", "random", "--most", 1)
     assert code == 0
-    assert re.search(r"\ngreedy quota 20 +10 of 10 ", out)
+    assert re.search(r"\ngreedy with communication quota 20 +10 of 10 ", out)
     (of_a,) = re.findall(r"     A: dess simulate .*--policy greedy", out)
     (of_b,) = re.findall(r"     B: dess simulate .*--policy random", out)
     assert "2 more" not in out

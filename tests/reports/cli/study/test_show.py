@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 FIELDS = ["uavs", "initial_data"]
+FIRST = "1 UAV, initial data per node 5 "  # the first design point, in words
 
 
 @pytest.fixture
@@ -57,7 +58,7 @@ def test_targets_leave_what_meets_them_by_the_lower_end(shown, dess_json):
     assert text.startswith(
         f"{len(passed)} of 8 settings meet collection ratio of {least:g} or more"
     )
-    listed = re.findall(r"^(?:greedy|random) uavs [^%]*?  ", text, re.M)
+    listed = re.findall(r"^(?:greedy|random) with \d UAVs?, [^%]*?  ", text, re.M)
     assert len({*listed}) == len(passed)
 
 
@@ -74,7 +75,7 @@ def test_the_best_policies_of_a_point_are_named(shown, dess_json):
     means = pd.DataFrame(dess_json("study", "show", "out")["means"])
     product = means[means["metric"] == "collection_ratio_and_communication"]
     table = out[out.index("product ") :]
-    for point, words in enumerate(("uavs 1, initial_data 5 ", "uavs 1, initial_data 5..9.5 ")):
+    for point, words in enumerate((FIRST, f"{FIRST.rstrip()}–9.5 ")):
         rows = product[(product["point"] == point) & (product["verdict"] != "worse")]
         names = rows.sort_values("mean", ascending=False)["policy"]
         line = next(line for line in table.splitlines() if line.startswith(words))

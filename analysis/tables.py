@@ -1,19 +1,41 @@
-"""What both the page of a study and the terminal show of it, as tables of text.
-
-Every function turns rows of ``analysis.answers`` into text, with the same columns and words for
-both; ``reports.pages.html.table`` and ``reports.cli.tables.print_frame`` write them.
-"""
+"""Tables of text with their captions, as a page, the terminal, CSV and LaTeX show them."""
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import COST, METRICS, PRODUCT, metric_name, parameter, value_text
+from analysis.metrics import METRICS, PRODUCT
+from analysis.names import parameter, value_text
+from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import MARKS, position_by_test
 
+INTERVALS = f"{numbers.level(LEVEL)} intervals"
+CHECKED = f"The check of the selected settings: means with {INTERVALS}"
+MOST_ROWS = 25  # the largest number of rows of a table on a page; its data have all rows
+YES = {True: "yes", False: "no"}
 _HEADS = {"policy": "Policy", "n": "Missions", **METRICS}
+
+
+class Table(NamedTuple):
+    """A table: what is read of it, and the numbers behind it.
+
+    Attributes:
+        cells: Its cells as text, with its heads.
+        caption: The text above it.
+        data: The complete numbers, of which the cells may show the first.
+    """
+
+    cells: pd.DataFrame
+    caption: str
+    data: pd.DataFrame
+
+
+def counts(numbers_of: pd.Series) -> pd.Series:
+    """Whole numbers as text, as ``1,200``."""
+    return numbers_of.map("{:,}".format)
 
 
 def estimates(
@@ -36,14 +58,14 @@ def estimates(
 
     table = numbers.wide(rows, [*index], columns, cell).fillna("").reset_index()
     for name in index:
-        table[name] = table[name].map("{:,}".format if name == "n" else value_text)
+        table[name] = counts(table[name]) if name == "n" else table[name].map(value_text)
     heads = {field: parameter(field).name for field in index} | _HEADS
     return table.rename(columns=lambda name: heads.get(name) or value_text(name))
 
 
-def means(rows: pd.DataFrame) -> pd.DataFrame:
+def means(rows: pd.DataFrame, caption: str = f"Means with {INTERVALS}") -> Table:
     """Rows of ``analysis.summary`` by policy: a column per metric of the paper."""
-    return estimates(rows[rows["metric"].isin(METRICS)], ["policy", "n"])
+    return Table(estimates(rows[rows["metric"].isin(METRICS)], ["policy", "n"]), caption, rows)
 
 
 def compared(rows: pd.DataFrame, of: str) -> pd.DataFrame:
@@ -70,39 +92,3 @@ def compared(rows: pd.DataFrame, of: str) -> pd.DataFrame:
         shown["Trainings"] = product["trainings"]
     shown["p of the product"] = product["p_adjusted"].map(numbers.p_value)
     return shown.reset_index(names=of.capitalize())
-
-
-def precisions(rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows of ``summary.precisions``: the precision of each estimate beside its target."""
-    columns = {
-        "Policy": rows["policy"],
-        "Point": rows["point"],
-        "Metric": rows["metric"].map(metric_name),
-        "Missions": rows["missions"].map("{:,}".format),
-        "Mean": rows["mean"].map(numbers.quantity),
-        "Half-width": rows["half_width"].map("{:.2g}".format),
-        "Target": rows["target"].map("{:.2g}".format),
-        "Reached": rows["met"].map({True: "yes", False: "no: the budget ended"}),
-    }
-    return pd.DataFrame(columns)
-
-
-def spread(distributions: pd.DataFrame, metric: str) -> pd.DataFrame:
-    """Rows of ``analysis.distribution``: quantiles of a metric, and means of the worst missions."""
-    heads = [
-        f"{numbers.level(row.share)} quantile"
-        if row.view == "quantile"
-        else f"Mean of the worst {numbers.level(row.share)}"
-        for row in distributions.itertuples()
-    ]
-    rows = distributions.assign(head=heads).rename(columns={"value": "mean"})
-    return numbers.wide(rows, "policy", "head", numbers.written(metric)).reset_index(names="Policy")
-
-
-def priced(rows: pd.DataFrame, metrics: list[str]) -> pd.DataFrame:
-    """Rows of ``costs.priced``: condition, fleet, policy, cost and metrics of settings."""
-    columns = {"Condition": rows["condition"]} if rows["condition"].any() else {}
-    columns |= {"Fleet": rows["fleet"], "Policy": rows["policy"]}
-    write = {COST: numbers.amounts} | dict.fromkeys(metrics, numbers.interval)
-    columns |= {metric_name(name): numbers.estimates(rows, name, write[name]) for name in write}
-    return pd.DataFrame(columns)
