@@ -99,7 +99,8 @@ def _card(report: Report) -> Card:
     picture = None
     if report.name == SCORECARD and figures:
         picture = Picture(**{name: figures[0][name] for name in Picture.model_fields})
-    return Card(title=report.title, finding=finding, number=number, picture=picture)
+    key = report.key
+    return Card(title=report.title, finding=finding, number=number, picture=picture, key=key)
 
 
 def parts_of(cells: Iterable[NotebookNode]) -> list[dict[str, Any]]:

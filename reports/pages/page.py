@@ -35,19 +35,21 @@ class Learned(Document):
 
 
 class Card(Document):
-    """What a page tells the index: its question and, in one sentence, what it found.
+    """What a page tells others: its question and, in one sentence, what it found.
 
     Attributes:
         title: The question.
         finding: The sentence.
         number: The number of the answer, which the index shows large; may be empty.
         picture: The figure that shows the answer, if the index shows it too.
+        key: What the page depends on; empty if it has other parameters than by default.
     """
 
     title: str
     finding: str
     number: str = ""
     picture: Picture | None = None
+    key: str = ""
 
 
 def hidden(kind: str, text: str) -> Markup:

@@ -51,9 +51,9 @@ def has_key(page: Path, key: str) -> bool:
     """Whether a file is a page with this key that has not been altered."""
     try:
         found = Page.read(page)
+        return bool(key) and found.card.key == key and found.is_sealed
     except (OSError, InputError):
         return False
-    return f'<meta name="dess-key" content="{key}">' in found.text and found.is_sealed
 
 
 @lru_cache
