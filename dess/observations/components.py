@@ -8,22 +8,12 @@ from dess.sea.chart import is_open
 from dess.sections.wind import move_surcharge
 from dess.state import ACTION_NAMES, HOVER, STEP_X, STEP_Y, State, spaces_of
 
-# The UAV's own state, the scenario's parameters and the time. The residual data of the nodes
-# follow, then the teammates in the order of their indices, then what is beyond the paper.
+# The UAV's own state, whether it waits for a pad, the way to the nearest cell of a zone, the
+# scenario's parameters and the time. The residual data of the nodes follow, then the teammates in
+# the order of their indices, then what is beyond the paper.
 _OWN = (
-    "active",
-    "x",
-    "y",
-    "battery",
-    "quota",
-    "latch",
-    "charging",
-    "waiting",  # for a pad
-    "zone_dx",  # to the nearest cell of a zone
-    "zone_dy",
-    "charge_start",
-    "charge_complete",
-    "slot",
+    *("active", "x", "y", "battery", "quota", "latch", "charging", "waiting"),
+    *("zone_dx", "zone_dy", "charge_start", "charge_complete", "slot"),
 )
 _MATE = ("active", "dx", "dy", "battery", "quota", "charging")  # all 0 after the teammate has ended
 
@@ -63,9 +53,8 @@ def component_bounds(scenario: Scenario | ScenarioSpace) -> tuple[np.ndarray, np
     """The lowest and the highest values (F,) of an observation."""
     names = component_names(scenario)
     low = [-1.0 if name.endswith(("dx", "dy")) else 0.0 for name in names]
-    high = [
-        np.inf if name.startswith("residual") else 1.0 for name in names
-    ]  # arrivals are not bounded
+    # Arrivals are not bounded.
+    high = [np.inf if name.startswith("residual") else 1.0 for name in names]
     return np.array(low, np.float32), np.array(high, np.float32)
 
 

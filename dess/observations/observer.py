@@ -4,6 +4,7 @@ observer = Observer(space, "vector", guarded=False)
 observations, masks = observer.observe(state, missions, uavs)    # (R, F) and (R, 5)
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -66,14 +67,12 @@ class Observer:
         if kind not in KINDS:
             raise InputError(f"observation: {shown(kind)} is unknown{one_of(kind, KINDS)}")
         self.kind, self.guarded, self._chart = kind, guarded, scenario.chart
-        if kind == "state":
-            self._encoder: Any = Components(scenario)
-            self.space: spaces.Space = spaces.Box(*component_bounds(scenario), dtype=np.float32)
-            return
-        self._encoder = encoder_of(kind, scenario)
+        self._encoder: Any = Components(scenario) if kind == "state" else encoder_of(kind, scenario)
         boxes = [spaces.Box(-np.inf, np.inf, shape) for shape in self._encoder.shapes]
-        names = _PARTS.get(kind)
-        self.space = spaces.Dict(dict(zip(names, boxes, strict=True))) if names else boxes[0]
+        if kind == "state":
+            boxes = [spaces.Box(*component_bounds(scenario), dtype=np.float32)]
+        named = self._named(boxes)
+        self.space: spaces.Space = spaces.Dict(named) if isinstance(named, dict) else named
 
     def observe(
         self, state: State, missions: np.ndarray, uavs: np.ndarray
@@ -89,16 +88,17 @@ class Observer:
             The observations, arrays with R rows, and the (R, 5) masks of the allowed actions as
             booleans. Only Hover is allowed for a UAV that charges or is not active, and for -1.
         """
-        seen: Any = state
-        if self.guarded or self.kind != "state":
-            states = compact_states(state, self._chart, self.guarded)
-            allowed = masks(states, missions, uavs)
-            seen = state if self.kind == "state" else states
-        else:
+        if self.kind == "state" and not self.guarded:
             allowed = legal_actions(state.uavs, self._chart, missions, uavs)
-        parts = self._encoder.encode(seen, missions, uavs)
+            return self._encoder.encode(state, missions, uavs)[0], allowed
+        states = compact_states(state, self._chart, self.guarded)
+        parts = self._encoder.encode(state if self.kind == "state" else states, missions, uavs)
+        return self._named(parts), masks(states, missions, uavs)
+
+    def _named(self, parts: Sequence[Any]) -> Any:
+        """The parts by their names, or the only one."""
         names = _PARTS.get(self.kind)
-        return (dict(zip(names, parts, strict=True)) if names else parts[0]), allowed
+        return dict(zip(names, parts, strict=True)) if names else parts[0]
 
     def observe_all(self, state: State, shown: np.ndarray) -> tuple[Observation, np.ndarray]:
         """The observations and masks of all B x I UAVs, row by row of ``shown``.
