@@ -10,10 +10,11 @@ import pandas as pd
 from analysis import numbers
 from analysis.answers import comparison, summary
 from analysis.answers.comparison import Times
-from analysis.answers.missions import LoggedMission, collected, held, logged_mission
+from analysis.answers.missions import collected, held
 from analysis.names import BOUND, GAP, PRODUCT, SUCCESS
 from analysis.results.chunks import MANIFEST
 from analysis.results.event_log import uav_slots
+from analysis.results.resimulate import Mission
 from analysis.results.tables import Results, load_results
 from analysis.stats.differences import compare
 from analysis.stats.intervals import summary as means_of
@@ -210,11 +211,11 @@ def returns(results: Results, policies: Sequence[str]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=heads)
 
 
-def example(results: Results, policy: str) -> LoggedMission:
+def example(results: Results, policy: str) -> Mission:
     """The first mission of the smallest fleet whose event log is kept."""
     missions = results.missions[results.missions["policy"] == policy].set_index("replication")
     replication = int(missions.loc[[*_logged(results, policy)], "uavs"].idxmin())
-    return logged_mission(results, policy, 0, replication)
+    return Mission.of(results, policy, 0, replication)
 
 
 def plan(results: Results, policy: str, replication: int) -> list[Course]:

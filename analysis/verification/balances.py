@@ -179,8 +179,8 @@ def _mission_agrees(log: Log) -> bool:
         "collected": value.get("communication", 0.0),
         "residual": log.left.sum(),
     }
-    return all(log.mission[name] == whole[name] for name in whole) and np.allclose(
-        [log.mission[name] for name in sums], [*sums.values()], rtol=1e-12
+    return all(log.record[name] == whole[name] for name in whole) and np.allclose(
+        [log.record[name] for name in sums], [*sums.values()], rtol=1e-12
     )
 
 

@@ -84,8 +84,8 @@ kept = kept_missions(study, answers.drawn(missions, pair), results)
 html.gallery(
     [
         (
-            mission_figure(mission.log, mission.scenario),
-            f"Map of mission {mission.row['replication']} by {mission.row['policy']}",
+            mission_figure(mission.events, mission.scenario),
+            f"Map of mission {mission.replication} by {mission.policy}",
             mission.caption,
         )
         for mission in kept

@@ -31,6 +31,7 @@ from analysis.answers.summary import best_policy, ranked_policies
 from analysis.figures.missions import mission_figure
 from analysis.names import RATIO
 from analysis.paper import values
+from analysis.results.resimulate import Mission
 from reports.pages import html
 from reports.player import READING, library, player, together
 
@@ -39,9 +40,9 @@ fig1, fig4 = (load_results(Path(results) / name) for name in ("fig1", "fig4"))
 shown_policy, best = policy or best_policy(fig4.missions), best_policy(fig1.missions)
 seed = fig4.manifest["seed"]
 points = range(len(fig4.manifest["points"]))
-shown = [missions.logged_mission(fig4, shown_policy, point, replication) for point in points]
+shown = [Mission.of(fig4, shown_policy, point, replication) for point in points]
 printed = [values.FIG_4[mission.scenario.uavs][RATIO] for mission in shown]
-example = missions.logged_mission(fig1, best, 0, replication)
+example = Mission.of(fig1, best, 0, replication)
 
 # %%
 html.answer(missions.answer(shown))
@@ -51,14 +52,14 @@ library()
 
 
 # %%
-def played(mission: missions.LoggedMission, name: str) -> html.HTML:
-    policy_name = mission.row["policy"]
-    title = f"{mission.fleet}, {policy_name}: {numbers.percent(mission.row[RATIO])} collected"
+def played(mission: Mission, name: str) -> html.HTML:
+    policy_name = mission.policy
+    title = f"{mission.fleet}, {policy_name}: {numbers.percent(mission.record[RATIO])} collected"
     caption = (
         f"n = 1 mission of {policy_name}, replication {replication} of seed {seed}, "
-        f"{mission.row['slots']} mission slots. {mission.causes}"
+        f"{mission.record.slots} mission slots. {mission.causes}"
     )
-    return player(mission.log, mission.scenario, name, title, caption)
+    return player(mission.events, mission.scenario, name, title, caption)
 
 
 played(shown[-1], "player")
@@ -80,7 +81,7 @@ html.say("{reading}", reading=READING)
 
 # %%
 second = next((p for p in ranked_policies(fig4.missions) if p != shown_policy), shown_policy)
-other = missions.logged_mission(fig4, second, points[-1], replication)
+other = Mission.of(fig4, second, points[-1], replication)
 together([played(shown[-1], "player-first"), played(other, "player-second")])
 
 # %% [markdown]
@@ -99,12 +100,12 @@ display(*(played(mission, f"player-{mission.scenario.uavs}") for mission in show
 def captioned(point: int) -> tuple[Figure, str, str]:
     mission, mean = shown[point], missions.estimate(fig4, shown_policy, RATIO, point)
     caption = (
-        f"n = 1 mission of {mission.row['slots']} slots; {mission.collected}. The mean of this "
+        f"n = 1 mission of {mission.record.slots} slots; {mission.collected}. The mean of this "
         f"policy, n = {mean['n']:,}, is {numbers.estimate(mean)}, the paper's "
         f"{numbers.percent(printed[point])}."
     )
     alt = f"Map of the mission with {mission.fleet}; battery, residual data and charging"
-    return mission_figure(mission.log, mission.scenario), alt, caption
+    return mission_figure(mission.events, mission.scenario), alt, caption
 
 
 html.gallery([captioned(point) for point in points])
@@ -118,10 +119,10 @@ html.gallery([captioned(point) for point in points])
 # %%
 caption = (
     f"n = 1 mission of {best}, replication {replication} of seed {fig1.manifest['seed']}: "
-    f"{example.row['slots']} mission slots, {example.collected}. {example.causes}"
+    f"{example.record.slots} mission slots, {example.collected}. {example.causes}"
 )
 alt = "Map of the mission; battery, residual data and charging"
-html.gallery([(mission_figure(example.log, example.scenario), alt, caption)])
+html.gallery([(mission_figure(example.events, example.scenario), alt, caption)])
 
 # %% [markdown]
 # ## How far to trust it

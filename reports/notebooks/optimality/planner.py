@@ -88,8 +88,8 @@ home = optimality.at_home(study, [planner, learner])
 rows = home.assign(panel=0, **dict.fromkeys(("mean", "low", "high"), home["share"]))
 zone = learning.courses(rows, "policy", "%", {0: "Share of the UAVs in the charging zone"})
 mission = optimality.example(study, planner)
-replication = int(mission.row["replication"])
-plan = maps.plan(mission.log, mission.scenario, optimality.plan(study, planner, replication))
+replication = mission.replication
+plan = maps.plan(mission.events, mission.scenario, optimality.plan(study, planner, replication))
 values, title = optimality.node_prices(study, replication), "Price of a node's data"
 prices = maps.node_map(nodes, title, values, write="{:.2f}".format)
 

@@ -148,7 +148,7 @@ def test_the_share_at_home_is_that_of_uavs_in_the_zone(results):
 def test_the_example_is_the_first_of_the_smallest_fleets_with_a_log(results):
     example = optimality.example(results, "greedy")
     fleets = results.missions.query("policy == 'greedy'")["uavs"].to_numpy()[:LOGGED]
-    assert example.row["replication"] == int(np.argmin(fleets))
+    assert example.replication == int(np.argmin(fleets))
 
 
 def test_the_price_of_a_node_is_the_sum_over_cuts(results):
