@@ -1,7 +1,6 @@
 """Missions of a study: which one is typical, its cost in words, and the data of its nodes."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,80 +12,27 @@ from analysis import numbers
 from analysis.figures import Drawing
 from analysis.metrics import PRODUCT, RATIO
 from analysis.results import parquet
-from analysis.results.event_log import Events, causes
-from analysis.results.resimulate import resimulate
+from analysis.results.event_log import Events
+from analysis.results.resimulate import Mission, resimulate
 from analysis.results.tables import Results
 from analysis.stats.intervals import summary
 from dess import InputError
 from dess.files.reading import paths_in
-from dess.scenario import SAMPLED, Scenario
 
 FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
 
 
-@dataclass(frozen=True, eq=False)
-class LoggedMission:
-    """A mission of a study whose event log is stored.
-
-    Attributes:
-        row: The row of the mission in ``Results.missions``.
-        scenario: The scenario with the parameters that the mission drew.
-        log: The event log.
-    """
-
-    row: pd.Series
-    scenario: Scenario
-    log: pd.DataFrame
-
-    @property
-    def collected(self) -> str:
-        """How much data the mission collected, as a part of a sentence."""
-        total = self.row["initial"] + self.row["arrived"]
-        return f"{self.row['collected']:.1f} of {total:.1f} data units collected"
-
-    @property
-    def fleet(self) -> str:
-        """The fleet of the mission, as ``3 UAVs``."""
-        return numbers.counted(self.scenario.uavs, "UAV")
-
-    @property
-    def causes(self) -> str:
-        """What ended the mission of each UAV that did not fill its quota, as sentences."""
-        return " ".join(f"{cause}." for cause in causes(self.log, self.scenario))
-
-    @property
-    def caption(self) -> str:
-        """What happened in the mission, as the caption of a figure."""
-        policy, replication = self.row["policy"], self.row["replication"]
-        return (
-            f"{policy} in mission {replication}, a single one (n = 1): "
-            f"{self.causes or 'All UAVs filled their quota.'} "
-            f"{self.collected} in {self.row['slots']} mission slots."
-        )
-
-
-def answer(missions: Sequence[LoggedMission]) -> str:
+def answer(missions: Sequence[Mission]) -> str:
     """What share of the data single missions of fleets of different sizes collect."""
     parts = [
-        f"{numbers.percent(m.row[RATIO])} with {m.fleet} in {m.row['slots']} slots"
+        f"{numbers.percent(m.record[RATIO])} with {m.fleet} in {m.record.slots} slots"
         for m in missions
     ]
     return (
-        f"Of the data, single missions of {missions[0].row['policy']} collect "
+        f"Of the data, single missions of {missions[0].policy} collect "
         f"{numbers.words(parts)}: the UAVs share the nodes, and fly home to charge before their "
         "batteries are empty."
     )
-
-
-def logged_mission(
-    results: Results, policy: str, point: int = 0, replication: int = 0
-) -> LoggedMission:
-    """A mission of a study with its event log.
-
-    Raises:
-        InputError: If the event log has not been stored.
-    """
-    return _mission(results, policy, point, replication, results.events(policy, point, replication))
 
 
 def keep_logs(
@@ -117,10 +63,10 @@ def keep_logs(
 
 def kept_missions(
     results: Results, wanted: Sequence[tuple[str, int]], folder: str | Path
-) -> list[LoggedMission]:
+) -> list[Mission]:
     """Those of the missions whose event logs ``keep_logs`` has stored."""
     return [
-        _mission(results, policy, 0, replication, log)
+        Mission.of(results, policy, 0, replication, log)
         for policy, replication in wanted
         if (log := _kept_log(results, policy, replication, folder)) is not None
     ]
@@ -148,16 +94,6 @@ def _name(results: Results, policy: str, replication: int) -> str:
     return f"{results.cell(policy, 0).key}-{replication:06}"
 
 
-def _mission(
-    results: Results, policy: str, point: int, replication: int, log: pd.DataFrame
-) -> LoggedMission:
-    of_mission = "policy == @policy and point == @point and replication == @replication"
-    row = results.missions.query(of_mission).iloc[0]
-    sampled = {key: int(row[key]) for key in SAMPLED}
-    scenario = results.scenario(point).scenario_at(**sampled)
-    return LoggedMission(row, scenario, log)
-
-
 def estimate(results: Results, policy: str, metric: str = PRODUCT, point: int | None = None) -> Any:
     """The mean of a metric over the missions of a policy, at one design point or at all.
 
@@ -170,7 +106,7 @@ def estimate(results: Results, policy: str, metric: str = PRODUCT, point: int | 
     return summary(missions, by=["policy"]).query("metric == @metric").iloc[0]
 
 
-def drawing(mission: LoggedMission, alt: str, caption: str) -> Drawing:
+def drawing(mission: Mission, alt: str, caption: str) -> Drawing:
     """The map of a mission and its curves over time.
 
     Args:
@@ -180,10 +116,10 @@ def drawing(mission: LoggedMission, alt: str, caption: str) -> Drawing:
     """
     from analysis.figures.missions import mission_figure  # figures need the extra reports
 
-    return Drawing(mission_figure(mission.log, mission.scenario), alt, caption)
+    return Drawing(mission_figure(mission.events, mission.scenario), alt, caption)
 
 
-def beside_paper(results: Results, mission: LoggedMission, printed: float) -> Drawing:
+def beside_paper(results: Results, mission: Mission, printed: float) -> Drawing:
     """A mission, with the mean collection ratio of its policy and the paper's number.
 
     Args:
@@ -191,23 +127,23 @@ def beside_paper(results: Results, mission: LoggedMission, printed: float) -> Dr
         mission: The mission.
         printed: The collection ratio that the paper prints.
     """
-    row = mission.row
-    mean = estimate(results, row["policy"], RATIO, row["point"])
+    mean = estimate(results, mission.policy, RATIO, mission.record.point)
     caption = (
-        f"n = 1 mission of {row['slots']} slots; {mission.collected}. The mean of this policy, "
-        f"n = {mean['n']:,}, is {numbers.estimate(mean)}, the paper's {numbers.percent(printed)}."
+        f"n = 1 mission of {mission.record.slots} slots; {mission.collected}. The mean of this "
+        f"policy, n = {mean['n']:,}, is {numbers.estimate(mean)}, the paper's "
+        f"{numbers.percent(printed)}."
     )
     alt = f"Map of the mission with {mission.fleet}; battery, residual data and charging"
     return drawing(mission, alt, caption)
 
 
-def outcome_table(missions: Sequence[LoggedMission]) -> pd.DataFrame:
+def outcome_table(missions: Sequence[Mission]) -> pd.DataFrame:
     """A table to print with a row per mission; data are in data units."""
     return pd.DataFrame([_outcome(mission) for mission in missions])
 
 
-def _outcome(mission: LoggedMission) -> dict[str, Any]:
-    row, log = mission.row, mission.log
+def _outcome(mission: Mission) -> dict[str, Any]:
+    row, log = mission.record, mission.events
     served = log.loc[log["event"] == "communication", "node"].nunique()
     left = log[(log["event"] == "mission_end") & (log["node"] >= 0)]
     fullest = left.loc[left["value"].idxmax()]

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from analysis import numbers
 from analysis.answers import comparison
 from analysis.answers.comparison import Times
-from analysis.answers.missions import LoggedMission, collected, held, logged_mission
+from analysis.answers.missions import collected, held
 from analysis.answers.optimality import ALL
 from analysis.figures import Drawing, style
 from analysis.figures import comparison as figures
@@ -18,6 +18,7 @@ from analysis.figures import missions as maps
 from analysis.figures.settings import decision_times
 from analysis.metrics import PRODUCT, SUCCESS
 from analysis.results.event_log import uav_slots
+from analysis.results.resimulate import Mission
 from analysis.results.tables import Results
 from analysis.stats.differences import compare
 from analysis.stats.intervals import summary
@@ -199,24 +200,24 @@ def returns(results: Results, policies: Sequence[str]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=heads)
 
 
-def example(results: Results, policy: str) -> LoggedMission:
+def example(results: Results, policy: str) -> Mission:
     """The first mission of the smallest fleet whose event log is kept."""
     missions = results.missions[results.missions["policy"] == policy].set_index("replication")
     replication = int(missions.loc[[*_logged(results, policy)], "uavs"].idxmin())
-    return logged_mission(results, policy, 0, replication)
+    return Mission.of(results, policy, 0, replication)
 
 
-def plan(results: Results, mission: LoggedMission) -> Drawing:
+def plan(results: Results, mission: Mission) -> Drawing:
     """What a planner plans in the first slot of a mission, over the mission as simulated.
 
     Nothing is simulated. If the policy is no planner, no plan is drawn.
     """
-    planner, courses = load(mission.row["policy"]), list[Course]()
+    planner, courses = load(mission.policy), list[Course]()
     if isinstance(planner, Planner):
-        place = results.store.manifest.seed, int(mission.row["replication"])
+        place = results.store.manifest.seed, mission.replication
         courses = first_plan(results.scenario(), *place, planner)
     with style.panels(6.0) as (figure, ax):
-        maps.trajectories(mission.log, mission.scenario, ax)
+        maps.trajectories(mission.events, mission.scenario, ax)
         for uav, course in enumerate(courses):
             colour = style.uav_colours(len(courses))[uav]
             ax.plot(*course.path.T, color=colour, linestyle=(0, (3, 1.5)), linewidth=1.6, zorder=7,

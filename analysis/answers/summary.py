@@ -14,7 +14,6 @@ from analysis.answers.settings import edge, ends, in_words
 from analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS, metric_of
 from analysis.names import parameter, value_text
 from analysis.results.chunks import parts_of
-from analysis.results.provenance import study_of
 from analysis.results.tables import Results
 from analysis.stats.choices import may_be_best
 from analysis.stats.differences import compare, for_choice
@@ -475,7 +474,7 @@ def precisions(results: Results) -> pd.DataFrame:
         ``analysis.study.stopping.Reached``. Empty if the study has no targets.
     """
     manifest = results.store.manifest
-    if (rule := study_of(manifest.study).precision) is None:
+    if (rule := manifest.study.precision) is None:
         return pd.DataFrame()
     tables = {
         policy: pd.DataFrame(rule.reached(results.store.samples(parts_of(manifest, team))))
@@ -512,7 +511,7 @@ def sensitivities(results: Results) -> pd.DataFrame:
         A row per policy, metric and parameter: ``policy``, and the columns of
         ``answers.summary``. Empty if the design is not of the kind ``saltelli``.
     """
-    design = study_of(results.manifest["study"]).design
+    design = results.store.manifest.study.design
     if not isinstance(design, Saltelli):
         return pd.DataFrame()
     missions = results.missions.groupby("policy", sort=False)

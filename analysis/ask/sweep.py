@@ -159,7 +159,7 @@ def question(
     if requirements:
         data["selection"] = _cheapest(requirements, missions, study_from(data, "sweep"))
     if policies is None:
-        spaces = [point.scenario for point in study_from(data, "sweep").points]
+        spaces = study_from(data, "sweep").scenarios
         each = max(USUAL, missions) if requirements else missions
         data["policies"] = policies_for(spaces, each)
     study = study_from(data, "sweep")
@@ -259,7 +259,7 @@ def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) ->
             allowed = one_of(metric, [*METRICS, *ALIASES])
             raise InputError(f"requirements: {metric!r} is unknown{allowed}")
         least[full] = share
-    spaces = [point.scenario for point in study.points]
+    spaces = study.scenarios
     fleet = prices.uav * max(space.uavs[1] for space in spaces)
     fleet += prices.pad * max(space.charging_pads for space in spaces)
     running = prices.missions * (prices.charge + prices.hour + prices.lost_uav)

@@ -99,7 +99,7 @@ def key_of(study: Study) -> str:
     So the same question with more missions adds to the same results folder.
     """
     manifest = Manifest.of(study)
-    without_number = {name: v for name, v in manifest.study.items() if name != "missions"}
+    without_number = {name: v for name, v in manifest.data["study"].items() if name != "missions"}
     cells = [cell.key for of_team in manifest.cells for cell in of_team]
     return short_hash(json.dumps([without_number, cells], sort_keys=True).encode())
 
@@ -151,7 +151,7 @@ def fields(results: Results, names: Iterable[str]) -> pd.DataFrame:
 def field_table(results: Results) -> pd.DataFrame:
     """The fields that the variation changes, that both sides set and that every mission draws."""
     manifest, space = results.store.manifest, results.scenario(BASELINE)
-    changed, shared = manifest.points[VARIATION].values, manifest.study["set"]
+    changed, shared = manifest.points[VARIATION].values, manifest.study.set
     ranges = {name: getattr(space, name) for name in _RANGES}
     drawn = [name for name, (low, high) in ranges.items() if low < high]
     return fields(results, dict.fromkeys([*changed, *shared, *drawn]))
@@ -178,7 +178,7 @@ def in_words(space: ScenarioSpace, field: str) -> str:
 
 def command(results: Results) -> str:
     """The command that makes the page of a question again."""
-    study, points = results.store.manifest.study, results.store.manifest.points
+    study, points = results.manifest["study"], results.store.manifest.points
     fixed = study["set"] | points[BASELINE].values
     parameters = {
         "baseline": f"{{{', '.join(_assignments(fixed))}}}",
@@ -194,7 +194,7 @@ def command(results: Results) -> str:
 
 def as_toml(results: Results) -> str:
     """The question as the TOML file of a study, to which rows can be added."""
-    study = results.store.manifest.study
+    study = results.manifest["study"]
     names = ("scenario", "policies", "missions", "seed", "set", "design")
     return tomli_w.dumps({"name": "my-sweep"} | {n: study[n] for n in names if study[n] != {}})
 

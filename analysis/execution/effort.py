@@ -142,20 +142,19 @@ def _decision(policy: str) -> tuple[float, float]:
     return _TRAINED if folder_of(policy) else _OTHER
 
 
-def check_time(what: str, seconds: float | Range, allowed: str = CONFIRMED) -> None:
+def check_time(what: str, seconds: float | Range) -> None:
     """Refuse work that takes long, by the lower end of its range.
 
     Args:
         what: The work and its size.
         seconds: The estimated time [s].
-        allowed: What is allowed instead.
 
     Raises:
         InputError: If it takes more than ``LONG_RUN``.
     """
     if (seconds.low if isinstance(seconds, Range) else seconds) > LONG_RUN:
         text = seconds if isinstance(seconds, Range) else numbers.duration(seconds)
-        raise InputError(f"{what}, about {text}; allowed: {allowed}")
+        raise InputError(f"{what}, about {text}; allowed: {CONFIRMED}")
 
 
 def check_missions(what: str, spaces: Sequence[ScenarioSpace], earlier: float = 0.0) -> float:
@@ -317,8 +316,7 @@ def check_run(
     if not yes and any(planned.missing + planned.logs for planned in plan):
         check_time(what, total(plan, workers))
         held = study.size * (POINT_MEMORY + study.first * teams * MISSION_MEMORY)
-        ends = [study.points[number].scenario for number in (0, -1)]
-        check_workers_memory(what, workers, ends, held)
+        check_workers_memory(what, workers, [study.scenarios[0], study.scenarios[-1]], held)
     if missing:
         _check_policies(study)
 
@@ -330,8 +328,7 @@ def _check_policies(study: Study) -> None:
 
     Errors other than ``InputError`` are ignored here, because the run records them as failures.
     """
-    spaces = (point.scenario for point in study.points)
-    places = {(space.size, space.rectangles, space.no_fly, space.nodes): space for space in spaces}
+    places = {(s.size, s.rectangles, s.no_fly, s.nodes): s for s in study.scenarios}
     loaded = cache(partial(load_team, uavs=max(space.uavs[1] for space in places.values())))
     for number, space in enumerate(places.values()):
         first_slot = space.model_copy(update={"max_slots": 1})
@@ -377,7 +374,7 @@ def _most(study: Study) -> int:
 
 def _seconds(study: Study, planned: Planned) -> Range:
     """Estimated time on one core of the missing missions and event logs, or of the bounds."""
-    spaces = [point.scenario for point in study.points]
+    spaces = study.scenarios
     if planned.policy not in study.policies:
         made = planned.missing * sum(map(decisions, spaces)) / len(spaces)
         return Range(*(made * each for each in BOUND))

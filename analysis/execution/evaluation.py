@@ -1,7 +1,6 @@
 """Evaluate single teams: many missions of one scenario, kept as records or as means alone."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import reduce
 from time import perf_counter
 from typing import NamedTuple
@@ -63,29 +62,8 @@ class Asked(NamedTuple):
         check_team(len(load_team(self.team)), [self.scenario])
 
 
-@dataclass(frozen=True)
-class Evaluation:
+class Evaluation(NamedTuple):
     """Many missions of one team.
-
-    Attributes:
-        policy: The team.
-        records: The records of the missions.
-        seconds: Time of the simulation [s], without compilation and the start of workers.
-    """
-
-    policy: str
-    records: Records
-    seconds: float
-
-    @property
-    def uav_slots(self) -> int:
-        """Mission slots in which a UAV was active, summed over the UAVs of all missions."""
-        return int(self.records.missions["uav_slots"].sum())
-
-
-@dataclass(frozen=True)
-class Means:
-    """The metrics of many missions of one team, whose records are not kept.
 
     Attributes:
         policy: The team.
@@ -93,12 +71,14 @@ class Means:
             scenario measures is among the metrics; missions without a value are left out.
         uav_slots: Mission slots in which a UAV was active, summed over the UAVs of all missions.
         seconds: Time of the simulation [s], without compilation and the start of workers.
+        records: The records of the missions; None if only their moments are kept.
     """
 
     policy: str
     moments: dict[str, Moments]
     uav_slots: int
     seconds: float
+    records: Records | None = None
 
 
 def evaluate(
@@ -112,7 +92,7 @@ def evaluate(
 ) -> Evaluation:
     """Simulate replications 0, 1, ... of a team, and measure the time.
 
-    The records of all missions are kept: some 300 bytes for each of them. ``means`` keeps none.
+    The records of all missions are kept, some 300 bytes for each of them; ``means`` need not.
 
     Args:
         scenario: The scenario space from which the missions are drawn.
@@ -128,12 +108,10 @@ def evaluate(
             than the largest fleet has UAVs.
     """
     asked = Asked(scenario, TypedByUser(team), missions, seed, engine, workers)
-    asked.check()
-    (whole,) = _evaluations(asked, [range(missions)], progress)
-    return whole
+    return _evaluated(asked, missions, progress)
 
 
-def means(asked: Asked, progress: Progress | None = None) -> Means:
+def means(asked: Asked, progress: Progress | None = None) -> Evaluation:
     """The metrics of replications 0, 1, ... of a team, in a memory that does not grow with them.
 
     The number of workers does not change the result.
@@ -145,24 +123,32 @@ def means(asked: Asked, progress: Progress | None = None) -> Means:
     Raises:
         InputError: As for ``evaluate``.
     """
+    return _evaluated(asked, _together(asked.scenario), progress)
+
+
+def _evaluated(asked: Asked, size: int, progress: Progress | None) -> Evaluation:
+    """The evaluation, by ``size`` missions at a time; their records are kept if these are all."""
     asked.check()
     moments: dict[str, dict[int, Moments]] = {}
-    uav_slots, seconds, size = 0, 0.0, _together(asked.scenario)
+    uav_slots, seconds = 0, 0.0
+    records: Records | None = None
     pieces = (range(n, min(n + size, asked.missions)) for n in range(0, asked.missions, size))
-    for piece in _evaluations(asked, pieces, progress):
-        for metric, values in _metrics(piece.records).items():
-            fleets = piece.records.missions["uavs"]
+    for records, took in _simulated(asked, pieces, progress):
+        fleets = records.missions["uavs"]
+        for metric, values in _metrics(records).items():
             for fleet in np.unique(fleets[~np.isnan(values)]):
                 new = Moments.of(values[(fleets == fleet) & ~np.isnan(values)])
                 old = moments.setdefault(metric, {}).get(fleet)
                 moments[metric][int(fleet)] = old.with_others(new) if old else new
-        uav_slots, seconds = uav_slots + piece.uav_slots, seconds + piece.seconds
+        uav_slots += int(records.missions["uav_slots"].sum())
+        seconds += took
     low, high = asked.scenario.uavs
     over_space = {
         metric: Moments.of_space([of.get(n) for n in range(low, high + 1)], asked.missions)
         for metric, of in moments.items()
     }
-    return Means(asked.team, over_space, uav_slots, seconds)
+    kept = records if size >= asked.missions else None
+    return Evaluation(asked.team, over_space, uav_slots, seconds, kept)
 
 
 def _metrics(records: Records) -> dict[str, np.ndarray]:
@@ -207,10 +193,10 @@ def _together(scenario: ScenarioSpace) -> int:
     return 2 ** ((MEMORY // each).bit_length() - 1)
 
 
-def _evaluations(
+def _simulated(
     asked: Asked, pieces: Iterable[range], progress: Progress | None
-) -> Iterator[Evaluation]:
-    """An evaluation for each piece of the replications; only the simulation is timed."""
+) -> Iterator[tuple[Records, float]]:
+    """The records of each piece of the replications, and the time of the simulation alone [s]."""
     policies, pool = load_team(asked.team), Here(asked.workers)
     about = (asked.scenario, policies, asked.seed)
     if asked.engine == "batch":
@@ -224,7 +210,7 @@ def _evaluations(
             records = simulate_batch(*about, piece, workers=asked.workers, progress=progress)
         else:
             records = _results(pool, _jobs(asked, piece), progress)
-        yield Evaluation(asked.team, records, perf_counter() - begin)
+        yield records, perf_counter() - begin
 
 
 def _jobs(asked: Asked, replications: range) -> list[Job]:

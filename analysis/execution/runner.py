@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from analysis.execution.cluster import Cluster
 from analysis.execution.effort import check_workers
@@ -37,7 +37,6 @@ from analysis.results.tables import Results, results_of
 from analysis.study.cheapest import Setting
 from analysis.study.stopping import Samples
 from analysis.study.study import Study, load_study
-from dess import InputError
 from policies.registry import load_team
 
 # Bounds of a chunk: few, since each takes seconds.
@@ -184,8 +183,6 @@ class _Run:
         """
         failures: dict[Path, Failure] = {}
         needs = [(kind, missions_in(parts), [*self._jobs(kind, parts)]) for kind, parts in works]
-        for kind, _, jobs in needs:
-            self.store.check_places(kind.kind, (job.chunk for job in jobs))
         for kind, needed, jobs in needs:
             if needed:
                 self._begin(needed, needed - sum(job.missions for job in jobs), kind.work)
@@ -200,7 +197,7 @@ class _Run:
             policy = "the upper bound" if kind is BoundsJob else study.policies[team]
             for chunk in split(of_team, self._size(kind, policy)):
                 if missing := tuple(self.store.missing(kind.kind, chunk.parts)):
-                    spaces = tuple(study.points[part.cell.point].scenario for part in missing)
+                    spaces = tuple(study.scenarios[part.cell.point] for part in missing)
                     yield kind(Chunk(team, missing), spaces, policy, study.seed, study.engine)
 
     def _size(self, kind: type[Job], policy: str) -> int:
@@ -225,21 +222,12 @@ class _Run:
         with closing(self.pool.run(jobs, self.progress)) as results:
             for number, result in results:
                 job = jobs[number]
-                problem = result if isinstance(result, Problem) else self._save(job, result)
-                if problem:
-                    failure = self._failure(job, problem)
+                if isinstance(result, Problem):
+                    failure = self._failure(job, result)
                     failures[self.store.write_failure(job.chunk, failure)] = failure
+                else:
+                    job.save(self.store, result)
         return failures
-
-    def _save(self, job: Job, result: Any) -> Problem | None:
-        """Store the result of a job; if the store refuses it, the job has a problem."""
-        try:
-            job.save(self.store, result)
-        except InputError:  # it cannot be written
-            raise
-        except ValueError as error:
-            return Problem.of(error)
-        return None
 
     def _failure(self, job: Job, problem: Problem) -> Failure:
         """The failure of a job, with a command that reproduces it by a mission or by the study."""

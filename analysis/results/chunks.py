@@ -83,9 +83,9 @@ def check_parts(manifest: Manifest, team: int) -> list[Part]:
 
     The selection was not based on any of these missions.
     """
-    points = manifest.selected_points(team)
-    check = range(CHECK, CHECK + manifest.study["selection"]["check"]) if points else range(0)
-    return [Part(manifest.cells[team][point], check) for point in points]
+    check = manifest.study.selection.check if manifest.study.selection else 0
+    cells, replications = manifest.cells[team], range(CHECK, CHECK + check)
+    return [Part(cells[point], replications) for point in manifest.selected_points(team)]
 
 
 def split(parts: Iterable[Part], size: int) -> Iterator[Chunk]:

@@ -1,6 +1,7 @@
 """The manifest of a results folder: the study, what it was run with, and the keys of its cells."""
 
 import json
+from dataclasses import asdict
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path, PurePath
@@ -19,12 +20,11 @@ from analysis.results.provenance import (
     differing,
     engine_code,
     library_versions,
-    study_of,
     team_of,
 )
 from analysis.study.cheapest import AnySelection, Costs, Setting
 from analysis.study.design import DesignPoint
-from analysis.study.study import CHECK, Point, Study
+from analysis.study.study import CHECK, Study, StudyData
 from dess import InputError
 from dess.scenario import SEA, ScenarioSpace, load_scenario
 
@@ -72,7 +72,7 @@ class Manifest(Origin):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        names, study = [team.policy for team in self.policies], study_of(self.study)
+        names, study = [team.policy for team in self.policies], self.study
         if len({*names}) < len(names):
             raise ValueError("policies: one is listed twice")
         shape = [len(self.points)] * len(names)
@@ -101,7 +101,7 @@ class Manifest(Origin):
         # The path of a scenario file does not matter, since its content is stored.
         data = study.model_dump(mode="json") | {"scenario": PurePath(study.scenario).name}
         base = load_scenario(study.scenario, **study.set)
-        points = [*map(_as_json, study.points)]
+        points = json.loads(json.dumps([*map(asdict, study.points)]))
         return cls(
             schema_version=SCHEMA_VERSION,
             version=dess.__version__,
@@ -111,7 +111,7 @@ class Manifest(Origin):
             commit=commit_of_source(),
             libraries=library_versions(),
             seed=study.seed,
-            study=data,
+            study=StudyData.model_validate(data),
             scenario=base.model_dump(mode="json"),
             policies=[team_of(policy) for policy in study.policies],
             points=points,
@@ -164,13 +164,10 @@ class Manifest(Origin):
         if self.study == new.study and self.points == new.points:
             progress = ("missions", "selected", "complete")
             update |= {name: getattr(self, name) for name in progress}
-        extended = new.model_copy(update=update)
-        for keyed in ("cells", "bound_cells"):  # the cached values have the keys of ``new``
-            extended.__dict__.pop(keyed, None)
-        return extended
+        return new.model_copy(update=update)
 
     def _check_extended_by(self, new: "Manifest", path: Path) -> None:
-        name, held = new.study["name"], self.study["name"]
+        name, held = new.study.name, self.study.name
         teams = {team.policy: team.weights for team in new.policies}
         dropped = [team.policy for team in self.policies if team.policy not in teams]
         changed = [t.policy for t in self.policies if teams.get(t.policy) != t.weights]
@@ -199,15 +196,15 @@ class Manifest(Origin):
         content = _canonical([keys, self.missions, self.selected, accepted, *bounds])
         return sha256(content.encode()).hexdigest()[:16]
 
-    @cached_property
+    @property
     def costs(self) -> Costs | None:
         """The prices of the study, if it has any."""
-        return study_of(self.study).costs
+        return self.study.costs
 
-    @cached_property
+    @property
     def selection(self) -> AnySelection | None:
         """The rule by which the study selects design points; None if it selects none."""
-        return study_of(self.study).selection
+        return self.study.selection
 
     @cached_property
     def settings(self) -> list[Setting]:
@@ -226,7 +223,7 @@ class Manifest(Origin):
         fields = dict.fromkeys(field for point in self.points for field in point.values)
         base = self.space({})
         unset = {field: base.plain_value(field) for field in fields if field != SEA}
-        unset |= {SEA: self.study["scenario"]} if SEA in fields else {}
+        unset |= {SEA: self.study.scenario} if SEA in fields else {}
         return [unset | point.values for point in self.points]
 
     @cached_property
@@ -268,11 +265,6 @@ class Manifest(Origin):
         """The manifest as JSON, with a line for each of its parts."""
         lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in self.data.items())
         return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
-def _as_json(point: Point | DesignPoint) -> DesignPoint:
-    """A design point with its values as a JSON document has them."""
-    return DesignPoint(json.loads(json.dumps(point.values)), point.replication)
 
 
 _ALLOWED = "another --out or name, or remove the folder"

@@ -16,7 +16,13 @@ from pathlib import Path
 from platform import python_version
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    field_serializer,
+    model_validator,
+)
 
 import dess
 from analysis.study.stopping import Text
@@ -25,7 +31,7 @@ from dess import InputError
 from dess.code.sources import OURS, code_of, combined
 from dess.errors import validation_line
 from dess.files.documents import Document
-from dess.scenario import SEA, ScenarioSpace, fields_of, merged, scenario_at
+from dess.scenario import SEA, ScenarioSpace, merged, scenario_at
 from policies.base import Policy
 from policies.registry import TypedByUser, confirmed, load_team
 
@@ -98,7 +104,7 @@ class Origin(Document):
         seed: Seed of the missions.
         scenario: The complete scenario, before the design points change it.
         policies: The teams, with the hashes of code and weights that are part of the cells' keys.
-        study: The study as data.
+        study: The study, with the name of its scenario in place of a path.
     """
 
     version: Version
@@ -110,30 +116,27 @@ class Origin(Document):
     seed: int
     scenario: dict[str, Any]
     policies: list[Team] = Field(min_length=1)
-    study: dict[str, Any]
+    study: StudyData
 
-    @field_validator("study")
-    @classmethod
-    def _is_a_study(cls, study: dict[str, Any]) -> dict[str, Any]:
-        # Results of earlier versions have neither costs nor bounds.
-        study = {"costs": None, "bounds": False} | study
-        if missing := StudyData.model_fields.keys() - study.keys():
-            raise ValueError(f"has no {min(missing)}")
-        study_of(study)
-        return study
+    @field_serializer("study", mode="wrap")
+    def _newest_first(self, study: StudyData, dump: SerializerFunctionWrapHandler) -> Any:
+        """The study as data, in the order in which manifests have always had it."""
+        data = dump(study)
+        return {name: data[name] for name in ("costs", "bounds")} | data
 
     @model_validator(mode="after")
     def _is_of_the_study(self) -> Self:
-        space, study = self.space({}), self.study
-        if space.model_dump(mode="json").keys() != self.scenario.keys():
-            raise ValueError("scenario: is not complete")
-        if study["set"].keys() - fields_of(ScenarioSpace).keys() or "/" in study["scenario"]:
-            raise ValueError("study.scenario, study.set: are not a scenario and its fields")
-        if [team.policy for team in self.policies] != [*study["policies"]]:
+        self.space({})  # it is checked when it is made
+        if "/" in self.study.scenario:
+            raise ValueError("study.scenario: is not the name of a scenario")
+        if [team.policy for team in self.policies] != [*self.study.policies]:
             raise ValueError("policies: are not those of the study")
-        if study["seed"] != self.seed:
-            raise ValueError("seed: is not that of the study")
         return self
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with other values, which computes anew what depends on them."""
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return self.model_construct(**fields | dict(update or {}))
 
     def space(self, values: dict[str, Any]) -> ScenarioSpace:
         """The scenario with the values of a design point.
@@ -142,7 +145,7 @@ class Origin(Document):
             InputError: If it is not valid.
         """
         if SEA in values:
-            return scenario_at(self.study["scenario"], values, **self.study["set"])
+            return scenario_at(self.study.scenario, values, **self.study.set)
         return _scenario_of(json.dumps(merged(self.scenario, values)))
 
     def changes_here(self, named: Collection[str] = ()) -> list[str]:
@@ -158,7 +161,7 @@ class Origin(Document):
         teams = {confirmed(team.policy, named): team for team in self.policies}
         closed = [name for name in teams if not isinstance(name, TypedByUser)]
         teams = {name: team for name, team in teams.items() if name not in closed}
-        here = code_behind(teams, self.study["bounds"])
+        here = code_behind(teams, self.study.bounds)
         changes = []
         code = {name: code for name, code in self.code.items() if name in here or not closed}
         if self.version != dess.__version__:
@@ -189,19 +192,6 @@ def _scenario_of(fields: str) -> ScenarioSpace:
         return ScenarioSpace.model_validate(json.loads(fields))
     except ValidationError as error:
         raise InputError(validation_line(error, "scenario", ScenarioSpace)) from None
-
-
-def study_of(data: Mapping[str, Any]) -> StudyData:
-    """The data of a study as a model; no policy is loaded.
-
-    Raises:
-        ValueError: If they are not valid.
-    """
-    try:
-        return StudyData.model_validate_json(json.dumps(data))
-    except ValidationError as error:
-        line = validation_line(error, "study", StudyData)
-        raise ValueError(line.removeprefix("study: ")) from None
 
 
 def team_of(policy: str) -> Team:

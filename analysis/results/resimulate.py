@@ -1,16 +1,19 @@
 """Missions of a study simulated again, and the evidence that a page gives for them."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from hashlib import sha256
 from math import isnan
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
+from analysis import numbers
 from analysis.metrics import measured_in
+from analysis.results.event_log import causes
 from analysis.results.provenance import Origin
 from analysis.results.tables import Results
 from analysis.study.stopping import Text
@@ -19,29 +22,86 @@ from dess.files.documents import Document
 from dess.files.reading import paths_in, read_bytes
 from dess.files.tables import LIMIT
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 from dess.state import END_NAMES, sample_scenario
 from policies.base import Policy
 from policies.registry import TRAINED, load_team
 
 
-class Resimulated(NamedTuple):
-    """A mission that was simulated again.
+@dataclass(frozen=True, eq=False)
+class Mission:
+    """A mission with its event log, of a study or of any scenario.
 
     Attributes:
+        policy: The team.
         scenario: The scenario of the mission, with its drawn parameters.
-        record: The record of the mission.
+        record: The metrics of the mission as attributes: a row of ``Results.missions`` or, if it
+            was simulated again, a ``MissionRecord``.
+        uavs: The records of its UAVs, a row each.
         events: The event log, with the columns of ``dess.record.EventLog``.
     """
 
+    policy: str
     scenario: Scenario
-    record: MissionRecord
+    record: Any
+    uavs: pd.DataFrame
     events: pd.DataFrame
+
+    @classmethod
+    def of(
+        cls,
+        results: Results,
+        policy: str,
+        point: int = 0,
+        replication: int = 0,
+        events: pd.DataFrame | None = None,
+    ) -> Self:
+        """A mission of a study, with the event log that is given or else the one that is stored.
+
+        Raises:
+            InputError: If no log is given, and none is stored.
+        """
+        events = results.events(policy, point, replication) if events is None else events
+        mission = {"policy": policy, "point": point, "replication": replication}
+        record = _rows(results.missions, mission).iloc[0]
+        sampled = {name: int(record[name]) for name in SAMPLED}
+        scenario = results.scenario(point).scenario_at(**sampled)
+        return cls(policy, scenario, record, _rows(results.uavs, mission), events)
+
+    @property
+    def replication(self) -> int:
+        """The replication of the mission."""
+        return int(self.record.replication)
+
+    @property
+    def collected(self) -> str:
+        """How much data the mission collected, as a part of a sentence."""
+        total = self.record.initial + self.record.arrived
+        return f"{self.record.collected:.1f} of {total:.1f} data units collected"
+
+    @property
+    def fleet(self) -> str:
+        """The fleet of the mission, as ``3 UAVs``."""
+        return numbers.counted(self.scenario.uavs, "UAV")
+
+    @property
+    def causes(self) -> str:
+        """What ended the mission of each UAV that did not fill its quota, as sentences."""
+        return " ".join(f"{cause}." for cause in causes(self.events, self.scenario))
+
+    @property
+    def caption(self) -> str:
+        """What happened in the mission, as the caption of a figure."""
+        return (
+            f"{self.policy} in mission {self.replication}, a single one (n = 1): "
+            f"{self.causes or 'All UAVs filled their quota.'} "
+            f"{self.collected} in {self.record.slots} mission slots."
+        )
 
 
 def mission_of(
     space: ScenarioSpace, team: Sequence[Policy], seed: int = 0, replication: int = 0
-) -> Resimulated:
+) -> Mission:
     """Simulate a mission of any scenario, with its event log.
 
     Raises:
@@ -49,11 +109,12 @@ def mission_of(
     """
     record = simulate(space, team, seed, replication, events=True)
     assert record.events is not None
+    scenario, names = sample_scenario(space, seed, replication), (policy.name for policy in team)
     events = pd.DataFrame(record.events.columns())
-    return Resimulated(sample_scenario(space, seed, replication), record, events)
+    return Mission(",".join(names), scenario, record, _uavs_of(record), events)
 
 
-def resimulate(results: Results, policy: str, point: int, replication: int) -> Resimulated:
+def resimulate(results: Results, policy: str, point: int, replication: int) -> Mission:
     """Simulate a mission of a study again, with the SimPy engine.
 
     Raises:
@@ -80,7 +141,7 @@ def recorded(results: Results, policy: str, point: int, replication: int) -> dic
     """
     mission = {"policy": policy, "point": point, "replication": replication}
     tables = (results.missions, results.checks, results.uavs)
-    missions, checks, uavs = (_rows(table, mission) for table in tables)
+    missions, checks, uavs = (_rows(table, mission).to_dict("records") for table in tables)
     if missions or checks:
         row = (missions or checks)[0]
         return _by_field(row, uavs) | {m: row[m] for m in measured_in(row) if not isnan(row[m])}
@@ -92,8 +153,8 @@ def recorded(results: Results, policy: str, point: int, replication: int) -> dic
 
 def difference(record: MissionRecord, fields: Mapping[str, Any]) -> str:
     """The stored fields that differ, in any bit, from a record, in words; empty if none does."""
-    uavs = pd.DataFrame(record.uavs).assign(end=[END_NAMES[end] for end in record.uavs["end"]])
-    simulated = _by_field(record.metrics, uavs.to_dict("records")) | record.measured
+    uavs = _uavs_of(record).to_dict("records")
+    simulated = _by_field(record.metrics, uavs) | record.measured
     names = [*fields, *(name for name in record.measured if name not in fields)]
     changed = [name for name in names if simulated.get(name) != fields.get(name)]
     if not changed:
@@ -110,17 +171,22 @@ def _by_field(mission: Any, uavs: Sequence[Mapping[Any, Any]]) -> dict[str, Any]
     return fields
 
 
-def _rows(table: pd.DataFrame, mission: Mapping[str, Any]) -> list[dict[Any, Any]]:
+def _uavs_of(record: MissionRecord) -> pd.DataFrame:
+    """The records of the UAVs, as results have them."""
+    return pd.DataFrame(record.uavs).assign(end=[END_NAMES[end] for end in record.uavs["end"]])
+
+
+def _rows(table: pd.DataFrame, mission: Mapping[str, Any]) -> pd.DataFrame:
     """The rows of a table that belong to a mission."""
     for name in ("replication", "point", "policy"):  # texts last: they are slow to compare
         table = table[table[name].to_numpy() == mission[name]]
-    return table.to_dict("records")
+    return table
 
 
 SAMPLE = 32  # missions of a study that a page contains
 
 
-class Mission(Document):
+class SampleMission(Document):
     """A mission of a study: its team, what its design point sets, and its record by field."""
 
     policy: Text
@@ -142,7 +208,7 @@ class Evidence(Origin):
     key: Text
     points: int
     missions: tuple[int, int]
-    sample: list[Mission] = Field(min_length=1)
+    sample: list[SampleMission] = Field(min_length=1)
 
     @model_validator(mode="after")
     def _sample_is_of_the_study(self) -> Self:
@@ -175,7 +241,7 @@ class Evidence(Origin):
             points=len(manifest.points),
             missions=(min(counts), max(counts)),
             sample=[
-                Mission(
+                SampleMission(
                     policy=policy,
                     values=manifest.points[point].values,
                     replication=replication,

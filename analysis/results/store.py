@@ -30,7 +30,7 @@ from analysis.results.manifest import NO_TEAM, Cell, Manifest, Selected
 from analysis.study.study import Study
 from dess import InputError
 from dess.files.reading import paths_in
-from dess.files.writing import check_folder, check_target, delete, locked, make_folder, write_file
+from dess.files.writing import check_folder, delete, locked, make_folder, write_file
 
 _BUSY = "in use by another run; allowed: another --out, or wait for its end"
 
@@ -203,32 +203,8 @@ class Store:
         """
         return absent(parts, self._present[kind])
 
-    def check_places(self, kind: str, chunks: Iterable[Chunk]) -> None:
-        """Refuse devices and the like in the places of chunks, before these are computed.
-
-        Args:
-            kind: ``missions``, ``bounds`` or ``events``.
-            chunks: The chunks that will be written; one of events has a single mission.
-
-        Raises:
-            InputError: If there are some.
-        """
-        folders = [*paths_in(self.folder, "*/policy=*"), self.folder / files.BOUNDS]
-        paths = (path for folder in folders for path in paths_in(folder, "*.parquet"))
-        others = {parquet.content_hash(path): path for path in paths if not path.is_file()}
-        for chunk in chunks if others else ():
-            part = chunk.parts[0]
-            log = f"{part.cell.key}-{part.replications.start:06}"
-            if path := others.get(log if kind == "events" else chunk.name):
-                check_target(path)
-
     def keep(self, kind: str, chunk: Chunk, tables: Sequence[pa.Table]) -> None:
-        """Store the tables of a chunk.
-
-        Raises:
-            ValueError: If they are not those of the chunk.
-        """
-        parquet.check(tables, chunk.rows)
+        """Store the tables of a chunk."""
         places = self._places(kind, chunk.team)
         for (folder, _), table in [*zip(places, tables, strict=True)][::-1]:
             parquet.write(folder, chunk.name, table)

@@ -53,8 +53,8 @@ def of_fields(origin: Origin, policy: str, values: dict[str, Any], replication: 
         values: Of the mission's design point.
         replication: Of the mission.
     """
-    changes = origin.study["set"] | values
-    name = changes.pop(SEA, origin.study["scenario"])
+    changes = origin.study.set | values
+    name = changes.pop(SEA, origin.study.scenario)
     if not is_scenario_name(name):
         name, paper = "paper", load_scenario("paper").model_dump(mode="json")
         fields = origin.space(values).model_dump(mode="json")
@@ -139,7 +139,8 @@ class Results:
     @property
     def design(self) -> str:
         """The kind of the design; the scenario alone is a grid."""
-        return str((self.manifest["study"]["design"] or {}).get("kind", "grid"))
+        design = self.store.manifest.study.design
+        return design.kind if design else "grid"
 
     def scenario(self, point: int = 0) -> ScenarioSpace:
         """The scenario of a design point."""
@@ -152,7 +153,7 @@ class Results:
             InputError: If it has not been stored.
         """
         cell = self.cell(policy, point)
-        logged = self.store.manifest.study["logged"]
+        logged = self.store.manifest.study.logged
         log = self.store.load_log(cell, replication) if replication in range(logged) else None
         if log is None:
             raise InputError(
@@ -168,8 +169,8 @@ class Results:
         Pages name no other one, so that they do not depend on where the results are.
         """
         study = self.store.manifest.study
-        within = f"{SWEEPS}/" if study["description"] == SWEEP else ""
-        return f"results/{within}{study['name']}"
+        within = f"{SWEEPS}/" if study.description == SWEEP else ""
+        return f"results/{within}{study.name}"
 
     def command(
         self, policy: str, point: int, replication: int, folder: str | Path | None = None

@@ -184,7 +184,7 @@ class Seas(_Design):
         return (DesignPoint({SEA: name}) for name in seas_of(self.set))
 
 
-class _Sampled(_Design):
+class Sampled(_Design):
     """Points drawn uniformly from the ranges; integer fields take each integer equally often."""
 
     ranges: Ranges = Field(
@@ -208,7 +208,7 @@ class _Sampled(_Design):
         return 0
 
 
-class LatinHypercube(_Sampled):
+class LatinHypercube(Sampled):
     """A Latin hypercube: of ``size`` equal parts of each field's range, each contains one point."""
 
     kind: Literal["latin-hypercube"] = "latin-hypercube"
@@ -226,7 +226,7 @@ class LatinHypercube(_Sampled):
         return qmc.LatinHypercube(len(self.ranges), rng=self.seed).random(self.size)
 
 
-class Saltelli(_Sampled):
+class Saltelli(Sampled):
     """The design of a global sensitivity analysis, in which the randomness is one of the factors.
 
     A mission is a deterministic function of its parameters and its replication. So the replication

@@ -5,7 +5,7 @@ from contextlib import suppress
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     BeforeValidator,
@@ -20,7 +20,7 @@ from pydantic import (
 from analysis.bound import check_scenario
 from analysis.metrics import BOUND, COST, GAP, metrics_in
 from analysis.study.cheapest import AnySelection, Cheapest, Costs
-from analysis.study.design import Design, DesignPoint, Saltelli
+from analysis.study.design import Design, DesignPoint, Saltelli, Sampled
 from analysis.study.selection import Selection
 from analysis.study.stopping import MOST, Precision, StrictTable, Text
 from dess import InputError
@@ -69,20 +69,6 @@ MOST_CHARACTERS = 100
 # The first replication of the missions that check a selected setting. They are independent of the
 # missions on which the selection was based.
 CHECK = MOST
-
-
-class Point(NamedTuple):
-    """A design point: the values that the design sets, their scenario, and a first replication."""
-
-    values: dict[str, Any]
-    scenario: ScenarioSpace
-    replication: int = 0
-
-    @property
-    def key(self) -> frozenset[tuple[str, Any]]:
-        """What the design sets, as the scenario has it: it is the same for 1 and 1.0."""
-        values = self.values.items()
-        return frozenset((f, v if f == SEA else self.scenario.value(f)) for f, v in values)
 
 
 def _by_field(values: Any) -> Any:
@@ -190,7 +176,7 @@ class Study(StudyData):
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
         self._check_rule()
-        self.points  # noqa: B018 - they are checked when they are made
+        self._check_points()
         self._check_metrics()
         self._choose_engine()
         if self.logged > self.first:
@@ -200,27 +186,22 @@ class Study(StudyData):
         self._check_budget()
         self._check_teams()
         if self.bounds:
-            for space in self._spaces:
+            for space in self.scenarios:
                 check_scenario(space)
         return self
 
     @property
     def metrics(self) -> list[str]:
         """The metrics that missions of the study have, be it only at some design points."""
-        measured = {name for space in self._spaces for name in measures_of(space)}
+        measured = {name for space in self.scenarios for name in measures_of(space)}
         of_bounds = {BOUND, GAP} if self.bounds else set()
         return [*metrics_in(measured | of_bounds), *([COST] if self.costs else [])]
-
-    @property
-    def _spaces(self) -> list[ScenarioSpace]:
-        """The scenarios of the design points."""
-        return [point.scenario for point in self.points]
 
     def _choose_engine(self) -> None:
         """Take the SimPy engine if the study does not say which and a design point needs it."""
         asked = self.engine if "engine" in self.model_fields_set else None
         # The model is frozen, and this is a part of its making.
-        self.__dict__["engine"] = engine_of(self._spaces, asked)
+        self.__dict__["engine"] = engine_of(self.scenarios, asked)
 
     def _check_rule(self) -> None:
         if self.precision and self.selection:
@@ -245,7 +226,7 @@ class Study(StudyData):
             key, asked = "selection.metric", {self.selection.metric}
         else:
             return
-        for space in self._spaces:
+        for space in self.scenarios:
             known = metrics_in(measures_of(space))
             if absent := sorted(asked - {*known}):
                 raise ValueError(
@@ -264,7 +245,7 @@ class Study(StudyData):
 
     def _check_teams(self) -> None:
         """No policy of a team may be without a UAV at every design point."""
-        fleet = max(point.scenario.uavs[1] for point in self.points)
+        fleet = max(space.uavs[1] for space in self.scenarios)
         for team in self.policies:
             if team.count(",") >= fleet:
                 raise ValueError(
@@ -290,27 +271,37 @@ class Study(StudyData):
         """The fields of ``_base``: its file is read once, and not for every design point."""
         return self._base.model_dump()
 
-    @cached_property
-    def points(self) -> tuple[Point, ...]:
+    @property
+    def points(self) -> tuple[DesignPoint, ...]:
         """The design points in the order of the design.
 
         Raises:
-            InputError: If there are too many points, one is listed twice or has no valid scenario.
+            InputError: If there are too many.
         """
-        points = tuple(map(self._point, self.design.points if self.design else [DesignPoint({})]))
-        if not hasattr(self.design, "ranges"):  # sampled integers may be equal by chance
-            found = set()
-            for point in points:
-                if point.key in found:
-                    shown = _shown(point.values)
-                    raise InputError(f"design: {shown} is listed twice; allowed: once")
-                found.add(point.key)
-        return points
+        return self.design.points if self.design else (DesignPoint({}),)
 
-    def _point(self, row: DesignPoint) -> Point:
-        if both := sorted(self.set.keys() & row.values.keys()):
-            raise InputError(f"design: {both[0]} is also in set; allowed: either")
-        return Point(row.values, self._scenario_at(row.values), row.replication)
+    @cached_property
+    def scenarios(self) -> tuple[ScenarioSpace, ...]:
+        """The scenario of every design point.
+
+        Raises:
+            InputError: If a design point has no valid scenario.
+        """
+        return tuple(self._scenario_at(point.values) for point in self.points)
+
+    def _check_points(self) -> None:
+        """Check that every design point has a scenario, and is listed once."""
+        for point in self.points:
+            if both := sorted(self.set.keys() & point.values.keys()):
+                raise InputError(f"design: {both[0]} is also in set; allowed: either")
+        found = set()
+        for point, space in zip(self.points, self.scenarios, strict=True):
+            # As the scenario has the values, which is the same for 1 and 1.0.
+            key = frozenset((f, v if f == SEA else space.value(f)) for f, v in point.values.items())
+            if key in found and not isinstance(self.design, Sampled):  # equal integers by chance
+                shown = _shown(point.values)
+                raise InputError(f"design: {shown} is listed twice; allowed: once")
+            found.add(key)
 
     def _scenario_at(self, values: dict[str, Any]) -> ScenarioSpace:
         if not values.keys() & {SEA, "grid", "rows", "cell_size"}:  # these move nodes of a file
@@ -365,12 +356,7 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
         raise InputError(
             f"{where}: {unknown[0]}: unknown key{one_of(unknown[0], Study.model_fields)}"
         )
-    try:
-        study = Study.model_validate(values)
-    except ValidationError as error:
-        raise InputError(validation_line(error, where, Study)) from None
-    except InputError as error:  # of a design point's scenario
-        raise InputError(f"{where}: {error}") from None
+    study = study_from(values, where)
     study._origin = (text, overrides)
     return study
 
@@ -393,24 +379,22 @@ def study_descriptions() -> dict[str, str]:
     return {name: _STUDIES.load(name)[1].get("description", "") for name in study_names()}
 
 
-def budget_of(study: Mapping[str, Any]) -> str:
+def budget_of(study: StudyData) -> str:
     """In words, how a study differs from the shipped study of the same name; none is loaded."""
-    if (name := study["name"]) not in study_names():
+    if study.name not in study_names():
         return "as asked"
-    shipped = StudyData.model_validate({"name": name, **_STUDIES.load(name)[1]}).model_dump(
-        mode="json"
-    )
-    policies, missions = study["policies"], study["missions"]
+    shipped = StudyData.model_validate({"name": study.name, **_STUDIES.load(study.name)[1]})
+    policies, missions = {*study.policies}, study.missions
     words = []
-    if {*policies} < {*shipped["policies"]}:
-        words.append(f"{len(policies)} of {len(shipped['policies'])} policies")
-    elif {*policies} != {*shipped["policies"]}:
+    if policies < {*shipped.policies}:
+        words.append(f"{len(policies)} of {len(shipped.policies)} policies")
+    elif policies != {*shipped.policies}:
         words.append("other policies")
-    if missions != shipped["missions"]:
-        words.append(f"{missions:,} instead of {shipped['missions']:,} missions")
-    others = shipped.keys() - {"policies", "missions", "description", "engine"}
-    words += [f"another {key}" for key in sorted(others) if study[key] != shipped[key]]
-    return ", ".join(words) or "full"
+    if missions != shipped.missions:
+        words.append(f"{missions:,} instead of {shipped.missions:,} missions")
+    others = StudyData.model_fields.keys() - {"policies", "missions", "description", "engine"}
+    changed = [key for key in sorted(others) if getattr(study, key) != getattr(shipped, key)]
+    return ", ".join([*words, *(f"another {key}" for key in changed)]) or "full"
 
 
 def _shown(values: dict[str, Any]) -> str:

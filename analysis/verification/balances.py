@@ -188,7 +188,7 @@ def _adds_up(log: Log) -> bool:
     of_uavs = {name: found.reindex(uavs.index, fill_value=0) for name, found in of_uavs.items()}
     return {*uavs.index[uavs["end"] == "quota"]} == filled and all(
         np.allclose(np.asarray(record[name], float), np.asarray(known, float), rtol=1e-12)
-        for record, fields in ((log.mission, of_mission), (uavs, of_uavs))
+        for record, fields in ((log.record, of_mission), (uavs, of_uavs))
         for name, known in fields.items()
     )
 

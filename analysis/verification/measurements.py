@@ -14,7 +14,6 @@ slot are one random draw of the rate.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ import pandas as pd
 
 from analysis.answers.missions import FOLDER
 from analysis.results import event_log
-from analysis.results.resimulate import difference, recorded
+from analysis.results.resimulate import Mission, difference, recorded
 from analysis.results.tables import Results
 from analysis.study.stopping import Text
 from analysis.verification import closed_forms
@@ -32,34 +31,14 @@ from dess import InputError, simulate, simulate_batch
 from dess.files.documents import Document, Outdated
 from dess.files.reading import Missing
 from dess.files.writing import check_target, write_file
-from dess.scenario import SAMPLED, Scenario, ScenarioSpace
+from dess.scenario import ScenarioSpace
 from dess.state import HOVER
 from dess.view import View
 from policies.registry import files_of, load_team
 
 
-@dataclass(frozen=True, eq=False)
-class Log:
-    """A mission whose event log is stored.
-
-    Attributes:
-        policy: The team.
-        scenario: The scenario with the parameters that the mission drew.
-        mission: The record of the mission.
-        uavs: The records of its UAVs.
-        events: The event log.
-    """
-
-    policy: str
-    scenario: Scenario
-    mission: pd.Series
-    uavs: pd.DataFrame
-    events: pd.DataFrame
-
-    @property
-    def replication(self) -> int:
-        """The replication of the mission."""
-        return int(self.mission["replication"])
+class Log(Mission):
+    """A mission whose event log is stored, with what the log says of UAVs and nodes."""
 
     @cached_property
     def uav_slots(self) -> pd.DataFrame:
@@ -109,22 +88,8 @@ class Log:
 
 def logs_of(results: Results) -> list[Log]:
     """The missions of the first design point whose logs a study has stored."""
-    logs = []
-    space, replications = results.scenario(), range(results.manifest["study"]["logged"])
-    missions, uavs = (
-        table[(table["point"] == 0) & table["replication"].isin(replications)]
-        for table in (results.missions, results.uavs)
-    )
-    for policy in results.policies:
-        records = missions[missions["policy"] == policy].set_index("replication", drop=False)
-        fleets = uavs[uavs["policy"] == policy]
-        for replication in replications:
-            record = records.loc[replication]
-            scenario = space.scenario_at(**{name: int(record[name]) for name in SAMPLED})
-            fleet = fleets[fleets["replication"] == replication]
-            events = results.events(policy, 0, replication)
-            logs.append(Log(policy, scenario, record, fleet, events))
-    return logs
+    logged = range(results.store.manifest.study.logged)
+    return [Log.of(results, policy, 0, n) for policy in results.policies for n in logged]
 
 
 def longest(logs: Sequence[Log]) -> list[Log]:
@@ -132,7 +97,7 @@ def longest(logs: Sequence[Log]) -> list[Log]:
     by_replication: dict[int, Log] = {}
     for log in logs:
         other = by_replication.setdefault(log.replication, log)
-        if log.mission["slots"] > other.mission["slots"]:
+        if log.record.slots > other.record.slots:
             by_replication[log.replication] = log
     return [by_replication[replication] for replication in sorted(by_replication)]
 

@@ -159,7 +159,7 @@ def _of_study(
         console.say(line, sys.stderr)
     if replication is None:
         replication = manifest.points[point].replication
-    names = manifest.study["scenario"], manifest.study["name"]
+    names = manifest.study.scenario, manifest.study.name
     return _Asked(space, policy, team, manifest.seed, replication, *names, point)
 
 

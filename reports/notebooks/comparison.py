@@ -61,9 +61,7 @@ html.gallery(answers.leads(missions, lead, pair), f"{pair.title}; bars are 95 % 
 kept = logged.kept_missions(study, answers.drawn(missions, pair), results)
 html.gallery(
     logged.drawing(
-        mission,
-        f"Map of mission {mission.row['replication']} by {mission.row['policy']}",
-        mission.caption,
+        mission, f"Map of mission {mission.replication} by {mission.policy}", mission.caption
     )
     for mission in kept
 )

@@ -26,6 +26,7 @@ from analysis import load_results, numbers
 from analysis.answers import missions, summary
 from analysis.metrics import RATIO
 from analysis.paper import values
+from analysis.results.resimulate import Mission
 from reports.pages import html
 from reports.player import READING, library, player, together
 
@@ -34,8 +35,8 @@ fig1, fig4 = (load_results(f"{results}/{name}") for name in ("fig1", "fig4"))
 ranked, best = summary.ranked_policies(fig4.missions), summary.best_policy(fig1.missions)
 shown_policy, seed = policy or ranked[0], fig4.manifest["seed"]
 points = range(len(fig4.manifest["points"]))
-shown = [missions.logged_mission(fig4, shown_policy, point, replication) for point in points]
-example = missions.logged_mission(fig1, best, 0, replication)
+shown = [Mission.of(fig4, shown_policy, point, replication) for point in points]
+example = Mission.of(fig1, best, 0, replication)
 
 # %%
 html.answer(missions.answer(shown))
@@ -45,14 +46,14 @@ library()
 
 
 # %%
-def played(mission: missions.LoggedMission, name: str) -> html.Part:
-    policy_name = mission.row["policy"]
-    title = f"{mission.fleet}, {policy_name}: {numbers.percent(mission.row[RATIO])} collected"
+def played(mission: Mission, name: str) -> html.Part:
+    policy_name = mission.policy
+    title = f"{mission.fleet}, {policy_name}: {numbers.percent(mission.record[RATIO])} collected"
     caption = (
         f"n = 1 mission of {policy_name}, replication {replication} of seed {seed}, "
-        f"{mission.row['slots']} mission slots. {mission.causes}"
+        f"{mission.record.slots} mission slots. {mission.causes}"
     )
-    return player(mission.log, mission.scenario, name, title, caption)
+    return player(mission.events, mission.scenario, name, title, caption)
 
 
 played(shown[-1], "player")
@@ -74,7 +75,7 @@ html.say("{reading}", reading=READING)
 
 # %%
 second = next((other for other in ranked if other != shown_policy), shown_policy)
-other = missions.logged_mission(fig4, second, points[-1], replication)
+other = Mission.of(fig4, second, points[-1], replication)
 together([played(shown[-1], "player-first"), played(other, "player-second")])
 
 # %% [markdown]
@@ -103,7 +104,7 @@ html.gallery(
 # %%
 caption = (
     f"n = 1 mission of {best}, replication {replication} of seed {fig1.manifest['seed']}: "
-    f"{example.row['slots']} mission slots, {example.collected}. {example.causes}"
+    f"{example.record.slots} mission slots, {example.collected}. {example.causes}"
 )
 alt = "Map of the mission; battery, residual data and charging"
 html.gallery([missions.drawing(example, alt, caption)])

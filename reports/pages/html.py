@@ -197,17 +197,17 @@ def carrying(evidence: Sequence[Evidence], files: Iterable[str] = ()) -> HTML:
 
 
 def _origins(evidence: Sequence[Evidence]) -> HTML:
-    names = [of_study.study["name"] for of_study in evidence]
+    names = [of_study.study.name for of_study in evidence]
     columns = {
         name if names.count(name) == 1 else f"{name} {e.key}": {
-            "Scenario": e.study["scenario"],
+            "Scenario": e.study.scenario,
             "Policies": ", ".join(team.policy for team in e.policies),
             "Weights": ", ".join(_weights(e)) or "none",
             "Design points": f"{e.points:,}",
             "Missions per policy and point": span(e.missions),
             "Budget": budget_of(e.study),
             "Seed": e.seed,
-            "Engine": e.study["engine"],
+            "Engine": e.study.engine,
             "Study key": e.key,
             "dess": e.version,
             "Code": e.engine_code[:SHORT],

@@ -222,7 +222,7 @@ def _check_results(folder: Path) -> None:
             f"allowed: what is made by: dess study run {folder.name} --out {folder}"
         )
     manifest = Manifest.read(folder / MANIFEST)
-    study = manifest.study["name"]
+    study = manifest.study.name
     if study != folder.name:
         raise InputError(f"results: {folder} holds study {study}; allowed: {folder.name}")
     if not manifest.complete:

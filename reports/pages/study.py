@@ -26,14 +26,14 @@ def simulated(results: Results) -> html.Marked:
     """What was simulated: scenario, policies, design and missions, as a list."""
     manifest = results.store.manifest
     study, points = manifest.study, len(manifest.points)
-    fixed = [f"{parameter(field).within} {_set(value)}" for field, value in study["set"].items()]
+    fixed = [f"{parameter(field).within} {_set(value)}" for field, value in study.set.items()]
     policies = numbers.words([html.code(policy) for policy in results.policies])
     missions = numbers.span(n for of_policy in manifest.missions for n in of_policy)
     each = f" per policy{' and design point' * (points > 1)}"
     lines = [
         html.marked(
             "- **Scenario:** {scenario}{fixed}.",
-            scenario=html.code(study["scenario"]),
+            scenario=html.code(study.scenario),
             fixed=", with " * bool(fixed) + numbers.words(fixed),
         ),
         f"- **Policies:** {policies}.",

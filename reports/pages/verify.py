@@ -20,7 +20,7 @@ from analysis.execution.effort import check_missions
 from analysis.results import tables
 from analysis.results.chunks import MANIFEST
 from analysis.results.parquet import EVENTS
-from analysis.results.resimulate import Evidence, Mission, chosen, difference, learned_files
+from analysis.results.resimulate import Evidence, SampleMission, chosen, difference, learned_files
 from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from dess import InputError, simulate
@@ -36,7 +36,7 @@ BOUNDS_CHECKED = 3  # upper bounds that are computed again at most, since each t
 _ALLOWED = f"{ALLOWED}, or a results folder"
 
 _Item = TypeVar("_Item")
-_Drawn = Sequence[tuple[Mission, ScenarioSpace, list[Policy]]]
+_Drawn = Sequence[tuple[SampleMission, ScenarioSpace, list[Policy]]]
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def verify_results(
 def _check_study(store: Store, sampling: _Sampling) -> list[Check]:
     if store.damaged:
         lines = [f"{path}: has been changed since it was written" for path in store.damaged]
-        return [Check(f"{store.manifest.study['name']}, files", len(store.files), lines)]
+        return [Check(f"{store.manifest.study.name}, files", len(store.files), lines)]
     results = results_of(store)
     evidence = Evidence.of(results, sampling.missions, sampling.seed)
     checks = [_compared(evidence, _drawn(evidence, sampling), sampling.named)]
@@ -168,7 +168,7 @@ def _check_study(store: Store, sampling: _Sampling) -> list[Check]:
 
 def _drawn(evidence: Evidence, sampling: _Sampling) -> _Drawn:
     """The missions of a study that are simulated again, with their scenarios and teams."""
-    study = f"study {evidence.study['name']}"
+    study = f"study {evidence.study.name}"
     names = (team.policy for team in evidence.policies)
     teams = {name: load_team(confirmed(name, sampling.named)) for name in names}
     sample = sampling.drawn(evidence.sample)
@@ -189,14 +189,14 @@ def _compared(evidence: Evidence, drawn: _Drawn, named: Collection[str] = ()) ->
             of = (mission.policy, mission.values, mission.replication)
             command = tables.of_fields(evidence, *of)
             lines.append(f"{changed}; command: {command}")
-    return Check(evidence.study["name"], len(drawn), lines, evidence.changes_here(named))
+    return Check(evidence.study.name, len(drawn), lines, evidence.changes_here(named))
 
 
 def _check_logs(store: Store, sampling: _Sampling) -> Check:
     """Simulate some missions with a stored event log again, and compare the logs."""
     manifest, lines = store.manifest, []
     logged = sampling.drawn(store.logged)
-    what = f"study {manifest.study['name']}"
+    what = f"study {manifest.study.name}"
     sampling.admit(what, [manifest.scenarios[cell.point] for cell, _ in logged])
     for cell, replication in logged:
         space = manifest.scenarios[cell.point]
@@ -208,7 +208,7 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
         if not stored.to_pandas().equals(_as_stored(pd.DataFrame(log.columns()), stored)):
             command = tables.of_folder(store.folder, manifest, cell, replication)
             lines.append(f"the event log differs when simulated again; command: {command}")
-    return Check(f"{manifest.study['name']}, event logs", len(logged), lines)
+    return Check(f"{manifest.study.name}, event logs", len(logged), lines)
 
 
 def _check_bounds(results: Results, sampling: _Sampling) -> Check:

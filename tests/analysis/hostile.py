@@ -37,8 +37,6 @@ def hostile_folder(sound: Path, into: Path, text: str) -> Path:
     source = Store.read(sound)
     # Nothing is validated, so that texts that reading refuses reach the folder as well.
     manifest = source.manifest.model_copy(update=_changed(source.manifest, text))
-    for name in ("cells", "bound_cells", "scenarios", "values", "costs", "selection", "settings"):
-        manifest.__dict__.pop(name, None)  # cached properties of the original
     into.mkdir(parents=True)
     store = Store(into, manifest)
     for name in FOLDERS:
@@ -65,14 +63,14 @@ def _changed(manifest: Manifest, text: str) -> dict[str, Any]:
         strings = {"name": text, "weights": text, "learner": text}
         members = [member.model_copy(update=strings) for member in team.members]
         teams.append(team.model_copy(update={"policy": names[team.policy], "members": members}))
-    study = manifest.study | {
-        "policies": [names[name] for name in manifest.study["policies"]],
+    study = {
+        "policies": tuple(names.values()),
         "description": text,
         "scenario": text.replace("/", "\u2215"),  # the name of a file
     }
-    if study["costs"]:
-        study["costs"] = study["costs"] | {"currency": text[:16]}
-    return {"policies": teams, "study": study}
+    if costs := manifest.study.costs:
+        study["costs"] = costs.model_copy(update={"currency": text[:16]})
+    return {"policies": teams, "study": manifest.study.model_copy(update=study)}
 
 
 def _copy(source: Store, store: Store, parts: list[Part], cells: Any) -> None:

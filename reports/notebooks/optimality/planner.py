@@ -61,7 +61,7 @@ html.gallery(
     [
         answers.at_home(study, [planner, learner]),
         answers.plan(study, mission),
-        answers.prices(study, int(mission.row["replication"])),
+        answers.prices(study, mission.replication),
     ]
 )
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from analysis import run_study
 from analysis.answers import missions
+from analysis.results.resimulate import Mission
 from analysis.results.tables import Results
 from tests.analysis.small import grid, small_study
 
@@ -23,8 +24,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
 
 
 @pytest.fixture(scope="module")
-def shown(results: Results) -> list[missions.LoggedMission]:
-    return [missions.logged_mission(results, "greedy", point, 1) for point in (0, 1)]
+def shown(results: Results) -> list[Mission]:
+    return [Mission.of(results, "greedy", point, 1) for point in (0, 1)]
 
 
 # --- missions simulated again ---
@@ -40,9 +41,9 @@ def test_kept_logs_are_those_that_the_study_keeps(results: Results, tmp_path: Pa
     assert steps == [(1, 2), (2, 2)]
     kept = missions.kept_missions(results, WANTED, tmp_path)
     for (policy, replication), mission in zip(WANTED, kept, strict=True):
-        same = missions.logged_mission(results, policy, 0, replication)
-        pd.testing.assert_frame_equal(mission.log, same.log)
-        assert mission.row.equals(same.row) and mission.scenario == same.scenario
+        same = Mission.of(results, policy, 0, replication)
+        pd.testing.assert_frame_equal(mission.events, same.events)
+        assert mission.record.equals(same.record) and mission.scenario == same.scenario
     files = {path: path.read_bytes() for path in (tmp_path / missions.FOLDER).iterdir()}
     damaged = min(files)
     damaged.write_bytes(b"damaged")
@@ -63,14 +64,16 @@ def test_logs_of_other_results_and_of_other_records_are_not_shown(
     assert missions.kept_missions(other, WANTED[:1], tmp_path) == []
 
 
-def test_a_caption_says_what_ended_a_mission(shown: list[missions.LoggedMission]) -> None:
+def test_a_caption_says_what_ended_a_mission(shown: list[Mission]) -> None:
     mission = shown[1]
-    filled = mission.log.assign(event=mission.log["event"].replace("battery_empty", "quota_filled"))
-    assert ": All UAVs filled their quota. " in replace(mission, log=filled).caption
+    filled = mission.events.assign(
+        event=mission.events["event"].replace("battery_empty", "quota_filled")
+    )
+    assert ": All UAVs filled their quota. " in replace(mission, events=filled).caption
     end = (filled["event"] == "quota_filled") & (filled["uav"] == 2)
     failed = filled.assign(event=filled["event"].mask(end, "battery_empty"))
-    assert ": UAV 3 ran empty after " in replace(mission, log=failed).caption
-    assert f". {mission.collected} in {mission.row['slots']} mission slots." in mission.caption
+    assert ": UAV 3 ran empty after " in replace(mission, events=failed).caption
+    assert f". {mission.collected} in {mission.record.slots} mission slots." in mission.caption
 
 
 SQUARE = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
@@ -92,12 +95,12 @@ def test_what_is_collected_and_held() -> None:
     assert missions.left_behind(EVENTS, 2).tolist() == [False, True]  # 3.5 of 6, 1 of 5
 
 
-def test_a_mission_is_accounted_for(shown: list[missions.LoggedMission]) -> None:
+def test_a_mission_is_accounted_for(shown: list[Mission]) -> None:
     """Of three UAVs and three nodes."""
     mission = shown[1]
-    data, row = missions.collected(mission.log, 3, 3), mission.row
+    data, row = missions.collected(mission.events, 3, 3), mission.record
     assert data.sum() == pytest.approx(row["collected"])
-    assert missions.held(mission.log, 3).sum() == pytest.approx(row["initial"] + row["arrived"])
+    assert missions.held(mission.events, 3).sum() == pytest.approx(row["initial"] + row["arrived"])
 
 
 def test_the_far_edges_of_the_paper() -> None:

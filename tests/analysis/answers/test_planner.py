@@ -90,7 +90,7 @@ def test_the_share_at_home_is_that_of_uavs_in_the_zone(results):
 def test_the_example_is_the_first_of_the_smallest_fleets_with_a_log(results):
     example = planner.example(results, "greedy")
     fleets = results.missions.query("policy == 'greedy'")["uavs"].to_numpy()[:LOGGED]
-    assert example.row["replication"] == int(np.argmin(fleets))
+    assert example.replication == int(np.argmin(fleets))
 
 
 def test_the_price_of_a_node_is_the_sum_over_cuts(results):
@@ -100,7 +100,7 @@ def test_the_price_of_a_node_is_the_sum_over_cuts(results):
 def test_the_plan_begins_where_the_uavs_start(results, monkeypatch):
     monkeypatch.setattr(Planner, "budget", Budget(500, 0))
     mission = planner.example(results, "greedy")
-    planned = replace(mission, row=mission.row.replace("greedy", "planner"))
+    planned = replace(mission, policy="planner")
     (ax,) = planner.plan(results, planned).figure.axes
     ways = [line.get_xydata() for line in ax.lines if "plan" in str(line.get_gid())]
     log = mission.log

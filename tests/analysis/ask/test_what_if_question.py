@@ -44,7 +44,7 @@ def results(ask):
 )
 def test_the_two_points_are_the_scenario_before_and_after(settings, baseline):
     study = what_if.question(settings, baseline, policies=POLICIES)
-    before, after = (point.scenario for point in study.points)
+    before, after = study.scenarios
     assert before == load_scenario("paper", **baseline)
     assert after == load_scenario("paper", **baseline | settings)
 
@@ -63,8 +63,8 @@ def test_the_two_points_are_the_scenario_before_and_after(settings, baseline):
 )
 def test_both_sides_measure_what_belongs_to_a_section(settings, baseline, measured):
     study = what_if.question(settings, baseline, policies=POLICIES)
-    assert tuple(point.scenario.age.measured for point in study.points) == measured
-    assert not any(point.scenario.charging.measured for point in study.points)
+    assert tuple(space.age.measured for space in study.scenarios) == measured
+    assert not any(space.charging.measured for space in study.scenarios)
 
 
 @pytest.mark.parametrize(
@@ -165,7 +165,7 @@ def test_the_question_is_a_study_file(results, tmp_path):
     write_scenario(tmp_path)
     (tmp_path / "sweep.toml").write_text(what_if.as_toml(results), "utf-8")
     study = load_study(tmp_path / "sweep.toml")
-    assert [point.scenario for point in study.points] == [results.scenario(p) for p in (0, 1)]
+    assert [*study.scenarios] == [results.scenario(p) for p in (0, 1)]
     assert (study.policies, study.missions, study.seed) == (tuple(POLICIES), MISSIONS, 3)
 
 

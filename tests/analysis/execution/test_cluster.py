@@ -22,7 +22,6 @@ from analysis.results.manifest import Manifest
 from analysis.results.provenance import engine_code, members_of
 from dess import InputError
 from reports import cli
-from tests.analysis import troublesome
 from tests.analysis.execution.test_workers import failing
 from tests.analysis.small import environment, files_of, small_study
 
@@ -40,13 +39,6 @@ if __name__ == "__main__":
 
 
 @pytest.fixture
-def plugin(tmp_path, monkeypatch):
-    troublesome.install(tmp_path / "plugin", monkeypatch)
-    yield
-    monkeypatch.undo()
-
-
-@pytest.fixture
 def cluster():
     """A dask cluster of two worker processes; its address."""
     with distributed.LocalCluster(n_workers=2, **OPTIONS) as cluster:
@@ -57,7 +49,7 @@ def test_a_worker_with_other_code_or_weights_does_nothing(tmp_path):
     study = small_study(tmp_path)
     cell = Manifest.of(study).cells[0][0]
     chunk = Chunk(0, (Part(cell, range(1)),))
-    job = MissionsJob(chunk, (study.points[0].scenario,), "greedy", 7, "batch")
+    job = MissionsJob(chunk, (study.scenarios[0],), "greedy", 7, "batch")
     code, members = engine_code(), members_of("greedy")
     assert len(_checked(job, code, members).missions) == 1
     for others in (("0" * 64, members), (code, members_of("random"))):

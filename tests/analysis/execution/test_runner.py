@@ -50,9 +50,7 @@ def test_a_mission_of_a_study_equals_the_same_one_alone(tmp_path):
     study = small_study(tmp_path, policies=["greedy,tour"])
     results = run_study(study, tmp_path / "out")
     for replication in (0, 4, 9):
-        alone = simulate(
-            study.points[0].scenario, load_team("greedy,tour"), study.seed, replication
-        )
+        alone = simulate(study.scenarios[0], load_team("greedy,tour"), study.seed, replication)
         row = results.missions.iloc[replication]
         assert {name: row[name] for name in MISSION_RECORD.names} == {
             name: alone.metrics[name].item() for name in MISSION_RECORD.names
@@ -141,7 +139,7 @@ def test_an_interrupted_run_is_completed(after, tmp_path):
 def test_event_logs_are_those_of_the_missions(tmp_path):
     study = small_study(tmp_path, design=grid(uavs=[1, 2]), logged=2)
     results = run_study(study, tmp_path / "out")
-    alone = simulate(study.points[1].scenario, load_team("random"), 7, 1, events=True)
+    alone = simulate(study.scenarios[1], load_team("random"), 7, 1, events=True)
     log = results.events("random", point=1, replication=1)
     columns = alone.events.columns()
     assert list(log.columns) == list(columns)
@@ -321,7 +319,7 @@ def test_a_team_may_be_larger_than_the_fleet_of_some_points(engine, tmp_path):
     study = small_study(tmp_path, design=grid(uavs=[1, 3]), logged=1, **values)
     results = run_study(study, tmp_path / "out", workers=1)
     (team,) = results.policies
-    alone = evaluate(study.points[0].scenario, "greedy", 3, study.seed)
+    alone = evaluate(study.scenarios[0], "greedy", 3, study.seed)
     of_one = results.missions.query("point == 0")
     assert (of_one["reward"].to_numpy() == alone.records.missions["reward"]).all()
     assert resimulate(results, team, 0, 2).record.uavs.shape == (1,)

@@ -5,17 +5,8 @@ import pytest
 
 from analysis import load_results, run_study
 from analysis.execution.runner import ChunkError
-from analysis.results import parquet
 from dess import InputError
-from tests.analysis import troublesome
 from tests.analysis.small import files_of, small_study
-
-
-@pytest.fixture
-def plugin(tmp_path, monkeypatch):
-    troublesome.install(tmp_path / "plugin", monkeypatch)
-    yield
-    monkeypatch.undo()
 
 
 def failing(study, out, **options):
@@ -48,21 +39,6 @@ def test_a_chunk_that_raises_is_recorded_and_the_rest_goes_on(plugin, tmp_path):
     again = ["--policy", "raising", "--replication", "5"]
     assert shlex.split(failure.command)[-4:] == again
     check_that_the_rest_is_there(study, tmp_path / "out", "raising", 4)
-
-
-def test_what_the_store_refuses_is_a_failure_of_its_chunk(tmp_path, monkeypatch):
-    keys = set()  # of the cell of either team
-
-    def refuse_the_second(tables, rows):
-        (key, start, _), *_ = rows
-        keys.add(key)
-        if len(keys) == 2 and start == 4:
-            raise ValueError("not what was asked for")
-
-    monkeypatch.setattr(parquet, "check", refuse_the_second)
-    failure = failing(small_study(tmp_path), tmp_path / "out")
-    assert (failure.policy, failure.missions) == ("random", 4)
-    assert failure.error == "ValueError: not what was asked for"
 
 
 def test_an_event_log_that_fails_is_recorded_too(plugin, tmp_path):

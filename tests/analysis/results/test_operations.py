@@ -93,8 +93,8 @@ def test_tables_of_sections_are_fields_of_a_study(tmp_path):
     plain = small_study(tmp_path, set={"charging.measured": True},
                         design=grid(**{"failures.uav_rate": [0.0, 0.01]}))  # fmt: skip
     assert nested.model_dump() == plain.model_dump()
-    assert [p.scenario.failures.uav_rate for p in nested.points] == [0.0, 0.01]
-    assert all(point.scenario.charging.measured for point in nested.points)
+    assert [space.failures.uav_rate for space in nested.scenarios] == [0.0, 0.01]
+    assert all(space.charging.measured for space in nested.scenarios)
 
 
 def test_the_command_of_a_mission_sets_sections_and_fleets(tmp_path):

@@ -152,18 +152,6 @@ def test_what_only_has_the_name_of_a_chunk_is_left_alone(sound: Path, tmp_path: 
     assert outside.read_text() == "mine"
 
 
-def test_a_device_in_the_place_of_a_log_is_refused_before_any_mission(
-    sound: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("analysis.execution.runner._Run._do", lambda *_: pytest.fail("ran"))
-    folder = shutil.copytree(sound, tmp_path / "out")
-    (node,) = (folder / "events").rglob("*.parquet")
-    node.unlink()
-    node.symlink_to("/dev/null")
-    with pytest.raises(InputError, match="is a device; allowed: a file"):
-        run_study(small_study(tmp_path, logged=1, policies=["greedy"]), folder)
-
-
 @pytest.mark.parametrize("name", [".lock", "missions", "failures", "uavs/policy=greedy"])
 def test_a_run_does_not_write_or_delete_where_a_link_leads(
     name: str, sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

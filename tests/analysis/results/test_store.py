@@ -62,7 +62,7 @@ FOREIGN = {
     ),
     "other schema": (lambda out: _rewrite(out, schema_version=99), "has schema_version 99, not"),
     "other keys": (lambda out: _rewrite(out, colour="blue"), "colour"),
-    "no study": (lambda out: _rewrite(out, study={}), "study: has no description"),
+    "no study": (lambda out: _rewrite(out, study={}), "study.name: is missing"),
 }
 
 
@@ -104,7 +104,7 @@ def test_the_scenario_counts_not_its_name(out, tmp_path):
         run_study(small_study_again(tmp_path), out)
     write_scenario(tmp_path).rename(tmp_path / "renamed.toml")
     run_study(small_study_again(tmp_path, scenario=str(tmp_path / "renamed.toml")), out)
-    assert study.points[0].scenario == load_results(out).scenario()
+    assert study.scenarios[0] == load_results(out).scenario()
 
 
 def small_study_again(folder, **changes):
@@ -183,20 +183,6 @@ def test_two_runs_of_one_folder_at_once(tmp_path):
     assert len(run_study(study, tmp_path / "out").missions) == 20
 
 
-def test_records_that_were_not_asked_for_do_not_enter(tmp_path):
-    study = small_study(tmp_path)
-    with Store.open(study, tmp_path / "out") as store:
-        cell = store.manifest.cells[0][0]
-        chunk = Chunk(0, (Part(cell, range(2)),))
-        records = simulate_batch(study.points[0].scenario, load("greedy"), 7, 2)
-        records.missions["replication"][0] = 3
-        before = files_of(tmp_path)
-        with pytest.raises(ValueError, match="not those of the requested missions"):
-            store.keep("missions", chunk, parquet.tables_of(chunk, records))
-        assert files_of(tmp_path) == before
-        assert store.missing("missions", chunk.parts) == [*chunk.parts]
-
-
 def test_folders_that_were_put_together_count_once(tmp_path):
     few, more = small_study(tmp_path), small_study(tmp_path, missions=13)
     run_study(few, tmp_path / "out")
@@ -241,7 +227,7 @@ def test_a_failure_is_forgotten_once_its_chunk_is_there(tmp_path):
         chunk = Chunk(0, (Part(store.manifest.cells[0][0], range(2)),))
         path = store.write_failure(chunk, Failure("greedy", 2, "no", "dess", ""))
         assert path.exists()
-        records = simulate_batch(study.points[0].scenario, load("greedy"), 7, 2)
+        records = simulate_batch(study.scenarios[0], load("greedy"), 7, 2)
         store.keep("missions", chunk, parquet.tables_of(chunk, records))
         assert not path.exists()
 

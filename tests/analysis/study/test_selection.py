@@ -154,17 +154,26 @@ RULES = {
 def test_interruptions_leave_no_trace(name):
     data = normal(3, np.linspace(0.0, 0.5, 6), correlation=0.3)
     whole = rule(**({"procedure": name} | RULES[name]))
-    choice = chosen(whole, data)
+    check_that_interruptions_leave_no_trace(whole, samples_of(data, [3000] * 6))
+
+
+def check_that_interruptions_leave_no_trace(rule, data, settings=()):
+    """Ask for missions, simulate some of them, and ask again: the choice is the same."""
+    choice = rule.choice(data, settings)
     assert choice.rounds > 3
-    generator = np.random.default_rng(4)
-    counts = [0] * len(data)
-    while (wanted := whole.wanted(samples_of(data, counts))) != counts:
+    generator, counts = np.random.default_rng(4), [0] * len(data)
+
+    def present():
+        pairs = zip(data, counts, strict=True)
+        return [{name: values[:n] for name, values in sample.items()} for sample, n in pairs]
+
+    while (wanted := rule.wanted(present(), settings)) != counts:
         assert all(w >= count for w, count in zip(wanted, counts, strict=True))
         counts = [
             int(generator.integers(count, w + 1)) for count, w in zip(counts, wanted, strict=True)
         ]
     assert tuple(counts) == choice.counts
-    assert whole.choice(samples_of(data, counts)) == choice
+    assert rule.choice(present(), settings) == choice
 
 
 def rate(rule, draw, trials):
@@ -235,16 +244,10 @@ def test_a_choice_needs_the_missions_of_round_one():
 @pytest.mark.parametrize(
     "fields, complaint",
     [
-        ({}, "procedure"),
         ({"procedure": "best"}, "'kn' or 'kn-bounded'"),
-        ({"procedure": "kn"}, "indifference"),
         ({"procedure": "kn-bounded", "indifference": 1.0, "metric": "reward"}, "not bounded"),
-        ({"procedure": "kn", "indifference": 0.0}, "greater than or equal to 0.000000001"),
-        ({"procedure": "kn", "indifference": 0.1, "confidence": 0.5}, "greater than 0.5"),
         ({"procedure": "kn", "indifference": 0.1, "confidence": 1.0}, "less than or equal to 0.99"),
-        ({"procedure": "kn", "indifference": 0.1, "first": 1}, "first"),
         ({"procedure": "kn", "indifference": 0.1, "metric": "speed"}, "metric"),
-        ({"procedure": "kn", "indifference": 0.1, "delta": 0.1}, "delta"),
     ],
 )
 def test_what_makes_no_sense_is_refused(fields, complaint):

@@ -8,21 +8,10 @@ import tomli_w
 from pydantic import ValidationError
 
 from analysis import load_study, run_study, study_names
-from analysis.study.study import Study, budget_of, engine_of
+from analysis.study.study import Study, budget_of
 from dess import InputError, load_scenario
-from policies.registry import HEURISTICS, TypedByUser, load_team, trained_names
+from policies.registry import TypedByUser, load_team
 from tests.analysis.small import grid, small_study, write_scenario
-
-SLOTTED = load_scenario("paper")
-CONTINUOUS = load_scenario("paper", **{"arrivals.process": "continuous"})
-
-
-def test_the_batch_engine_is_taken_unless_a_scenario_needs_the_other():
-    assert engine_of([SLOTTED]) == "batch"
-    assert engine_of([SLOTTED], "events") == "events"
-    assert engine_of([SLOTTED, CONTINUOUS]) == "events"
-    with pytest.raises(InputError, match=r"arrivals\.process: continuous needs the SimPy engine"):
-        engine_of([SLOTTED, CONTINUOUS], "batch")
 
 
 def test_a_study_takes_the_engine_that_one_of_its_points_needs(tmp_path):
@@ -30,12 +19,8 @@ def test_a_study_takes_the_engine_that_one_of_its_points_needs(tmp_path):
     assert small_study(tmp_path).engine == "batch"
     assert small_study(tmp_path, design=design).engine == "events"
     assert small_study(tmp_path, design=design, engine="events").engine == "events"
-    with pytest.raises(InputError, match="needs the SimPy engine"):
+    with pytest.raises(InputError, match=r"arrivals\.process: continuous needs the SimPy engine"):
         small_study(tmp_path, design=design, engine="batch")
-
-
-# Trainings of ddqn that tell how much chance there is in one, and the policy for other seas.
-REPEATED = ("ddqn-2", "ddqn-3", "any")
 
 
 def test_the_shipped_studies():
@@ -48,17 +33,7 @@ def test_the_shipped_studies():
     assert {rule.procedure for rule in rules if rule} == {"kn", "kn-bounded"}
     table4, fig4 = studies["table4"], studies["fig4"]
     assert (table4.scenario, table4.missions, table4.seed) == ("paper", 1000, 2022)
-    assert [point.scenario.uavs for point in fig4.points] == [(1, 1), (2, 2), (3, 3)]
-
-
-def test_the_papers_studies_run_every_heuristic_and_learned_policy():
-    once = [name for name in trained_names() if name not in REPEATED]
-    heuristics = [name for name in HEURISTICS if name != "age"]  # it has another aim than the paper
-    assert load_study("table4").policies == (*heuristics, *once)
-    for name in ("fig4", "fig5"):
-        assert load_study(name).policies == (*heuristics, *once)
-    guarded = [name for name in heuristics if name != "random-unguarded"]
-    assert load_study("sweet-spot").policies == (*guarded, *once)
+    assert [space.uavs for space in fig4.scenarios] == [(1, 1), (2, 2), (3, 3)]
 
 
 def test_teams_are_written_alike(tmp_path):
@@ -121,7 +96,7 @@ def test_the_sea_may_differ_from_point_to_point(tmp_path):
     design = {"kind": "grid", "values": {"scenario": [*names]}}
     study = small_study(tmp_path, design=design, set={"uavs": 2}, missions=2)
     expected = [load_scenario(name, uavs=2) for name in names]
-    assert [point.scenario for point in study.points] == expected
+    assert [*study.scenarios] == expected
     results = run_study(study, tmp_path / "seas")
     assert [results.scenario(point) for point in range(3)] == expected
     command = shlex.split(results.command("greedy", 0, 1))
@@ -165,13 +140,11 @@ def test_fewer_missions_than_event_logs_keep_a_log_each():
 def test_the_budget_says_what_differs_from_the_shipped_study(tmp_path):
     few = load_study("fig5", missions=3, policies=["greedy"])
     others = load_study("fig5", seed=3, policies=["greedy", "greedy,tour"])
-    words = [
-        budget_of(study.model_dump(mode="json")) for study in (load_study("fig5"), few, others)
-    ]
+    words = [budget_of(study) for study in (load_study("fig5"), few, others)]
     assert words[0] == "full"
     assert words[1] == "1 of 7 policies, 3 instead of 300 missions"
     assert words[2] == "other policies, another seed"
-    assert budget_of(small_study(tmp_path).model_dump(mode="json")) == "as asked"
+    assert budget_of(small_study(tmp_path)) == "as asked"
 
 
 def test_nodes_of_a_file_stay_where_they_are(tmp_path):
@@ -187,8 +160,8 @@ def test_nodes_of_a_file_stay_where_they_are(tmp_path):
         return load_study(path)
 
     nodes = ((5, 6), (6, 5))
-    assert [p.scenario.nodes for p in study(design=grid(quota=[1, 2])).points] == [nodes] * 2
-    assert study(set={"grid": 14}).points[0].scenario.nodes == ((6, 7), (7, 6))
+    assert [space.nodes for space in study(design=grid(quota=[1, 2])).scenarios] == [nodes] * 2
+    assert study(set={"grid": 14}).scenarios[0].nodes == ((6, 7), (7, 6))
     with pytest.raises(InputError, match="at grid=14: grid moves the nodes of a file; allowed"):
         study(design=grid(grid=[12, 14]))
     (tmp_path / "rocks.csv").write_text("lon,lat\n8.52,54.25\n")
@@ -197,7 +170,7 @@ def test_nodes_of_a_file_stay_where_they_are(tmp_path):
         study(design=grid(grid=[12, 14]), set={"nodes": [[7, 1]]})
     scenario.write_text(scenario.read_text().partition("\n")[2])
     fixed = grid(grid=[12, 14])
-    assert study(design=fixed, set={"nodes": [[1, 1]]}).points[1].scenario.nodes == ((1, 1),)
+    assert study(design=fixed, set={"nodes": [[1, 1]]}).scenarios[1].nodes == ((1, 1),)
 
 
 def test_bounds_of_extended_scenarios_are_refused_before_the_run(tmp_path):

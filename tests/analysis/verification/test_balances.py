@@ -26,7 +26,7 @@ def test_the_batteries_of_every_scenario_follow_the_rules(
     record = simulate(space, policy, seed, replication, events=True)
     assert record.events is not None
     events = pd.DataFrame(record.events.columns())
-    log = Log("", sample_scenario(space, seed, replication), pd.Series(), pd.DataFrame(), events)
+    log = Log("", sample_scenario(space, seed, replication), None, pd.DataFrame(), events)
     assert not balances.battery_errors(log).any()
     (changed,) = altered([log], "move", -1, value=lambda value: value + 1)
     assert balances.battery_errors(changed).any()
@@ -100,8 +100,8 @@ def test_a_record_that_its_log_does_not_add_up_to_is_noticed(logs: list[Log], na
     first, *rest = logs
     changed = replace(first, uavs=first.uavs.assign(**{name: first.uavs.get(name, 0) + 1}))
     if name in OF_MISSION:
-        changed = replace(first, mission=first.mission.copy())
-        changed.mission[name] += 1
+        changed = replace(first, record=first.record.copy())
+        changed.record[name] += 1
     assert fails(balances.record_check([changed, *rest]))
 
 

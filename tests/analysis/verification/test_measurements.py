@@ -31,8 +31,8 @@ def test_of_every_replication_the_longest_log_is_taken(logs: list[Log]) -> None:
     kept = measurements.longest(logs)
     assert [log.replication for log in kept] == list(range(8))
     for log in kept:
-        others = [o.mission["slots"] for o in logs if o.replication == log.replication]
-        assert log.mission["slots"] == max(others)
+        others = [o.record["slots"] for o in logs if o.replication == log.replication]
+        assert log.record["slots"] == max(others)
 
 
 SPACE = load_scenario("paper")

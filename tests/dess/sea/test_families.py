@@ -145,7 +145,7 @@ def test_a_study_names_a_sea(tmp_path: Path) -> None:
     path.write_text('scenario = "scattered:4"\npolicies = ["greedy"]\nmissions = 2\n')
     study = load_study(path)
     assert study.scenario == "scattered:4"
-    assert study.points[0].scenario == load_scenario("scattered:4")
+    assert study.scenarios[0] == load_scenario("scattered:4")
 
 
 @pytest.mark.parametrize(
