@@ -43,7 +43,7 @@ about = (scenario, policies, missions, seed, results, workers, priced, requireme
 answer = sweep(*about, yes=yes, **fields)
 
 # %%
-html.answer(costs.answer(answer.results), answer.cheapest() or "none")
+html.answer(costs.answer(answer.results), costs.cheapest_fleet(answer.results))
 
 # %%
 html.lead(*study.deciding(answer.results))
@@ -98,7 +98,7 @@ study.judged_table(answer.results)
 # This command runs the same sweep and makes a page with more details:
 
 # %%
-html.say("{lines}", lines=html.commands([answer.command]))
+html.say("{lines}", lines=html.commands([answer.question.command]))
 
 # %% [markdown]
 # ## How this page was made

@@ -25,6 +25,7 @@ yes = False  # True if the missions may take more than an hour
 
 # %%
 from analysis import sweep
+from analysis.answers.settings import varied
 from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
 from reports.pages import html, study
 
@@ -32,7 +33,8 @@ from reports.pages import html, study
 answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **fields)
 
 ranked = answer.table()
-of_fields, each = " and ".join(answer.fields[:2]), f"n = {missions:,} missions per setting"
+of_fields = " and ".join([*varied(answer.results)][:2])
+each = f"n = {missions:,} missions per setting"
 drawn = {
     metric: (answer.plot(metric=metric), f"{name} by {of_fields}", f"{each}; 95 % intervals.")
     for metric, name in METRICS.items()
@@ -74,7 +76,7 @@ study.best_of_policies(answer.results, PRODUCT)
 # cheapest fleet ([own sea](own-sea.html)).
 
 # %%
-html.say("{lines}", lines=html.commands([answer.command]))
+html.say("{lines}", lines=html.commands([answer.question.command]))
 
 # %% [markdown]
 # ## How this page was made

@@ -6,7 +6,7 @@ import pytest
 
 from analysis.answers import comparison as regions
 from analysis.answers.comparison import AHEAD, BEHIND, Pair
-from analysis.ask import what_if
+from analysis.ask import answer
 from analysis.figures import comparison
 from analysis.figures.comparison import COLOURS
 from analysis.names import BOUND, GAP, METRICS, PARAMETERS, PRODUCT
@@ -91,11 +91,11 @@ def test_the_band_holds_the_whole_curve(missions):
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    return asked(tmp_path_factory.mktemp("what-if"), 5)
+    return asked(tmp_path_factory.mktemp("what-if"), 5).results
 
 
 def test_figures_show_the_means_and_the_gains(results):
-    table, answers = what_if.means(results), what_if.answers(results)
+    table, answers = answer.means(results), answer.answers(results)
     sides = ["baseline\nuavs 2\npads 6", "variation\nuavs 6\npads 1"]
     for metric in METRICS:
         (ax,) = comparison.means(table, metric, sides).axes
