@@ -56,18 +56,17 @@ MAY_RUN_FILES = {
         *("analysis.results.provenance", "reports.cli.simulate"),
     },
     "policies.registry.typed": {
-        *("analysis.study.study", "analysis.ask.sweep"),
-        *("analysis.ask.what_if", "reports.cli.evaluate"),
+        *("analysis.study.study", "analysis.ask.question", "reports.cli.evaluate"),
     },
     "policies.registry.confirmed": {"analysis.results.provenance", "reports.pages.verify"},
     "policies.load": set(),
     "policies.load_team": set(),
     "policies.about.about": {"reports.cli.lists"},
     "analysis.execution.evaluation.evaluate": {"analysis"},
-    "analysis.ask.sweep.question": {"reports.cli.sweep"},
-    "analysis.ask.sweep.sweep": {"analysis"},
-    "analysis.ask.what_if.question": set(),
-    "analysis.ask.what_if.what_if": {"analysis"},
+    "analysis.ask.question.sweep_question": {"analysis.ask.answer", "reports.cli.ask"},
+    "analysis.ask.question.what_if_question": {"analysis.ask.answer", "reports.cli.ask"},
+    "analysis.ask.answer.sweep": {"analysis"},
+    "analysis.ask.answer.what_if": {"analysis"},
     **{f"analysis.{name}": set() for name in ("evaluate", "sweep", "what_if")},
 }
 

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 import dess
-from reports.cli import console, evaluate, lists, report, simulate, studies, sweep, train
+from reports.cli import ask, console, evaluate, lists, report, simulate, studies, train
 
 
 def _print_version(is_wanted: bool) -> None:
@@ -33,7 +33,7 @@ def options(
     """Options of the command itself."""
 
 
-for group in (simulate, evaluate, train, sweep, report):
+for group in (simulate, evaluate, train, ask, report):
     app.add_typer(group.app)
 for name in ("policies", "scenarios", "studies"):
     app.add_typer(getattr(lists, name), name=name)

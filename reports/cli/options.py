@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from decimal import Decimal, InvalidOperation
 from inspect import getdoc
 from pathlib import Path
@@ -56,6 +57,8 @@ def _beginning(names: Iterable[str], start: str) -> list[str]:
 
 
 if TYPE_CHECKING:
+    from pydantic.fields import FieldInfo
+
     from dess import ScenarioSpace
 
 SET = "--set"
@@ -127,46 +130,44 @@ def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, An
     Raises:
         InputError: If the text has another form.
     """
-    key, equals, value = text.partition("=")
-    try:
+    key, equals, value = (part.strip() for part in text.partition("="))
+    with suppress(InputError):
         parsed = parse_toml(f"value = {value}", option)
-    except InputError:
-        parsed = {}
-    if not equals or parsed.keys() != {"value"} or not _is_plain(parsed["value"]):
-        if option == SET and value.strip() in choices(key.strip()):
-            return key.strip(), value.strip()
-        if option == SET and value.strip():
-            check_words(key.strip(), value.strip())
-        raise InputError(f"{option}: {shown(text)} is not KEY=VALUE; allowed: {allowed}")
-    return key.strip(), parsed["value"]
+        if equals and parsed.keys() == {"value"} and _is_plain(parsed["value"]):
+            return key, parsed["value"]
+    if allowed == FIELD and value:
+        _check_word(key, value, option)
+        return key, value
+    raise InputError(f"{option}: {shown(text)} is not KEY=VALUE; allowed: {allowed}")
 
 
-def choices(field: str) -> list[str]:
-    """The words that a field of a scenario may be, which need no quotes; empty for all others."""
-    from dess.errors import choices_of
-    from dess.scenario import ScenarioSpace, fields_of
-
-    known = fields_of(ScenarioSpace).get(field)
-    return choices_of(known) if known is not None else []
-
-
-def check_words(field: str, value: str) -> None:
-    """Refuse a value that is no TOML, such as ``lots``, in the words of the field of a scenario.
-
-    Raises:
-        InputError: If the scenario has such a field, and if it has not.
-    """
-    from dess.errors import form_of, kind_of
+def _field(name: str, option: str = SET) -> "FieldInfo":
+    """The field of a scenario; ``InputError`` if there is none."""
     from dess.scenario import ScenarioSpace, fields_of
 
     fields = fields_of(ScenarioSpace)
-    if field not in fields:
-        raise InputError(f"{SET}: {field}: unknown key{one_of(field, fields)}")
-    known = fields[field]
-    if words := choices(field):
-        raise InputError(f"{SET}: {field}: {shown(value)} is unknown{one_of(value, words)}")
-    problem = f"is not {kind_of(known)}" if kind_of(known) else "has the wrong form"
-    raise InputError(f"{SET}: {field}: {shown(value)} {problem}; allowed: {form_of(known)}")
+    if name not in fields:
+        raise InputError(f"{option}: {name}: unknown key{one_of(name, fields)}")
+    return fields[name]
+
+
+def _check_word(name: str, word: str, option: str = SET) -> None:
+    """Refuse a value that is no TOML, such as ``lots``, in the words of the field of a scenario.
+
+    Raises:
+        InputError: If the field is none of those that words need no quotes for, or may not be this
+            word; or if there is no such field.
+    """
+    from dess.errors import choices_of, form_of, kind_of
+
+    field = _field(name, option)
+    words, kind = choices_of(field), kind_of(field)
+    if word in words:
+        return
+    if words:
+        raise InputError(f"{option}: {name}: {shown(word)} is unknown{one_of(word, words)}")
+    problem = f"is not {kind}" if kind else "has the wrong form"
+    raise InputError(f"{option}: {name}: {shown(word)} {problem}; allowed: {form_of(field)}")
 
 
 def _is_plain(value: Any) -> bool:
@@ -192,7 +193,7 @@ def all_values(texts: Iterable[str]) -> dict[str, tuple[Any, ...]]:
     return _once("--set", map(values_of, texts))
 
 
-def all_settings(texts: Iterable[str], option: str, allowed: str) -> dict[str, Any]:
+def all_settings(texts: Iterable[str], option: str = SET, allowed: str = FIELD) -> dict[str, Any]:
     """The keys and values of an option such as ``--price uav=20000``.
 
     Raises:
@@ -207,25 +208,23 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
     Raises:
         InputError: If the text has another form, or a range is none.
     """
-    from analysis.ask import sweep
-    from dess.scenario import ScenarioSpace, fields_of
+    from analysis.ask.question import listed
 
-    field, equals, values = text.partition("=")
-    field = field.strip()
-    fields = fields_of(ScenarioSpace)
-    if equals and field not in fields:
-        raise InputError(f"--set: {field}: unknown key{one_of(field, fields)}")
-    if found := _RANGE.fullmatch(values.strip()):
-        return field, sweep.listed(field, _range(field, text, **found.groupdict()))
+    field, equals, values = (part.strip() for part in text.partition("="))
+    if equals:
+        _field(field)
+    if found := _RANGE.fullmatch(values):
+        return field, listed(field, _range(field, text, **found.groupdict()))
     try:
-        listed = setting(f"{field}=[{values}]" if equals else text)[1]
+        given = setting(f"{field}=[{values}]" if equals else text, allowed="")[1]
     except InputError:
-        listed = [word.strip() for word in values.split(",")]
-        if unknown := [word for word in listed if word not in choices(field)]:
-            for word in filter(str.isidentifier, unknown):
-                check_words(field, word)
+        given = [word.strip() for word in values.split(",")]
+        named = [word for word in given if word.replace("-", "_").isidentifier()]
+        for word in named:
+            _check_word(field, word)
+        if not equals or len(named) < len(given):
             raise _refused(text, "is not KEY=VALUES", ALLOWED) from None
-    return field, sweep.listed(field, listed)
+    return field, listed(field, given)
 
 
 def _range(field: str, text: str, low: str, high: str, count: str | None) -> Any:
@@ -266,12 +265,10 @@ def _is_whole(number: Decimal) -> bool:
 
 
 def _number(text: str, end: str) -> Decimal:
-    try:
+    with suppress(InvalidOperation):
         number = Decimal(end.strip())
         if abs(number) <= Decimal("1e300"):
             return number
-    except InvalidOperation:
-        pass
     raise _refused(text, f"has an end {end.strip()!r} that is not a number", ALLOWED)
 
 

@@ -18,10 +18,21 @@ from reports.cli.report import rendering
 from reports.folders import PREFIX, check_pages
 
 if TYPE_CHECKING:
+    import pandas as pd
+
+    from analysis.answers.diff import Diff
     from analysis.execution.effort import Planned
+    from analysis.results.tables import Results
     from analysis.study.study import Study
 
+TARGET = "a metric and its least mean, such as success=0.99, or its largest, such as age=40"
 
+app = typer.Typer(
+    help="Run studies (policies x design points x replications), show and compare results."
+)
+
+
+@command(app)
 def run(
     names: Annotated[
         list[str], typer.Argument(metavar="NAME|FILE...", autocompletion=options.studies)
@@ -125,14 +136,7 @@ def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -
     )
 
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from analysis.results.tables import Results
-
-TARGET = "a metric and its least mean, such as success=0.99, or its largest, such as age=40"
-
-
+@command(app)
 def show(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
     policy: Annotated[str | None, typer.Option(metavar="P[,P...]")] = None,
@@ -252,10 +256,7 @@ def _with_values(results: "Results", means: "pd.DataFrame") -> "pd.DataFrame":
     return table
 
 
-if TYPE_CHECKING:
-    from analysis.answers.diff import Diff
-
-
+@command(app)
 def diff(
     a: Annotated[Path, typer.Argument(metavar="A")],
     b: Annotated[Path, typer.Argument(metavar="B")],
@@ -303,6 +304,7 @@ def _diff_document(found: "Diff", most: int) -> dict:
     }
 
 
+@command(app)
 def export(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
     crate: Annotated[Path, typer.Option(metavar="FILE.zip")],
@@ -332,12 +334,3 @@ def export(
     if not console.is_stdout(crate):
         missions = f"{len(results.missions):,} missions"
         console.say(f"{crate}: {missions} with {page.name}, licence {licence}")
-
-
-app = typer.Typer(
-    help="Run studies (policies x design points x replications), show and compare results."
-)
-command(app, "run")(run)
-command(app, "show")(show)
-command(app, "diff")(diff)
-command(app, "export")(export)

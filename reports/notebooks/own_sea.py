@@ -44,7 +44,7 @@ about = (scenario, policies, missions, seed, results, workers, priced, requireme
 answer = sweep(*about, yes=yes, **fields)
 
 # %%
-html.answer(costs.answer(answer.results), answer.cheapest() or "none")
+html.answer(costs.answer(answer.results), costs.cheapest_fleet(answer.results))
 
 # %%
 html.lead(*figures.deciding(answer.results))
@@ -99,7 +99,7 @@ html.show(costs.judged_table(answer.results))
 # This command runs the same sweep and makes a page with more details:
 
 # %%
-html.say("{lines}", lines=html.commands([answer.command]))
+html.say("{lines}", lines=html.commands([answer.question.command]))
 
 # %% [markdown]
 # ## How this page was made

@@ -33,7 +33,8 @@ from reports.pages import html, study
 answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **fields)
 
 ranked = answer.table()
-of_fields, each = " and ".join(answer.fields[:2]), f"n = {missions:,} missions per setting"
+of_fields = " and ".join([*settings.varied(answer.results)][:2])
+each = f"n = {missions:,} missions per setting"
 drawn = {
     metric: (answer.plot(metric=metric), f"{name} by {of_fields}", f"{each}; 95 % intervals.")
     for metric, name in METRICS.items()
@@ -75,7 +76,7 @@ html.show(settings.best_of_policies(answer.results, PRODUCT))
 # cheapest fleet ([own sea](own-sea.html)).
 
 # %%
-html.say("{lines}", lines=html.commands([answer.command]))
+html.say("{lines}", lines=html.commands([answer.question.command]))
 
 # %% [markdown]
 # ## How this page was made

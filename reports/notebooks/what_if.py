@@ -29,7 +29,7 @@ shown = None  # the policy whose missions are drawn; None for the best in the va
 from IPython.display import display
 
 from analysis import metrics, what_if
-from analysis.ask import what_if as answer
+from analysis.ask.answer import measured
 from analysis.metrics import metric_of
 from reports.pages import html
 
@@ -37,27 +37,27 @@ from reports.pages import html
 asked = what_if(
     settings, baseline, scenario, policies, missions, seed, results, workers, shown, yes=yes
 )
-found, table = asked.results, asked.table()
+found = asked.results
 
 # %%
 html.answer(asked.sentence())
 
 # %%
-pairs, better = f"n = {missions:,} pairs per policy", answer.winners(answer.all_differences(found))
+pairs = f"n = {missions:,} pairs per policy"
 html.lead(asked.plot(), "Paired differences of the metrics", f"{pairs}; bars are 95 % intervals.")
 
 # %% [markdown]
 # ## Why
 
 # %%
-html.say("Of the pairs, {better}.", better=html.composed(better))
+html.say("Of the pairs, {better}.", better=html.composed(asked.winners()))
 
 # %% [markdown]
 # A failed mission counts 0 in the product: a policy that gains a little in most missions and fails
 # in a few more can be better in most of them and worse on average.
 
 # %%
-measured = [metric for metric in answer.measured(found) if found.missions[metric].any()]
+extended = [metric for metric in measured(found) if found.missions[metric].any()]
 caption = f"n = {missions:,} missions per dot; bars are 95 % intervals of the means."
 
 # %%
@@ -67,7 +67,7 @@ html.gallery(
         (asked.plot_spread(), "Distribution of the paired differences of the product", spread),
         *(
             (asked.plot_means(metric), f"{name}, baseline and variation", f"{name}. {caption}")
-            for metric in (*metrics.METRICS, *measured)
+            for metric in (*metrics.METRICS, *extended)
             for name in [metric_of(metric).name]
         ),
     ]
@@ -95,7 +95,7 @@ html.say("{answer}", answer=html.composed(asked.answer()))
 
 # %%
 html.table(
-    answer.pairing(table),
+    asked.pairing(),
     f"What common random numbers gain in the differences of n = {missions:,} pairs: the variance "
     "that is left of that of independent missions, and how many of these would be as precise",
 )
@@ -106,7 +106,7 @@ html.table(
 # %%
 for policy in found.policies:
     marks = "▲ higher in the variation, ▼ lower, ≈ inconclusive"
-    display(html.table(answer.answer_table(table, policy), f"{policy}, n = {missions:,}; {marks}"))
+    display(html.table(asked.measures(policy), f"{policy}, n = {missions:,}; {marks}"))
 
 # %% [markdown]
 # ## Change the question
@@ -115,8 +115,8 @@ for policy in found.policies:
 # lines are the same question as a study: every further row is another variation.
 
 # %%
-command = html.commands([answer.command(found)])
-study = html.block("toml", answer.as_toml(found).rstrip("\n"))
+command = html.commands([asked.question.command])
+study = html.block("toml", asked.as_toml().rstrip("\n"))
 html.say("{command}\n\n{study}", command=command, study=study)
 
 # %% [markdown]
@@ -124,7 +124,7 @@ html.say("{command}\n\n{study}", command=command, study=study)
 
 # %%
 name = found.manifest["study"]["scenario"]
-html.table(answer.field_table(found), f"Scenario {name}, {missions:,} missions of each policy")
+html.table(asked.field_table(), f"Scenario {name}, {missions:,} missions of each policy")
 
 # %%
 for example in examples:

@@ -8,8 +8,8 @@ from typing import Any
 import tomli_w
 
 from analysis import load_study
-from analysis.ask import what_if
-from analysis.results.tables import Results
+from analysis.ask.answer import WhatIf, best_policy
+from analysis.ask.question import what_if_question
 from analysis.study.study import Study
 
 SCENARIO: dict[str, Any] = {
@@ -46,7 +46,7 @@ def small_study(folder: Path, **changes: Any) -> Study:
     return load_study(path, **changes)
 
 
-def asked(folder: Path, missions: int = 12, **changes: Any) -> Results:
+def asked(folder: Path, missions: int = 12, **changes: Any) -> WhatIf:
     """The answer to a question about the small scenario: six UAVs at a single pad, not two."""
     values = {
         "settings": {"uavs": 6, "pads": 1},
@@ -56,7 +56,9 @@ def asked(folder: Path, missions: int = 12, **changes: Any) -> Results:
         "scenario": write_scenario(folder),
         "missions": missions,
     }
-    return what_if.ask(what_if.question(**values | changes), folder)
+    question = what_if_question(**values | changes, folder=folder)
+    results = question.ask()
+    return WhatIf(question, results, best_policy(results, 1))
 
 
 def grid(**values: Any) -> dict[str, Any]:

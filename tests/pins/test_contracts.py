@@ -16,10 +16,12 @@ from tests.reports.cli.conftest import dess, dess_json
 __all__ = ["dess", "dess_json"]  # fixtures
 
 SWEEP = ["sweep", "--scenario", "small.toml", "--set", "uavs=1,2", "--policy", "greedy,random"]
+WHAT_IF = ["what-if", "--scenario", "small.toml", "--policy", "greedy"]
 COMMANDS = {
     "simulate": ["simulate", "--scenario", "small.toml", "--policy", "greedy"],
     "evaluate": ["evaluate", "--scenario", "small.toml", "--policy", "greedy", "--missions", "5"],
     "sweep": [*SWEEP, "--price", "uav=2", "--require", "success=0.5", "--name", "asked"],
+    "what-if": [*WHAT_IF, "--set", "uavs=1", "--baseline", "uavs=2", "--missions", "3"],
     "study show": ["study", "show", "trial"],
     "study diff": ["study", "diff", "trial", "again"],
     "verify": ["verify", "trial", "--missions", "2", "--seed", "1"],

@@ -1,3 +1,5 @@
+"""Questions: studies made of values, kept, and asked again."""
+
 import shutil
 from pathlib import Path
 
@@ -6,10 +8,10 @@ import pandas as pd
 import pytest
 
 from analysis import load_results, load_study, run_study
-from analysis.ask.sweep import ask, file_of, folder_of, question, values_of
+from analysis.ask.question import sweep_question, values_of, what_if_question
 from analysis.execution import effort
 from analysis.execution.effort import BASELINE, SECONDS
-from dess import InputError
+from dess import InputError, load_scenario
 from tests.analysis.small import files_of, write_scenario
 
 FIELDS = {"uavs": [1, 2], "quota": [20, 40], "pads": 2}
@@ -17,21 +19,22 @@ FIELDS = {"uavs": [1, 2], "quota": [20, 40], "pads": 2}
 
 @pytest.fixture
 def asking(tmp_path):
-    """Asks a sweep of the small scenario into ``results``; the study, results and missions done."""
+    """Asks a sweep of the small scenario: the question, the results and the missions done."""
 
     def run(fields=FIELDS, missions=6, **about):
-        study = sweep_of(fields, tmp_path, missions=missions, **about)
+        question = sweep_of(fields, tmp_path, missions=missions, **about)
         rounds, done = [], []
-        results = ask(study, tmp_path / "results", 1, done.append, rounds.append)
-        return study, results, sum(done) - rounds[0].present
+        results = question.ask(1, done.append, rounds.append)
+        return question, results, sum(done) - rounds[0].present
 
     return run
 
 
 def sweep_of(fields, folder, **about):
-    """The study of a sweep of the small scenario."""
+    """A sweep of the small scenario."""
     values = {field: values_of(field, given) for field, given in fields.items()}
-    return question(values, write_scenario(folder), **{"policies": ["greedy"]} | about)
+    about = {"policies": ["greedy"], "folder": folder / "results"} | about
+    return sweep_question(values, write_scenario(folder), **about)
 
 
 def tables(results):
@@ -48,14 +51,15 @@ def tables(results):
     ]
 
 
-def check_equal_to_a_fresh_run(study, results, folder):
-    fresh = run_study(study, folder / "fresh")
+def check_equal_to_a_fresh_run(question, results, folder):
+    fresh = run_study(question.study, folder / "fresh")
     for found, expected in zip(tables(results), tables(fresh), strict=True):
         pd.testing.assert_frame_equal(found, expected)
 
 
 def test_a_sweep_is_the_grid_of_what_has_several_values(asking, tmp_path):
-    study, results, done = asking()
+    question, results, done = asking()
+    study = question.study
     assert study.set == {"pads": 2}
     assert [point.values for point in study.points] == [
         {"uavs": uavs, "quota": quota} for uavs in (1, 2) for quota in (20, 40)
@@ -77,10 +81,10 @@ OTHERS = {
 def test_only_what_is_new_is_simulated(case, asking, tmp_path):
     first = asking()[0]
     fields, new = OTHERS[case]
-    study, results, done = asking(fields)
-    assert study.name != first.name
+    question, results, done = asking(fields)
+    assert question.out != first.out
     assert done == new
-    check_equal_to_a_fresh_run(study, results, tmp_path)
+    check_equal_to_a_fresh_run(question, results, tmp_path)
     assert asking(fields)[2] == 0
 
 
@@ -101,19 +105,18 @@ def _accepted(folder):
 
 @pytest.mark.parametrize("damage", [_no_manifest, _cut, _accepted, shutil.rmtree])
 def test_a_damaged_folder_gives_nothing(damage, asking, tmp_path):
-    study, *_ = asking()
-    damage(folder_of(study, tmp_path / "results"))
-    study, results, done = asking(OTHERS["wider"][0])
+    damage(asking()[0].out)
+    question, results, done = asking(OTHERS["wider"][0])
     assert done == 36
-    check_equal_to_a_fresh_run(study, results, tmp_path)
+    check_equal_to_a_fresh_run(question, results, tmp_path)
 
 
 def test_the_file_completes_the_sweep(asking, tmp_path, monkeypatch):
     prices = {"uav": 20_000, "hour": 10.0, "slot_seconds": 60.0}
-    study, *_ = asking(prices=prices)
-    out = folder_of(study, tmp_path / "results")
+    question, *_ = asking(prices=prices)
+    study, out = question.study, question.out
     monkeypatch.chdir(tmp_path)
-    again = load_study(file_of(study, "results"))
+    again = load_study(question.file.relative_to(tmp_path))
     assert again.model_dump() == study.model_dump() | {"scenario": again.scenario}
     assert Path(again.scenario).resolve() == Path(study.scenario).resolve()
     before = files_of(out)
@@ -136,19 +139,19 @@ def test_a_name_is_of_one_question(asking, tmp_path):
 def test_a_search_has_a_policy_for_the_missions_that_it_will_take() -> None:
     """It takes more of them than the check of its answer, so it gets a faster policy."""
     values = {"uavs": [1, 2, 3, 4, 5], "pads": [1, 2, 3, 4]}
-    same = question(values, "bay", missions=30)
-    search = question(values, "bay", prices={"uav": 20_000}, requirements={"success": 0.99})
+    requirements = {"success": 0.99}
+    same = sweep_question(values, "bay", missions=30).study
+    search = sweep_question(values, "bay", prices={"uav": 20_000}, requirements=requirements).study
     assert SECONDS[search.policies[0]] < SECONDS[same.policies[0]]
     assert search.policies[1:] == same.policies[1:] == (BASELINE,)
 
 
 def test_missions_of_other_sweeps_take_no_time(asking, tmp_path, monkeypatch):
-    for module in (effort, effort):
-        monkeypatch.setattr(module, "LONG_RUN", 0.00015)  # less than 24 missions take
-    study = sweep_of(FIELDS, tmp_path, missions=6)
+    monkeypatch.setattr(effort, "LONG_RUN", 0.00015)  # less than 24 missions take
+    question = sweep_of(FIELDS, tmp_path, missions=6)
     with pytest.raises(InputError, match="24 missions to simulate"):
-        ask(study, tmp_path / "results")
-    ask(study, tmp_path / "results", yes=True)
+        question.ask()
+    question.ask(yes=True)
     assert asking({**FIELDS, "uavs": [1, 2, 3]})[2] == 12  # of 36
 
 
@@ -187,3 +190,87 @@ def test_one_value_is_fixed_and_several_are_swept(field, given, values):
 def test_values_that_are_none(given, line):
     with pytest.raises(InputError, match=line):
         values_of("uavs", given)
+
+
+POLICIES = ["random", "greedy"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "baseline"),
+    [
+        ({"uavs": 5}, {}),
+        ({"uavs": 5}, {"uavs": 3, "quota": 400}),
+        ({"pads": 2, "initial_data": [5, 10]}, {"initial_data": 12, "uavs": [2, 3]}),
+    ],
+)
+def test_the_two_points_are_the_scenario_before_and_after(settings, baseline):
+    study = what_if_question(settings, baseline, policies=POLICIES).study
+    before, after = study.scenarios
+    assert before == load_scenario("paper", **baseline)
+    assert after == load_scenario("paper", **baseline | settings)
+
+
+@pytest.mark.parametrize(
+    ("settings", "baseline", "measured"),
+    [
+        ({"age.reward": -1.0}, {}, (True, True)),
+        ({"age": {"reward": -1.0}}, {}, (True, True)),
+        ({"uavs": 5}, {"age.reward": -1.0}, (True, True)),
+        ({"age.measured": True}, {}, (False, True)),
+        ({"age.measured": True, "uavs": 5}, {}, (True, True)),
+        ({"age.reward": -1.0}, {"age.measured": False}, (False, False)),
+        ({"wind.strength": 1.0}, {}, (False, False)),
+    ],
+)
+def test_both_sides_measure_what_belongs_to_a_section(settings, baseline, measured):
+    study = what_if_question(settings, baseline, policies=POLICIES).study
+    assert tuple(space.age.measured for space in study.scenarios) == measured
+    assert not any(space.charging.measured for space in study.scenarios)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (
+            {"settings": {"uav": 5}},
+            r"scenario paper: uav: unknown key .did you mean uavs",
+        ),
+        ({"settings": {"uavs": 99}}, r"uavs: 99 is out of range; allowed: 1\.\.16"),
+        ({"baseline": {"quota": 0}}, r"scenario paper: quota: .*0"),
+        ({"settings": {}}, r"settings: none is given; allowed: .*uavs"),
+        ({"settings": {"uavs": [1, 3]}}, r"uavs is 1 to 3 in the baseline already; allowed: an"),
+        ({"settings": {"uavs": 2}, "baseline": {"uavs": 2}}, r"uavs is 2 in the baseline already"),
+        ({"settings": {"pads": 16}}, r"pads is 16 in the baseline already"),
+        (
+            {"policies": ["gredy"]},
+            r"question: policies: .*'gredy' is unknown .did you mean greedy",
+        ),
+        ({"policies": []}, r"question: policies: .*is too short"),
+        ({"policies": 3}, r"question: policies: 3 has the wrong form"),
+        ({"policies": "greedy"}, r"question: policies: 'greedy' has the wrong form"),
+        ({"missions": 1}, r"missions: 1 is too few; allowed: 2 or more"),
+        ({"missions": "many"}, r"question: missions: .*'many'"),
+        ({"seed": -1}, r"question: seed: .*-1"),
+        ({"scenario": "papr"}, r"papr: no such scenario .did you mean paper"),
+    ],
+)
+def test_what_is_no_question_is_refused_in_one_line(values, message):
+    with pytest.raises(InputError, match=message) as caught:
+        what_if_question(**{"settings": {"uavs": 5}, "policies": ["greedy"]} | values)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_policy_that_cannot_act_in_the_variation_leaves_nothing_behind(tmp_path):
+    moved = {"zone": [0, 0, 4, 4]}
+    question = what_if_question(moved, policies=["ddqn"], missions=2, folder=tmp_path)
+    with pytest.raises(InputError, match="policy ddqn: has learned zone_x 26, not 0; allowed: "):
+        question.ask()
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_has_what_makes_the_question(tmp_path):
+    scenario = write_scenario(tmp_path)
+    asked = what_if_question({"uavs": 6}, {"uavs": 2, "initial_data": [5, 9]}, scenario, POLICIES)
+    sides = "--set uavs=6 --baseline 'initial_data=[5,9]' --baseline uavs=2"
+    about = "--policy random --policy greedy --missions 500 --seed 0 --scenario small.toml"
+    assert asked.command == f"dess what-if {sides} {about}"

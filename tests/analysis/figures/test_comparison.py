@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.ask import what_if
+from analysis.ask import answer
 from analysis.figures import comparison
 from analysis.metrics import BOUND, METRICS, PRODUCT
 from tests.analysis.answers.test_comparison import drawn_interval
@@ -15,11 +15,11 @@ POLICIES = ["random", "greedy"]
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    return asked(tmp_path_factory.mktemp("what-if"), 5)
+    return asked(tmp_path_factory.mktemp("what-if"), 5).results
 
 
 def test_figures_show_the_means_and_the_gains(results):
-    table, answers = what_if.means(results), what_if.answers(results)
+    table, answers = answer.means(results), answer.answers(results)
     sides = ["baseline\nuavs 2\npads 6", "variation\nuavs 6\npads 1"]
     for metric in METRICS:
         (ax,) = comparison.means(table, metric, sides).axes

@@ -1,4 +1,4 @@
-"""``dess sweep``: from a line to a page."""
+"""``dess sweep`` and ``dess what-if``: from a line to an answer and its page."""
 
 import json
 import re
@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from analysis import load_results, load_study
-from analysis.ask.sweep import command
+from analysis.ask.question import Question
 from analysis.execution import runner
-from reports.pages import render
+from reports.pages import notebook, render
 from tests.analysis.small import files_of
 from tests.reports.small import words
 
@@ -18,10 +18,22 @@ ASKED = ["sweep", "--scenario", "small.toml", "--missions", 6, "--policy", "gree
 FIELDS = ["--set", "uavs=1..2", "--set", "quota=20,40"]
 
 
+WHAT_IF = ["what-if", "--scenario", "small.toml", "--missions", 6, "--set", "uavs=2"]
+WHAT_IF += ["--baseline", "uavs=1", "--policy", "greedy", "--policy", "random"]
+
+
 @pytest.fixture
 def unrendered(monkeypatch):
-    """No page is made, which takes seconds."""
+    """No page is made, which takes seconds; the parameters of the page of a what-if question."""
+    given = []
+
+    def note(names, results, out, progress, parameters):
+        notebook.check_parameters([notebook.read(*names)], parameters)
+        given.append(parameters)
+
     monkeypatch.setattr(render, "render_study", lambda folder, out, *_: Path(out, "page.html"))
+    monkeypatch.setattr(render, "render", note)
+    return given
 
 
 def test_a_line_leads_to_a_page(dess, tmp_path):
@@ -52,7 +64,8 @@ def test_the_command_of_a_sweep_asks_it_again(dess, unrendered, tmp_path):
     prices = ["--price", "uav=20000", "--price", "currency=USD", "--require", "ratio=0.1"]
     file = json.loads(dess(*ASKED, *FIELDS, "--set", "pads=2", *prices, "--json")[1])["study_file"]
     before = files_of(tmp_path / "results")
-    code, _, err = dess(*shlex.split(command(load_study(file)))[1:])
+    question = Question(load_study(file), Path(file).with_suffix(""))
+    code, _, err = dess(*shlex.split(question.command)[1:])
     assert code == 0
     assert files_of(tmp_path / "results") == before
 
@@ -82,6 +95,30 @@ def test_the_cheapest_fleet_is_named(dess, unrendered):
     assert points == [0, 1, None]  # all conditions together have several
 
 
+def test_a_what_if_question_is_answered_and_asked_again(dess, unrendered, tmp_path):
+    plan = dess(*WHAT_IF, "--dry-run")[1]
+    assert "24 missions of study what-if (2 policies x 2 design points x 6 replications)" in plan
+    assert not (tmp_path / "results").exists()
+    code, out, err = dess(*WHAT_IF)
+    assert code == 0
+    assert "24 missions" in err
+    for policy in ("greedy", "random"):
+        assert re.search(rf"{policy} +Baseline +Variation +Paired difference\n", out)
+        assert re.search(rf"{policy}: product is .*, by .* points: from .* % to .* %\.", out)
+    assert "With 2 UAVs instead of 1, the product changes: " in out
+    assert out.endswith("page: build/reports/what-if.html\n")
+    before = files_of(tmp_path / "results")
+    found = json.loads(dess(*WHAT_IF, "--json")[1])
+    assert all(line in out for line in (f"study: {found['study_file']}", *found["answers"]))
+    assert {row["policy"] for row in found["table"]} == {"greedy", "random"}
+    question = Question(load_study(found["study_file"]), Path(found["results"]))
+    assert dess(*shlex.split(question.command)[1:])[0] == 0
+    assert files_of(tmp_path / "results") == before
+    asked = {"settings": {"uavs": 2}, "baseline": {"uavs": 1}, "policies": ["greedy", "random"]}
+    asked |= {"scenario": "small.toml", "missions": 6, "seed": 0, "shown": None}
+    assert unrendered == [asked] * 3
+
+
 def test_an_interruption_names_the_command_that_goes_on(dess, unrendered, monkeypatch):
     monkeypatch.setitem(runner.CHUNK, "batch", 4)
     simulate, calls = runner.Here.run, []
@@ -104,35 +141,46 @@ def test_an_interruption_names_the_command_that_goes_on(dess, unrendered, monkey
 
 
 BAD = {
-    "--set uavs=5..2": "begins with the larger number",
-    "--set uavs=2 --set uavs=3": "--set: uavs is given twice; allowed: once",
-    "--set uavs=2,7": "uavs: 7 is out of range; allowed: 1..6",
-    "--set nodes=[[1,1]] --set grid=8,9 --policy ddqn": "policy ddqn: has learned grid 32, not 8",
-    "--policy gredy": "'gredy' is unknown",
-    "--missions 0": "--missions",
-    "--price uav=-1": "costs.uav: -1 is out of range; allowed: a number 0..1,000,000,000,000",
-    "--price uav": "--price: 'uav' is not KEY=VALUE; allowed: a price",
-    "--price hour=3": "slot_seconds: is missing",
-    "--price uav=1 --price uav=2": "--price: uav is given twice",
-    "--require success=0.9": "requirements: need prices",
-    "--price uav=1 --require speed=0.9": "requirements: 'speed' is unknown; allowed: success",
-    "--price uav=1 --require success=2": "requirements.success: 2 is out of range",
-    "--price uavs=3": "prices: 'uavs' is unknown (did you mean uav?); allowed: currency, uav, pad",
-    "--name a/b": "name: 'a/b' has the wrong form",
-    "--name ": "name: '' has the wrong form",
-    "--set pads=7": "pads: 7 is more than the zone has cells",
-    "--price uav=0 --require ratio=0.9": "prices: all are 0",
-    "--out small.toml": "small.toml: cannot be written",
-    "--out small.toml/pages": "small.toml/pages: cannot be written",
-    "--results small.toml": "cannot be written: Not a directory",
-    "--set quota=1..1000 --set arrival_rate=0..1:1000": "design: 1,000,000 points; allowed: ",
+    "sweep --set uavs=5..2": "begins with the larger number",
+    "sweep --set uavs=2 --set uavs=3": "--set: uavs is given twice; allowed: once",
+    "sweep --set uavs=2,7": "uavs: 7 is out of range; allowed: 1..6",
+    "sweep --set nodes=[[1,1]] --set grid=8,9 --policy ddqn": "ddqn: has learned grid 32, not 8",
+    "sweep --policy gredy": "'gredy' is unknown",
+    "sweep --missions 0": "--missions",
+    "sweep --price uav=-1": "costs.uav: -1 is out of range; allowed: a number 0..1,000,000,000,000",
+    "sweep --price uav": "--price: 'uav' is not KEY=VALUE; allowed: a price",
+    "sweep --price hour=3": "slot_seconds: is missing",
+    "sweep --price uav=1 --price uav=2": "--price: uav is given twice",
+    "sweep --require success=0.9": "requirements: need prices",
+    "sweep --price uav=1 --require speed=0.9": "requirements: 'speed' is unknown; allowed: success",
+    "sweep --price uav=1 --require success=2": "requirements.success: 2 is out of range",
+    "sweep --price uavs=3": "prices: 'uavs' is unknown (did you mean uav?); allowed: currency,",
+    "sweep --name a/b": "name: 'a/b' has the wrong form",
+    "sweep --name ": "name: '' has the wrong form",
+    "sweep --set pads=7": "pads: 7 is more than the zone has cells",
+    "sweep --price uav=0 --require ratio=0.9": "prices: all are 0",
+    "sweep --out small.toml": "small.toml: cannot be written",
+    "sweep --out small.toml/pages": "small.toml/pages: cannot be written",
+    "sweep --results small.toml": "cannot be written: Not a directory",
+    "sweep --set quota=1..1000 --set arrival_rate=0..1:1000": "design: 1,000,000 points; allowed: ",
+    "what-if": "Missing option '--set'",
+    "what-if --set uvs=2": "uvs: unknown key (did you mean uavs?)",
+    "what-if --set uavs=two": "--set: uavs: 'two' has the wrong form; allowed: an integer",
+    "what-if --set uavs=2 --set uavs=3": "--set: uavs is given twice; allowed: once",
+    "what-if --set uavs=2 --baseline uavs=2": "settings: uavs is 2 in the baseline already",
+    "what-if --set uavs=2 --baseline pads": "--baseline: 'pads' is not KEY=VALUE; allowed: a fie",
+    "what-if --set uavs=2 --missions 1": "--missions",
+    "what-if --set uavs=2 --shown tour": "shown: 'tour' is not asked about",
+    "what-if --set uavs=2 --out small.toml": "small.toml: cannot be written",
+    "what-if --set uavs=2 --results small.toml": "cannot be written: Not a directory",
 }
 
 
 @pytest.mark.parametrize("arguments", BAD)
 def test_bad_input_gets_one_line_and_leaves_nothing(arguments, refusal):
+    command, *words = arguments.split(" ")
     given = ["--scenario", "small.toml", "--missions", "300", "--policy", "greedy,random"]
-    assert BAD[arguments] in refusal("sweep", *given, *arguments.split(" "))
+    assert BAD[arguments] in refusal(command, *given, *words)
 
 
 def test_a_study_of_very_many_points_is_refused(refusal, tmp_path):

@@ -1,0 +1,647 @@
+"""The answers to questions asked in one line, ``analysis.sweep`` and ``analysis.what_if``."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import tomli_w
+from scipy import stats
+
+from analysis import numbers
+from analysis.answers import costs, settings, summary
+from analysis.answers.missions import estimate
+from analysis.ask.question import (
+    RANGES,
+    Question,
+    in_words,
+    sweep_question,
+    values_of,
+    what_if_question,
+)
+from analysis.execution.jobs import Progress
+from analysis.execution.runner import Round
+from analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
+from analysis.names import parameter
+from analysis.results.resimulate import resimulate
+from analysis.results.tables import Results, once
+from analysis.stats.differences import compare
+from analysis.stats.intervals import LEVEL, by_replication
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position
+from dess import InputError
+from dess.errors import one_of
+from dess.scenario import ScenarioSpace, fields_of
+
+if TYPE_CHECKING:  # figures need the extra reports
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """The answer to a sweep.
+
+    Attributes:
+        question: The study that was run, its folder and its command.
+        results: The results; ``results.missions`` is a tidy table of the missions.
+    """
+
+    question: Question
+    results: Results
+
+    def table(self, metric: str = PRODUCT) -> pd.DataFrame:
+        """The settings, the best first; a setting is a policy with a value of every swept field.
+
+        Args:
+            metric: The metric that ranks the settings, ``cost`` included if there are prices.
+
+        Returns:
+            A row per setting with ``rank``, ``policy``, ``point``, ``n`` missions, the swept
+            fields, every metric with the ends of its 95 % interval (``success``, ``success_low``,
+            ``success_high``), and ``tied``: whether the setting may be as good as the best one.
+            With prices also ``cost`` with its interval. With requirements also the ``verdict``
+            (``met``, ``missed`` or ``open``), and ``selected``: whether the setting is the selected
+            one of its policy under its condition.
+        """
+        table = settings.ranked(self.results, metric)
+        study = self.question.study
+        if study.costs is None:
+            return table
+        priced = costs.judged(self.results) if study.selection else costs.priced(self.results)
+        key = ["policy", "point"]
+        more = [name for name in priced if name in key or name not in table]
+        return table.merge(priced[more], on=key, how="left")
+
+    def best(self, metric: str = PRODUCT) -> pd.DataFrame:
+        """The best setting of every policy, the best policy first.
+
+        With requirements, the cheapest settings that meet them: one for each policy and condition
+        (the values of swept fields that no operator decides on, such as the arrival rate). There is
+        none where no setting is known to meet the requirements.
+        """
+        table = self.table(metric)
+        if self.question.study.selection:
+            return table[table["selected"]].sort_values("point", kind="stable", ignore_index=True)
+        return table.drop_duplicates("policy", ignore_index=True)
+
+    def answers(self) -> list[str]:
+        """The best setting and what other policies would have said, in sentences.
+
+        With requirements: the cheapest fleet of all policies first, then those of each policy and
+        condition, and why cheaper ones do not meet them.
+        """
+        if not self.question.study.selection:
+            ranked, words = self.table(), settings.in_words(self.results)
+            point, others = ranked["point"][0], settings.dependence(self.results, ranked, PRODUCT)
+            edge = settings.edge(self.results, point, settings.ends(self.results, point))
+            best = f"The best setting is {ranked['policy'][0]} with {words[point]}.{edge}"
+            return [best, *others] if others or edge else []
+        return [*map(_plain, costs.sentences(self.results))]
+
+    @property
+    def guarantee(self) -> str:
+        """With requirements: what is guaranteed about the selected settings, in words."""
+        choices = (self.results.cheapest(policy) for policy in self.results.policies)
+        return "; ".join(dict.fromkeys(choice.guarantee for choice in choices if choice))
+
+    def plot(self, x: str | None = None, hue: str | None = None, metric: str = PRODUCT) -> "Figure":
+        """Curves of a metric over a swept field, with 95 % intervals, for every policy.
+
+        Args:
+            x: The field on the horizontal axis. By default the first swept field, with the second
+                one as ``hue``.
+            hue: A field; there is a curve for each of its values.
+            metric: The metric on the vertical axis.
+
+        Raises:
+            InputError: If a field is not swept, or there is no such metric.
+        """
+        from analysis.figures import settings as figures
+
+        if x is None:
+            if not (fields := [*settings.varied(self.results)]):
+                raise InputError("x: no field is swept; allowed: a sweep of one field or more")
+            x, hue = fields[0], hue or next(iter(fields[1:]), None)
+        return figures.plot(self.results, x, hue, metric).figure
+
+
+def sweep(
+    scenario: str | Path = "paper",
+    policies: Iterable[str] | None = None,
+    missions: int = 300,
+    seed: int = 0,
+    folder: str | Path = "results",
+    workers: int = 1,
+    prices: Mapping[str, Any] | None = None,
+    requirements: Mapping[str, float] | None = None,
+    name: str | None = None,
+    progress: bool | Progress = True,
+    yes: bool = False,
+    **fields: Any,
+) -> Sweep:
+    """Simulate every combination of values of fields, and store the missions.
+
+    The same sweep is answered at once the next time. With more missions or other values, only the
+    missions that no sweep in the folder has are simulated. All settings use the same replications
+    (common random numbers).
+
+    Args:
+        scenario: The name of a shipped scenario, or a TOML file.
+        policies: Teams to compare: ``"P"`` or ``"P,P,..."``. Without any, the best policy that
+            five minutes allow, and ``greedy``.
+        missions: Number of missions of every setting. With requirements, the number of additional
+            missions that check each selected setting.
+        seed: Seed of the missions.
+        folder: Results are stored in ``FOLDER/sweeps/NAME``, with ``NAME.toml`` beside it.
+        workers: Number of processes. Two or more take seconds to start; they help in long runs.
+        prices: Fields of ``analysis.study.cheapest.Costs``, such as ``{"uav": 20_000}``.
+        requirements: For each required metric its lowest acceptable mean, such as ``{"success":
+            0.99}``. With requirements, as many missions are simulated as the search for the
+            cheapest setting that meets them needs.
+        name: Name of the sweep. Without one, it is made of the fields and a hash.
+        progress: Whether to show a progress bar, or a function that is called with the number of
+            missions done since its last call.
+        yes: Whether the sweep may take more than an hour.
+        **fields: Fields of the scenario. A single value is fixed; a list, range, tuple or array of
+            values is swept. ``initial_data=[5, 20]`` is one range; see ``values_of``.
+
+    Raises:
+        InputError: Before anything is written, if a field, a value or a policy is not allowed, a
+            policy cannot act in the scenario, or the sweep would take long.
+        ChunkError: If a chunk could not be computed. It is raised after all other chunks are done.
+    """
+    values = {field: values_of(field, given) for field, given in fields.items()}
+    about = scenario, policies, missions, seed, prices, requirements, name, folder
+    question = sweep_question(values, *about)
+    if progress is True:
+        with _bar() as (bar, announce):
+            return Sweep(question, question.ask(workers, bar, announce, yes))
+    return Sweep(question, question.ask(workers, progress or None, yes=yes))
+
+
+@contextmanager
+def _bar() -> Iterator[tuple[Progress, Callable[[Round], None]]]:
+    """A progress bar in missions, shown if they take a second; its total may grow by a rule."""
+    from tqdm.auto import tqdm
+
+    with tqdm(unit="mission", delay=1) as bar:
+
+        def begin(started: Round) -> None:
+            bar.total = started.missions
+            if not bar.disable:
+                bar.initial += started.present  # took no time
+
+        yield bar.update, begin
+
+
+def _plain(text: str) -> str:
+    """A sentence of Markdown as plain text."""
+    return text.replace("**", "").replace("`", "")
+
+
+BASELINE, VARIATION = 0, 1  # the design points
+SIDES = ("baseline", "variation")
+
+# Further quantities per mission, in addition to the paper's metrics.
+MEASURES = {
+    "slots": "Mission slots",
+    "collected": "Data collected",
+    "collected_per_uav": "Data collected per UAV",
+    "residual": "Data left",
+    "charging_per_uav": "Slots charging per UAV",
+    "waiting_per_uav": "Slots waiting per UAV",
+    "depleted": "Depleted batteries in 100 missions",
+}
+
+# Power, for ``missions_needed``: the probability that a difference of this size is significant.
+POWER = 0.8
+
+# What is 0 where nothing can fail and no buffer is limited, which is not measured then.
+_NOTHING = ("failures", "slots_grounded", "lost")
+
+_SHORT = {SUCCESS: "Success", RATIO: "Collection ratio", PRODUCT: "Their product"}
+_MISSION = ["policy", "point", "replication"]
+
+
+@once
+def missions_of(results: Results) -> pd.DataFrame:
+    """``results.missions`` with all of ``MEASURES``; nothing failed where nothing can fail."""
+    uavs = results.uavs.assign(depleted=100 * (results.uavs["end"] == "battery"))
+    sums = uavs.groupby(_MISSION)[["slots_charging", "slots_waiting", "depleted"]].sum()
+    missions = results.missions.join(sums, on=_MISSION)
+    fillable = [name for name in _NOTHING if name in measured(results)]
+    return missions.fillna(dict.fromkeys(fillable, 0.0)).assign(
+        collected_per_uav=missions["collected"] / missions["uavs"],
+        charging_per_uav=missions["slots_charging"] / missions["uavs"],
+        waiting_per_uav=missions["slots_waiting"] / missions["uavs"],
+    )
+
+
+def measured(results: Results) -> list[str]:
+    """What scenarios beyond the paper measure, on at least one of both sides."""
+    missions = results.missions
+    return [name for name in measured_in(missions) if missions[name].notna().any()]
+
+
+def means(results: Results) -> pd.DataFrame:
+    """Means with intervals: rows of ``analysis.summary`` by ``policy`` and ``point``."""
+    table = summary.means(replace(results, missions=missions_of(results)))
+    return table[table["metric"].isin([*METRICS, *measured(results)])].reset_index(drop=True)
+
+
+@once
+def answers(results: Results) -> pd.DataFrame:
+    """The variation compared with the baseline, mission by mission.
+
+    Returns:
+        A row per policy and metric (those of ``METRICS``, what is ``measured``, then those of
+        ``MEASURES``): ``policy``, the means ``before`` and ``after``, and the columns of
+        ``analysis.compare``. Every interval has its own level of 95 %; see
+        ``stats.paired.paired``. Of what only one side measures, ``n`` is 0 and all else nan but the
+        mean of this side.
+    """
+    missions = missions_of(results)
+    metrics = [*METRICS, *measured(results), *MEASURES]
+    tables = []
+    for policy, rows in missions.groupby("policy", sort=False):
+        table = compare(rows, BASELINE, metrics, correction=None, of="point")
+        table = table.set_index("metric").reindex(metrics).rename_axis("metric").reset_index()
+        table["n"] = table["n"].fillna(0).astype(int)
+        sides = pd.DataFrame({m: by_replication(rows, m, "point").mean() for m in metrics})
+        table.insert(0, "policy", policy)
+        table["before"] = table["metric"].map(sides.loc[BASELINE])
+        table["after"] = table["metric"].map(sides.loc[VARIATION])
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True)
+
+
+def verdict(answer: Any) -> str:
+    """Whether the variation is significantly ``ABOVE`` or ``BELOW`` the baseline.
+
+    The complete interval has to be above or below 0. If it has no length, it tells nothing about
+    the variance, so the sign test must be significant as well.
+
+    Args:
+        answer: A row of ``answers``.
+    """
+    known = answer.low < answer.high or answer.p <= 1 - LEVEL
+    return position(answer) if known else INCONCLUSIVE
+
+
+def missions_needed(answer: Any) -> float:
+    """The number of missions that would show a difference of the observed size.
+
+    It is computed by the normal approximation from the observed difference and variance, which are
+    estimates themselves.
+
+    Returns:
+        The number with which the interval excludes 0 with probability ``POWER``; infinite if there
+        is no difference, or its variance is unknown.
+    """
+    if not answer.difference or not answer.low < answer.high:
+        return np.inf
+    quantile = stats.norm.isf((1 - LEVEL) / 2)
+    half = (answer.high - answer.low) / 2 / abs(answer.difference)
+    return float(np.ceil(answer.n * (half * (1 + stats.norm.ppf(POWER) / quantile)) ** 2))
+
+
+def differences(results: Results, policy: str) -> pd.Series:
+    """Variation - baseline in product of a policy, by replication."""
+    missions = results.missions[results.missions["policy"] == policy]
+    sides = missions.pivot(index="replication", columns="point", values=PRODUCT)
+    return sides[VARIATION] - sides[BASELINE]
+
+
+def _meaning(field: str) -> str:
+    """The first part of a field's description, without details."""
+    description = fields_of(ScenarioSpace)[field].description or ""
+    return description.partition(";")[0].partition(":")[0]
+
+
+def best_policy(results: Results, point: int) -> str:
+    """The policy with the highest mean product on one side."""
+    missions = results.missions
+    return summary.best_policy(missions[missions["point"] == point])
+
+
+def conclusion(answer: Any) -> str:
+    """What a row of ``answers`` says about the product, in Markdown."""
+    words = {
+        ABOVE: "is **higher** in the variation",
+        BELOW: "is **lower** in the variation",
+        INCONCLUSIVE: "is **inconclusive**",
+    }
+    found = verdict(answer)
+    return (
+        f"**{answer.policy}**: product {words[found]}, by {change(answer)} points: from "
+        f"{numbers.percent(answer.before)} to {numbers.percent(answer.after)}."
+        f"{_missing(answer) if found == INCONCLUSIVE else ''}"
+    )
+
+
+def _missing(answer: Any) -> str:
+    """How many missions would be needed for a conclusive answer, in words."""
+    needed = missions_needed(answer)
+    if needed == np.inf:
+        return " These missions do not tell how many would show a difference."
+    return (
+        " If the true difference is as large as this estimate, about "
+        f"{float(f'{needed:.2g}'):,.0f} missions (instead of {answer.n:,}) show it with a "
+        f"probability of {100 * POWER:g} %. Only the additional missions would be simulated."
+    )
+
+
+def change(answer: Any) -> str:
+    """The paired difference of a row of ``answers`` with its interval, as text.
+
+    It is in percentage points for the paper's metrics; small numbers have more digits.
+    """
+    ends = (answer.difference, answer.low, answer.high)
+    if answer.metric not in METRICS:
+        return _amount(*ends, sign="+")
+    if 0 < answer.high - answer.low < 0.01:
+        return _amount(*(100 * end for end in ends), sign="+")
+    return numbers.points(*ends)
+
+
+def _amount(value: float, *ends: float, sign: str = "") -> str:
+    """A number with two decimals, or more if it is small, and its interval if it has a length."""
+    digits = 2 if abs(value) >= 0.1 or not value else 4
+    rounded = [round(number, digits) or 0.0 for number in (value, *ends)]  # no -0.00
+    texts = [numbers.minus(f"{number:{sign if number else ''}.{digits}f}") for number in rounded]
+    return f"{texts[0]} [{', '.join(texts[1:])}]" if len({*ends}) > 1 else texts[0]
+
+
+@dataclass(frozen=True, eq=False)
+class WhatIf:
+    """The answer to a what-if question.
+
+    Attributes:
+        question: The study that was run, its folder and its command.
+        results: The results; ``results.missions`` is a tidy table of the missions.
+        shown: The policy of ``typical`` and ``worst``.
+    """
+
+    question: Question
+    results: Results
+    shown: str
+
+    def table(self) -> pd.DataFrame:
+        """The paired differences, with a row per policy and metric, as ``answers``."""
+        return answers(self.results)
+
+    def _of_product(self) -> Iterable[Any]:
+        """The rows of the table on the product, one per policy."""
+        table = self.table()
+        return table[table["metric"] == PRODUCT].itertuples()
+
+    def answer(self) -> str:
+        """The paired differences in product, in words (Markdown)."""
+        before, after = map(self._best, (BASELINE, VARIATION))
+        lines = "\n".join(f"- {conclusion(row)}" for row in self._of_product())
+        return f"{lines}\n\nThe highest mean: in the baseline {before}; in the variation {after}."
+
+    def _repr_markdown_(self) -> str:
+        return self.answer()
+
+    def sentence(self) -> str:
+        """What the variation changes, in a sentence."""
+        new = [
+            f"{parameter(side.Field).words(side.Variation)} instead of {side.Baseline}"
+            for side in self._fields(self._changed).itertuples()
+        ]
+        parts = [
+            f"that of {row.policy} by {change(row)} points"
+            + " (inconclusive)" * (verdict(row) == INCONCLUSIVE)
+            for row in self._of_product()
+        ]
+        n = f"n = {numbers.span(row.n for row in self._of_product())} pairs"
+        return f"With {numbers.words(new)}, the product changes: {numbers.words(parts)}; {n}."
+
+    def answers(self) -> list[str]:
+        """What the variation changes, and then the conclusion on every policy, in sentences."""
+        return [self.sentence(), *(_plain(conclusion(row)) for row in self._of_product())]
+
+    def _best(self, point: int) -> str:
+        """The best policy of one side with its mean, as ``greedy, 95.3 % [94.5, 96.1]``."""
+        policy = best_policy(self.results, point)
+        return f"{policy}, {numbers.estimate(estimate(self.results, policy, point=point))}"
+
+    def winners(self) -> str:
+        """In words: the shares of the missions in which each policy is better or worse."""
+        gaps = {policy: differences(self.results, policy) for policy in self.results.policies}
+        return "; ".join(
+            f"{policy} is better in {numbers.percent((of_policy > 0).mean())} and worse in "
+            f"{numbers.percent((of_policy < 0).mean())}"
+            for policy, of_policy in gaps.items()
+        )
+
+    @property
+    def _changed(self) -> dict[str, Any]:
+        """The fields that the variation sets."""
+        return self.results.store.manifest.points[VARIATION].values
+
+    def _fields(self, names: Iterable[str]) -> pd.DataFrame:
+        """Fields of the scenario in the baseline and in the variation, as a table to print."""
+        sides = [self.results.scenario(point) for point in (BASELINE, VARIATION)]
+        rows = [(name, _meaning(name), *(in_words(side, name) for side in sides)) for name in names]
+        return pd.DataFrame(rows, columns=["Field", "Meaning", "Baseline", "Variation"])
+
+    def field_table(self) -> pd.DataFrame:
+        """The fields that the variation changes, that both sides set and that missions draw."""
+        space = self.results.scenario(BASELINE)
+        ranges = {name: getattr(space, name) for name in RANGES}
+        drawn = [name for name, (low, high) in ranges.items() if low < high]
+        shared = self.results.store.manifest.study.set
+        return self._fields(dict.fromkeys([*self._changed, *shared, *drawn]))
+
+    @property
+    def sides(self) -> tuple[list[str], list[str]]:
+        """The changed fields with their values in the baseline and in the variation: ``uavs 3``."""
+        table = self._fields(self._changed)
+        before, after = (table["Field"] + " " + table[side] for side in ("Baseline", "Variation"))
+        return [*before], [*after]
+
+    def measures(self, policy: str) -> pd.DataFrame:
+        """The rows of the table of a policy, as a table to print."""
+        table, lines = self.table(), []
+        for row in table[table["policy"] == policy].itertuples():
+            write, unit = (numbers.percent, " points") if row.metric in METRICS else (_amount, "")
+            sides = ["–" if np.isnan(mean) else write(mean) for mean in (row.before, row.after)]
+            name = (_SHORT | MEASURES).get(row.metric) or metric_of(row.metric).label
+            difference = f"{MARKS[verdict(row)]} {change(row)}{unit}" if row.n else ""
+            lines.append([name, *sides, difference])
+        heads = ["Mean per mission", "Baseline", "Variation", "Paired difference"]
+        return pd.DataFrame(lines, columns=heads)
+
+    def pairing(self) -> pd.DataFrame:
+        """How much common random numbers narrow the intervals, as a table to print."""
+        table, lines = self.table(), []
+        for row in table[table["metric"].isin([*METRICS])].itertuples():
+            left = 1 - row.variance_reduction
+            narrower = numbers.percent(1 - left**0.5) if left < 1 else "none"
+            worth = f"{row.n / left:,.0f}" if left else "any number"
+            amounts = (numbers.minus(f"{row.correlation:.2f}"), numbers.percent(left), narrower)
+            lines.append((row.policy, _SHORT[row.metric], *amounts, worth))
+        heads = ["Policy", "Metric", "Correlation", "Variance left", "Narrower by", "Worth"]
+        return pd.DataFrame(lines, columns=heads)
+
+    def plot(self) -> "Figure":
+        """The paired differences of the metrics, with intervals."""
+        from analysis.figures import comparison
+
+        return comparison.gains(self.table())
+
+    def plot_means(self, metric: str = PRODUCT) -> "Figure":
+        """A metric of every policy in the baseline and in the variation, with intervals.
+
+        Args:
+            metric: One of the paper's metrics, or of what the missions measured.
+        """
+        from analysis.figures import comparison
+
+        sides = ["\n".join((side, *words)) for side, words in zip(SIDES, self.sides, strict=True)]
+        return comparison.means(means(self.results), metric, sides)
+
+    def plot_spread(self) -> "Figure":
+        """The distribution of the paired differences in product."""
+        from analysis.figures import comparison
+
+        policies = self.results.policies
+        return comparison.spread({policy: differences(self.results, policy) for policy in policies})
+
+    def typical(self) -> "Example":
+        """The replication that has the median of the differences.
+
+        With an even number it is the lower one of the two in the middle; among equal ones, the
+        first.
+        """
+        ordered = differences(self.results, self.shown).sort_values(kind="stable")
+        middle = ordered.iloc[(len(ordered) - 1) // 2]
+        return Example(self, int(ordered.index[ordered == middle][0]))
+
+    def worst(self) -> "Example":
+        """The replication with the lowest product in the variation.
+
+        Among equal ones it is the one with the lowest collection ratio, then the first.
+        """
+        missions = self.results.missions
+        is_shown = (missions["policy"] == self.shown) & (missions["point"] == VARIATION)
+        ordered = missions[is_shown].sort_values([PRODUCT, RATIO], kind="stable")
+        return Example(self, int(ordered["replication"].iloc[0]))
+
+    def as_toml(self) -> str:
+        """The question as the TOML file of a study, to which rows can be added."""
+        study = self.results.manifest["study"]
+        names = ("scenario", "policies", "missions", "seed", "set", "design")
+        return tomli_w.dumps({"name": "my-sweep"} | {n: study[n] for n in names if study[n] != {}})
+
+
+@dataclass(frozen=True)
+class Example:
+    """A replication of the shown policy in the baseline and in the variation.
+
+    Attributes:
+        answer: The answer to the question.
+        replication: The replication.
+    """
+
+    answer: WhatIf
+    replication: int
+
+    def effect(self) -> str:
+        """By how much the variation changes the mission, in a sentence of Markdown."""
+        policy = self.answer.shown
+        gap = numbers.difference(differences(self.answer.results, policy)[self.replication], 0)
+        return (
+            f"Replication {self.replication} with **{policy}**: the variation changes the product "
+            f"by {gap} points."
+        )
+
+    def commands(self) -> list[str]:
+        """The commands that simulate both missions again."""
+        command, lines = self.answer.results.command, []
+        for point, side in enumerate(SIDES):
+            lines += [f"# {side}", command(self.answer.shown, point, self.replication)]
+        return lines
+
+    def drawings(self) -> "list[tuple[Figure, str, str]]":
+        """The two missions, simulated again: a figure, its alternative text and caption each."""
+        return [self._drawing(point) for point in (BASELINE, VARIATION)]
+
+    def _drawing(self, point: int) -> "tuple[Figure, str, str]":
+        from analysis.figures.missions import mission_figure
+
+        shown, results = self.answer.shown, self.answer.results
+        mission = resimulate(results, shown, point, self.replication)
+        figure = mission_figure(mission.events, mission.scenario)
+        ends = [uav["end"] for uav in mission.record.uav_rows()]
+        fates = {"battery": "deplete their battery", "truncated": "run out of time"}
+        failures = [
+            f"{ends.count(end)} of {len(ends)} UAVs {fate}"
+            for end, fate in fates.items()
+            if end in ends
+        ]
+        fate = f"but {numbers.words(failures)}: it counts 0" if failures else "all quotas filled"
+        caption = (
+            f"{SIDES[point].capitalize()} ({', '.join(self.answer.sides[point])}): collection "
+            f"ratio {numbers.percent(mission.record.collection_ratio)}, {fate}. "
+            f"{mission.record.slots} mission slots. n = 1."
+        )
+        return figure, "Map of the mission; battery, residual data and charging", caption
+
+
+def check_shown(question: Question, policy: str | None) -> None:
+    """Refuse a policy to show that the question does not ask about.
+
+    Raises:
+        InputError: If there is one.
+    """
+    asked = question.study.policies
+    if policy is not None and policy not in asked:
+        raise InputError(f"shown: {policy!r} is not asked about{one_of(policy, asked)}")
+
+
+def what_if(
+    settings: Mapping[str, Any],
+    baseline: Mapping[str, Any] | None = None,
+    scenario: str | Path = "paper",
+    policies: Sequence[str] | None = None,
+    missions: int = 500,
+    seed: int = 0,
+    folder: str | Path = "results",
+    workers: int = 1,
+    shown: str | None = None,
+    progress: Progress | None = None,
+    yes: bool = False,
+) -> WhatIf:
+    """Simulate a baseline and a variation of it with common random numbers, and compare them.
+
+    The missions are stored in ``FOLDER/what-if``. The same question is answered at once the next
+    time; with more missions, only those that are missing are simulated.
+
+    Args:
+        settings: Fields of the scenario that the variation sets.
+        baseline: Fields of the scenario that are set in both; in the variation, ``settings`` comes
+            first.
+        scenario: The name of a shipped scenario, or a TOML file.
+        policies: Teams, each compared with itself: ``"P"`` or ``"P,P,..."``. Without any, the best
+            policy that five minutes allow, and ``greedy``.
+        missions: Number of missions of each policy on each side, at least 2.
+        seed: Seed of the missions.
+        folder: Folder in which results are stored.
+        workers: Number of processes. Two or more take seconds to start; they help in long runs.
+        shown: The policy of ``typical`` and ``worst``. By default the best one in the variation.
+        progress: Called with the number of missions done since its last call.
+        yes: Whether the question may take more than an hour.
+
+    Raises:
+        InputError: Before anything is written, if a field, a value or a policy is unknown or not
+            allowed, a policy cannot act in the scenario, or the question would take long.
+    """
+    question = what_if_question(settings, baseline, scenario, policies, missions, seed, folder)
+    check_shown(question, shown)
+    results = question.ask(workers, progress, yes=yes)
+    return WhatIf(question, results, shown or best_policy(results, VARIATION))

@@ -1,0 +1,414 @@
+"""A question in a line: a study made of values, kept in a folder under a hash, and asked again.
+
+    question = sweep_question({"uavs": (2, 3), "pads": (1, 2)}, policies=["greedy"])
+    results = question.ask()  # simulates the missions that no question in the folder has
+
+A sweep is a study of every combination of values; a what-if question is one of a scenario and
+changes of it.
+"""
+
+import json
+import os
+import shlex
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+from pydantic import ValidationError
+
+import dess
+from analysis import numbers
+from analysis.execution.effort import BASELINE as ANY_POLICY
+from analysis.execution.effort import Planned, check_run, plan_study, policies_for
+from analysis.execution.jobs import Progress
+from analysis.execution.runner import Round, run_study
+from analysis.metrics import ALIASES, METRICS
+from analysis.names import SWEEP, SWEEPS
+from analysis.results.chunks import MANIFEST, short_hash
+from analysis.results.provenance import engine_code, team_of
+from analysis.results.tables import Results
+from analysis.study.cheapest import Cheapest, Costs
+from analysis.study.design import MAX_SIZE, Grid, Table
+from analysis.study.study import Study, study_from
+from dess import InputError
+from dess.errors import one_of, validation_line
+from dess.files.reading import paths_in
+from dess.files.writing import write_file
+from dess.scenario import (
+    SAMPLED,
+    ScenarioSpace,
+    dotted,
+    fields_of,
+    is_scenario_name,
+    load_scenario,
+)
+from policies.registry import typed
+
+WHAT_IF = "what-if"
+RANGES = (*SAMPLED, "initial_data")  # fields that hold [low, high]
+_LENGTHS = {"initial_data": 2, "zone": 4}  # of fields whose value is a list of numbers
+LONGEST = 60  # largest number of characters for the fields in a name
+
+# Missions in the search for the cheapest setting: at most, per setting on average and over all
+# settings; and with how many of every setting it begins.
+BUDGET, ALL, FIRST = 2_000, 1_000_000, 20
+# How many a setting takes on average, with those that check the answer: 20 settings of the scenario
+# ``bay`` with a success of 99 % took 620 each.
+USUAL = 620
+LITTLE = 0.01  # as a share of the prices: a saving that does not matter
+
+
+@dataclass(frozen=True)
+class Question:
+    """A study that answers a question, and where it is kept.
+
+    Attributes:
+        study: The study.
+        out: Its results folder, beside those of other questions of the same kind.
+    """
+
+    study: Study
+    out: Path
+
+    @property
+    def file(self) -> Path:
+        """The file of the study, which ``dess study run`` reads."""
+        return self.out.parent / f"{self.out.name}.toml"
+
+    @property
+    def others(self) -> list[Path]:
+        """The results folders of the other questions, whose missions are copied."""
+        found = paths_in(self.out.parent, f"*/{MANIFEST}")
+        return [path.parent for path in found if path.parent != self.out]
+
+    def plan(self, workers: int = 1) -> list[Planned]:
+        """What ``ask`` would do, as ``plan_study`` says it; nothing is written."""
+        return plan_study(self.study, self.out, workers, reuse=self.others)
+
+    def ask(
+        self,
+        workers: int = 1,
+        progress: Progress | None = None,
+        announce: Callable[[Round], object] | None = None,
+        yes: bool = False,
+    ) -> Results:
+        """Write the file of the study, and simulate the missions that no question there has.
+
+        Args:
+            workers: Number of processes. Two or more take seconds to start; they help in long runs.
+            progress: As for ``run_study``.
+            announce: As for ``run_study``.
+            yes: Whether a question of any length is allowed.
+
+        Raises:
+            InputError: Before anything is written, if a policy cannot act in the scenario, the
+                question would take long, or another one has the same name; or if the folder cannot
+                be written or is in use.
+            ChunkError: As for ``run_study``.
+        """
+        reuse = self.others
+        check_run(self.study, self.out, workers, reuse=reuse, yes=yes)
+        data = self.study.model_dump(mode="json", exclude_unset=True)
+        if not is_scenario_name(self.study.scenario):
+            path = os.path.relpath(self.study.scenario, self.file.parent)
+            data["scenario"] = Path(path).as_posix()
+        write_file(self.file, tomli_w.dumps(data))
+        return run_study(self.study, self.out, workers, None, progress, announce, reuse=reuse)
+
+    @property
+    def command(self) -> str:
+        """The command that asks the question again."""
+        study, design, rule = self.study, self.study.design, self.study.selection
+        if isinstance(design, Table):
+            before, after = design.rows
+            sides = {"set": after, "baseline": study.set | before}
+            words = [WHAT_IF]
+            for option, values in sides.items():
+                words += _options(option, _listed({f: [value] for f, value in values.items()}))
+            teams = list(study.policies)
+        else:
+            assert isinstance(design, Grid)
+            fixed = {field: (value,) for field, value in study.set.items()}
+            words = ["sweep", *_options("set", _listed(fixed | design.values))]
+            teams = [",".join(study.policies)]
+        words += [word for team in teams for word in ("--policy", team)]
+        missions = rule.check if isinstance(rule, Cheapest) else study.missions
+        words += ["--missions", str(missions), "--seed", str(study.seed)]
+        if study.scenario != "paper":
+            words += ["--scenario", Path(study.scenario).name]
+        if study.costs:
+            words += _options("price", study.costs.model_dump(exclude_unset=True))
+        if isinstance(rule, Cheapest):
+            words += _options("require", rule.requirements)
+        return shlex.join(["dess", *words])
+
+
+def _options(name: str, values: Mapping[Any, Any]) -> list[str]:
+    """``--NAME KEY=VALUE`` for every value."""
+    return [word for key, value in values.items() for word in (f"--{name}", f"{key}={value}")]
+
+
+def _listed(values: Mapping[str, Iterable[Any]]) -> dict[str, str]:
+    """The values of every field in the syntax of ``--set``."""
+    return {f: json.dumps([*v], separators=(",", ":"))[1:-1] for f, v in values.items()}
+
+
+def _key(study: Study) -> str:
+    """A hash of all that the records of a question depend on, without their number.
+
+    So the same question with more missions adds to the same results folder.
+    """
+    data = study.model_dump(mode="json", exclude={"missions": True, "selection": {"check"}})
+    about = {
+        "version": dess.__version__,
+        "engine": engine_code(),
+        "teams": [team_of(policy).model_dump(mode="json") for policy in study.policies],
+        "base": load_scenario(study.scenario, **study.set).model_dump(mode="json"),
+        "study": data | {"scenario": Path(study.scenario).name},
+    }
+    return short_hash(json.dumps(about, sort_keys=True).encode())
+
+
+def sweep_question(
+    values: Mapping[str, Sequence[Any]],
+    scenario: str | Path = "paper",
+    policies: Iterable[str] | None = None,
+    missions: int = 300,
+    seed: int = 0,
+    prices: Mapping[str, Any] | None = None,
+    requirements: Mapping[str, float] | None = None,
+    name: str | None = None,
+    folder: str | Path = "results",
+) -> Question:
+    """Which combination of values is the best, or the cheapest that meets requirements?
+
+    Args:
+        values: For each field of the scenario its values. A field with one value is fixed.
+        scenario: The name of a shipped scenario, or a TOML file.
+        policies: Teams: ``"P"`` or ``"P,P,..."``. Without any, the best policy that five minutes
+            allow, and ``greedy``.
+        missions: Number of missions of every setting. With requirements, the number of additional
+            missions that check each selected setting.
+        seed: Seed of the missions.
+        prices: Fields of ``Costs``.
+        requirements: For each required metric its lowest acceptable mean. With requirements the
+            study searches for the cheapest setting that meets them, and needs prices.
+        name: Name of the sweep. Without one, it is made of the fields and a hash.
+        folder: It is kept in ``FOLDER/sweeps/NAME``.
+
+    Raises:
+        InputError: If a field, a value, a policy, a price or a requirement is not allowed.
+    """
+    if unknown := [key for key in prices or () if key not in Costs.model_fields]:
+        raise InputError(
+            f"prices: {unknown[0]!r} is unknown{one_of(unknown[0], Costs.model_fields)}"
+        )
+    swept = {field: of_field for field, of_field in values.items() if len(of_field) > 1}
+    load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
+    data = {
+        "name": "sweep" if name is None else name,
+        "description": SWEEP,
+        "scenario": str(scenario),
+        "set": {field: values[field][0] for field in values if field not in swept},
+        "design": {"kind": "grid", "values": swept},
+        "policies": typed([policies] if isinstance(policies, str) else policies or [ANY_POLICY]),
+        "seed": seed,
+        **({"costs": dict(prices)} if prices else {}),
+        **({} if requirements else {"missions": missions}),
+    }
+    study = study_from(data, "sweep")
+    # What is decided by the design points, so once the study is known to be valid.
+    decided: dict[str, Any] = {}
+    if requirements:
+        decided["selection"] = _cheapest(requirements, missions, study)
+    if policies is None:
+        each = max(USUAL, missions) if requirements else missions
+        decided["policies"] = policies_for(study.scenarios, each)
+    study = study.model_copy(update=decided)
+    if name is None:
+        name = f"{'-'.join(swept)[:LONGEST] or 'sweep'}-{_key(study)}"
+        study = study.model_copy(update={"name": name})
+    return Question(study, Path(folder) / SWEEPS / name)
+
+
+def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) -> Cheapest:
+    """The rule that searches for the cheapest setting that meets the requirements."""
+    prices = study.costs
+    if not prices:
+        raise InputError("requirements: need prices; allowed: prices, such as uav=20000")
+    least = {}
+    for metric, share in requirements.items():
+        full = ALIASES.get(metric, metric)
+        if full not in METRICS:
+            allowed = one_of(metric, [*METRICS, *ALIASES])
+            raise InputError(f"requirements: {metric!r} is unknown{allowed}")
+        least[full] = share
+    spaces = study.scenarios
+    fleet = prices.uav * max(space.uavs[1] for space in spaces)
+    fleet += prices.pad * max(space.charging_pads for space in spaces)
+    running = prices.missions * (prices.charge + prices.hour + prices.lost_uav)
+    if not fleet and not running:
+        raise InputError("prices: all are 0; allowed: one or more above 0")
+    rule = {
+        "procedure": "cheapest",
+        "requirements": least,
+        "indifference": LITTLE * (fleet or running),
+        "budget": min(BUDGET * study.size, max(ALL, FIRST * study.size)),
+        "first": FIRST,
+        "check": missions,
+    }
+    try:
+        return Cheapest.model_validate(rule)
+    except ValidationError as error:
+        raise InputError(validation_line(error, "sweep: selection: cheapest", Cheapest)) from None
+
+
+def what_if_question(
+    settings: Mapping[str, Any],
+    baseline: Mapping[str, Any] | None = None,
+    scenario: str | Path = "paper",
+    policies: Sequence[str] | None = None,
+    missions: int = 500,
+    seed: int = 0,
+    folder: str | Path = "results",
+) -> Question:
+    """What if the baseline had these settings?
+
+    Where fields of a section are set, both sides measure what the section can measure.
+
+    Args:
+        settings: Fields of the scenario that the variation sets.
+        baseline: Fields of the scenario that are set in both; in the variation, ``settings`` comes
+            first.
+        scenario: The name of a shipped scenario, or a TOML file.
+        policies: Teams, each compared with itself. Without any, the best policy that five minutes
+            allow, and ``greedy``.
+        missions: Number of missions of each policy on each side, at least 2.
+        seed: Seed of the missions.
+        folder: It is kept in ``FOLDER/what-if/HASH``.
+
+    Raises:
+        InputError: If a field, a value or a policy is unknown or not allowed, or if ``settings``
+            changes nothing.
+    """
+    for name, values in (("settings", settings), ("baseline", baseline or {})):
+        if not isinstance(values, Mapping):
+            raise InputError(f"{name}: {values!r}; allowed: fields and values, such as {{uavs=5}}")
+    fixed, changed = dotted(dict(baseline or {})), dotted(dict(settings))
+    measuring = {field for field in changed if field.endswith(".measured")}
+    if changed.keys() - measuring:  # what changes is something else, which both sides measure
+        fixed |= {field: changed.pop(field) for field in sorted(measuring)}
+    fixed = _measured(fixed | changed) | fixed
+    sides = load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed)
+    _check_changes(*sides, changed)
+    if isinstance(missions, int) and missions < 2:
+        raise InputError(f"missions: {missions} is too few; allowed: 2 or more")
+    before = {field: fixed[field] for field in changed if field in fixed}
+    data = {
+        "name": WHAT_IF,
+        "description": "a variation compared with its baseline, on the same missions",
+        "scenario": str(scenario),
+        "set": {field: value for field, value in fixed.items() if field not in changed},
+        "design": {"kind": "table", "rows": [before, changed]},
+        "policies": typed(policies_for(sides, missions) if policies is None else policies),
+        "missions": missions,
+        "seed": seed,
+    }
+    study = study_from(data, "question")
+    return Question(study, Path(folder) / WHAT_IF / _key(study))
+
+
+def _check_changes(before: ScenarioSpace, after: ScenarioSpace, changed: Iterable[str]) -> None:
+    """Refuse a variation that changes nothing, or sets a field to its value in the baseline."""
+    for field in changed:
+        if _value(before, field) == _value(after, field):
+            raise InputError(
+                f"settings: {field} is {in_words(before, field)} in the baseline already; "
+                "allowed: another value"
+            )
+    if not changed:
+        allowed = ", ".join(fields_of(ScenarioSpace))
+        raise InputError(f"settings: none is given; allowed: one or more of {allowed}")
+
+
+def _measured(values: Iterable[str]) -> dict[str, bool]:
+    """The fields that measure what belongs to the sections of these fields, without those given."""
+    sections = {section for section, dot, _ in (field.partition(".") for field in values) if dot}
+    measuring = fields_of(ScenarioSpace).keys() & {f"{section}.measured" for section in sections}
+    return dict.fromkeys(sorted(measuring - {*values}), True)
+
+
+def in_words(space: ScenarioSpace, field: str) -> str:
+    """The value of a field in words: ``3``, ``10 to 50`` for a range, ``25 cells`` for nodes."""
+    value = _value(space, field)
+    if field in RANGES:
+        return numbers.span(value, "{:g}")
+    if field == "nodes":
+        return f"{len(value)} cells"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value).strip("()")
+
+
+def _value(space: ScenarioSpace, field: str) -> Any:
+    """The value of a field; for ``pads``, the number of pads also if it follows from the zone."""
+    value = space.value(field)
+    return space.zone_pads[0] if field == "pads" else value
+
+
+def values_of(field: str, given: Any) -> tuple[Any, ...]:
+    """The values of a field, as a tuple.
+
+    Args:
+        field: The field.
+        given: A value, or a list, tuple, range or array of values.
+
+    Raises:
+        InputError: If there is none, or there are too many.
+    """
+    return (_plain(given),) if _is_value(field, given) else listed(field, given)
+
+
+def listed(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
+    """One or several values of a field, in the types of TOML.
+
+    Raises:
+        InputError: If there is none, or there are too many.
+    """
+    if isinstance(given, range):  # ``len`` fails for more than 2^63
+        count = max(0, -((given.start - given.stop) // given.step))
+    else:
+        count = len(given)
+    if not 0 < count <= MAX_SIZE:
+        counted = f"{count:,}" if count else "no"
+        raise InputError(f"{field}: has {counted} values; allowed: 1 to {MAX_SIZE:,}")
+    return tuple(map(_plain, given))
+
+
+def _is_value(field: str, given: Any) -> bool:
+    """Whether ``given`` is one value of the field, and not several values."""
+    if isinstance(given, np.ndarray):
+        return given.ndim == 0
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        return True
+    if isinstance(given, range):
+        return False
+    if field == "nodes":
+        return all(_are_numbers(cell, 2) for cell in given) and len(given) > 0
+    return _are_numbers(given, _LENGTHS.get(field))
+
+
+def _are_numbers(given: Any, length: int | None) -> bool:
+    """Whether ``given`` is a list of so many numbers."""
+    is_list = isinstance(given, list | tuple) and len(given) == length
+    return is_list and all(isinstance(item, int | float | np.number) for item in given)
+
+
+def _plain(value: Any) -> Any:
+    """A value in the types of TOML, without numpy types and tuples."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value

@@ -1,0 +1,277 @@
+"""``dess sweep`` and ``dess what-if``: a question in one line, and its answer with a page."""
+
+import json
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dess.code.libraries import missing
+from dess.errors import InputError, one_of, shown
+from reports.cli import console, options
+from reports.cli.console import YesOption, complete
+from reports.cli.options import (
+    PAGES,
+    RESULTS,
+    SET,
+    JsonOption,
+    ScenarioOption,
+    SeedOption,
+    WorkersOption,
+    all_settings,
+    all_values,
+    command,
+)
+from reports.cli.report import WHAT_IF, rendering
+from reports.cli.studies import print_plan
+from reports.folders import PREFIX, check_pages
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from analysis.ask.answer import Sweep, WhatIf
+    from analysis.ask.question import Question
+    from analysis.results.tables import Results
+    from reports.pages.kernels import Progress
+
+SHOWN = 20  # rows of the table
+PRICE = "a price and its amount, e.g. uav=20000"
+SHARE = "a metric and its least mean, e.g. success=0.99"
+
+app = typer.Typer()
+
+
+@command(app)
+def sweep(
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUES", autocompletion=options.fields),
+    ] = None,
+    policy: Annotated[
+        list[str] | None, typer.Option(metavar="P,P,...", autocompletion=options.policies)
+    ] = None,
+    metric: str | None = None,
+    missions: Annotated[int, typer.Option(min=1)] = 300,
+    scenario: ScenarioOption = "paper",
+    seed: SeedOption = 0,
+    workers: WorkersOption = 1,
+    price: Annotated[list[str] | None, typer.Option(metavar="KEY=AMOUNT")] = None,
+    require: Annotated[list[str] | None, typer.Option(metavar="METRIC=SHARE")] = None,
+    name: str | None = None,
+    results: Annotated[Path, typer.Option(metavar="DIR")] = RESULTS,
+    out: Annotated[Path, typer.Option(metavar="DIR")] = PAGES,
+    dry_run: Annotated[bool, typer.Option("--dry-run")] = False,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Simulate every combination of values, write a page, and print the ranked settings.
+
+    Args:
+        settings: The values of a field: 2..5, 0.01..0.05:5 (five values) or 1,2,4. A field with
+            one value is fixed; zones.pads are the pads of all further zones; repeatable.
+        policy: Policies to compare; repeatable.  [default: the best that five minutes allow, and
+            greedy]
+        metric: The metric that ranks the settings: success, ratio, product, reward, cost, or
+            what the scenario measures, such as age.  [default: product]
+        missions: Missions per setting; with --require, additional missions that check each
+            selected setting.
+        price: A price: uav, pad, charge, hour or lost_uav; also currency, missions (planned for
+            the fleet) and slot_seconds; repeatable.
+        require: Search for the cheapest setting whose mean of a metric (success, ratio,
+            product) is at least this; repeatable. It may be half a point below; the answer says
+            what is guaranteed.
+        name: Name of the sweep.  [default: its fields and a hash]
+        results: Folder in which the results are stored, as sweeps/NAME.
+        out: Folder of the page.
+        dry_run: Only print the plan and the range of its time.
+    """
+    from analysis.ask.answer import Sweep
+    from analysis.ask.question import sweep_question
+    from analysis.metrics import ALIASES, PRODUCT
+
+    question = sweep_question(
+        all_values(settings or []),
+        scenario,
+        [name for text in policy for name in text.split(",")] if policy else None,
+        missions,
+        seed,
+        all_settings(map(_with_quotes, price or []), "--price", PRICE),
+        all_settings(require or [], "--require", SHARE),
+        name,
+        results,
+    )
+    ranking = ALIASES.get(metric or PRODUCT, metric or PRODUCT)
+    if ranking not in (measured := question.study.metrics):
+        allowed = one_of(metric, [*ALIASES, *measured])
+        raise InputError(f"--metric: {shown(metric)} is not measured{allowed}")
+    found = _run(question, f"{PREFIX}{question.study.name}", out, workers, dry_run, yes)
+    answer, parameters = Sweep(question, found), {"metric": ranking} if metric else {}
+
+    def render(progress: "Progress") -> Path:
+        from reports.pages.render import render_study
+
+        return render_study(question.out, out, progress, parameters)
+
+    show = partial(_print_settings, answer, ranking)
+    _tell(answer, answer.table(ranking), show, render, as_json, "sweep")
+
+
+@command(app, WHAT_IF)
+def what_if(
+    settings: Annotated[
+        list[str], typer.Option(SET, metavar="KEY=VALUE", autocompletion=options.fields)
+    ],
+    baseline: Annotated[
+        list[str] | None, typer.Option(metavar="KEY=VALUE", autocompletion=options.fields)
+    ] = None,
+    policy: Annotated[
+        list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.policies)
+    ] = None,
+    missions: Annotated[int, typer.Option(min=2)] = 500,
+    scenario: ScenarioOption = "paper",
+    seed: SeedOption = 0,
+    workers: WorkersOption = 1,
+    shown: Annotated[str | None, typer.Option(metavar="P[,P...]")] = None,
+    results: Annotated[Path, typer.Option(metavar="DIR")] = RESULTS,
+    out: Annotated[Path, typer.Option(metavar="DIR")] = PAGES,
+    dry_run: Annotated[bool, typer.Option("--dry-run")] = False,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare a variation with a baseline on the same missions, write a page, print the answer.
+
+    Args:
+        settings: What the variation changes: a field of the scenario and its value, in TOML
+            syntax; repeatable.
+        baseline: A field that is set in the baseline, and in the variation as well where --set
+            does not set it; repeatable.  [default: the scenario as it is]
+        policy: A policy, or several that the UAVs follow in turn, compared with itself;
+            repeatable.  [default: the best that five minutes allow, and greedy]
+        missions: Missions of every policy on each side.
+        shown: The policy whose missions are drawn.  [default: the best one in the variation]
+        results: Folder in which the results are stored, as what-if/HASH.
+        out: Folder of the page.
+        dry_run: Only print the plan and the range of its time.
+    """
+    from analysis.ask.answer import VARIATION, WhatIf, best_policy, check_shown
+    from analysis.ask.question import what_if_question
+
+    changes, fixed = all_settings(settings, SET), all_settings(baseline or [], "--baseline")
+    question = what_if_question(changes, fixed, scenario, policy, missions, seed, results)
+    check_shown(question, shown)
+    found = _run(question, WHAT_IF, out, workers, dry_run, yes)
+    parameters = {
+        "settings": changes,
+        "baseline": fixed,
+        "scenario": scenario,
+        "policies": [*map(str, question.study.policies)],
+        "missions": missions,
+        "seed": seed,
+        "shown": shown,
+    }
+
+    def render(progress: "Progress") -> Path:
+        from reports.pages.render import render
+
+        render([WHAT_IF], results, out, progress, parameters)
+        return out / f"{WHAT_IF}.html"
+
+    answer = WhatIf(question, found, shown or best_policy(found, VARIATION))
+    show = partial(_print_measures, answer)
+    _tell(answer, answer.table(), show, render, as_json, "what-if question")
+
+
+def _run(
+    question: "Question", page: str, out: Path, workers: int, dry_run: bool, yes: bool
+) -> "Results":
+    """Run a question after all checks; with --dry-run, print its plan and end the command."""
+    study, folder = question.study, question.out
+    if dry_run:
+        print_plan(question.plan(workers), study, folder, workers)
+        raise typer.Exit
+    check_pages(out, page)
+    return complete(
+        study.name,
+        lambda progress, announce: question.ask(workers, progress, announce, yes),
+        f"dess study run {question.file} --out {folder}",
+    )
+
+
+def _tell(
+    answer: "Sweep | WhatIf",
+    table: "pd.DataFrame",
+    show: Callable[[], None],
+    render: "Callable[[Progress], Path]",
+    as_json: bool,
+    asked: str,
+) -> None:
+    """Print an answer, and write its page, which takes longer; or print all of it as JSON."""
+    question = answer.question
+    if not as_json:
+        show()
+        for line in answer.answers():
+            console.say(line)
+        console.say(f"study: {question.file}")
+    page = None
+    if absent := missing("reports", f"the page of a {asked}"):
+        console.say(f"no page: {absent}", sys.stderr)
+    else:
+        with rendering() as progress:
+            page = render(progress)
+    if as_json:
+        places = {"results": str(question.out), "study_file": str(question.file)}
+        about = {"study": question.study.name, **places, "page": page and str(page)}
+        rows = json.loads(table.to_json(orient="records"))
+        print(json.dumps({**about, "answers": answer.answers(), "table": rows}, indent=2))
+    elif page:
+        console.say(f"page: {page}")
+
+
+def _print_settings(answer: "Sweep", ranking: str) -> None:
+    """Print the first settings of the ranking."""
+    import numpy as np
+    import pandas as pd
+
+    from analysis import numbers
+    from analysis.answers.settings import varied
+    from analysis.metrics import COST, PRODUCT, SUCCESS, metric_of
+    from analysis.names import value_text
+
+    study = answer.question.study
+    table, fields, prices = answer.table(ranking), [*varied(answer.results)], study.costs
+    top = table.head(SHOWN)
+    cells = pd.DataFrame({"rank": top["rank"], "": np.where(top["tied"], "≈", "")})
+    cells["policy"] = top["policy"]
+    cells[fields] = top[fields].map(value_text)
+    required = getattr(study.selection, "requirements", {})
+    shown = dict.fromkeys([ranking, SUCCESS, *required, PRODUCT])
+    for name in [name for name in shown if name != COST]:
+        metric = metric_of(name)
+        cells[metric.head] = numbers.estimates(top, name, metric.written)
+    if prices:
+        paid = [numbers.money(cost, prices.currency) for cost in top[COST]]
+        cells[COST] = paid
+    console.print_table([*map(str, cells)], cells.astype(str).to_numpy().tolist())
+    first = f", the first {SHOWN} are shown" if len(table) > SHOWN else ""
+    what = metric_of(ranking).within
+    console.say(
+        f"{len(table):,} settings{first}; ≈: the {what} may be as good as that of the first"
+    )
+
+
+def _print_measures(answer: "WhatIf") -> None:
+    """Print what was measured on both sides, policy by policy."""
+    from reports.cli.tables import print_frame
+
+    for policy in answer.results.policies:
+        print_frame(policy, answer.measures(policy).set_index("Mean per mission"))
+
+
+def _with_quotes(text: str) -> str:
+    """The name of a currency in TOML syntax."""
+    key, _, value = text.partition("=")
+    quoted = key.strip() != "currency" or value.strip().startswith(("'", '"'))
+    return text if quoted else f"{key}={json.dumps(value)}"

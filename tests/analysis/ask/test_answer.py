@@ -1,0 +1,310 @@
+"""``analysis.sweep`` and ``analysis.what_if``: what the answers to questions offer."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pandas as pd
+import pytest
+import tqdm.auto
+from matplotlib.figure import Figure
+from scipy import stats
+
+from analysis import load_study, sweep, what_if
+from analysis.answers.settings import varied
+from analysis.ask import answer as found
+from analysis.ask.answer import BASELINE, VARIATION, Example, WhatIf
+from analysis.metrics import PRODUCT
+from analysis.stats.intervals import LEVEL
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE
+from dess import InputError
+from tests.analysis.small import asked, files_of, write_scenario
+
+POLICIES = ["random", "greedy"]
+
+
+@pytest.fixture
+def asking(tmp_path):
+    """Asks a sweep of the small scenario."""
+
+    def run(missions=6, progress=False, **fields):
+        return sweep(
+            write_scenario(tmp_path), POLICIES, missions, 3, tmp_path, progress=progress, **fields
+        )
+
+    return run
+
+
+def test_settings_are_ranked(asking):
+    answer = asking(uavs=range(1, 3), quota=np.array([20, 40]), pads=2)
+    assert [*varied(answer.results)] == ["uavs", "quota"]
+    table = answer.table()
+    assert len(table) == 2 * 2 * 2
+    assert [*table["rank"]] == [*range(1, 9)]
+    assert table[PRODUCT].is_monotonic_decreasing
+    missions = answer.results.missions
+    for row in table.itertuples():
+        of_row = missions[(missions["policy"] == row.policy) & (missions["point"] == row.point)]
+        assert row.collection_ratio == pytest.approx(of_row["collection_ratio"].mean())
+        assert {*of_row["uavs"]} == {row.uavs}
+    best = answer.best()
+    assert [*best["policy"]] == [*table["policy"].unique()]
+    assert best["rank"].iloc[0] == 1
+    best, other = answer.answers()
+    assert best.startswith(f"The best setting is {table['policy'][0]} with ")
+    found = table[table["policy"] != table["policy"][0]].iloc[0]
+    assert other.startswith(f"With {found['policy']}, it would be {found['uavs']} UAV")
+    assert answer.guarantee == ""
+
+
+def test_the_cheapest_settings_are_the_best(tmp_path):
+    about = {"missions": 5, "folder": tmp_path, "prices": {"uav": 7}, "progress": False}
+    about["policies"] = ["greedy"]
+    answer = sweep(
+        write_scenario(tmp_path), requirements={"ratio": 0.1}, uavs=[1, 2], quota=[20, 40], **about
+    )
+    best = answer.best()
+    assert [*best["uavs"]] == [1, 1]
+    assert [*best["quota"]] == [20, 40]
+    assert {*best["verdict"]} == {"met"}
+    assert len(answer.answers()) == 3
+    assert "with probability at least 0.95" in answer.guarantee
+    assert len(answer.results.checks) == 2 * 5
+
+
+def test_a_plot_is_over_the_first_fields(asking):
+    answer = asking(missions=2, uavs=[1, 2], quota=[20, 40])
+    assert isinstance(answer.plot(), Figure)
+    assert answer.plot().axes[0].get_xlabel() == answer.plot("uavs", "quota").axes[0].get_xlabel()
+    with pytest.raises(InputError, match="pads: has not several values"):
+        answer.plot("pads")
+    with pytest.raises(InputError, match="x: no field is swept"):
+        asking(missions=2, uavs=1).plot()
+
+
+def test_progress_counts_missions(asking, capsys, monkeypatch):
+    done = []
+    asking(progress=done.append, uavs=[1, 2])
+    assert sum(done) == 2 * 2 * 6
+    asking(progress=True, uavs=[1, 2])
+    assert capsys.readouterr().err == ""  # nothing is simulated
+    monkeypatch.setattr(tqdm.auto, "tqdm", partial(tqdm.auto.tqdm, disable=True))  # as on pages
+    assert len(asking(progress=True, uavs=[1, 3]).results.missions) == 2 * 2 * 6
+
+
+def test_the_best_setting_at_an_end_of_the_values_says_so(tmp_path):
+    """More data can be collected by more UAVs; with one UAV nothing is left to leave out."""
+    asked = {"scenario": write_scenario(tmp_path, quota=30), "policies": ["greedy"]}
+    asked |= {"missions": 100, "folder": tmp_path / "results", "progress": False}
+    (text,) = sweep(uavs=[1, 2], **asked).answers()
+    assert text.endswith(
+        "Of the values asked for, 2 UAVs is the largest; a better one may lie beyond."
+    )
+    assert sweep(uavs=[1, 6], **asked).answers() == []  # the zone has no more cells
+
+
+MISSIONS = 12
+
+
+@pytest.fixture(scope="module")
+def ask(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("what-if")
+    return lambda **changes: asked(folder, **changes)
+
+
+@pytest.fixture(scope="module")
+def answer(ask):
+    return ask()
+
+
+def test_questions_lie_side_by_side_and_the_same_one_is_found_again(ask, answer):
+    folders = {answer.question.out}
+    for changes in (
+        {"settings": {"uavs": 5}},
+        {"baseline": {}},
+        {"policies": ["greedy"]},
+        {"seed": 4},
+    ):
+        folders.add(ask(missions=2, **changes).question.out)
+    assert len(folders) == 5
+    assert {folder.parent for folder in folders} == {answer.question.out.parent}
+    before = files_of(answer.question.out)
+    assert ask().question.out == answer.question.out
+    assert files_of(answer.question.out) == before
+
+
+def test_more_missions_top_up_what_is_there(ask):
+    few = ask(missions=5, seed=8)
+    kept = {name for name in files_of(few.question.out) if name.startswith("missions")}
+    more = ask(missions=9, seed=8)
+    assert more.question.out == few.question.out
+    assert kept < files_of(more.question.out).keys()
+    missions = more.results.missions
+    first = missions[missions["replication"] < 5].reset_index(drop=True)
+    pd.testing.assert_frame_equal(first, few.results.missions)
+    again = ask(missions=5, seed=8).results.missions
+    pd.testing.assert_frame_equal(again, few.results.missions)
+
+
+def test_both_sides_meet_the_same_realisations(answer):
+    sides = answer.results.missions.pivot(
+        index=["policy", "replication"], columns="point", values=["initial", "flying_time", "uavs"]
+    )
+    for field in ("initial", "flying_time"):
+        assert (sides[field, BASELINE] == sides[field, VARIATION]).all()
+        assert sides[field, BASELINE].nunique() > 1
+    assert (sides["uavs", BASELINE] == 2).all() and (sides["uavs", VARIATION] == 6).all()
+
+
+def test_the_question_is_a_study_file(answer, tmp_path):
+    write_scenario(tmp_path)
+    (tmp_path / "rows.toml").write_text(answer.as_toml(), "utf-8")
+    study = load_study(tmp_path / "rows.toml")
+    assert [*study.scenarios] == [answer.results.scenario(p) for p in (0, 1)]
+    assert (study.policies, study.missions, study.seed) == (tuple(POLICIES), MISSIONS, 3)
+
+
+def row(difference, low, high, p=0.01, n=100):
+    """A row of an answer."""
+    return pd.Series({"difference": difference, "low": low, "high": high, "p": p, "n": n})
+
+
+def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(tmp_path):
+    changes = {"age.reward": -1.0, "failures.uav_rate": 0.2}
+    results = asked(tmp_path, 6, settings=changes, policies=["greedy"]).results
+    assert {"age", "failures"} <= {*found.measured(results)}
+    answers = found.answers(results).set_index("metric")
+    sides = results.missions.pivot(index="replication", columns="point", values="age")
+    change = (sides[VARIATION] - sides[BASELINE]).mean()
+    assert answers.loc["age", "difference"] == pytest.approx(change)
+    assert (answers.loc["failures", "before"], answers.loc["failures", "n"]) == (0, 6)
+    failed = results.missions.query("point == @VARIATION")["failures"].mean()
+    assert answers.loc["failures", "difference"] == pytest.approx(failed) and failed > 0
+    assert found.means(results).query("metric == 'age'")["mean"].tolist() == (
+        pytest.approx(answers.loc["age", ["before", "after"]].tolist())
+    )
+
+
+def test_what_one_side_measures_has_no_difference(tmp_path):
+    answer = asked(tmp_path, 4, settings={"age.measured": True}, policies=["greedy"])
+    answers = answer.table().set_index("metric")
+    assert np.isnan(answers.loc["age", ["before", "difference"]].astype(float)).all()
+    assert (answers.loc["age", "n"], answers.loc["success", "n"]) == (0, 4)
+    lines = answer.measures("greedy").set_index("Mean per mission")
+    line = lines.loc["Age of information [mission slots]"]
+    mean = answer.results.missions["age"].mean()
+    assert line.tolist() == ["–", f"{mean:.2f}", ""]
+
+
+@pytest.mark.parametrize(
+    ("answer", "side"),
+    [
+        (row(0.2, 0.1, 0.3), ABOVE),
+        (row(-0.2, -0.3, -0.1), BELOW),
+        (row(0.1, -0.1, 0.3), INCONCLUSIVE),
+        (row(0.0, 0.0, 0.0, p=1.0), INCONCLUSIVE),
+        (row(0.5, 0.5, 0.5, p=0.5, n=2), INCONCLUSIVE),  # two equal differences prove nothing
+        (row(0.5, 0.5, 0.5, p=0.002, n=10), ABOVE),
+    ],
+)
+def test_the_whole_interval_decides(answer, side):
+    assert found.verdict(answer) == side
+
+
+def test_so_many_missions_show_the_difference_that_was_seen():
+    """So many normal differences of that mean and spread are significant with that power."""
+    n, gap, spread = 400, 0.05, 0.8
+    half = stats.t.isf((1 - LEVEL) / 2, n - 1) * spread / np.sqrt(n)
+    needed = found.missions_needed(row(gap, gap - half, gap + half, n=n))
+    edge = stats.t.isf((1 - LEVEL) / 2, needed - 1)
+    power = stats.nct.sf(edge, needed - 1, gap / spread * np.sqrt(needed))
+    assert power == pytest.approx(found.POWER, abs=0.02)
+    assert found.missions_needed(row(-gap, -gap - half, -gap + half, n=n)) == needed
+    for nothing in (row(0.0, -half, half), row(0.0, 0.0, 0.0), row(gap, gap, gap)):
+        assert found.missions_needed(nothing) == np.inf
+
+
+def with_missions(answer, before, after, ratios):
+    """The answer with other missions of a single policy."""
+    columns = {"replication": range(len(before)), "policy": "greedy"}
+    sides = [
+        pd.DataFrame({**columns, "point": p, PRODUCT: values, "collection_ratio": ratios})
+        for p, values in ((BASELINE, before), (VARIATION, after))
+    ]
+    results = replace(answer.results, missions=pd.concat(sides, ignore_index=True))
+    return replace(answer, results=results, shown="greedy")
+
+
+def test_the_typical_mission_has_the_median_difference_and_the_worst_the_least_left(answer):
+    before, after = [0.5, 0.5, 0.9, 0.1, 0.9], [0.6, 0.4, 0.0, 0.3, 0.0]
+    made = with_missions(answer, before, after, [0.6, 0.4, 0.8, 0.3, 0.7])
+    differences = found.differences(made.results, "greedy").tolist()
+    assert differences == pytest.approx([0.1, -0.1, -0.9, 0.2, -0.9])
+    assert (made.typical().replication, made.worst().replication) == (1, 4)
+    even = with_missions(answer, [0.0] * 4, [0.4, 0.1, 0.2, 0.2], [0.5] * 4)
+    # The lower middle, of those alike the first.
+    assert (even.typical().replication, even.worst().replication) == (2, 1)
+
+
+def test_the_best_policy_of_each_side_is_found(answer):
+    table = found.means(answer.results)
+    for point in (BASELINE, VARIATION):
+        side = table[(table["point"] == point) & (table["metric"] == PRODUCT)]
+        best = side.loc[side["mean"].idxmax(), "policy"]
+        assert found.best_policy(answer.results, point) == best
+    assert answer.shown == best
+    lines = answer.answer().splitlines()
+    for line, policy in zip(lines, POLICIES, strict=False):
+        assert line.startswith(f"- **{policy}**: product is")
+    assert "in the variation" in lines[-1]
+    assert answer._repr_markdown_() == answer.answer()  # what Jupyter shows
+    assert [line.split(":")[0] for line in answer.answers()[1:]] == POLICIES
+
+
+CONCLUSIONS = {
+    (0.05, 0.04, 0.06): "is **higher** in the variation, by +5.0 [+4.0, +6.0] points: from 90.0 %",
+    (-0.05, -0.06, -0.04): "is **lower** in the variation, by −5.0 [−6.0, −4.0] points: from 90.",
+    (0.0, -0.01, 0.01): "is **inconclusive**, by 0.0 [−1.0, +1.0] points: from 90.0 %",
+    (0.01, -0.01, 0.03): "820 missions (instead of 100) show it with a probability of 80 %",
+    (0.0, 0.0, 0.0): "These missions do not tell how many would show a difference.",
+}
+
+
+@pytest.mark.parametrize("ends", CONCLUSIONS)
+def test_a_conclusion_names_the_side_of_the_whole_interval_or_how_many_missions_it_takes(ends):
+    about = {"policy": "greedy", "metric": PRODUCT, "before": 0.9, "after": 0.9 + ends[0]}
+    text = found.conclusion(pd.Series({**row(*ends, p=0.2), **about, "n": 100}))
+    assert text.startswith("**greedy**: product ")
+    assert CONCLUSIONS[ends] in text
+
+
+def test_examples_are_missions_of_the_policy_that_is_shown(answer):
+    example = Example(replace(answer, shown="random"), 3)
+    assert "**random**" in example.effect() and len(example.commands()) == 4
+    before, after = example.drawings()
+    assert "Baseline (uavs 2, pads 6)" in before[2] and "Variation (uavs 6, pads 1)" in after[2]
+
+
+def test_another_variation_of_the_same_baseline_simulates_that_side_only(tmp_path):
+    done: list[int] = []
+    about = {"baseline": {"uavs": 2}, "policies": POLICIES, "missions": 3, "folder": tmp_path}
+    about |= {"scenario": write_scenario(tmp_path), "progress": done.append}
+    assert isinstance(what_if({"uavs": 6}, **about), WhatIf)
+    for settings, new in (({"uavs": 3}, 6), ({"uavs": 6}, 0)):
+        done.clear()
+        what_if(settings, **about)
+        assert (done[0], sum(done)) == (12 - new, 12)
+
+
+@pytest.mark.parametrize(
+    ("asked_for", "line"),
+    [
+        ({"shown": "tour"}, "shown: 'tour' is not asked about"),
+        ({"missions": 10**9}, "4,000,000,000 missions to simulate .*--yes, or less"),
+    ],
+)
+def test_what_cannot_be_answered_is_refused_before_anything_is_written(asked_for, line, tmp_path):
+    about = {"scenario": write_scenario(tmp_path), "policies": POLICIES} | asked_for
+    with pytest.raises(InputError, match=line):
+        what_if({"uavs": 6}, folder=tmp_path / "results", **about)
+    assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
