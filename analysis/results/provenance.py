@@ -134,7 +134,7 @@ class Origin(Document):
         return self
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy with other values, which computes anew what depends on them."""
+        """A copy with other values, which computes again what depends on them."""
         fields = {name: getattr(self, name) for name in type(self).model_fields}
         return self.model_construct(**fields | dict(update or {}))
 
