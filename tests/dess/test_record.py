@@ -9,14 +9,7 @@ from hypothesis import given
 from dess.mission import simulate
 from dess.record import MISSION_RECORD, measures_of
 from dess.scenario import ScenarioSpace
-from tests.drawn import (
-    Commuter,
-    continuous_spaces,
-    extended_spaces,
-    policies,
-    replications,
-    seeds,
-)
+from tests.drawn import Commuter, continuous_spaces, extended_spaces, policies, replications, seeds
 
 # Nothing was delivered, no age has come to its end, or no UAV has asked for a pad.
 NOT_ALWAYS = {"latency", "latency_p99", "peak_age", "waiting"}

@@ -107,6 +107,17 @@ ROW = [[x, 5] for x in range(17, 24)]  # 4 cells around either end
 NEAR = {"zones": [{"cells": [20, 8, 1, 1]}]}
 PADS_FAIL = {"failures": {"pad_rate": 0.1}}
 HERE, THERE = {"x": 20, "y": 4}, {"x": 20, "y": 8, "latch": True}
+# A zone of 3 x 3 cells in the corner of the grid, with a coast to the north of it.
+COAST: dict[str, Any] = {"grid": 8, "zone": [0, 2, 3, 3], "nodes": [[7, 7]]}
+COAST |= {"no_fly": [[0, 1], [1, 1], [2, 1]], "charge_complete": 80}
+PARKED = {"x": 2, "y": 2, "latch": True}
+# A zone at the end of a corridor, in the first row.
+CORRIDOR = COAST | {"zone": [0, 0, 4, 1], "no_fly": [[x, 1] for x in range(6)]}
+MOUTH = {"x": 3, "y": 0, "latch": True}
+# Two zones of which the second has one cell, and its only pad is that of the first UAV.
+LAST_PAD: dict[str, Any] = {"grid": 6, "rows": 5, "zone": [3, 2, 2, 2], "pads": 1}
+LAST_PAD |= {"zones": [{"cells": [3, 4, 1, 1]}], "nodes": [[0, 0]], "charge_complete": 80}
+POOR = [{"x": x, "y": y, "battery": b} for x, y, b in ((3, 1, 11), (1, 4, 7), (1, 1, 8))]
 
 
 @pytest.mark.parametrize(
@@ -120,6 +131,12 @@ HERE, THERE = {"x": 20, "y": 4}, {"x": 20, "y": 8, "latch": True}
         ([HERE], NEAR | PADS_FAIL, (26, 4, 6)),  # its pad is out of order for good
         # It will be repaired, but a pad works two cells farther.
         ([HERE], NEAR | {"failures": {"pad_rate": 0.1, "pad_repair": 9.0}}, (26, 4, 6)),
+        # Parked teammates are islands: from (3, 1) the only way of 3 cells to (1, 2) is over one.
+        ([{"x": 3, "y": 1}, PARKED], COAST, (2, 3, 3)),
+        # No way leads around a teammate, which is charged after 5 slots at most.
+        ([{"x": 7, "y": 0}, MOUTH], CORRIDOR, (2, 0, 5 + 5)),
+        # Who is parked keeps its cell, although teammates with less battery choose before it.
+        ([{"x": 3, "y": 4, "battery": 9, "latch": True}, *POOR], LAST_PAD, (3, 4, 0)),
     ],
 )
 def test_a_uav_charges_at_the_cell_where_it_can_soonest(
@@ -134,31 +151,6 @@ def test_the_battery_to_a_zone_farther_than_the_nearest_is_that_of_the_way_there
     for uavs, needed in (([HERE, {}], 8), ([HERE, THERE], 12)):  # two slots per cell
         states = compact_states(*placed(uavs, **NEAR, fleet=[{"slots_per_cell": 2}]), True)
         assert states.uavs[0, 0, HOME] == needed
-
-
-# A zone of 3 x 3 cells in the corner of the grid, with a coast to the north of it.
-COAST: dict[str, Any] = {"grid": 8, "zone": [0, 2, 3, 3], "nodes": [[7, 7]]}
-COAST |= {"no_fly": [[0, 1], [1, 1], [2, 1]]}
-PARKED = {"x": 2, "y": 2, "latch": True}
-# A zone at the end of a corridor, in the first row.
-CORRIDOR = COAST | {"zone": [0, 0, 4, 1], "no_fly": [[x, 1] for x in range(6)]}
-MOUTH = {"x": 3, "y": 0, "latch": True}
-
-
-@pytest.mark.parametrize(
-    ("uavs", "scenario", "home"),
-    [
-        # From (3, 1) the only way of 3 cells to (1, 2) is over (2, 2).
-        ([{"x": 3, "y": 1}, PARKED], COAST, (2, 3, 3)),
-        # No way leads around a teammate, which is charged after 5 slots at most.
-        ([{"x": 7, "y": 0}, MOUTH], CORRIDOR, (2, 0, 5 + 5)),
-    ],
-)
-def test_parked_teammates_are_islands(
-    uavs: list[dict[str, Any]], scenario: dict[str, Any], home: tuple[int, ...]
-) -> None:
-    state, chart = placed(uavs, **scenario, charge_complete=80)
-    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[:3] == home
 
 
 ISLANDS = """
@@ -341,17 +333,6 @@ def test_a_uav_that_waits_in_the_queue_keeps_its_place() -> None:
     state, chart = placed([{"x": 27, "y": 4, "battery": 20, "latch": True, "pad_request": 3}])
     allowed = masks(compact_states(state, chart, True), np.array([0]), np.array([0]))[0]
     assert np.nonzero(allowed)[0].tolist() == [HOVER]
-
-
-def test_a_parked_uav_keeps_its_cell_whoever_chooses_first() -> None:
-    """A teammate with less battery must not take the cell, and its only pad, from it."""
-    places = ((3, 4, 9), (3, 1, 11), (1, 4, 7), (1, 1, 8))
-    team: list[dict[str, Any]] = [{"x": x, "y": y, "battery": b} for x, y, b in places]
-    team[0]["latch"] = True
-    sea: dict[str, Any] = {"grid": 6, "rows": 5, "zone": [3, 2, 2, 2], "pads": 1, "nodes": [[0, 0]]}
-    sea |= {"zones": [{"cells": [3, 4, 1, 1]}], "charge_start": 30, "charge_complete": 80}
-    state, chart = placed(team, **sea)
-    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[:3] == (3, 4, 0)
 
 
 def test_a_uav_that_can_reach_two_zones_leaves_the_pad_to_one_that_can_reach_one() -> None:

@@ -186,14 +186,6 @@ def test_a_small_sea_by_hand() -> None:
     assert actions[:, 6] == pytest.approx(near, rel=1e-5)
 
 
-def test_rows_without_a_uav_are_zeros() -> None:
-    space = ScenarioSpace.of(uavs=2)
-    states = empty_states(1, 2, len(space.nodes))
-    states.uavs[0, :, column.ACTIVE] = 1
-    for part in _sets(space).encode(states, np.array([0]), np.array([-1])):
-        assert not part.any()
-
-
 @given(_cases(), st.integers(1, 3))
 def test_uavs_that_are_not_there_are_zeros_behind_the_others(
     case: tuple[dict[str, Any], CompactStates, int], more: int

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis import load_study
 from dess import InputError, load_scenario
 from dess.scenario import ScenarioSpace, scenario_description, scenario_names
 from dess.sea import families
@@ -109,16 +108,6 @@ def test_coasts_face_all_ways_and_corridors_run_both_ways() -> None:
     assert sides == {0, 1, 2, 3} and shapes == {True, False}
 
 
-def test_families_differ_in_what_they_are_named_after() -> None:
-    seas = {family: load_scenario(f"{family}:5") for family in FAMILIES}
-    assert {f for f, sea in seas.items() if not sea.no_fly} <= {
-        *("scattered", "clustered", "dense", "large")
-    }
-    assert len(seas["archipelago"].no_fly) > len(seas["archipelago"].nodes)
-    assert len(seas["dense"].nodes) > 60
-    assert min(seas["large"].size) >= 56
-
-
 @given(st.sampled_from([*FAMILIES]), st.integers(0, MOST_SEED))
 def test_a_sea_is_a_scenario_as_any(family: str, seed: int) -> None:
     name = f"{family}:{seed}"
@@ -138,14 +127,6 @@ def test_the_paper_s_channel_cell_by_cell() -> None:
 
     paper = at_five_cells(load_scenario("paper"))
     assert all(abs(at_five_cells(load_scenario(sea)) - paper) < 2.1 for sea in seas_of("test")[::9])
-
-
-def test_a_study_names_a_sea(tmp_path: Path) -> None:
-    path = tmp_path / "sea-study.toml"
-    path.write_text('scenario = "scattered:4"\npolicies = ["greedy"]\nmissions = 2\n')
-    study = load_study(path)
-    assert study.scenario == "scattered:4"
-    assert study.scenarios[0] == load_scenario("scattered:4")
 
 
 @pytest.mark.parametrize(
