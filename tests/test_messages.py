@@ -27,6 +27,7 @@ from policies.learner.checkpoint import Header
 from policies.learner.config import TrainingConfig, load_config
 from policies.learner.description import Description
 from policies.registry import TRAINED
+from reports.pages.page import Card, Learned
 
 SECTIONS = {
     "arrivals": {"process": "continuous", "schedule": [[0, 1.0]], "buffer": 3},
@@ -82,6 +83,8 @@ def documents() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     yield Times, {"processor": "x", "costs": [cost]}
     point = {"type": "Point", "coordinates": [1.0, 2.0]}
     yield files.Points, {"features": [{"geometry": point}]}
+    yield Card, {"title": "", "finding": "", "picture": {"alt": "", "source": "", "narrow": ""}}
+    yield Learned, {"files": {"a": ""}}
     ring = [[1.0, 2.0], [3.0, 2.0], [3.0, 4.0], [1.0, 2.0]]
     polygon = {"type": "Polygon", "coordinates": [ring]}
     yield files.Polygons, {"features": [{"geometry": polygon}]}

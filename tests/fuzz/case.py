@@ -59,8 +59,10 @@ class Case:
         is_named = any(word.startswith("--out") for word in self.arguments)
         allowed = [OUT]
         is_kept = command == "report" and not any(w.startswith("--results") for w in self.arguments)
-        if command == "sweep" or is_kept or (command == "study run" and not is_named):
+        if command in ("sweep", "what-if") or is_kept or (command == "study run" and not is_named):
             allowed.append(f"{CWD}/results")
-        if "--report" in self.arguments or (command in ("sweep", "report") and not is_named):
+        if "--report" in self.arguments or (
+            command in ("sweep", "what-if", "report") and not is_named
+        ):
             allowed.append(f"{CWD}/build")
         return tuple(allowed)

@@ -157,7 +157,8 @@ def shown_by(source: str | Report, **parameters: Any) -> str:
     report, shown, scope = read(source) if isinstance(source, str) else source, [], {}
     report.set(parameters)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(IPython.display, "display", lambda *pieces: shown.extend(pieces))
+        for module in (IPython.display, html):
+            patch.setattr(module, "display", lambda *pieces: shown.extend(pieces))
         patch.setattr(html, "svg", lambda drawing: b"")
         for cell in report.cells:
             tree = ast.parse(cell.source)

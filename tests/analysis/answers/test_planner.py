@@ -103,7 +103,7 @@ def test_the_plan_begins_where_the_uavs_start(results, monkeypatch):
     planned = replace(mission, policy="planner")
     (ax,) = planner.plan(results, planned).figure.axes
     ways = [line.get_xydata() for line in ax.lines if "plan" in str(line.get_gid())]
-    log = mission.log
+    log = mission.events
     starts = log[(log["event"] == "mission_start") & (log["uav"] >= 0)]
     assert [way[0].tolist() for way in ways] == starts[["x", "y"]].to_numpy().tolist()
     cells = np.array([text.xy for text in ax.texts if text.get_position() == (6, 6)])

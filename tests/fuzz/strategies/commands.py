@@ -49,6 +49,7 @@ READS = {
     "report names": ("results",),
     "verify path": ("results", "page"),
     "sweep --results": ("swept",),
+    "what-if --results": ("asked",),
 }
 # What a command always has, unless another value is drawn.
 BASE: dict[str, dict[str, str | None]] = {
@@ -57,6 +58,10 @@ BASE: dict[str, dict[str, str | None]] = {
     "sweep": {
         **{"--results": "../out/results", "--out": "../out/pages", "--name": "kept"},
         **{"--scenario": SEA, "--set": "uavs=1..2", "--missions": "2"},
+    },
+    "what-if": {
+        **{"--results": "../out/results", "--out": "../out/pages", "--scenario": SEA},
+        **{"--set": "uavs=2", "--baseline": "uavs=1", "--policy": "greedy", "--missions": "2"},
     },
     "report": {"report names": RESULTS, "--out": "../out/pages"},
     "verify": {"verify path": RESULTS, "--missions": "2"},
@@ -72,7 +77,9 @@ BASE: dict[str, dict[str, str | None]] = {
 PLAIN: dict[str, tuple[str, ...]] = {
     "--scenario": ("paper", "bay", SEA, f"../in/{ready.SECTIONS}"),
     "--set": ("uavs=2", "initial_data=[5, 20]", "pads=1", "max_slots=20", *SETTINGS),
+    "--baseline": ("uavs=1", "pads=2"),
     "--policy": ("greedy", "random,nearest", POLICY),
+    "--shown": ("greedy",),
     "--missions": ("1", "2", "3"),
     "--workers": ("1",),
     "--seed": ("0", "7"),

@@ -41,6 +41,7 @@ _READY = {
     "page": (ready.PAGE,),
     "policy": (ready.POLICY,),
     "swept": (ready.SWEPT,),
+    "asked": (ready.ASKED,),
 }
 
 

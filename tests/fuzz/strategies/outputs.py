@@ -8,12 +8,13 @@ from tests.fuzz.steps import copy, node, write
 from tests.fuzz.strategies import commands
 from tests.fuzz.strategies.changes import NODES
 
-# Every parameter that writes, and sweeps, which keep results.
+# Every parameter that writes, and questions, which keep results.
 _WRITING = [
     (words, name)
     for words, parameters in commands.COMMANDS
     for name in (commands.name_of(words, parameter) for parameter in parameters)
-    if name in commands.OUTPUTS or (*words, name) == ("sweep", "--results")
+    if name in commands.OUTPUTS
+    or (*words, name) in (("sweep", "--results"), ("what-if", "--results"))
 ]
 _PRINTING = (
     ("studies",),

@@ -57,7 +57,7 @@ def test_a_selection_is_shown_with_its_check(dess, tmp_path):
     (tmp_path / "best.toml").write_text(f"{text}\n{design}[selection]\n{rule}")
     code, out, _ = dess("study", "run", "best.toml")
     assert code == 0
-    assert re.search(r"greedy +quota (20|60) +\d+ +1", out)
+    assert re.search(r"greedy +communication quota (20|60) +\d+ +1", out)
     assert "9 further missions" in out
     assert "with probability at least 0.95" in out
 
