@@ -131,15 +131,12 @@ def short_hash(content: bytes) -> str:
     return sha256(content).hexdigest()[:16]
 
 
-def rows_of(parts: Sequence[Part], tables: Sequence[pa.Table]) -> pd.DataFrame:
+def rows_of(parts: Sequence[Part], stacked: pd.DataFrame) -> pd.DataFrame:
     """The rows of the missions of the parts, with the ``point`` and ``cell`` of each.
 
     Args:
-        parts: The parts; the tables must contain all of them.
-        tables: Tables with the columns ``cell`` and ``replication``.
-
-    Raises:
-        InputError: If two tables have different rows for the same mission.
+        parts: The parts.
+        stacked: The rows of these missions, and of others, as ``stacked`` returns them.
     """
     lengths = [len(part.replications) for part in parts]
     wanted = pd.DataFrame(
@@ -149,13 +146,19 @@ def rows_of(parts: Sequence[Part], tables: Sequence[pa.Table]) -> pd.DataFrame:
             "replication": np.concatenate([part.replications for part in parts]),
         }
     )
-    stacked = _stacked(tables)
     rows = wanted.merge(stacked, on=["cell", "replication"], how="left")
     return rows[["point", *stacked]]
 
 
-def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
-    """The rows of all tables; nan in columns that only others of them have."""
+def stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
+    """The rows of all tables; nan in columns that only others of them have.
+
+    Args:
+        tables: Tables with the columns ``cell`` and ``replication``.
+
+    Raises:
+        InputError: If two tables have different rows for the same mission.
+    """
     frame = pa.concat_tables(tables, promote_options="default").to_pandas().astype({"cell": str})
     one = [name for name in ("cell", "replication", "uav") if name in frame]
     if frame.duplicated(one).any():  # such as after files of two folders were merged

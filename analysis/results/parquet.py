@@ -158,27 +158,30 @@ def check(tables: Sequence[pa.Table], rows: Sequence[Row]) -> None:
     """
     keys, starts, stops = zip(*rows, strict=True)
     lengths = np.subtract(stops, starts)
-    if lengths.sum() != len(tables[0]):  # before memory is taken for them
+    missions, *others = tables
+    if lengths.sum() != len(missions):  # before memory is taken for them
         raise ValueError("the records are not as many as the requested missions")
     cells = np.repeat(np.array(keys, object), lengths)
     replications = np.concatenate([*map(np.arange, starts, stops)])
-    for table in tables:
-        found = table.select(["cell", "replication"]).to_pandas().drop_duplicates()
-        if not (
-            np.array_equal(found["replication"], replications)
-            and np.array_equal(found["cell"].to_numpy(object), cells)
+    if not _are_of(missions, cells, replications):
+        raise ValueError("the records are not those of the requested missions")
+    for uavs in others:
+        fleet = missions["uavs"].to_numpy()
+        first = np.repeat(np.cumsum(fleet) - fleet, fleet)
+        if len(uavs) != len(first) or not (
+            np.array_equal(uavs["uav"], np.arange(len(first)) - first)
+            and _are_of(uavs, np.repeat(cells, fleet), np.repeat(replications, fleet))
         ):
-            raise ValueError("the records are not those of the requested missions")
-    if len(tables) > 1:
-        _check_uavs(*tables)
+            raise ValueError("the records are not those of all UAVs")
 
 
-def _check_uavs(missions: pa.Table, uavs: pa.Table) -> None:
-    """Check that there is a record of every UAV of the missions, in their order."""
-    fleet = missions["uavs"].to_numpy()
-    first = np.repeat(np.cumsum(fleet) - fleet, fleet)
-    if not np.array_equal(uavs["uav"], np.arange(len(first)) - first):
-        raise ValueError("the records are not those of all UAVs")
+def _are_of(table: pa.Table, cells: np.ndarray, replications: np.ndarray) -> bool:
+    """Whether the rows of a table are those of some missions."""
+    keys = table["cell"].unify_dictionaries().combine_chunks()
+    names = np.array(keys.dictionary.to_pylist(), object)
+    return np.array_equal(table["replication"], replications) and np.array_equal(
+        names[keys.indices.to_numpy()], cells
+    )
 
 
 def parts_in(table: pa.Table) -> list[Row]:

@@ -25,7 +25,17 @@ import pyarrow as pa
 from analysis.bound import Bound
 from analysis.results import chunks as files
 from analysis.results import parquet
-from analysis.results.chunks import FOLDERS, LOCK, MANIFEST, Chunk, Part, Present, absent, rows_of
+from analysis.results.chunks import (
+    FOLDERS,
+    LOCK,
+    MANIFEST,
+    Chunk,
+    Part,
+    Present,
+    absent,
+    rows_of,
+    stacked,
+)
 from analysis.results.manifest import NO_TEAM, Cell, Manifest, Selected
 from analysis.study.study import Study
 from dess import InputError
@@ -74,6 +84,8 @@ class Store:
         self._present: dict[str, Present] = {kind: defaultdict(list) for kind in TABLES}
         # By kind and key of a cell, the tables that contain it: missions and UAVs, or bounds alone.
         self._tables: dict[tuple[str, str], list[Sequence[pa.Table]]] = defaultdict(list)
+        # The rows of several tables, until there are new ones: every round of a rule needs them.
+        self._stacked: dict[tuple, pd.DataFrame] = {}
         self._logs: dict[tuple[str, int], Path] = {}  # by the key of a cell and the replication
         self.damaged: list[Path] = []
 
@@ -180,6 +192,7 @@ class Store:
             self._enter(kind, rows, tables)
 
     def _enter(self, kind: str, rows: Sequence[parquet.Row], tables: Sequence[pa.Table]) -> None:
+        self._stacked.clear()
         for key, start, stop in rows:
             self._tables[kind, key].append(tables)
             self._present[kind][key].append(range(start, stop))
@@ -232,7 +245,7 @@ class Store:
                 chunk = Chunk(team, tuple(shared))
                 tables = zip(*other._tables_with("missions", shared), strict=True)
                 try:
-                    rows = [rows_of(shared, of_kind) for of_kind in tables]
+                    rows = [rows_of(shared, stacked(of_kind)) for of_kind in tables]
                 except InputError:
                     return
                 columns = ({str(n): of_kind[n].to_numpy() for n in of_kind} for of_kind in rows)
@@ -326,7 +339,11 @@ class Store:
         for gap in self.missing(kind, parts)[:1]:
             whole = next(part for part in parts if part.cell == gap.cell)
             raise InputError(self._incomplete(whole, gap.replications))
-        rows = rows_of(parts, [tables[table] for tables in self._tables_with(kind, parts)])
+        found = [tables[table] for tables in self._tables_with(kind, parts)]
+        key = kind, table, *map(id, found)
+        if key not in self._stacked:
+            self._stacked[key] = stacked(found)
+        rows = rows_of(parts, self._stacked[key])
         return rows.drop(columns="cell")
 
     def _tables_with(self, kind: str, parts: Iterable[Part]) -> list[Sequence[pa.Table]]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from analysis.results import parquet
-from analysis.results.chunks import FOLDERS, Chunk, Part, check_parts, parts_of, rows_of
+from analysis.results.chunks import FOLDERS, Chunk, Part, check_parts, parts_of, rows_of, stacked
 from analysis.results.manifest import Manifest
 from analysis.results.store import Store
 
@@ -79,9 +79,8 @@ def _copy(source: Store, store: Store, parts: list[Part], cells: Any) -> None:
         parts[0].cell.team,
         tuple(Part(cell, p.replications) for cell, p in zip(cells, parts, strict=True)),
     )
-    rows = [
-        rows_of(parts, kind) for kind in zip(*source._tables_with("missions", parts), strict=True)
-    ]
+    tables = zip(*source._tables_with("missions", parts), strict=True)
+    rows = [rows_of(parts, stacked(of_kind)) for of_kind in tables]
     keys = {part.cell.key: cell.key for part, cell in zip(parts, cells, strict=True)}
     columns = [{str(n): of[n].to_numpy() for n in of} for of in rows]
     columns = [of | {"cell": np.array([keys[key] for key in of["cell"]])} for of in columns]
