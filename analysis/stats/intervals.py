@@ -177,7 +177,7 @@ class Moments(NamedTuple):
 
     def student(self, level: float = LEVEL) -> Interval:
         """The mean with the interval of ``mean_interval``."""
-        if self.least == self.most:
+        if self.least == self.most or not self.squares:  # the square of a tiny number is 0
             half = 0.0 if self.n > 1 else np.nan
             return Interval(self.mean, self.mean - half, self.mean + half)
         error = np.sqrt(self.squares / (self.n - 1)) / np.sqrt(self.n)

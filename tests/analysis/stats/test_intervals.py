@@ -138,6 +138,11 @@ def test_wilson_and_student_by_hand(found, expected):
     assert found == pytest.approx(expected, abs=1e-5)
 
 
+def test_values_that_hardly_differ_have_an_interval_without_a_warning():
+    with np.errstate(invalid="raise"):
+        assert mean_interval([0.0, 5e-324]) == (0.0, 0.0, 0.0)
+
+
 @pytest.mark.parametrize(
     "estimate",
     [lambda: wilson(0, 0), lambda: mean_interval([]), lambda: quantile_interval([], 0.5)],
