@@ -2,6 +2,6 @@
 
 import sys
 
-# The library nbformat imports jsonschema, which compiles grammars for addresses if it finds this
-# library. It takes longer than most pages, and no schema of a notebook has an address.
+# nbformat imports jsonschema, which compiles grammars of web addresses if it finds rfc3987_syntax.
+# That takes longer than most pages, and no schema of a notebook has an address.
 sys.modules["rfc3987_syntax"] = None  # type: ignore[assignment]
