@@ -1,29 +1,29 @@
 """Studies: define them, run them, store their results, and analyse the results.
 
-Names are imported on first use, so that ``import analysis`` is fast.
+Names are imported on first use, so that ``import dess.analysis`` is fast.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
-    from analysis.answers.learning import marl_eval_data as marl_eval_data
-    from analysis.answers.learning import rliable_scores as rliable_scores
-    from analysis.ask.answer import sweep as sweep
-    from analysis.ask.answer import what_if as what_if
-    from analysis.execution.evaluation import evaluate as evaluate
-    from analysis.execution.runner import run_study as run_study
-    from analysis.results.resimulate import resimulate as resimulate
-    from analysis.results.tables import Results as Results
-    from analysis.results.tables import load_results as load_results
-    from analysis.stats.differences import compare as compare
-    from analysis.stats.distribution import distribution as distribution
-    from analysis.stats.intervals import bootstrap_interval as bootstrap_interval
-    from analysis.stats.intervals import summary as summary
-    from analysis.stats.learners import compare_learners as compare_learners
-    from analysis.study.study import Study as Study
-    from analysis.study.study import load_study as load_study
-    from analysis.study.study import study_names as study_names
+    from dess.analysis.answers.learning import marl_eval_data as marl_eval_data
+    from dess.analysis.answers.learning import rliable_scores as rliable_scores
+    from dess.analysis.ask.answer import sweep as sweep
+    from dess.analysis.ask.answer import what_if as what_if
+    from dess.analysis.execution.evaluation import evaluate as evaluate
+    from dess.analysis.execution.runner import run_study as run_study
+    from dess.analysis.results.resimulate import resimulate as resimulate
+    from dess.analysis.results.tables import Results as Results
+    from dess.analysis.results.tables import load_results as load_results
+    from dess.analysis.stats.differences import compare as compare
+    from dess.analysis.stats.distribution import distribution as distribution
+    from dess.analysis.stats.intervals import bootstrap_interval as bootstrap_interval
+    from dess.analysis.stats.intervals import summary as summary
+    from dess.analysis.stats.learners import compare_learners as compare_learners
+    from dess.analysis.study.study import Study as Study
+    from dess.analysis.study.study import load_study as load_study
+    from dess.analysis.study.study import study_names as study_names
 
 _HOME = {
     "Study": "study.study",
@@ -50,8 +50,8 @@ __all__ = [*_HOME]
 
 def __getattr__(name: str) -> Any:
     if name in _HOME:
-        return getattr(import_module(f"analysis.{_HOME[name]}"), name)
-    raise AttributeError(f"module 'analysis' has no attribute {name!r}")
+        return getattr(import_module(f"dess.analysis.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'dess.analysis' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

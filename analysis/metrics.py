@@ -4,7 +4,7 @@ from collections.abc import Callable, Container
 from dataclasses import dataclass
 from typing import Literal
 
-from analysis import numbers
+from dess.analysis import numbers
 from dess.record import OPERATIONS
 
 Kind = Literal["outcome", "share", "number", "cost"]

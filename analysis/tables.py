@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis import numbers
-from analysis.metrics import METRICS, PRODUCT
-from analysis.names import parameter, value_text
-from analysis.stats.intervals import LEVEL
-from analysis.stats.verdict import MARKS, position_by_test
+from dess.analysis import numbers
+from dess.analysis.metrics import METRICS, PRODUCT
+from dess.analysis.names import parameter, value_text
+from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.verdict import MARKS, position_by_test
 
 INTERVALS = f"{numbers.level(LEVEL)} intervals"
 CHECKED = f"The check of the selected settings: means with {INTERVALS}"
@@ -64,18 +64,18 @@ def estimates(
 
 
 def means(rows: pd.DataFrame, caption: str = f"Means with {INTERVALS}") -> Table:
-    """Rows of ``analysis.summary`` by policy: a column per metric of the paper."""
+    """Rows of ``dess.analysis.summary`` by policy: a column per metric of the paper."""
     return Table(estimates(rows[rows["metric"].isin(METRICS)], ["policy", "n"]), caption, rows)
 
 
 def compared(rows: pd.DataFrame, of: str) -> pd.DataFrame:
-    """Rows of ``analysis.compare``: differences in every metric, and the p-value of the product.
+    """Rows of ``dess.analysis.compare``: all differences, and the p-value of the product.
 
     The mark of a difference says whether it is significant, by its adjusted p-value.
 
     Args:
-        rows: The rows. Those of ``analysis.compare_learners`` have the prediction interval of the
-            product of one new training as well; a single training has none.
+        rows: The rows. Those of ``dess.analysis.compare_learners`` have the prediction interval of
+            the product of one new training as well; a single training has none.
         of: The column that tells what is compared.
     """
     sides = map(position_by_test, rows["difference"], rows["p_adjusted"])

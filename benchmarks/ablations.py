@@ -51,9 +51,9 @@ VARIANTS = {
 TIMED = """
 import hashlib, sys, time
 sys.path.insert(0, ".")
-import numpy as np, policies
+import numpy as np
 from benchmarks.recorded import Recorded, Recorder
-from dess import load_scenario, simulate_batch
+from dess import load_scenario, policies, simulate_batch
 scenario, missions = load_scenario("paper"), 600
 recorder = Recorder(policies.load("greedy"), missions, scenario.max_slots, scenario.uavs[1])
 simulate_batch(scenario, recorder, 5, missions)
@@ -67,8 +67,8 @@ print(1e9 * best / records["uav_slots"].sum(), hashlib.sha256(records.tobytes())
 
 
 def _copy(folder: Path, changes: tuple) -> Path:
-    """The packages with these lines changed."""
-    for name in ("dess", "policies", "benchmarks"):
+    """The package with these lines changed."""
+    for name in ("dess", "benchmarks"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     for name, line, instead in changes:
         text = (folder / name).read_text()

@@ -11,8 +11,8 @@ import time
 
 import numpy as np
 
-from analysis.bound.prices import ITERATIONS, Detail, improve, known_of
 from dess import load_scenario
+from dess.analysis.bound.prices import ITERATIONS, Detail, improve, known_of
 
 FINE = tuple(np.linspace(0, 1, 15))
 VARIANTS = {

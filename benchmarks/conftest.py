@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-import policies
 from benchmarks.recorded import Recorder
-from dess import load_scenario, simulate_batch
+from dess import load_scenario, policies, simulate_batch
 from dess.scenario import ScenarioSpace
 
 SEED, MISSIONS = 5, 2000

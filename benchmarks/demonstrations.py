@@ -31,14 +31,14 @@ from dess.guard import guard
 from dess.observations.observer import encoder_of
 from dess.observations.sets import Sets
 from dess.observations.states import CompactStates, compact_states, masks
+from dess.policies.learner.config import MISSION_SEED, TrainingConfig, load_config
+from dess.policies.learner.network import SetNetwork
+from dess.policies.learner.policy import LearnedPolicy
+from dess.policies.learner.trained import save_policy
+from dess.policies.learner.training import soft_update
+from dess.policies.planner import LongPlanner, Planner
 from dess.sea.families import FAMILIES, SETS
 from dess.view import View
-from policies.learner.config import MISSION_SEED, TrainingConfig, load_config
-from policies.learner.network import SetNetwork
-from policies.learner.policy import LearnedPolicy
-from policies.learner.trained import save_policy
-from policies.learner.training import soft_update
-from policies.planner import LongPlanner, Planner
 
 
 class Round(NamedTuple):

@@ -21,17 +21,16 @@ from typing import Any
 import numpy as np
 import torch
 
-import policies
-from analysis.metrics import PRODUCT
-from analysis.stats.intervals import mean_interval
 from benchmarks.recorded import Recorded, Recorder
-from dess import load_scenario, simulate_batch
+from dess import load_scenario, policies, simulate_batch
+from dess.analysis.metrics import PRODUCT
+from dess.analysis.stats.intervals import mean_interval
 from dess.guard import guard
 from dess.observations.states import CompactStates, masks
+from dess.policies.learner.config import MISSION_SEED, TrainingConfig, load_config
+from dess.policies.learner.dqn import Batch, DQNLearner, DQNTraining
+from dess.policies.learner.trained import save_policy
 from dess.view import View
-from policies.learner.config import MISSION_SEED, TrainingConfig, load_config
-from policies.learner.dqn import Batch, DQNLearner, DQNTraining
-from policies.learner.trained import save_policy
 
 RECORDED, EVALUATED = 777_002, 777_001  # seeds of the planner's missions and of the evaluation
 HELD_OUT = 50  # of the planner's missions, which no training sees

@@ -20,16 +20,16 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
-from analysis.answers.learning import SHIPPED, read_curves, trained_policies
-from analysis.metrics import METRICS, PRODUCT
 from dess import simulate_batch
+from dess.analysis.answers.learning import SHIPPED, read_curves, trained_policies
+from dess.analysis.metrics import METRICS, PRODUCT
 from dess.files.reading import paths_in
 from dess.files.tables import read_table, write_table
-from policies.base import Policy
-from policies.learner.config import TrainingConfig, load_config
-from policies.learner.dqn import DQNTraining
-from policies.learner.session import device_of
-from policies.registry import TRAINED, load
+from dess.policies.base import Policy
+from dess.policies.learner.config import TrainingConfig, load_config
+from dess.policies.learner.dqn import DQNTraining
+from dess.policies.learner.session import device_of
+from dess.policies.registry import TRAINED, load
 
 EVALUATION_SEED, MISSIONS = 900_000_001, 1000  # of the final evaluation
 

@@ -12,19 +12,19 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from analysis import load_study, numbers
-from analysis.answers.learning import read_curve
-from analysis.metrics import METRICS, PRODUCT
-from analysis.paper import values
-from analysis.stats.differences import paired
-from analysis.stats.intervals import interval_of, post_stratified
 from dess import load_scenario, simulate_batch
+from dess.analysis import load_study, numbers
+from dess.analysis.answers.learning import read_curve
+from dess.analysis.metrics import METRICS, PRODUCT
+from dess.analysis.paper import values
+from dess.analysis.stats.differences import paired
+from dess.analysis.stats.intervals import interval_of, post_stratified
 from dess.files.reading import read_text
 from dess.files.writing import write_file
-from policies.about import CARD
-from policies.learner.config import MISSION_SEED, load_config
-from policies.learner.description import read_description
-from policies.registry import HEURISTICS, load
+from dess.policies.about import CARD
+from dess.policies.learner.config import MISSION_SEED, load_config
+from dess.policies.learner.description import read_description
+from dess.policies.registry import HEURISTICS, load
 
 # The seed of the missions of model cards, which neither training nor selection of weights uses.
 EVALUATION_SEED = 20_261_121

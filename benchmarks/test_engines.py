@@ -5,11 +5,10 @@ import time
 import numpy as np
 import pytest
 
-import policies
 from benchmarks.conftest import MISSIONS, SEED, RecordedMissions
 from benchmarks.floor import draw, needed_draws
 from benchmarks.recorded import Recorded
-from dess import simulate, simulate_batch
+from dess import policies, simulate, simulate_batch
 
 FLOOR_MISSIONS = 300
 # What other processes do matters less for CPU time than for the clock.

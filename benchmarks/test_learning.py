@@ -5,11 +5,10 @@ from collections.abc import Iterator
 import pytest
 import torch
 
-import policies
 from benchmarks.conftest import MISSIONS, SEED
-from dess import load_scenario, simulate_batch
-from policies.learner.checkpoint import new_training
-from policies.learner.config import config_names, load_config
+from dess import load_scenario, policies, simulate_batch
+from dess.policies.learner.checkpoint import new_training
+from dess.policies.learner.config import config_names, load_config
 
 DEVICES = ["cpu", *(["cuda"] if torch.cuda.is_available() else [])]
 

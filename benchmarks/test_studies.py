@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from analysis import load_study, run_study
-from analysis.execution import jobs
-from analysis.results.tables import Results
-from analysis.study.study import Study
 from dess import simulate_batch
+from dess.analysis import load_study, run_study
+from dess.analysis.execution import jobs
+from dess.analysis.results.tables import Results
+from dess.analysis.study.study import Study
 
 ROUNDS = 5
 

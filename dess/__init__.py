@@ -1,10 +1,10 @@
 """Discrete-event simulation of UAV data harvesting with charging at sea.
 
-    import dess, policies
+    import dess
 
     scenario = dess.load_scenario("paper", uavs=3)
-    record = dess.simulate(scenario, policies.load("greedy"), seed=1)
-    records = dess.simulate_batch(scenario, policies.load("greedy"), seed=1, replications=1000)
+    record = dess.simulate(scenario, dess.policies.load("greedy"), seed=1)
+    records = dess.simulate_batch(scenario, dess.policies.load("greedy"), seed=1, replications=1000)
     records.missions["success"].mean()
 
 Names are imported on first use, so that ``import dess`` is fast.
@@ -36,12 +36,16 @@ _HOME = {
     "vector_env": "env.vector",
 }
 
-__all__ = ["__version__", *_HOME]
+_FLOORS = ("policies", "analysis")  # above this one, imported by name alone
+
+__all__ = ["__version__", *_HOME, *_FLOORS]
 
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         return metadata.version("dess")
+    if name in _FLOORS:
+        return import_module(f"dess.{name}")
     if name in _HOME:
         return getattr(import_module(f"dess.{_HOME[name]}"), name)
     raise AttributeError(f"module 'dess' has no attribute {name!r}")

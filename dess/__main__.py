@@ -1,9 +1,23 @@
-"""``python -m dess``: the command that the distribution installs under the name ``dess``."""
+"""The command ``dess``, also as ``python -m dess``."""
 
 import sys
-from importlib.metadata import distribution
+from importlib import import_module
+from pathlib import Path
+
+
+def main() -> int:
+    """Run the command; the exit code."""
+    if Path(__file__).with_name("reports").is_file():
+        print(
+            "dess: the folders dess/policies, dess/analysis and dess/reports of this checkout are "
+            "text files; allowed: links, which git makes with: "
+            "git config core.symlinks true && git checkout -- dess (on Windows in developer mode)",
+            file=sys.stderr,
+        )
+        return 2
+    # Found by its name: this floor must not import the floors above it.
+    return import_module("dess.reports.cli").main()
+
 
 if __name__ == "__main__":
-    # Found by its name: this package must not import the floors above it.
-    (command,) = distribution("dess").entry_points.select(group="console_scripts", name="dess")
-    sys.exit(command.load()())
+    sys.exit(main())

@@ -1,6 +1,6 @@
 """The batch engine: compiled code that advances many missions together, slot by slot.
 
-    records = simulate_batch(load_scenario("paper"), policies.load("greedy"), 1, range(1000))
+    records = simulate_batch(load_scenario("paper"), dess.policies.load("greedy"), 1, range(1000))
     records.missions["collection_ratio"].mean()
 
 Like the SimPy model it calls ``rules.py``, so both give the same records. A batch has a fixed

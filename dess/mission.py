@@ -5,7 +5,7 @@ the mission clock, opens each mission slot t, runs its communication slots at th
 adds the arrivals at its end. A charging zone is a ``simpy.Resource`` (``ChargingZone``): a UAV that
 may charge asks for a pad, and gives it back when it may not any more.
 
-    record = simulate(load_scenario("paper"), policies.load("greedy"), seed=1, events=True)
+    record = simulate(load_scenario("paper"), dess.policies.load("greedy"), seed=1, events=True)
     record.success, record.collection_ratio, record.events.columns()
 
 Several things happen at the start of a slot, at the same simulation time, in this order, which

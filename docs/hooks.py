@@ -21,8 +21,8 @@ from mkdocs.structure.pages import Page
 from typer.cli import get_docs_for_click
 
 import dess
-from analysis.names import fields
-from reports.cli.commands import app
+from dess.analysis.names import fields
+from dess.reports.cli.commands import app
 
 ROOT = Path(__file__).parents[1]
 LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)")
@@ -58,8 +58,9 @@ def _default(value: Any) -> str:
 def names(package: str) -> str:
     """The documentation of a package's public names, by their docstrings."""
     module = import_module(package)
-    found = [getattr(module, name) for name in module.__all__ if not name.startswith("__")]
-    return "\n\n".join(f"::: {thing.__module__}.{thing.__qualname__}" for thing in found)
+    found = [getattr(module, name) for name in module.__all__]
+    documented = [thing for thing in found if hasattr(thing, "__qualname__")]  # no module
+    return "\n\n".join(f"::: {thing.__module__}.{thing.__qualname__}" for thing in documented)
 
 
 def changelog() -> str:

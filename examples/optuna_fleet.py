@@ -5,7 +5,7 @@ import warnings
 import optuna
 
 import dess
-import policies
+from dess import policies
 
 warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)  # of the pruner
 

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 from rliable import library, metrics, plot_utils
 
-import analysis
+from dess import analysis
 
 SHARES = np.linspace(0, 1, 51)  # of the best score
 

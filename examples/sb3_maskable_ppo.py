@@ -21,7 +21,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 import dess
 from dess.integrations.sb3 import SB3VecEnv
-from policies.adapter import Adapter
+from dess.policies.adapter import Adapter
 
 FILE = Path("maskable_ppo.zip")  # in the working folder
 

@@ -14,7 +14,7 @@ from torchrl.modules import MLP, MaskedCategorical, MultiAgentMLP, Probabilistic
 from torchrl.objectives import ClipPPOLoss, ValueEstimators
 
 import dess
-from policies.adapter import Adapter
+from dess.policies.adapter import Adapter
 
 WEIGHTS = "mappo.pt"
 SEEN, LOGITS, MASK = ("uav", "observation"), ("uav", "logits"), ("uav", "action_mask")

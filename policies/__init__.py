@@ -1,15 +1,15 @@
 """Policies: heuristics, the return guard, the learned policy, and policies of other packages.
 
-policy = policies.load("greedy")      # by name, or the folder of a trained policy
-team = policies.load_team("ddqn,tour")
+policy = dess.policies.load("greedy")      # by name, or the folder of a trained policy
+team = dess.policies.load_team("ddqn,tour")
 actions = policy.act(view)
 """
 
 from pathlib import Path
 
-from policies import registry
-from policies.base import Policy
-from policies.registry import TypedByUser, names
+from dess.policies import registry
+from dess.policies.base import Policy
+from dess.policies.registry import TypedByUser, names
 
 __all__ = ["load", "load_team", "names"]
 

@@ -6,9 +6,17 @@ from typing import Any, NamedTuple
 
 import dess
 from dess.files.reading import Missing, read_text
+from dess.policies.learner.description import read_description
+from dess.policies.registry import (
+    FILE,
+    SHIPPED,
+    TypedByUser,
+    folder_of,
+    load,
+    package_of,
+    trained_names,
+)
 from dess.scenario import SAMPLED, load_scenario, scenario_names
-from policies.learner.description import read_description
-from policies.registry import FILE, SHIPPED, TypedByUser, folder_of, load, package_of, trained_names
 
 CARD = "README.md"  # beside the weights of a trained policy
 CARD_LIMIT = 2**20  # bytes

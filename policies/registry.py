@@ -21,26 +21,29 @@ from dess.code.libraries import needs
 from dess.code.sources import path_of
 from dess.errors import InputError, one_of, shown
 from dess.files.reading import paths_in
-from policies.base import Policy
+from dess.policies.base import Policy
 
 GROUP = "dess.policies"
 
 # Name -> (module and class, description).
 HEURISTICS = {
-    "random": ("policies.heuristics:Random", "a random safe move, clear of teammates"),
+    "random": ("dess.policies.heuristics:Random", "a random safe move, clear of teammates"),
     "random-unguarded": (
-        "policies.heuristics:RandomUnguarded",
+        "dess.policies.heuristics:RandomUnguarded",
         "the same without the return guard: it shows what the guard is worth",
     ),
-    "nearest": ("policies.heuristics:Nearest", "the nearest node with enough data"),
-    "greedy": ("policies.heuristics:Greedy", "the best residual data for the distance"),
-    "tour": ("policies.heuristics:Tour", "a fixed circuit through the nodes, split among the UAVs"),
-    "age": ("policies.heuristics:Age", "the stalest data for the distance"),
+    "nearest": ("dess.policies.heuristics:Nearest", "the nearest node with enough data"),
+    "greedy": ("dess.policies.heuristics:Greedy", "the best residual data for the distance"),
+    "tour": (
+        "dess.policies.heuristics:Tour",
+        "a fixed circuit through the nodes, split among the UAVs",
+    ),
+    "age": ("dess.policies.heuristics:Age", "the stalest data for the distance"),
 }
 PLANNERS = {
-    "planner": ("policies.planner:Planner", "a plan for the whole team, kept up to date"),
-    "planner-short": ("policies.planner:ShortPlanner", "the same with a fifth of the search"),
-    "planner-long": ("policies.planner:LongPlanner", "the same with a longer search"),
+    "planner": ("dess.policies.planner:Planner", "a plan for the whole team, kept up to date"),
+    "planner-short": ("dess.policies.planner:ShortPlanner", "the same with a fifth of the search"),
+    "planner-long": ("dess.policies.planner:LongPlanner", "the same with a longer search"),
 }
 SHIPPED = HEURISTICS | PLANNERS
 
@@ -104,7 +107,7 @@ def load(name: str | Path) -> Policy:
         return _made(name, SHIPPED[name][0], lambda: _class_of(*SHIPPED[name][0].split(":")))
     if folder := folder_of(name):
         needs("learning", f"policy {name}")
-        from policies.learner.trained import load_policy  # imports torch
+        from dess.policies.learner.trained import load_policy  # imports torch
 
         policy = load_policy(folder)
         if name in trained_names():
@@ -136,7 +139,7 @@ def folder_of(name: str) -> Path | None:
 
 def _check_untrained(folder: Path) -> None:
     """Raise an error if a folder has a training that has not written any weights yet."""
-    from policies.learner.config import CHECKPOINT  # imports pydantic
+    from dess.policies.learner.config import CHECKPOINT  # imports pydantic
 
     if os.path.exists(folder / CHECKPOINT):  # False for a name that no folder can have
         raise InputError(
@@ -260,7 +263,7 @@ def _outside() -> dict[str, EntryPoint]:
 
 def _description(folder: Path) -> str:
     """The description in the config of a trained policy, or the policy that it repeats."""
-    from policies.learner.description import read_description  # imports pydantic
+    from dess.policies.learner.description import read_description  # imports pydantic
 
     training = read_description(folder).training
     if training.name == folder.name:

@@ -16,16 +16,16 @@ from typing import Any
 import tomli_w
 from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
 
-from analysis import numbers
-from analysis.results.chunks import BOUNDS, MANIFEST, partition
-from analysis.results.parquet import files_in
-from analysis.results.tables import Results
 from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.results.chunks import BOUNDS, MANIFEST, partition
+from dess.analysis.results.parquet import files_in
+from dess.analysis.results.tables import Results
 from dess.files import documents, tables
 from dess.files.reading import read_bytes
 from dess.files.writing import write_zip
-from reports.pages.html import template
-from reports.pages.page import LARGEST, LIMIT, Page
+from dess.reports.pages.html import template
+from dess.reports.pages.page import LARGEST, LIMIT, Page
 
 _TABLES = ("missions", "uavs", "events", BOUNDS)
 

@@ -16,13 +16,13 @@ from typing import Any, NamedTuple
 import pandas as pd
 from IPython.display import HTML
 
-from analysis import metrics, names, numbers
-from analysis.answers import summary
-from analysis.answers.settings import points, varied
-from analysis.figures import style
-from analysis.results.tables import Results
 from dess import InputError
-from reports.pages.html import template
+from dess.analysis import metrics, names, numbers
+from dess.analysis.answers import summary
+from dess.analysis.answers.settings import points, varied
+from dess.analysis.figures import style
+from dess.analysis.results.tables import Results
+from dess.reports.pages.html import template
 
 
 class Slider(NamedTuple):
@@ -103,7 +103,7 @@ class Grid:
         return f"In the middle of all ranges the product is {numbers.words(parts)}; move a slider."
 
     def table(self) -> pd.DataFrame:
-        """The means of all settings: the fields, then the columns of ``analysis.summary``."""
+        """The means of all settings: the fields, then the columns of ``dess.analysis.summary``."""
         return self.means.join(points(self.results), on="point")[
             [*self._places, "policy", "metric", "mean", "low", "high", "n"]
         ]

@@ -5,9 +5,9 @@ import numpy as np
 from dess import guard, rules
 from dess.channel import empty_scratch
 from dess.code.kernels import kernel
+from dess.policies import heuristics
 from dess.sea.chart import FAR, distance, is_open
 from dess.state import STEP_X, STEP_Y
-from policies import heuristics
 
 
 @kernel

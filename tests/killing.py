@@ -51,7 +51,7 @@ class Command:
         # Not beside the folder, since the names of the sockets of kernels must be short.
         self.temporary = Path(tempfile.mkdtemp(prefix="dess-killed-"))
         atexit.register(shutil.rmtree, self.temporary, ignore_errors=True)
-        script = f"import sys\n{before}\nfrom reports.cli import main\nsys.exit(main())"
+        script = f"import sys\n{before}\nfrom dess.reports.cli import main\nsys.exit(main())"
         self.words = [sys.executable, "-c", script, *arguments, "--out", "out"]
         self.stderr = folder.with_name(f"{folder.name}.stderr")
 

@@ -25,13 +25,13 @@ ROOMS = {
     ),
     "reports": (
         *("folders", "tools", "pages", "player", "explorer", "crate"),
-        *("interrupts", "cli", "__main__"),
+        *("interrupts", "cli"),
     ),
 }
 # What a floor must not import, besides the floors above it.
 REFUSED = {"dess": {"pandas"}, "policies": {"pandas"}}
 # What only the learner may import: it takes seconds to load, and most commands need none of it.
-LEARNER, LEARNING = "policies.learner", {"torch", "safetensors"}
+LEARNER, LEARNING = "dess.policies.learner", {"torch", "safetensors"}
 # The libraries that only the classes made for them import; who uses these classes imports them.
 INTEGRATIONS = "dess.integrations"
 FOREIGN = {"agilerl", "benchmarl", "pufferlib", "ray", "rliable", "sb3_contrib"}
@@ -40,8 +40,8 @@ FOREIGN |= {"stable_baselines3", "supersuit", "tensordict", "torchrl"}
 HEAVY = {"torch", "numba", "numpy", "pandas", "pyarrow", "pydantic", "scipy", "matplotlib"}
 # What runs without the learner.
 LIGHT = (
-    "import dess, policies, analysis; from reports.cli import main",
-    "policies.load_team('random,nearest,greedy,tour'), policies.names()",
+    "import dess.policies, dess.analysis; from dess.reports.cli import main",
+    "dess.policies.load_team('random,nearest,greedy,tour'), dess.policies.names()",
     "assert main(['policies']) == 0",
     "assert main(['evaluate', '--policy', 'greedy', '--missions', '1']) == 0",
     "assert main(['train', 'none', '--out', 'none']) == 2",
@@ -51,30 +51,46 @@ LIGHT = (
 # What makes a name that may be a Python file, which is code that runs, and the modules that use it.
 # These are the types and functions of the registry, and the functions to which users give names.
 MAY_RUN_FILES = {
-    "policies.registry.TypedByUser": {
-        *("policies", "policies.about", "analysis.execution.evaluation"),
-        *("analysis.results.provenance", "reports.cli.simulate"),
+    "dess.policies.registry.TypedByUser": {
+        *("dess.policies", "dess.policies.about", "dess.analysis.execution.evaluation"),
+        *("dess.analysis.results.provenance", "dess.reports.cli.simulate"),
     },
-    "policies.registry.typed": {
-        *("analysis.study.study", "analysis.ask.question", "reports.cli.evaluate"),
+    "dess.policies.registry.typed": {
+        *("dess.analysis.study.study", "dess.analysis.ask.question", "dess.reports.cli.evaluate"),
     },
-    "policies.registry.confirmed": {"analysis.results.provenance", "reports.pages.verify"},
-    "policies.load": set(),
-    "policies.load_team": set(),
-    "policies.about.about": {"reports.cli.lists"},
-    "analysis.execution.evaluation.evaluate": {"analysis"},
-    "analysis.ask.question.sweep_question": {"analysis.ask.answer", "reports.cli.ask"},
-    "analysis.ask.question.what_if_question": {"analysis.ask.answer", "reports.cli.ask"},
-    "analysis.ask.answer.sweep": {"analysis"},
-    "analysis.ask.answer.what_if": {"analysis"},
-    **{f"analysis.{name}": set() for name in ("evaluate", "sweep", "what_if")},
+    "dess.policies.registry.confirmed": {
+        "dess.analysis.results.provenance",
+        "dess.reports.pages.verify",
+    },
+    "dess.policies.load": set(),
+    "dess.policies.load_team": set(),
+    "dess.policies.about.about": {"dess.reports.cli.lists"},
+    "dess.analysis.execution.evaluation.evaluate": {"dess.analysis"},
+    "dess.analysis.ask.question.sweep_question": {
+        "dess.analysis.ask.answer",
+        "dess.reports.cli.ask",
+    },
+    "dess.analysis.ask.question.what_if_question": {
+        "dess.analysis.ask.answer",
+        "dess.reports.cli.ask",
+    },
+    "dess.analysis.ask.answer.sweep": {"dess.analysis"},
+    "dess.analysis.ask.answer.what_if": {"dess.analysis"},
+    **{f"dess.analysis.{name}": set() for name in ("evaluate", "sweep", "what_if")},
 }
 
 
 def module_name(path: Path) -> str:
     """The dotted name of a source file."""
     parts = path.relative_to(ROOT).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+    name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+    return name if parts[0] == "dess" else f"dess.{name}"
+
+
+def place_of(module: str) -> list[str]:
+    """The floor of a module of ours, its room, and so on; without the name that all have."""
+    parts = module.split(".")
+    return parts[1:] if parts[0] == "dess" and parts[1:] and parts[1] in FLOORS else parts
 
 
 SOURCES = {
@@ -127,9 +143,9 @@ def test_imports_only_go_downwards(floor: str) -> None:
     climbing = {
         f"{name} imports {imported}"
         for name in SOURCES
-        if name.split(".")[0] == floor
+        if place_of(name)[0] == floor
         for imported in imports_of(name)
-        if imported.split(".")[0] in refused
+        if place_of(imported)[0] in refused
     }
     assert not climbing
 
@@ -140,16 +156,16 @@ def test_rooms_only_import_from_rooms_before_them(floor: str) -> None:
 
     def place(module: str) -> int:
         """Of the room of a module, which may be a room of its own."""
-        _, room, *rest = module.split(".")
+        room, *rest = place_of(module)[1:]
         own = ".".join([room, *rest])
         return rooms.index(own if own in rooms else room)
 
+    inside = {name for name in LIBRARY if name.startswith(f"dess.{floor}.")}
     climbing = {
         f"{name} imports {imported}"
-        for name in LIBRARY
-        if name.startswith(f"{floor}.")
-        for imported in imports_of(name)
-        if imported.startswith(f"{floor}.") and place(imported) > place(name)
+        for name in inside
+        for imported in imports_of(name) & inside
+        if place(imported) > place(name)
     }
     assert not climbing
 
@@ -216,30 +232,30 @@ def test_only_words_of_the_user_can_name_a_python_file(door: str) -> None:
 def test_the_policies_of_a_study_are_replaced_by_the_words_of_a_user_alone() -> None:
     replacing = {
         user
-        for user in users_of_name("analysis.study.study", "load_study")
+        for user in users_of_name("dess.analysis.study.study", "load_study")
         for node in ast.walk(LIBRARY[user])
         if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("load_study")
         if any(keyword.arg in (None, "policies") for keyword in node.keywords)
     }
-    assert replacing == {"reports.cli.studies"}
+    assert replacing == {"dess.reports.cli.studies"}
 
 
 @pytest.mark.parametrize(
     "source",
     [
-        "from policies.registry import typed",
-        "from policies.registry import typed as plain",
-        "from policies.registry import *",
-        "from policies import registry\nregistry.typed([])",
-        "from policies import registry as r\nr.typed([])",
-        "import policies.registry\npolicies.registry.typed([])",
-        "import policies.registry as r\nr.typed([])",
+        "from dess.policies.registry import typed",
+        "from dess.policies.registry import typed as plain",
+        "from dess.policies.registry import *",
+        "from dess.policies import registry\nregistry.typed([])",
+        "from dess.policies import registry as r\nr.typed([])",
+        "import dess.policies.registry\ndess.policies.registry.typed([])",
+        "import dess.policies.registry as r\nr.typed([])",
     ],
 )
 def test_every_way_to_take_a_name_is_seen(source: str) -> None:
-    assert _takes(ast.parse(source), "policies.registry", "typed")
+    assert _takes(ast.parse(source), "dess.policies.registry", "typed")
     assert not _takes(ast.parse(source.replace("typed", "names").replace("*", "names")),
-                      "policies.registry", "typed")  # fmt: skip
+                      "dess.policies.registry", "typed")  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -262,14 +278,14 @@ def test_nothing_imports_integrations() -> None:
 
 
 def test_the_command_line_loads_nothing_heavy() -> None:
-    assert not HEAVY & loaded_by("from reports.cli import main; main(['--help'])")
+    assert not HEAVY & loaded_by("from dess.reports.cli import main; main(['--help'])")
 
 
 def test_torch_is_loaded_only_for_the_learner() -> None:
     assert not LEARNING & loaded_by("; ".join(LIGHT))
 
 
-@pytest.mark.parametrize("package", ["dess", "analysis"])
+@pytest.mark.parametrize("package", ["dess", "dess.analysis"])
 def test_lazy_names_are_typed_for_editors(package: str) -> None:
     block = next(node for node in SOURCES[package].body if isinstance(node, ast.If))
     assert ast.unparse(block.test) == "TYPE_CHECKING"
@@ -283,7 +299,7 @@ def test_lazy_names_are_typed_for_editors(package: str) -> None:
     assert typed == {name: f"{package}.{module}.{name}" for name, module in home.items()}
 
 
-@pytest.mark.parametrize("package", ["dess", "policies", "analysis"])
+@pytest.mark.parametrize("package", ["dess", "dess.policies", "dess.analysis"])
 def test_packages_list_their_public_names(package: str) -> None:
     module = import_module(package)
     assert dir(module) == sorted(module.__all__)

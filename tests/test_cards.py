@@ -5,8 +5,8 @@ import re
 import pytest
 
 from benchmarks import model_cards
-from policies.about import CARD
-from policies.registry import TRAINED, trained_names
+from dess.policies.about import CARD
+from dess.policies.registry import TRAINED, trained_names
 
 
 @pytest.mark.slow

@@ -16,14 +16,13 @@ import yaml
 from PIL import Image
 
 import dess
-import policies
-from analysis import load_study
-from analysis.paper import values
 from benchmarks import learning_curves
-from dess import load_scenario
+from dess import load_scenario, policies
+from dess.analysis import load_study
+from dess.analysis.paper import values
 from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
-from reports import cli
-from reports.cli import commands, options
+from dess.reports import cli
+from dess.reports.cli import commands, options
 
 ROOT = Path(__file__).parents[1]
 TOP = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")

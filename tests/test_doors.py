@@ -34,18 +34,18 @@ OPENING_OF = {
 # What is no way past the door, by the module.
 ALLOWED = {
     # A results folder, whose files the door reads and writes.
-    "analysis.execution.runner": {"open"},
+    "dess.analysis.execution.runner": {"open"},
     # Sources of our own code, and what numba keeps of it.
     "dess.code.kernels": {"read_bytes"},
     "dess.code.sources": {"read_bytes", "walk"},
     # A library that opens a file which the door has checked, or a temporary one of the door.
-    "policies.learner.tensors": {"safe_open", "save_file"},
-    "policies.learner.session": {"SummaryWriter"},
-    "reports.cli.simulate": {"savefig"},
-    "reports.player.animation": {"saving"},
+    "dess.policies.learner.tensors": {"safe_open", "save_file"},
+    "dess.policies.learner.session": {"SummaryWriter"},
+    "dess.reports.cli.simulate": {"savefig"},
+    "dess.reports.player.animation": {"saving"},
     # The null device in the place of a closed stream; the licence of the package.
-    "reports.cli.console": {"open"},
-    "reports.crate": {"read_text"},
+    "dess.reports.cli.console": {"open"},
+    "dess.reports.crate": {"read_text"},
 }
 
 
@@ -103,14 +103,14 @@ MADE_HERE = {"dumps", "to_json"}
 # Text that is parsed outside the door, by the module.
 PARSED = {
     # The header of a checkpoint, which is a ``Document``, as it was written: for its checksum.
-    "policies.learner.checkpoint": {"parse_json"},
+    "dess.policies.learner.checkpoint": {"parse_json"},
     # Tables that are no objects of JSON, by types of pydantic.
-    "analysis.results.parquet": {"validate_json"},
+    "dess.analysis.results.parquet": {"validate_json"},
     # Keys of dictionaries and of a cache, which are texts of JSON.
-    "analysis.study.cheapest": {"loads"},
-    "analysis.results.provenance": {"loads"},
+    "dess.analysis.study.cheapest": {"loads"},
+    "dess.analysis.results.provenance": {"loads"},
     # Lines from the process that has started this one.
-    "reports.pages.cells": {"loads"},
+    "dess.reports.pages.cells": {"loads"},
 }
 
 

@@ -7,7 +7,7 @@ import optuna
 import pytest
 
 import dess
-import policies
+from dess import policies
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

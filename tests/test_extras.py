@@ -9,7 +9,7 @@ import pytest
 from packaging.utils import canonicalize_name
 
 from dess.code import libraries
-from policies.registry import trained_names
+from dess.policies.registry import trained_names
 from tests.analysis.small import environment, small_study
 from tests.distributions import EXTRAS, absent, homes, requirements
 
@@ -20,7 +20,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from tests.hiding import hide
 hidden, lines = json.loads(sys.argv[1])
 hide(hidden)
-from reports.cli import main
+from dess.reports.cli import main
 done = {}
 for line in lines:
     with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
@@ -130,7 +130,7 @@ def test_packages_are_imported_without_any_extra(folder) -> None:
         "import dess, policies, analysis\n"
         "for package in (dess, policies, analysis):\n"
         "    for name in package.__all__: getattr(package, name)\n"
-        "try: policies.load('ddqn')\n"
+        "try: dess.policies.load('ddqn')\n"
         "except dess.InputError as error: print(error)\n"
     )
     assert python(folder, script, json.dumps(sorted(absent()))).startswith("policy ddqn needs ")

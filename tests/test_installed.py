@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -21,13 +22,17 @@ def run(*command: object, folder: Path) -> str:
 
 
 def check_commands(dess: Path, folder: Path) -> None:
-    """Run a study and render its page with an installed command, from an empty folder."""
+    """Run a study and render its page, from a folder that has modules with names of ours."""
     small_study(folder, missions=4)
-    script = "import dess, reports.pages; print(dess.__version__, dess.__file__, reports.__file__)"
+    for name in ("policies.py", "analysis/__init__.py", "reports/__init__.py"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text("raise AssertionError('not ours')", "utf-8")
+    script = "import dess, dess.reports as r; print(dess.__version__, dess.__file__, r.__file__)"
     version, *files = run(dess.with_name("python"), "-c", script, folder=folder).split()
     assert version == PROJECT["version"]
     assert all(Path(file).is_relative_to(dess.parents[1]) for file in files)
-    run(dess, "study", "run", "trial.toml", "--out", "trial", folder=folder)
+    command = ("-m", "dess", "study", "run", "trial.toml", "--out", "trial")
+    run(dess.with_name("python"), *command, folder=folder)
     page = folder / run(dess, "report", "./trial", folder=folder).strip()
     assert "trial" in page.read_text("utf-8")
     assert str(ROOT) not in page.read_text("utf-8")
@@ -35,6 +40,17 @@ def check_commands(dess: Path, folder: Path) -> None:
 
 def test_the_wheel_runs_without_the_repository(installed: Path, tmp_path: Path) -> None:
     check_commands(installed, tmp_path)
+
+
+def test_a_checkout_without_links_says_how_to_make_them(tmp_path: Path) -> None:
+    (tmp_path / "dess").mkdir()
+    for name in ("__init__.py", "__main__.py"):
+        shutil.copy(ROOT / "dess" / name, tmp_path / "dess")
+    (tmp_path / "dess/reports").write_text("../reports", "utf-8")  # as git writes it on Windows
+    command = [sys.executable, "-m", "dess", "policies"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "allowed: links" in done.stderr and done.stderr.count("\n") == 1
 
 
 @pytest.mark.slow

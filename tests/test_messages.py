@@ -13,21 +13,21 @@ from typing import Any, get_args
 import pytest
 from pydantic import BaseModel
 
-from analysis.answers.comparison import Times
-from analysis.results.manifest import Manifest
-from analysis.results.resimulate import Evidence
-from analysis.study.study import Study
-from analysis.verification.measurements import CrossCheck
 from dess import InputError
+from dess.analysis.answers.comparison import Times
+from dess.analysis.results.manifest import Manifest
+from dess.analysis.results.resimulate import Evidence
+from dess.analysis.study.study import Study
+from dess.analysis.verification.measurements import CrossCheck
 from dess.files.documents import Document
+from dess.policies.learner.checkpoint import Header
+from dess.policies.learner.config import TrainingConfig, load_config
+from dess.policies.learner.description import Description
+from dess.policies.registry import TRAINED
 from dess.record import MISSION_RECORD
+from dess.reports.pages.page import Card, Learned
 from dess.scenario import Scenario, ScenarioSpace, validated
 from dess.sea import files
-from policies.learner.checkpoint import Header
-from policies.learner.config import TrainingConfig, load_config
-from policies.learner.description import Description
-from policies.registry import TRAINED
-from reports.pages.page import Card, Learned
 
 SECTIONS = {
     "arrivals": {"process": "continuous", "schedule": [[0, 1.0]], "buffer": 3},

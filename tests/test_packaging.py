@@ -13,12 +13,13 @@ from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
-from policies.registry import TRAINED, trained_names
+from dess.policies.registry import TRAINED, trained_names
 from tests.distributions import EXTRAS, PROJECT, ROOT, asked, closure, homes, requirements
 from tests.installed import built
 
 CONSTRAINTS = ROOT / "constraints.txt"
-PACKAGES = ("dess", "policies", "analysis", "reports")
+# The folders of the product, and what is before their names where they are installed.
+FOLDERS = {"dess": "", "policies": "dess/", "analysis": "dess/", "reports": "dess/"}
 ASKED = asked("test", "lint", "docs", "examples")
 APART = {"test", "lint", "docs", "examples"}  # extras that ``all`` does not include
 
@@ -39,15 +40,15 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> ZipFile:
 
 def test_the_wheel_holds_the_packages_with_all_their_files_and_nothing_else(wheel: ZipFile) -> None:
     files = {
-        path.relative_to(ROOT).as_posix()
-        for package in PACKAGES
-        for path in (ROOT / package).rglob("*")
+        f"{FOLDERS[folder]}{path.relative_to(ROOT).as_posix()}"
+        for folder in FOLDERS
+        for path in (ROOT / folder).rglob("*")
         if path.is_file() and not {"__pycache__", ".ipynb_checkpoints"} & set(path.parts)
     }
     held = {name for name in wheel.namelist() if not name.split("/")[0].endswith(".dist-info")}
     assert held == files
-    for package in PACKAGES:
-        assert f"{package}/py.typed" in held
+    assert {name.split("/")[0] for name in held} == {"dess"}
+    assert "dess/py.typed" in held
 
 
 def test_trained_policies_have_their_curves_and_model_cards() -> None:
@@ -59,14 +60,14 @@ def test_trained_policies_have_their_curves_and_model_cards() -> None:
 def test_every_library_that_is_imported_is_asked_for() -> None:
     imported = {
         (node.module if isinstance(node, ast.ImportFrom) else alias.name).split(".")[0]
-        for package in PACKAGES
-        for path in (ROOT / package).rglob("*.py")
+        for folder in FOLDERS
+        for path in (ROOT / folder).rglob("*.py")
         if path.parent.name != "integrations"  # the libraries of these modules are the user's
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
         if isinstance(node, ast.Import | ast.ImportFrom)
         for alias in node.names
     }
-    outside = imported - set(sys.stdlib_module_names) - set(PACKAGES)
+    outside = imported - set(sys.stdlib_module_names) - {"dess"}
     found = homes()
     wanted = {home for name in outside for home in found.get(name, {canonicalize_name(name)})}
     assert not wanted - set(requirements(*asked("all")))

@@ -13,27 +13,27 @@ from matplotlib.figure import Figure
 from scipy import stats
 from threadpoolctl import threadpool_limits
 
-from analysis import numbers
-from analysis.answers.missions import FOLDER
-from analysis.answers.summary import learners, ranked_policies
-from analysis.figures import Drawing, style
-from analysis.figures.comparison import middle
-from analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
-from analysis.names import PARAMETERS, parameter, value_text
-from analysis.results.tables import Results
-from analysis.stats.choices import on_front
-from analysis.stats.differences import compare, for_choice, paired, with_adjusted
-from analysis.stats.intervals import LEVEL, by_replication, values_within, wilson
-from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
-from analysis.study.stopping import Text
 from dess import InputError, simulate, simulate_batch
+from dess.analysis import numbers
+from dess.analysis.answers.missions import FOLDER
+from dess.analysis.answers.summary import learners, ranked_policies
+from dess.analysis.figures import Drawing, style
+from dess.analysis.figures.comparison import middle
+from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
+from dess.analysis.names import PARAMETERS, parameter, value_text
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.choices import on_front
+from dess.analysis.stats.differences import compare, for_choice, paired, with_adjusted
+from dess.analysis.stats.intervals import LEVEL, by_replication, values_within, wilson
+from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
+from dess.analysis.study.stopping import Text
 from dess.errors import one_of
 from dess.files.documents import Document
 from dess.files.reading import read_text
 from dess.files.writing import check_target, write_file
+from dess.policies.base import Policy
+from dess.policies.registry import load_team
 from dess.view import View
-from policies.base import Policy
-from policies.registry import load_team
 
 OF_BASELINE = "_baseline"  # suffix of the names of the baseline's metrics
 

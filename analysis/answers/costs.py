@@ -18,15 +18,15 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from analysis import numbers
-from analysis.answers.settings import edge, ends, points, ranked
-from analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of
-from analysis.names import DECISIONS, parameter
-from analysis.results.tables import Results, once
-from analysis.stats.choices import membership, on_front
-from analysis.study.cheapest import PARTS, Answer, Cheapest, CheapestChoice, Costs
-from analysis.tables import CHECKED, INTERVALS, MOST_ROWS, Table, counts
 from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.answers.settings import edge, ends, points, ranked
+from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of
+from dess.analysis.names import DECISIONS, parameter
+from dess.analysis.results.tables import Results, once
+from dess.analysis.stats.choices import membership, on_front
+from dess.analysis.study.cheapest import PARTS, Answer, Cheapest, CheapestChoice, Costs
+from dess.analysis.tables import CHECKED, INTERVALS, MOST_ROWS, Table, counts
 from dess.errors import one_of
 from dess.scenario import ZONE_PADS
 

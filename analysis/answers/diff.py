@@ -14,13 +14,13 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
-from analysis.answers.settings import in_words
-from analysis.metrics import METRICS, PRODUCT, RATIO, REWARD
-from analysis.results.chunks import check_parts
-from analysis.results.provenance import differing
-from analysis.results.tables import Results
-from analysis.stats.differences import compare
 from dess import InputError
+from dess.analysis.answers.settings import in_words
+from dess.analysis.metrics import METRICS, PRODUCT, RATIO, REWARD
+from dess.analysis.results.chunks import check_parts
+from dess.analysis.results.provenance import differing
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.differences import compare
 from dess.record import MISSION_RECORD, OPERATIONS, UAV_RECORD
 
 _KEYS = ["team", "scenario", "replication"]  # columns by which missions are matched
@@ -111,7 +111,7 @@ def effects(found: Diff, by: Sequence[str] = ("policy_a",)) -> pd.DataFrame:
     Returns:
         A row per group and metric, the group with most differing missions first: the columns
         ``by``, ``missions``, ``differ`` (number of missions that differ), ``metric``, and the
-        columns that follow ``metric`` in ``analysis.compare``.
+        columns that follow ``metric`` in ``dess.analysis.compare``.
     """
     groups = found.missions.assign(differ=found.missions["fields"] != "").groupby([*by])
     counts = groups["differ"].agg(missions="size", differ="sum").reset_index()

@@ -11,21 +11,21 @@ import pandas as pd
 import pyarrow as pa
 from scipy import stats
 
-from analysis import numbers
-from analysis.answers.settings import in_words
-from analysis.answers.summary import learners
-from analysis.figures import Drawing
-from analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS
-from analysis.results.tables import Results
-from analysis.stats.differences import adjust
-from analysis.stats.intervals import LEVEL, Interval, mean_interval
-from analysis.stats.verdict import INCONCLUSIVE, MARKS, above, judged, position
 from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.answers.settings import in_words
+from dess.analysis.answers.summary import learners
+from dess.analysis.figures import Drawing
+from dess.analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.differences import adjust
+from dess.analysis.stats.intervals import LEVEL, Interval, mean_interval
+from dess.analysis.stats.verdict import INCONCLUSIVE, MARKS, above, judged, position
 from dess.errors import one_of
 from dess.files.reading import paths_in
 from dess.files.tables import read_table
-from policies.learner.config import TrainingConfig, learner_of
-from policies.learner.description import read_description
+from dess.policies.learner.config import TrainingConfig, learner_of
+from dess.policies.learner.description import read_description
 
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.axes import Axes
@@ -131,7 +131,7 @@ def variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str, alt: str) -
 
 
 def _variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> "Figure":
-    from analysis.figures import style
+    from dess.analysis.figures import style
 
     values = last.groupby("variant")[FINAL]
     level = table.loc[table["variant"] == baseline, "mean"].item()
@@ -349,7 +349,7 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> "
         metric: One of ``SHOWN``.
         labels: The variants to draw, with their names in the legend.
     """
-    from analysis.figures import style
+    from dess.analysis.figures import style
 
     drawn = curves[curves["variant"].isin(labels)]
     averages = smoothed(drawn, metric)

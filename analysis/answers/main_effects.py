@@ -14,14 +14,14 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from analysis import numbers
-from analysis.answers import summary
-from analysis.metrics import PRODUCT
-from analysis.names import parameter, value_text
-from analysis.results.tables import Results
-from analysis.stats.differences import paired, with_adjusted
-from analysis.stats.intervals import LEVEL, by_replication
 from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.answers import summary
+from dess.analysis.metrics import PRODUCT
+from dess.analysis.names import parameter, value_text
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.differences import paired, with_adjusted
+from dess.analysis.stats.intervals import LEVEL, by_replication
 
 _ENDS = ["difference", "low", "high"]
 LEVELS, RISES, FALLS = "stays level", "rises", "falls"

@@ -8,15 +8,15 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from analysis import numbers
-from analysis.figures import Drawing
-from analysis.metrics import PRODUCT, RATIO
-from analysis.results import parquet
-from analysis.results.event_log import Events
-from analysis.results.resimulate import Mission, resimulate
-from analysis.results.tables import Results
-from analysis.stats.intervals import summary
 from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.figures import Drawing
+from dess.analysis.metrics import PRODUCT, RATIO
+from dess.analysis.results import parquet
+from dess.analysis.results.event_log import Events
+from dess.analysis.results.resimulate import Mission, resimulate
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.intervals import summary
 from dess.files.reading import paths_in
 
 FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
@@ -98,7 +98,7 @@ def estimate(results: Results, policy: str, metric: str = PRODUCT, point: int | 
     """The mean of a metric over the missions of a policy, at one design point or at all.
 
     Returns:
-        A row of ``analysis.summary``.
+        A row of ``dess.analysis.summary``.
     """
     missions = results.missions[results.missions["policy"] == policy]
     if point is not None:
@@ -114,7 +114,7 @@ def drawing(mission: Mission, alt: str, caption: str) -> Drawing:
         alt: What the figure shows.
         caption: The text below it.
     """
-    from analysis.figures.missions import mission_figure  # figures need the extra reports
+    from dess.analysis.figures.missions import mission_figure  # figures need the extra reports
 
     return Drawing(mission_figure(mission.events, mission.scenario), alt, caption)
 

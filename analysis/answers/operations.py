@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis import numbers
-from analysis.answers import settings
-from analysis.figures import Drawing
-from analysis.figures.missions import courses
-from analysis.figures.settings import lines
-from analysis.metrics import AGE, PRODUCT, metric_of
-from analysis.names import value_text
-from analysis.results.event_log import duration
-from analysis.results.tables import Results
-from analysis.stats.differences import column_tests, relative_change
-from analysis.stats.intervals import LEVEL, by_replication, check_share
 from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.answers import settings
+from dess.analysis.figures import Drawing
+from dess.analysis.figures.missions import courses
+from dess.analysis.figures.settings import lines
+from dess.analysis.metrics import AGE, PRODUCT, metric_of
+from dess.analysis.names import value_text
+from dess.analysis.results.event_log import duration
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.differences import column_tests, relative_change
+from dess.analysis.stats.intervals import LEVEL, by_replication, check_share
 
 # The published changes of the average age of information, from one UAV to this number, in another
 # model of the same kind (Mathematics 13(21) 3564).

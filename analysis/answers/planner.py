@@ -7,25 +7,25 @@ import pandas as pd
 import seaborn as sns
 from matplotlib.figure import Figure
 
-from analysis import numbers
-from analysis.answers import comparison
-from analysis.answers.comparison import Times
-from analysis.answers.missions import collected, held
-from analysis.answers.optimality import ALL
-from analysis.figures import Drawing, style
-from analysis.figures import comparison as figures
-from analysis.figures import missions as maps
-from analysis.figures.settings import decision_times
-from analysis.metrics import PRODUCT, SUCCESS
-from analysis.results.event_log import uav_slots
-from analysis.results.resimulate import Mission
-from analysis.results.tables import Results
-from analysis.stats.differences import compare
-from analysis.stats.intervals import summary
-from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
+from dess.analysis import numbers
+from dess.analysis.answers import comparison
+from dess.analysis.answers.comparison import Times
+from dess.analysis.answers.missions import collected, held
+from dess.analysis.answers.optimality import ALL
+from dess.analysis.figures import Drawing, style
+from dess.analysis.figures import comparison as figures
+from dess.analysis.figures import missions as maps
+from dess.analysis.figures.settings import decision_times
+from dess.analysis.metrics import PRODUCT, SUCCESS
+from dess.analysis.results.event_log import uav_slots
+from dess.analysis.results.resimulate import Mission
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.differences import compare
+from dess.analysis.stats.intervals import summary
+from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
+from dess.policies.planner import Course, Planner, first_plan
+from dess.policies.registry import load
 from dess.scenario import ScenarioSpace
-from policies.planner import Course, Planner, first_plan
-from policies.registry import load
 
 _CLAIMS = {
     ABOVE: "The planner is better",
@@ -39,7 +39,7 @@ def differences(results: Results, planners: Sequence[str], learner: str) -> pd.D
 
     Returns:
         A row per policy, number of UAVs (or ``ALL``) and metric (product, success), as
-        ``analysis.compare`` returns it, with the column ``uavs``.
+        ``dess.analysis.compare`` returns it, with the column ``uavs``.
 
     Raises:
         InputError: If the study lacks one of the policies.

@@ -13,16 +13,16 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from analysis import numbers
-from analysis.answers import comparison
-from analysis.answers.comparison import Times
-from analysis.figures import Drawing, style
-from analysis.figures.settings import decision_times
-from analysis.metrics import BOUND, PRODUCT, SUCCESS
-from analysis.results.tables import Results
-from analysis.stats.differences import column_tests, relative_change
-from analysis.stats.intervals import column_intervals
 from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.answers import comparison
+from dess.analysis.answers.comparison import Times
+from dess.analysis.figures import Drawing, style
+from dess.analysis.figures.settings import decision_times
+from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.differences import column_tests, relative_change
+from dess.analysis.stats.intervals import column_intervals
 from dess.scenario import SEA
 
 # Groups of seas by their number of nodes: the largest number of each but the last.

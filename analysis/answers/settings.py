@@ -15,15 +15,15 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from analysis import numbers
-from analysis.metrics import COST, METRICS, PRODUCT, metric_of, metrics_in
-from analysis.names import parameter, value_text
-from analysis.results.tables import Results, once
-from analysis.stats.choices import may_be_best
-from analysis.stats.differences import column_tests, with_adjusted
-from analysis.stats.intervals import by_replication, column_intervals, stratified
-from analysis.tables import INTERVALS, MOST_ROWS, YES, Table, counts
 from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.metrics import COST, METRICS, PRODUCT, metric_of, metrics_in
+from dess.analysis.names import parameter, value_text
+from dess.analysis.results.tables import Results, once
+from dess.analysis.stats.choices import may_be_best
+from dess.analysis.stats.differences import column_tests, with_adjusted
+from dess.analysis.stats.intervals import by_replication, column_intervals, stratified
+from dess.analysis.tables import INTERVALS, MOST_ROWS, YES, Table, counts
 from dess.errors import one_of
 
 MOST_NAMES = 3  # the largest number of settings that are named because they may be as good
@@ -198,8 +198,9 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
     Returns:
         A row per policy and design point: ``rank``, ``policy``, ``point``, the varied fields, for
         every metric ``METRIC``, ``METRIC_low`` and ``METRIC_high`` (95 % intervals as in
-        ``analysis.summary``), ``n`` missions, and ``tied``: whether the setting may be the best, by
-        ``may_be_best`` over all rows. Of equal settings, the first in the study has the lower rank.
+        ``dess.analysis.summary``), ``n`` missions, and ``tied``: whether the setting may be the
+        best, by ``may_be_best`` over all rows. Of equal settings, the first in the study has the
+        lower rank.
 
     Raises:
         InputError: If there is no such metric or policy.

@@ -8,23 +8,23 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis import numbers
-from analysis.answers import costs
-from analysis.answers.settings import edge, ends, in_words
-from analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS, metric_of
-from analysis.names import parameter, value_text
-from analysis.results.chunks import parts_of
-from analysis.results.tables import Results
-from analysis.stats.choices import may_be_best
-from analysis.stats.differences import compare, for_choice
-from analysis.stats.distribution import distribution
-from analysis.stats.intervals import LEVEL, by_replication, summary, values_within
-from analysis.stats.learners import compare_learners
-from analysis.stats.verdict import MARKS, position
-from analysis.study.cheapest import Cheapest
-from analysis.study.design import NOISE, Saltelli
-from analysis.tables import INTERVALS, MOST_ROWS, YES, Table, compared, counts
 from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.answers import costs
+from dess.analysis.answers.settings import edge, ends, in_words
+from dess.analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS, metric_of
+from dess.analysis.names import parameter, value_text
+from dess.analysis.results.chunks import parts_of
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.choices import may_be_best
+from dess.analysis.stats.differences import compare, for_choice
+from dess.analysis.stats.distribution import distribution
+from dess.analysis.stats.intervals import LEVEL, by_replication, summary, values_within
+from dess.analysis.stats.learners import compare_learners
+from dess.analysis.stats.verdict import MARKS, position
+from dess.analysis.study.cheapest import Cheapest
+from dess.analysis.study.design import NOISE, Saltelli
+from dess.analysis.tables import INTERVALS, MOST_ROWS, YES, Table, compared, counts
 
 RESAMPLES = 1000  # bootstrap resamples of the blocks of the design; every metric has the same
 
@@ -151,7 +151,7 @@ def means(results: Results) -> pd.DataFrame:
     """Means with intervals of every policy at every design point.
 
     Returns:
-        A row per policy, design point and metric, as ``analysis.summary`` returns it.
+        A row per policy, design point and metric, as ``dess.analysis.summary`` returns it.
     """
     return summary(results.missions, by=["policy", "point"])
 
@@ -204,7 +204,8 @@ def by_fleet(missions: pd.DataFrame) -> pd.DataFrame:
     """Means with intervals of every policy by number of UAVs.
 
     Returns:
-        Rows of ``analysis.summary`` by ``policy`` (in order of appearance) and ``uavs`` (sorted).
+        Rows of ``dess.analysis.summary`` by ``policy`` (in order of appearance) and ``uavs``
+        (sorted).
     """
     policies = missions.groupby("policy", sort=False)
     tables = [summary(part.sort_values("uavs"), by=["policy", "uavs"]) for _, part in policies]
@@ -217,7 +218,7 @@ def beside_paper(
     """The metrics of every policy, with marks relative to the numbers that the paper prints.
 
     Args:
-        estimates: Rows of ``analysis.summary`` by ``policy``, and by ``uavs`` if needed.
+        estimates: Rows of ``dess.analysis.summary`` by ``policy``, and by ``uavs`` if needed.
         printed: The printed numbers by number of UAVs (None for all missions), then by metric.
 
     Returns:
@@ -249,7 +250,7 @@ def of_policy(means: pd.DataFrame, policy: str) -> pd.Series:
     """The means of a policy by metric, as text with their intervals.
 
     Args:
-        means: Rows of ``analysis.summary`` by policy.
+        means: Rows of ``dess.analysis.summary`` by policy.
         policy: The policy.
     """
     rows = means[means["policy"] == policy].set_index("metric")
@@ -260,7 +261,7 @@ def against_paper(means: pd.DataFrame, policy: str, printed: Mapping[str, float]
     """The success and the product of a policy, beside the paper's product, in a sentence.
 
     Args:
-        means: Rows of ``analysis.summary`` by policy.
+        means: Rows of ``dess.analysis.summary`` by policy.
         policy: The policy.
         printed: The paper's numbers by metric.
     """
@@ -276,7 +277,7 @@ def guard_in_words(means: pd.DataFrame) -> str:
     """Why even a random policy succeeds: the return guard, and what success is without it.
 
     Args:
-        means: Rows of ``analysis.summary`` by policy.
+        means: Rows of ``dess.analysis.summary`` by policy.
     """
     text = "All policies but `random-unguarded` act under the return guard, so nearly all succeed."
     known = {*means["policy"]}
@@ -365,7 +366,7 @@ def comparisons(results: Results) -> pd.DataFrame:
     """Every policy compared with the best one on the same missions, over all design points.
 
     Returns:
-        A row per policy and metric, as ``analysis.compare`` returns it; ``p_adjusted`` also
+        A row per policy and metric, as ``dess.analysis.compare`` returns it; ``p_adjusted`` also
         corrects for the choice of the best policy. Empty if there is only one policy, or if a
         stopping rule gave the policies different missions.
     """
@@ -400,10 +401,10 @@ def learned_against_heuristic(results: Results) -> pd.DataFrame:
     """Every learner compared with the best policy that is not learned, on the same missions.
 
     Returns:
-        A row per learner and metric, as ``analysis.compare_learners`` returns it: about the learner
-        if it has several trainings, otherwise about this one checkpoint. ``p_adjusted`` also
-        corrects for the choice of the best policy. Empty if there is nothing to compare, or if a
-        stopping rule gave the policies different missions.
+        A row per learner and metric, as ``dess.analysis.compare_learners`` returns it: about the
+        learner if it has several trainings, otherwise about this one checkpoint. ``p_adjusted``
+        also corrects for the choice of the best policy. Empty if there is nothing to compare, or
+        if a stopping rule gave the policies different missions.
     """
     trained = learners(results)
     learned = {policy for checkpoints in trained.values() for policy in checkpoints}
@@ -439,7 +440,7 @@ def distributions(results: Results) -> pd.DataFrame:
     """The distribution of product over the missions of every policy.
 
     Returns:
-        A row per policy and view, as ``analysis.distribution`` returns it. Empty if there are
+        A row per policy and view, as ``dess.analysis.distribution`` returns it. Empty if there are
         several design points, whose missions have different distributions.
     """
     if len(results.store.manifest.points) > 1:
@@ -452,7 +453,7 @@ def spread(rows: pd.DataFrame, metric: str) -> Table:
     """Quantiles of a metric over the missions, and means of the worst ones.
 
     Args:
-        rows: Rows of ``analysis.distribution``.
+        rows: Rows of ``dess.analysis.distribution``.
         metric: The metric.
     """
     of, heads = metric_of(metric), []
@@ -471,7 +472,7 @@ def precisions(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per policy, design point and metric: ``policy``, and the fields of
-        ``analysis.study.stopping.Reached``. Empty if the study has no targets.
+        ``dess.analysis.study.stopping.Reached``. Empty if the study has no targets.
     """
     manifest = results.store.manifest
     if (rule := manifest.study.precision) is None:

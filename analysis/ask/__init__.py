@@ -1,1 +1,1 @@
-"""Questions asked in one line of Python: ``analysis.sweep`` and ``analysis.what_if``."""
+"""Questions asked in one line of Python: ``dess.analysis.sweep`` and ``dess.analysis.what_if``."""

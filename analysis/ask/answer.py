@@ -1,4 +1,4 @@
-"""The answers to questions asked in one line, ``analysis.sweep`` and ``analysis.what_if``."""
+"""The answers to questions asked in one line: ``analysis.sweep`` and ``analysis.what_if``."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -11,10 +11,11 @@ import pandas as pd
 import tomli_w
 from scipy import stats
 
-from analysis import numbers
-from analysis.answers import costs, settings, summary
-from analysis.answers.missions import estimate
-from analysis.ask.question import (
+from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.answers import costs, settings, summary
+from dess.analysis.answers.missions import estimate
+from dess.analysis.ask.question import (
     RANGES,
     Question,
     in_words,
@@ -22,16 +23,15 @@ from analysis.ask.question import (
     values_of,
     what_if_question,
 )
-from analysis.execution.jobs import Progress
-from analysis.execution.runner import Round
-from analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
-from analysis.names import parameter
-from analysis.results.resimulate import resimulate
-from analysis.results.tables import Results, once
-from analysis.stats.differences import compare
-from analysis.stats.intervals import LEVEL, by_replication
-from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position
-from dess import InputError
+from dess.analysis.execution.jobs import Progress
+from dess.analysis.execution.runner import Round
+from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
+from dess.analysis.names import parameter
+from dess.analysis.results.resimulate import resimulate
+from dess.analysis.results.tables import Results, once
+from dess.analysis.stats.differences import compare
+from dess.analysis.stats.intervals import LEVEL, by_replication
+from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position
 from dess.errors import one_of
 from dess.scenario import ScenarioSpace, fields_of
 
@@ -118,7 +118,7 @@ class Sweep:
         Raises:
             InputError: If a field is not swept, or there is no such metric.
         """
-        from analysis.figures import settings as figures
+        from dess.analysis.figures import settings as figures
 
         if x is None:
             if not (fields := [*settings.varied(self.results)]):
@@ -156,7 +156,7 @@ def sweep(
         seed: Seed of the missions.
         folder: Results are stored in ``FOLDER/sweeps/NAME``, with ``NAME.toml`` beside it.
         workers: Number of processes. Two or more take seconds to start; they help in long runs.
-        prices: Fields of ``analysis.study.cheapest.Costs``, such as ``{"uav": 20_000}``.
+        prices: Fields of ``dess.analysis.study.cheapest.Costs``, such as ``{"uav": 20_000}``.
         requirements: For each required metric its lowest acceptable mean, such as ``{"success":
             0.99}``. With requirements, as many missions are simulated as the search for the
             cheapest setting that meets them needs.
@@ -246,7 +246,7 @@ def measured(results: Results) -> list[str]:
 
 
 def means(results: Results) -> pd.DataFrame:
-    """Means with intervals: rows of ``analysis.summary`` by ``policy`` and ``point``."""
+    """Means with intervals: rows of ``dess.analysis.summary`` by ``policy`` and ``point``."""
     table = summary.means(replace(results, missions=missions_of(results)))
     return table[table["metric"].isin([*METRICS, *measured(results)])].reset_index(drop=True)
 
@@ -258,7 +258,7 @@ def answers(results: Results) -> pd.DataFrame:
     Returns:
         A row per policy and metric (those of ``METRICS``, what is ``measured``, then those of
         ``MEASURES``): ``policy``, the means ``before`` and ``after``, and the columns of
-        ``analysis.compare``. Every interval has its own level of 95 %; see
+        ``dess.analysis.compare``. Every interval has its own level of 95 %; see
         ``stats.paired.paired``. Of what only one side measures, ``n`` is 0 and all else nan but the
         mean of this side.
     """
@@ -490,7 +490,7 @@ class WhatIf:
 
     def plot(self) -> "Figure":
         """The paired differences of the metrics, with intervals."""
-        from analysis.figures import comparison
+        from dess.analysis.figures import comparison
 
         return comparison.gains(self.table())
 
@@ -500,14 +500,14 @@ class WhatIf:
         Args:
             metric: One of the paper's metrics, or of what the missions measured.
         """
-        from analysis.figures import comparison
+        from dess.analysis.figures import comparison
 
         sides = ["\n".join((side, *words)) for side, words in zip(SIDES, self.sides, strict=True)]
         return comparison.means(means(self.results), metric, sides)
 
     def plot_spread(self) -> "Figure":
         """The distribution of the paired differences in product."""
-        from analysis.figures import comparison
+        from dess.analysis.figures import comparison
 
         policies = self.results.policies
         return comparison.spread({policy: differences(self.results, policy) for policy in policies})
@@ -572,7 +572,7 @@ class Example:
         return [self._drawing(point) for point in (BASELINE, VARIATION)]
 
     def _drawing(self, point: int) -> "tuple[Figure, str, str]":
-        from analysis.figures.missions import mission_figure
+        from dess.analysis.figures.missions import mission_figure
 
         shown, results = self.answer.shown, self.answer.results
         mission = resimulate(results, shown, point, self.replication)

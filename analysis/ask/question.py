@@ -20,23 +20,24 @@ import tomli_w
 from pydantic import ValidationError
 
 import dess
-from analysis import numbers
-from analysis.execution.effort import BASELINE as ANY_POLICY
-from analysis.execution.effort import Planned, check_run, plan_study, policies_for
-from analysis.execution.jobs import Progress
-from analysis.execution.runner import Round, run_study
-from analysis.metrics import ALIASES, METRICS
-from analysis.names import SWEEP, SWEEPS
-from analysis.results.chunks import MANIFEST, short_hash
-from analysis.results.provenance import engine_code, team_of
-from analysis.results.tables import Results
-from analysis.study.cheapest import Cheapest, Costs
-from analysis.study.design import MAX_SIZE, Grid, Table
-from analysis.study.study import Study, study_from
 from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.execution.effort import BASELINE as ANY_POLICY
+from dess.analysis.execution.effort import Planned, check_run, plan_study, policies_for
+from dess.analysis.execution.jobs import Progress
+from dess.analysis.execution.runner import Round, run_study
+from dess.analysis.metrics import ALIASES, METRICS
+from dess.analysis.names import SWEEP, SWEEPS
+from dess.analysis.results.chunks import MANIFEST, short_hash
+from dess.analysis.results.provenance import engine_code, team_of
+from dess.analysis.results.tables import Results
+from dess.analysis.study.cheapest import Cheapest, Costs
+from dess.analysis.study.design import MAX_SIZE, Grid, Table
+from dess.analysis.study.study import Study, study_from
 from dess.errors import one_of, validation_line
 from dess.files.reading import paths_in
 from dess.files.writing import write_file
+from dess.policies.registry import typed
 from dess.scenario import (
     SAMPLED,
     ScenarioSpace,
@@ -45,7 +46,6 @@ from dess.scenario import (
     is_scenario_name,
     load_scenario,
 )
-from policies.registry import typed
 
 WHAT_IF = "what-if"
 RANGES = (*SAMPLED, "initial_data")  # fields that hold [low, high]

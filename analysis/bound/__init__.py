@@ -1,5 +1,5 @@
 """An upper bound on what any policy can collect in a mission (docs/concepts/bound.md)."""
 
-from analysis.bound.prices import Bound as Bound
-from analysis.bound.prices import check_scenario as check_scenario
-from analysis.bound.prices import upper_bound as upper_bound
+from dess.analysis.bound.prices import Bound as Bound
+from dess.analysis.bound.prices import check_scenario as check_scenario
+from dess.analysis.bound.prices import upper_bound as upper_bound

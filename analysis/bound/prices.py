@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.bound.bundle import next_prices
-from analysis.bound.energy import Phases, early_charges, most_flying, phases_of
-from analysis.bound.paths import blocks_of, bound_paths
-from analysis.bound.service import POINTS, rates_of, spread, step_values
-from analysis.bound.slopes import add_slopes
 from dess import InputError, rules
+from dess.analysis.bound.bundle import next_prices
+from dess.analysis.bound.energy import Phases, early_charges, most_flying, phases_of
+from dess.analysis.bound.paths import blocks_of, bound_paths
+from dess.analysis.bound.service import POINTS, rates_of, spread, step_values
+from dess.analysis.bound.slopes import add_slopes
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.scenario import ScenarioSpace

@@ -5,7 +5,7 @@ No bound depends on what is computed here.
 
 import numpy as np
 
-from analysis.bound.paths import (
+from dess.analysis.bound.paths import (
     CHARGE,
     STOP,
     beginning,
@@ -16,7 +16,7 @@ from analysis.bound.paths import (
     memory_of,
     remembered,
 )
-from analysis.bound.service import step_takings
+from dess.analysis.bound.service import step_takings
 from dess.code.kernels import inlined, kernel
 from dess.state import STEP_X, STEP_Y
 

@@ -13,10 +13,10 @@ from contextlib import ExitStack, contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from analysis.execution.jobs import Job, attempt
-from analysis.execution.workers import Pool
-from analysis.results.provenance import Member, engine_code
 from dess import InputError
+from dess.analysis.execution.jobs import Job, attempt
+from dess.analysis.execution.workers import Pool
+from dess.analysis.results.provenance import Member, engine_code
 from dess.code.libraries import needs
 
 log = logging.getLogger(__name__)

@@ -10,17 +10,17 @@ from pathlib import Path
 from statistics import mean
 from typing import NamedTuple, Self
 
-from analysis import numbers
-from analysis.execution.jobs import simulate_missions
-from analysis.results.chunks import bound_parts, check_parts, missions_in, parts_of
-from analysis.results.store import Store, sources
-from analysis.study.cheapest import Cheapest
-from analysis.study.study import Study
 from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.execution.jobs import simulate_missions
+from dess.analysis.results.chunks import bound_parts, check_parts, missions_in, parts_of
+from dess.analysis.results.store import Store, sources
+from dess.analysis.study.cheapest import Cheapest
+from dess.analysis.study.study import Study
 from dess.code.libraries import missing
 from dess.code.memory import check_memory
+from dess.policies.registry import SHIPPED, folder_of, load_team, trained_names
 from dess.scenario import ScenarioSpace
-from policies.registry import SHIPPED, folder_of, load_team, trained_names
 
 # The policies from the slowest to the fastest: the time of a decision [s] as measured on one core.
 SECONDS = {"planner": 4e-4, "planner-short": 7e-5, "any": 2.5e-5, "greedy": 2e-6}

@@ -7,26 +7,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.execution.effort import (
+from dess import InputError, simulate_batch
+from dess.analysis.execution.effort import (
     Range,
     check_time,
     check_workers,
     check_workers_memory,
     seconds_of,
 )
-from analysis.execution.jobs import CHUNK, Job, MissionsJob, Problem, Progress, simulate_missions
-from analysis.execution.workers import Here, Pool
-from analysis.metrics import ALWAYS
-from analysis.results.chunks import Part, split
-from analysis.results.manifest import Cell
-from analysis.stats.intervals import Moments
-from dess import InputError, simulate_batch
+from dess.analysis.execution.jobs import (
+    CHUNK,
+    Job,
+    MissionsJob,
+    Problem,
+    Progress,
+    simulate_missions,
+)
+from dess.analysis.execution.workers import Here, Pool
+from dess.analysis.metrics import ALWAYS
+from dess.analysis.results.chunks import Part, split
+from dess.analysis.results.manifest import Cell
+from dess.analysis.stats.intervals import Moments
+from dess.policies.registry import TypedByUser, load_team
 from dess.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.scenario import ScenarioSpace
 from dess.state import check_seed
 from dess.streams import MAX_REPLICATION
 from dess.view import check_team
-from policies.registry import TypedByUser, load_team
 
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
 # sums depend on it.

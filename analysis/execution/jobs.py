@@ -9,16 +9,16 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from analysis.bound import Bound, upper_bound
-from analysis.results import parquet
-from analysis.results.chunks import Chunk, Part
-from analysis.results.manifest import Cell
-from analysis.results.provenance import Member, bound_code, members_of
-from analysis.results.store import Store
 from dess import InputError, simulate, simulate_batch
+from dess.analysis.bound import Bound, upper_bound
+from dess.analysis.results import parquet
+from dess.analysis.results.chunks import Chunk, Part
+from dess.analysis.results.manifest import Cell
+from dess.analysis.results.provenance import Member, bound_code, members_of
+from dess.analysis.results.store import Store
+from dess.policies.registry import load_team
 from dess.record import Records, empty_records
 from dess.scenario import ScenarioSpace
-from policies.registry import load_team
 
 # Missions of a chunk, by engine: enough to fill a batch, few enough to lose little when
 # interrupted.

@@ -15,12 +15,20 @@ from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
-from analysis.execution.cluster import Cluster
-from analysis.execution.effort import check_workers
-from analysis.execution.jobs import CHUNK, BoundsJob, Job, LogJob, MissionsJob, Problem, Progress
-from analysis.execution.workers import Here, Pool
-from analysis.results import tables
-from analysis.results.chunks import (
+from dess.analysis.execution.cluster import Cluster
+from dess.analysis.execution.effort import check_workers
+from dess.analysis.execution.jobs import (
+    CHUNK,
+    BoundsJob,
+    Job,
+    LogJob,
+    MissionsJob,
+    Problem,
+    Progress,
+)
+from dess.analysis.execution.workers import Here, Pool
+from dess.analysis.results import tables
+from dess.analysis.results.chunks import (
     Chunk,
     Part,
     Present,
@@ -31,13 +39,13 @@ from analysis.results.chunks import (
     parts_of,
     split,
 )
-from analysis.results.manifest import Selected
-from analysis.results.store import Failure, Store, sources
-from analysis.results.tables import Results, results_of
-from analysis.study.cheapest import Setting
-from analysis.study.stopping import Samples
-from analysis.study.study import Study, load_study
-from policies.registry import load_team
+from dess.analysis.results.manifest import Selected
+from dess.analysis.results.store import Failure, Store, sources
+from dess.analysis.results.tables import Results, results_of
+from dess.analysis.study.cheapest import Setting
+from dess.analysis.study.stopping import Samples
+from dess.analysis.study.study import Study, load_study
+from dess.policies.registry import load_team
 
 # Bounds of a chunk: few, since each takes seconds.
 BOUNDS_CHUNK = 5

@@ -12,8 +12,8 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
-from analysis.execution.jobs import Job, Problem, Progress, attempt, first_failing
-from analysis.execution.orphans import live_and_die_with
+from dess.analysis.execution.jobs import Job, Problem, Progress, attempt, first_failing
+from dess.analysis.execution.orphans import live_and_die_with
 
 Finished = Generator[tuple[int, Any], None, None]  # numbers and results of jobs
 

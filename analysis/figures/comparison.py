@@ -6,9 +6,9 @@ from textwrap import fill
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.figures import style
-from analysis.metrics import BOUND, METRICS, PRODUCT, metric_of
-from analysis.numbers import counted
+from dess.analysis.figures import style
+from dess.analysis.metrics import BOUND, METRICS, PRODUCT, metric_of
+from dess.analysis.numbers import counted
 
 TAIL = 0.05  # share of the missions that is beyond each end of the second panel of ``spread``
 

@@ -16,9 +16,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from analysis.figures import style
-from analysis.names import value_text
-from analysis.results.event_log import (
+from dess.analysis.figures import style
+from dess.analysis.names import value_text
+from dess.analysis.results.event_log import (
     Events,
     battery_levels,
     duration,

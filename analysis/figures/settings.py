@@ -16,16 +16,16 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator, NullLocator
 
-from analysis import numbers
-from analysis.answers import costs as priced
-from analysis.answers import main_effects as one_field
-from analysis.answers import settings, summary
-from analysis.figures import Drawing, style
-from analysis.metrics import COST, METRICS, PRODUCT, Metric, metric_of
-from analysis.names import parameter, value_text
-from analysis.results.tables import Results
-from analysis.study.design import NOISE
-from analysis.tables import INTERVALS
+from dess.analysis import numbers
+from dess.analysis.answers import costs as priced
+from dess.analysis.answers import main_effects as one_field
+from dess.analysis.answers import settings, summary
+from dess.analysis.figures import Drawing, style
+from dess.analysis.metrics import COST, METRICS, PRODUCT, Metric, metric_of
+from dess.analysis.names import parameter, value_text
+from dess.analysis.results.tables import Results
+from dess.analysis.study.design import NOISE
+from dess.analysis.tables import INTERVALS
 
 MOST_PANELS, COLUMNS = 12, 3  # of the values of a third field: panels, and columns of panels
 MARK = "#d55e00"  # colour that marks the best cell and cells that are not significantly worse
@@ -49,7 +49,7 @@ def performance(summary: pd.DataFrame, metric: str, printed: float | None = None
     """A metric of every policy: means with intervals, and the paper's number as a line.
 
     Args:
-        summary: Rows of ``analysis.summary`` by ``policy``.
+        summary: Rows of ``dess.analysis.summary`` by ``policy``.
         metric: The metric.
         printed: The paper's number.
     """
@@ -71,7 +71,7 @@ def by_fleet(
     """A metric of every policy against the number of UAVs, with intervals.
 
     Args:
-        summary: Rows of ``analysis.summary`` by ``policy`` and ``uavs``.
+        summary: Rows of ``dess.analysis.summary`` by ``policy`` and ``uavs``.
         metric: One of ``METRICS``.
         printed: The paper's numbers by number of UAVs.
     """
@@ -377,7 +377,7 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
     """Sobol indices of every parameter as dots with intervals; the noise has its own row.
 
     Args:
-        rows: Rows of ``analysis.answers.summary.sensitivities`` of a policy and a metric.
+        rows: Rows of ``dess.analysis.answers.summary.sensitivities`` of a policy and a metric.
         title: The title of the figure.
     """
     rows, look = rows.reset_index(drop=True), style.dot((style.palette()[0], "o"))

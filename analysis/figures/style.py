@@ -27,8 +27,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from pandas.api.types import is_numeric_dtype
 
-from analysis.names import value_text
-from analysis.numbers import minus
+from dess.analysis.names import value_text
+from dess.analysis.numbers import minus
 
 Look: TypeAlias = tuple[str, str]  # a colour and a marker
 Values: TypeAlias = Literal["x", "y", "xy"]

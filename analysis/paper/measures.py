@@ -8,17 +8,17 @@ from typing import Literal, NamedTuple, Self
 import numpy as np
 import pandas as pd
 
-from analysis import numbers
-from analysis.answers import learning, main_effects, missions
-from analysis.answers.learning import Transfer, last_phase, settled
-from analysis.metrics import RATIO
-from analysis.names import parameter, value_text
-from analysis.paper import values
-from analysis.paper.rules import MARGIN
-from analysis.results.tables import Results
-from analysis.stats.intervals import Interval, bounded_interval, mean_interval, wilson
-from analysis.stats.intervals import summary as means_of
-from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
+from dess.analysis import numbers
+from dess.analysis.answers import learning, main_effects, missions
+from dess.analysis.answers.learning import Transfer, last_phase, settled
+from dess.analysis.metrics import RATIO
+from dess.analysis.names import parameter, value_text
+from dess.analysis.paper import values
+from dess.analysis.paper.rules import MARGIN
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.intervals import Interval, bounded_interval, mean_interval, wilson
+from dess.analysis.stats.intervals import summary as means_of
+from dess.analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 
 
 class MissingError(Exception):

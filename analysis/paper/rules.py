@@ -9,12 +9,12 @@ from math import hypot
 
 import pandas as pd
 
-from analysis.answers import main_effects
-from analysis.answers.learning import Transfer
-from analysis.answers.main_effects import Shape
-from analysis.paper.values import CROSSING
-from analysis.stats.intervals import Interval
-from analysis.stats.verdict import (
+from dess.analysis.answers import main_effects
+from dess.analysis.answers.learning import Transfer
+from dess.analysis.answers.main_effects import Shape
+from dess.analysis.paper.values import CROSSING
+from dess.analysis.stats.intervals import Interval
+from dess.analysis.stats.verdict import (
     ABOVE,
     BELOW,
     HOLDS,
@@ -26,7 +26,7 @@ from analysis.stats.verdict import (
     position,
     position_by_test,
 )
-from analysis.study.selection import Choice
+from dess.analysis.study.selection import Choice
 
 # A value is near a printed number if its interval is above that number - NEAR; a change is small if
 # it is less than NEAR.

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple, Self
 
 import pandas as pd
 
-from analysis import numbers
-from analysis.answers import summary
-from analysis.answers.learning import BAND
-from analysis.paper import measures, rules, values
-from analysis.paper.measures import (
+from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.answers import summary
+from dess.analysis.answers.learning import BAND
+from dess.analysis.paper import measures, rules, values
+from dess.analysis.paper.measures import (
     FALLS_SHORT,
     NO_RESULTS,
     OUTCOMES,
@@ -25,13 +26,12 @@ from analysis.paper.measures import (
     Quantity,
     Unit,
 )
-from analysis.paper.rules import MARGIN, NEAR
-from analysis.results.tables import Results
-from analysis.stats.verdict import INCONCLUSIVE, position
-from dess import InputError
+from dess.analysis.paper.rules import MARGIN, NEAR
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.verdict import INCONCLUSIVE, position
 from dess.files.parsing import parse_toml
 from dess.files.reading import read_text
-from policies.learner.config import TrainingConfig
+from dess.policies.learner.config import TrainingConfig
 
 TRAININGS = "trainings"  # in place of the name of a study, for claims about learning curves
 

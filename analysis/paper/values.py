@@ -2,12 +2,12 @@
 
 import pandas as pd
 
-from analysis import numbers
-from analysis.answers import summary
-from analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
-from analysis.names import parameter, value_text
-from analysis.results.tables import Results
-from analysis.stats.intervals import Interval, wilson
+from dess.analysis import numbers
+from dess.analysis.answers import summary
+from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
+from dess.analysis.names import parameter, value_text
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.intervals import Interval, wilson
 
 # Table IV: means over TABLE_IV_MISSIONS random missions of the scenario space of Table II.
 TABLE_IV_MISSIONS = 1000

@@ -13,9 +13,9 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from analysis.results.manifest import Cell, Manifest
-from analysis.study.study import CHECK
 from dess import InputError
+from dess.analysis.results.manifest import Cell, Manifest
+from dess.analysis.study.study import CHECK
 from dess.files.reading import paths_in
 
 Present = defaultdict[str, list[range]]  # replications by the key of their cell

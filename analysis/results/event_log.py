@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 
-from analysis import numbers
+from dess.analysis import numbers
 from dess.scenario import Scenario
 from dess.sea.chart import spread
 from dess.sections.fleet import type_of

@@ -10,7 +10,8 @@ from typing import Annotated, Any, NamedTuple, Self
 from pydantic import Field, model_validator
 
 import dess
-from analysis.results.provenance import (
+from dess import InputError
+from dess.analysis.results.provenance import (
     Acceptance,
     Hash,
     Origin,
@@ -22,10 +23,9 @@ from analysis.results.provenance import (
     library_versions,
     team_of,
 )
-from analysis.study.cheapest import AnySelection, Costs, Setting
-from analysis.study.design import DesignPoint
-from analysis.study.study import CHECK, Study, StudyData
-from dess import InputError
+from dess.analysis.study.cheapest import AnySelection, Costs, Setting
+from dess.analysis.study.design import DesignPoint
+from dess.analysis.study.study import CHECK, Study, StudyData
 from dess.scenario import SEA, ScenarioSpace, load_scenario
 
 SCHEMA_VERSION = 3

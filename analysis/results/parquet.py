@@ -19,9 +19,9 @@ import pyarrow.parquet as pq
 from pyarrow.compute import list_value_length
 from pydantic import Field, TypeAdapter
 
-from analysis.bound import Bound
-from analysis.results.chunks import Chunk, name_of, short_hash
 from dess import InputError
+from dess.analysis.bound import Bound
+from dess.analysis.results.chunks import Chunk, name_of, short_hash
 from dess.files.reading import paths_in, read_bytes
 from dess.files.tables import LIMIT, check_size, parquet_of
 from dess.files.writing import write_file

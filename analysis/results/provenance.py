@@ -25,18 +25,18 @@ from pydantic import (
 )
 
 import dess
-from analysis.study.stopping import Text
-from analysis.study.study import StudyData
 from dess import InputError
+from dess.analysis.study.stopping import Text
+from dess.analysis.study.study import StudyData
 from dess.code.sources import OURS, code_of, combined
 from dess.errors import validation_line
 from dess.files.documents import Document
+from dess.policies.base import Policy
+from dess.policies.registry import TypedByUser, confirmed, load_team
 from dess.scenario import SEA, ScenarioSpace, merged, scenario_at
-from policies.base import Policy
-from policies.registry import TypedByUser, confirmed, load_team
 
 ENGINES = ("dess.batch", "dess.mission")
-BOUND = ("analysis.bound",)
+BOUND = ("dess.analysis.bound",)
 LIBRARIES = ("numpy", "numba", "simpy", "scipy", "torch", "pandas", "pyarrow")
 
 # Strings of a known form: a hash of code, a module, a class, a library, a version.

@@ -11,21 +11,21 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from analysis import numbers
-from analysis.metrics import measured_in
-from analysis.results.event_log import causes
-from analysis.results.provenance import Origin
-from analysis.results.tables import Results
-from analysis.study.stopping import Text
 from dess import InputError, simulate
+from dess.analysis import numbers
+from dess.analysis.metrics import measured_in
+from dess.analysis.results.event_log import causes
+from dess.analysis.results.provenance import Origin
+from dess.analysis.results.tables import Results
+from dess.analysis.study.stopping import Text
 from dess.files.documents import Document
 from dess.files.reading import paths_in, read_bytes
 from dess.files.tables import LIMIT
+from dess.policies.base import Policy
+from dess.policies.registry import TRAINED, load_team
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 from dess.state import END_NAMES, sample_scenario
-from policies.base import Policy
-from policies.registry import TRAINED, load_team
 
 
 @dataclass(frozen=True, eq=False)

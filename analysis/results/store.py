@@ -22,10 +22,11 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from analysis.bound import Bound
-from analysis.results import chunks as files
-from analysis.results import parquet
-from analysis.results.chunks import (
+from dess import InputError
+from dess.analysis.bound import Bound
+from dess.analysis.results import chunks as files
+from dess.analysis.results import parquet
+from dess.analysis.results.chunks import (
     FOLDERS,
     LOCK,
     MANIFEST,
@@ -36,9 +37,8 @@ from analysis.results.chunks import (
     rows_of,
     stacked,
 )
-from analysis.results.manifest import NO_TEAM, Cell, Manifest, Selected
-from analysis.study.study import Study
-from dess import InputError
+from dess.analysis.results.manifest import NO_TEAM, Cell, Manifest, Selected
+from dess.analysis.study.study import Study
 from dess.files.reading import paths_in
 from dess.files.writing import check_folder, delete, locked, make_folder, write_file
 

@@ -11,16 +11,16 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import numpy as np
 import pandas as pd
 
-from analysis.bound import Bound
-from analysis.metrics import BOUND, GAP, PRODUCT, measured_in
-from analysis.names import SWEEP, SWEEPS
-from analysis.results.chunks import bound_parts, check_parts, parts_of
-from analysis.results.manifest import Cell, Manifest
-from analysis.results.provenance import Origin
-from analysis.results.store import Place, Store
-from analysis.study.cheapest import Cheapest, CheapestChoice
-from analysis.study.selection import Choice, Selection
 from dess import InputError
+from dess.analysis.bound import Bound
+from dess.analysis.metrics import BOUND, GAP, PRODUCT, measured_in
+from dess.analysis.names import SWEEP, SWEEPS
+from dess.analysis.results.chunks import bound_parts, check_parts, parts_of
+from dess.analysis.results.manifest import Cell, Manifest
+from dess.analysis.results.provenance import Origin
+from dess.analysis.results.store import Place, Store
+from dess.analysis.study.cheapest import Cheapest, CheapestChoice
+from dess.analysis.study.selection import Choice, Selection
 from dess.errors import one_of
 from dess.record import MISSION_RECORD
 from dess.scenario import SEA, ScenarioSpace, dotted, is_scenario_name, load_scenario

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy import stats
 
-from analysis.metrics import metric_of
-from analysis.stats.intervals import LEVEL, check_share, rare_differences
+from dess.analysis.metrics import metric_of
+from dess.analysis.stats.intervals import LEVEL, check_share, rare_differences
 
 _BATCH = 2**21  # weights at a time, which take some megabytes for every n
 
@@ -105,7 +105,7 @@ def may_be_best(values: np.ndarray, metric: str = "", level: float = LEVEL) -> n
         values: (R, K) values of K settings in R replications; nan means that a setting lacks a
             replication. Two settings are compared on the replications of both.
         metric: The metric, by default one of which more is better. Its rare differences are
-            added, as in ``analysis.compare``.
+            added, as in ``dess.analysis.compare``.
         level: The probability.
 
     Returns:

@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.metrics import ALWAYS, MEASURES, REWARD, metric_of
-from analysis.stats.intervals import (
+from dess import InputError
+from dess.analysis.metrics import ALWAYS, MEASURES, REWARD, metric_of
+from dess.analysis.stats.intervals import (
     LEVEL,
     Interval,
     check_columns,
@@ -20,7 +21,6 @@ from analysis.stats.intervals import (
     rare_differences,
     values_within,
 )
-from dess import InputError
 
 Treatment = Literal["policy", "point"]
 

@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.metrics import metric_of
-from analysis.stats.intervals import (
+from dess import InputError
+from dess.analysis.metrics import metric_of
+from dess.analysis.stats.intervals import (
     LEVEL,
     Interval,
     bootstrap_interval,
@@ -18,7 +19,6 @@ from analysis.stats.intervals import (
     expanded_level,
     groups,
 )
-from dess import InputError
 
 # Views of ``distribution``: the quantiles, and the share of missions that counts as the worst.
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

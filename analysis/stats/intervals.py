@@ -14,8 +14,8 @@ import pandas as pd
 from scipy import stats
 from scipy.special import ndtri, stdtrit
 
-from analysis.metrics import REWARD, metric_of, metrics_in
 from dess import InputError
+from dess.analysis.metrics import REWARD, metric_of, metrics_in
 from dess.errors import one_of
 from dess.scenario import ScenarioSpace
 

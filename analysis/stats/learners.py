@@ -12,8 +12,9 @@ import numpy as np
 import pandas as pd
 from scipy import optimize, stats
 
-from analysis.metrics import ALWAYS, REWARD
-from analysis.stats.differences import (
+from dess import InputError
+from dess.analysis.metrics import ALWAYS, REWARD
+from dess.analysis.stats.differences import (
     Correction,
     check_same_missions,
     difference_test,
@@ -26,8 +27,7 @@ from analysis.stats.differences import (
     t_test,
     with_adjusted,
 )
-from analysis.stats.intervals import LEVEL, check_share, rare_differences
-from dess import InputError
+from dess.analysis.stats.intervals import LEVEL, check_share, rare_differences
 
 # What a comparison is about: all trainings of the learner, or the only one that there is.
 LEARNER, CHECKPOINT = "the learner", "this checkpoint"

@@ -10,7 +10,7 @@ A part of a claim is shown (True), refuted (False) or open (None), by a complete
 
 from typing import Protocol
 
-from analysis.stats.intervals import LEVEL
+from dess.analysis.stats.intervals import LEVEL
 
 ABOVE, INCONCLUSIVE, BELOW = POSITIONS = ("above", "inconclusive", "below")
 MARKS = {ABOVE: "▲", INCONCLUSIVE: "≈", BELOW: "▼"}  # in tables

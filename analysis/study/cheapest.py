@@ -11,9 +11,9 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.special import stdtrit
 
-from analysis.names import DECISIONS
-from analysis.study.selection import Chosen, Selection, based_on, check_begun, needed
-from analysis.study.stopping import MOST, Line, Samples, StrictTable, of_its_kind
+from dess.analysis.names import DECISIONS
+from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, needed
+from dess.analysis.study.stopping import MOST, Line, Samples, StrictTable, of_its_kind
 from dess.scenario import Integer, Number, ScenarioSpace
 
 # A price; the sums of all missions that may be planned are still finite.

@@ -17,8 +17,8 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from analysis.study.stopping import StrictTable, of_its_kind
 from dess import InputError
+from dess.analysis.study.stopping import StrictTable, of_its_kind
 from dess.errors import shown
 from dess.scenario import SEA, Integer, Scenario, dotted, fields_of
 from dess.sea.families import seas_of
@@ -234,7 +234,7 @@ class Saltelli(Sampled):
     is one mission. With D factors (the fields and the replication), the points come in ``base``
     blocks of D + 2: a point of the sample A, then D points that differ from it in one factor each,
     whose value is taken from the sample B, then the point of B.
-    ``analysis.answers.summary.sensitivity`` computes Sobol indices from the missions.
+    ``dess.analysis.answers.summary.sensitivity`` computes Sobol indices from the missions.
 
     Source: A. Saltelli et al., Variance based sensitivity analysis of model output, Comput. Phys.
     Commun. 181 (2010) 259-270.

@@ -41,9 +41,9 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from analysis.metrics import PRODUCT, SUCCESS, metric_of
-from analysis.study.stopping import MOST, Metric, Samples, StrictTable, values_in
 from dess import InputError
+from dess.analysis.metrics import PRODUCT, SUCCESS, metric_of
+from dess.analysis.study.stopping import MOST, Metric, Samples, StrictTable, values_in
 from dess.scenario import Integer, Number
 
 # Number of stages whose sums are computed together; it does not change any result.

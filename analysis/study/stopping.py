@@ -16,9 +16,9 @@ from pydantic import (
 )
 from scipy.special import ndtri, stdtrit
 
-from analysis.metrics import ALWAYS, MEASURES, metric_of
-from analysis.stats.intervals import LEVEL, bounded_ends
 from dess import InputError
+from dess.analysis.metrics import ALWAYS, MEASURES, metric_of
+from dess.analysis.stats.intervals import LEVEL, bounded_ends
 from dess.errors import listed, one_of, shown, validation_line
 from dess.scenario import Integer, Number
 

@@ -17,16 +17,17 @@ from pydantic import (
     model_validator,
 )
 
-from analysis.bound import check_scenario
-from analysis.metrics import BOUND, COST, GAP, metrics_in
-from analysis.study.cheapest import AnySelection, Cheapest, Costs
-from analysis.study.design import Design, DesignPoint, Saltelli, Sampled
-from analysis.study.selection import Selection
-from analysis.study.stopping import MOST, Precision, StrictTable, Text
 from dess import InputError
+from dess.analysis.bound import check_scenario
+from dess.analysis.metrics import BOUND, COST, GAP, metrics_in
+from dess.analysis.study.cheapest import AnySelection, Cheapest, Costs
+from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
+from dess.analysis.study.selection import Selection
+from dess.analysis.study.stopping import MOST, Precision, StrictTable, Text
 from dess.batch import check_slotted
 from dess.errors import cut, listed, one_of, validation_line
 from dess.files.shipped import Shipped
+from dess.policies.registry import load_team, typed
 from dess.record import measures_of
 from dess.scenario import (
     SEA,
@@ -39,7 +40,6 @@ from dess.scenario import (
 )
 from dess.sections.section import tuples
 from dess.streams import MAX_SEED
-from policies.registry import load_team, typed
 
 Engine = Literal["batch", "events"]
 
@@ -61,7 +61,7 @@ def engine_of(spaces: Sequence[ScenarioSpace], asked: Engine | None = None) -> E
     return asked
 
 
-_STUDIES = Shipped("study", "analysis.study", "shipped")
+_STUDIES = Shipped("study", "dess.analysis.study", "shipped")
 
 # The longest name of a study, which is part of the names of files.
 MOST_CHARACTERS = 100

@@ -6,13 +6,20 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.numbers import words
-from analysis.results import event_log
-from analysis.results.chunks import MANIFEST
-from analysis.results.tables import Results, load_results
-from analysis.verification.checks import CONSERVATION, ENERGY, ENGINES, REALISATIONS, RECORDS, Check
-from analysis.verification.measurements import CrossCheck, Log, longest
 from dess import InputError
+from dess.analysis.numbers import words
+from dess.analysis.results import event_log
+from dess.analysis.results.chunks import MANIFEST
+from dess.analysis.results.tables import Results, load_results
+from dess.analysis.verification.checks import (
+    CONSERVATION,
+    ENERGY,
+    ENGINES,
+    REALISATIONS,
+    RECORDS,
+    Check,
+)
+from dess.analysis.verification.measurements import CrossCheck, Log, longest
 from dess.files.reading import paths_in
 from dess.scenario import SAMPLED, Scenario
 from dess.sections.fleet import type_of

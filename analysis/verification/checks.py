@@ -14,10 +14,10 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis import numbers
-from analysis.stats.differences import adjust
-from analysis.stats.intervals import LEVEL
-from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
+from dess.analysis import numbers
+from dess.analysis.stats.differences import adjust
+from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 
 ARRIVALS, CHANNEL, DRAWS, COVERAGE = "Arrivals", "Channel", "Draws", "Intervals"
 CONSERVATION, ENERGY, RECORDS = "Conservation", "Energy", "Records"
@@ -101,7 +101,7 @@ def judge(checks: Sequence[Check], alpha: float = ALPHA) -> pd.DataFrame:
 
     Returns:
         A row per check: its fields, ``p_adjusted`` and ``verdict``, one of ``HOLDS``, ``REFUTED``
-        and ``INCONCLUSIVE`` of ``analysis.stats.verdict``.
+        and ``INCONCLUSIVE`` of ``dess.analysis.stats.verdict``.
     """
     table = pd.DataFrame(checks, columns=Check._fields).astype({"p": float, "error": float})
     chance = table["p"].notna()

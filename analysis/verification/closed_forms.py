@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import integrate, stats
 
-from analysis.stats.intervals import LEVEL, wilson
+from dess.analysis.stats.intervals import LEVEL, wilson
 from dess.scenario import Scenario, ScenarioSpace
 
 World = Scenario | ScenarioSpace

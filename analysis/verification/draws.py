@@ -8,11 +8,12 @@ import numpy as np
 import pandas as pd
 from scipy import special, stats
 
-from analysis.names import parameter
-from analysis.numbers import decimals, interval, minus
-from analysis.stats.intervals import Interval, mean_interval, wilson
-from analysis.verification import closed_forms
-from analysis.verification.checks import (
+from dess import streams
+from dess.analysis.names import parameter
+from dess.analysis.numbers import decimals, interval, minus
+from dess.analysis.stats.intervals import Interval, mean_interval, wilson
+from dess.analysis.verification import closed_forms
+from dess.analysis.verification.checks import (
     ARRIVALS,
     CHANNEL,
     COVERAGE,
@@ -24,8 +25,7 @@ from analysis.verification.checks import (
     poisson_fit,
     uniform_fit,
 )
-from analysis.verification.measurements import Log
-from dess import streams
+from dess.analysis.verification.measurements import Log
 from dess.scenario import SAMPLED, ScenarioSpace
 from dess.sections.fleet import type_of
 

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 
-from analysis.figures import style
-from analysis.stats.intervals import LEVEL
-from analysis.verification import closed_forms
-from analysis.verification.checks import Fit
+from dess.analysis.figures import style
+from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.verification import closed_forms
+from dess.analysis.verification.checks import Fit
 from dess.scenario import ScenarioSpace
 
 SEEN, MISS, KNOWN = "#0072b2", "#d55e00", "#c9d3da"

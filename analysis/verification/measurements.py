@@ -21,20 +21,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.answers.missions import FOLDER
-from analysis.results import event_log
-from analysis.results.resimulate import Mission, difference, recorded
-from analysis.results.tables import Results
-from analysis.study.stopping import Text
-from analysis.verification import closed_forms
 from dess import InputError, simulate, simulate_batch
+from dess.analysis.answers.missions import FOLDER
+from dess.analysis.results import event_log
+from dess.analysis.results.resimulate import Mission, difference, recorded
+from dess.analysis.results.tables import Results
+from dess.analysis.study.stopping import Text
+from dess.analysis.verification import closed_forms
 from dess.files.documents import Document, Outdated
 from dess.files.reading import Missing
 from dess.files.writing import check_target, write_file
+from dess.policies.registry import files_of, load_team
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER
 from dess.view import View
-from policies.registry import files_of, load_team
 
 
 class Log(Mission):
@@ -42,7 +42,7 @@ class Log(Mission):
 
     @cached_property
     def uav_slots(self) -> pd.DataFrame:
-        """The action of every UAV in every slot, as ``analysis.results.event_log.uav_slots``."""
+        """The action of every UAV in every slot, as ``event_log.uav_slots`` has it."""
         return event_log.uav_slots(self.events)
 
     @cached_property

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.answers.summary import best_policy
-from analysis.metrics import METRICS, SUCCESS
-from analysis.numbers import words
-from analysis.results.tables import load_results
-from analysis.verification import balances, draws, measurements
-from analysis.verification.checks import Check
-from analysis.verification.measurements import STUDY
 from dess import InputError
+from dess.analysis.answers.summary import best_policy
+from dess.analysis.metrics import METRICS, SUCCESS
+from dess.analysis.numbers import words
+from dess.analysis.results.tables import load_results
+from dess.analysis.verification import balances, draws, measurements
+from dess.analysis.verification.checks import Check
+from dess.analysis.verification.measurements import STUDY
 
 _LARGEST_BLOCK = 1_000_000  # missions
 

@@ -19,7 +19,7 @@ from importlib.machinery import PathFinder
 from pathlib import Path
 
 # Imports of other distributions are not followed: their versions identify their code.
-OURS = {"dess", "policies"}
+OURS = {"dess"}
 
 
 def code_of(*modules: str) -> dict[str, str]:

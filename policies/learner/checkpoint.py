@@ -18,17 +18,17 @@ from dess.errors import InputError
 from dess.files.documents import Document
 from dess.files.parsing import parse_json
 from dess.observations import states as column
+from dess.policies.learner import tensors
+from dess.policies.learner.config import CHECKPOINT, TrainingConfig
+from dess.policies.learner.description import Name, Number, Sha256
+from dess.policies.learner.dqn import DQNTraining
+from dess.policies.learner.ppo import ProximalTraining
+from dess.policies.learner.tensors import Tensors, array_of, bytes_of, part
+from dess.policies.learner.trained import require_version
+from dess.policies.learner.training import METRICS, Training
 from dess.record import MISSION_RECORD
 from dess.scenario import SAMPLED, ScenarioSpace
 from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, types_of
-from policies.learner import tensors
-from policies.learner.config import CHECKPOINT, TrainingConfig
-from policies.learner.description import Name, Number, Sha256
-from policies.learner.dqn import DQNTraining
-from policies.learner.ppo import ProximalTraining
-from policies.learner.tensors import Tensors, array_of, bytes_of, part
-from policies.learner.trained import require_version
-from policies.learner.training import METRICS, Training
 
 FORMAT = 2
 # Room for the header of a checkpoint; safetensors allows 100 MB.

@@ -27,7 +27,7 @@ from dess.files.shipped import Shipped
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.sea.families import SETS, seas_of
 
-_CONFIGS = Shipped("config", "policies.learner", "configs")
+_CONFIGS = Shipped("config", "dess.policies.learner", "configs")
 
 # The file of a training that can go on.
 CHECKPOINT = "checkpoint.safetensors"

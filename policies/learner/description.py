@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from dess.files.documents import Document
-from policies.learner.config import Name, TrainingConfig
+from dess.policies.learner.config import Name, TrainingConfig
 
 FORMAT: Literal[1] = 1
 MODEL, CONFIG = "model.safetensors", "config.json"

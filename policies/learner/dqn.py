@@ -16,10 +16,8 @@ from dess.env.stepper import MissionStepper
 from dess.errors import InputError
 from dess.observations import states as column
 from dess.observations.states import CompactStates, empty_states, masks
-from dess.sea.chart import FAR, spread
-from dess.state import HOVER, STEP_X, STEP_Y
-from policies.learner.config import MISSION_SEED, TrainingConfig
-from policies.learner.training import (
+from dess.policies.learner.config import MISSION_SEED, TrainingConfig
+from dess.policies.learner.training import (
     MISSIONS_PER_PHASE,
     Learner,
     Training,
@@ -29,6 +27,8 @@ from policies.learner.training import (
     just_ended,
     soft_update,
 )
+from dess.sea.chart import FAR, spread
+from dess.state import HOVER, STEP_X, STEP_Y
 
 
 class Batch(NamedTuple):

@@ -25,14 +25,10 @@ from dess.errors import InputError
 from dess.observations.observer import encoder_of
 from dess.observations.sets import Sets
 from dess.observations.states import CompactStates, masks
-from dess.record import MISSION_RECORD
-from dess.scenario import ScenarioSpace
-from dess.sea.chart import spread
-from dess.state import HOVER
-from policies.learner.config import MISSION_SEED, TrainingConfig
-from policies.learner.network import SetNetwork
-from policies.learner.policy import ROWS
-from policies.learner.training import (
+from dess.policies.learner.config import MISSION_SEED, TrainingConfig
+from dess.policies.learner.network import SetNetwork
+from dess.policies.learner.policy import ROWS
+from dess.policies.learner.training import (
     MISSIONS_PER_PHASE,
     SELECT_BY,
     Learner,
@@ -42,6 +38,10 @@ from policies.learner.training import (
     check_finite,
     just_ended,
 )
+from dess.record import MISSION_RECORD
+from dess.scenario import ScenarioSpace
+from dess.sea.chart import spread
+from dess.state import HOVER
 
 TRACE = 0.98  # lambda of generalized advantage estimation
 CLIP = 0.2  # by which share an action may become more likely or less before it gains no more

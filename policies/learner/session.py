@@ -2,7 +2,7 @@
 
 training = train(load_config("quick"), Path("runs/quick"))
 training = train(load_config("quick"), Path("runs/quick"), resume=True)
-policy = policies.load("runs/quick")       # from the first evaluation or interruption on
+policy = dess.policies.load("runs/quick")       # from the first evaluation or interruption on
 """
 
 import signal
@@ -25,16 +25,16 @@ from dess.files.reading import paths_in
 from dess.files.tables import write_table
 from dess.files.writing import check_folder, locked, writable
 from dess.observations.observer import encoder_of
+from dess.policies.learner.checkpoint import load_training, new_training, save_training
+from dess.policies.learner.config import CHECKPOINT, TrainingConfig
+from dess.policies.learner.description import MODEL
+from dess.policies.learner.dqn import ReplayMemory
+from dess.policies.learner.network import units_of
+from dess.policies.learner.trained import build, load_policy, save_policy
+from dess.policies.learner.training import Training
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace
 from dess.state import MISSION, UAV
-from policies.learner.checkpoint import load_training, new_training, save_training
-from policies.learner.config import CHECKPOINT, TrainingConfig
-from policies.learner.description import MODEL
-from policies.learner.dqn import ReplayMemory
-from policies.learner.network import units_of
-from policies.learner.trained import build, load_policy, save_policy
-from policies.learner.training import Training
 
 CURVE, EVENTS, LOCK = "training.parquet", "tensorboard", ".lock"
 CHECKPOINT_EVERY = 240.0  # seconds between checkpoints

@@ -1,6 +1,7 @@
 """A trained policy as a folder: ``model.safetensors`` (the weights) and ``config.json``.
 
-``config.json`` describes the weights (``policies.learner.description``) and has their checksum.
+``config.json`` describes the weights (``dess.policies.learner.description``) and has their
+checksum.
 """
 
 import copy
@@ -25,10 +26,9 @@ from dess.observations.maps import POOL
 from dess.observations.observer import ENCODERS
 from dess.observations.sets import Sets
 from dess.observations.states import Layout, layout_of
-from dess.scenario import ScenarioSpace
-from policies.learner import tensors
-from policies.learner.config import TrainingConfig, config_names, learner_of, resume_command
-from policies.learner.description import (
+from dess.policies.learner import tensors
+from dess.policies.learner.config import TrainingConfig, config_names, learner_of, resume_command
+from dess.policies.learner.description import (
     CONFIG,
     FORMAT,
     MODEL,
@@ -37,8 +37,9 @@ from policies.learner.description import (
     Run,
     read_description,
 )
-from policies.learner.network import NARROWEST, DuelingNetwork, PaperNetwork, SetNetwork
-from policies.learner.policy import LearnedPolicy
+from dess.policies.learner.network import NARROWEST, DuelingNetwork, PaperNetwork, SetNetwork
+from dess.policies.learner.policy import LearnedPolicy
+from dess.scenario import ScenarioSpace
 
 # The largest file of weights that is read [bytes]; the largest network of a config is half of it.
 MODEL_LIMIT = 2**30

@@ -18,11 +18,11 @@ from dess.batch import simulate_batch
 from dess.env.stepper import MissionStepper
 from dess.observations import states as column
 from dess.observations.states import CompactStates, compact_states
+from dess.policies.learner.config import Phase, TrainingConfig
+from dess.policies.learner.policy import LearnedPolicy
+from dess.policies.learner.tensors import require_forms
+from dess.policies.learner.trained import build
 from dess.scenario import ScenarioSpace
-from policies.learner.config import Phase, TrainingConfig
-from policies.learner.policy import LearnedPolicy
-from policies.learner.tensors import require_forms
-from policies.learner.trained import build
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 MISSIONS_PER_PHASE = 2**28

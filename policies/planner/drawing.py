@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.mission import MissionModel, simulate
+from dess.policies.planner.fluid import MOST_SLOTS, begin, empty_flight, fly
+from dess.policies.planner.plan import Plan
+from dess.policies.planner.policy import Planner, memory_of
+from dess.policies.planner.rates import rates_of
 from dess.scenario import Scenario, ScenarioSpace
 from dess.view import View, decide
-from policies.planner.fluid import MOST_SLOTS, begin, empty_flight, fly
-from policies.planner.plan import Plan
-from policies.planner.policy import Planner, memory_of
-from policies.planner.rates import rates_of
 
 
 class Course(NamedTuple):

@@ -18,11 +18,11 @@ import numpy as np
 
 from dess.code.kernels import inlined, kernel
 from dess.guard import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
+from dess.policies.planner.plan import CHARGE, NEVER, last_charge
 from dess.sea.chart import distance, in_zone, is_open
 from dess.sections.failures import working_pads
 from dess.sections.fleet import leg
 from dess.state import HOVER, STEP_X, STEP_Y, fields
-from policies.planner.plan import CHARGE, NEVER, last_charge
 
 # The data of a flight are records: the compiled code passes them on without counting references,
 # which would take longer than the model itself.

@@ -17,13 +17,13 @@ import numpy as np
 
 from dess.code.kernels import inlined, kernel
 from dess.guard import guard, must_charge
+from dess.policies.heuristics import step_towards
+from dess.policies.planner.fluid import CRAFT, MOST_SLOTS, begin, fly
+from dess.policies.planner.plan import CHARGE, MOST_WAYPOINTS, WAYPOINT, Plan, insert, remove
+from dess.policies.planner.rates import rates_of
+from dess.policies.planner.search import TRIED, empty_workspace, improve
 from dess.state import HOVER, STEP_X, State
 from dess.view import View
-from policies.heuristics import step_towards
-from policies.planner.fluid import CRAFT, MOST_SLOTS, begin, fly
-from policies.planner.plan import CHARGE, MOST_WAYPOINTS, WAYPOINT, Plan, insert, remove
-from policies.planner.rates import rates_of
-from policies.planner.search import TRIED, empty_workspace, improve
 
 # The temperature of the first step of a search [data units]: for a new plan, and for one that is
 # improved.

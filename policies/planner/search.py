@@ -15,12 +15,12 @@ import numpy as np
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
+from dess.policies.planner import fluid
+from dess.policies.planner import plan as plans
+from dess.policies.planner.fluid import Flight
+from dess.policies.planner.plan import Plan
 from dess.sea.chart import distance, in_zone, is_open
 from dess.state import STEP_X, STEP_Y
-from policies.planner import fluid
-from policies.planner import plan as plans
-from policies.planner.fluid import Flight
-from policies.planner.plan import Plan
 
 # The temperature [data units] falls to this in the last step.
 _COLDEST = 0.05

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from reports.interrupts import EXIT_CODE, LINE, Interrupts
+from dess.reports.interrupts import EXIT_CODE, LINE, Interrupts
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -24,8 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if arguments is None else [*arguments]
     with _safe_path(), Interrupts(is_last=arguments is None) as interrupts:
         try:  # the imports take a while, in which a signal may come
-            from reports.cli import console
-            from reports.cli.commands import app
+            from dess.reports.cli import console
+            from dess.reports.cli.commands import app
 
             console.prepare()
             _check_text(words)
@@ -75,7 +75,7 @@ def _failed(error: BaseException, words: Sequence[str], is_interrupted: bool) ->
 
     from dess import InputError
     from dess.code.libraries import absence
-    from reports.cli import console
+    from dess.reports.cli import console
 
     if isinstance(error, console.Interruption):
         return console.fail(str(error), EXIT_CODE)

@@ -11,9 +11,9 @@ import typer
 
 from dess.code.libraries import missing
 from dess.errors import InputError, one_of, shown
-from reports.cli import console, options
-from reports.cli.console import YesOption, complete
-from reports.cli.options import (
+from dess.reports.cli import console, options
+from dess.reports.cli.console import YesOption, complete
+from dess.reports.cli.options import (
     PAGES,
     RESULTS,
     SET,
@@ -25,17 +25,17 @@ from reports.cli.options import (
     all_values,
     command,
 )
-from reports.cli.report import WHAT_IF, rendering
-from reports.cli.studies import print_plan
-from reports.folders import PREFIX, check_pages
+from dess.reports.cli.report import WHAT_IF, rendering
+from dess.reports.cli.studies import print_plan
+from dess.reports.folders import PREFIX, check_pages
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analysis.ask.answer import Sweep, WhatIf
-    from analysis.ask.question import Question
-    from analysis.results.tables import Results
-    from reports.pages.kernels import Progress
+    from dess.analysis.ask.answer import Sweep, WhatIf
+    from dess.analysis.ask.question import Question
+    from dess.analysis.results.tables import Results
+    from dess.reports.pages.kernels import Progress
 
 SHOWN = 20  # rows of the table
 PRICE = "a price and its amount, e.g. uav=20000"
@@ -88,9 +88,9 @@ def sweep(
         out: Folder of the page.
         dry_run: Only print the plan and the range of its time.
     """
-    from analysis.ask.answer import Sweep
-    from analysis.ask.question import sweep_question
-    from analysis.metrics import ALIASES, PRODUCT
+    from dess.analysis.ask.answer import Sweep
+    from dess.analysis.ask.question import sweep_question
+    from dess.analysis.metrics import ALIASES, PRODUCT
 
     question = sweep_question(
         all_values(settings or []),
@@ -111,7 +111,7 @@ def sweep(
     answer, parameters = Sweep(question, found), {"metric": ranking} if metric else {}
 
     def render(progress: "Progress") -> Path:
-        from reports.pages.render import render_study
+        from dess.reports.pages.render import render_study
 
         return render_study(question.out, out, progress, parameters)
 
@@ -156,8 +156,8 @@ def what_if(
         out: Folder of the page.
         dry_run: Only print the plan and the range of its time.
     """
-    from analysis.ask.answer import VARIATION, WhatIf, best_policy, check_shown
-    from analysis.ask.question import what_if_question
+    from dess.analysis.ask.answer import VARIATION, WhatIf, best_policy, check_shown
+    from dess.analysis.ask.question import what_if_question
 
     changes, fixed = all_settings(settings, SET), all_settings(baseline or [], "--baseline")
     question = what_if_question(changes, fixed, scenario, policy, missions, seed, results)
@@ -174,7 +174,7 @@ def what_if(
     }
 
     def render(progress: "Progress") -> Path:
-        from reports.pages.render import render
+        from dess.reports.pages.render import render
 
         render([WHAT_IF], results, out, progress, parameters)
         return out / f"{WHAT_IF}.html"
@@ -235,10 +235,10 @@ def _print_settings(answer: "Sweep", ranking: str) -> None:
     import numpy as np
     import pandas as pd
 
-    from analysis import numbers
-    from analysis.answers.settings import varied
-    from analysis.metrics import COST, PRODUCT, SUCCESS, metric_of
-    from analysis.names import value_text
+    from dess.analysis import numbers
+    from dess.analysis.answers.settings import varied
+    from dess.analysis.metrics import COST, PRODUCT, SUCCESS, metric_of
+    from dess.analysis.names import value_text
 
     study = answer.question.study
     table, fields, prices = answer.table(ranking), [*varied(answer.results)], study.costs
@@ -264,7 +264,7 @@ def _print_settings(answer: "Sweep", ranking: str) -> None:
 
 def _print_measures(answer: "WhatIf") -> None:
     """Print what was measured on both sides, policy by policy."""
-    from reports.cli.tables import print_frame
+    from dess.reports.cli.tables import print_frame
 
     for policy in answer.results.policies:
         print_frame(policy, answer.measures(policy).set_index("Mean per mission"))

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 import dess
-from reports.cli import ask, console, evaluate, lists, report, simulate, studies, train
+from dess.reports.cli import ask, console, evaluate, lists, report, simulate, studies, train
 
 
 def _print_version(is_wanted: bool) -> None:

@@ -156,7 +156,7 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int 
         shown = ("  ".join(line[number] for number in columns).rstrip() for line in aligned)
         print("", *shown, "", sep="\n")
     if any("nan" in cell for line in lines for cell in line):
-        from analysis.numbers import why_nan  # which loads pandas
+        from dess.analysis.numbers import why_nan  # which loads pandas
 
         print("".join(f" {why}\n" for why in [why_nan(sum(lines, []))] if why), end="")
 
@@ -243,9 +243,9 @@ def _compiling(begin: Callable[[], object], end: Callable[[], object]) -> Iterat
 
 
 if TYPE_CHECKING:
-    from analysis.execution.jobs import Progress
-    from analysis.execution.runner import Round
-    from analysis.results.tables import Results
+    from dess.analysis.execution.jobs import Progress
+    from dess.analysis.execution.runner import Round
+    from dess.analysis.results.tables import Results
 
     Announce = Callable[[Round], object]
 
@@ -268,8 +268,8 @@ def complete(
         Interruption: If it was.
         typer.Exit: If some of it could not be computed.
     """
-    from analysis.execution.cluster import SchedulerError
-    from analysis.execution.runner import ChunkError
+    from dess.analysis.execution.cluster import SchedulerError
+    from dess.analysis.execution.runner import ChunkError
 
     try:
         with compile_notice(), _bar() as (progress, announce):

@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from reports.cli import console, options
-from reports.cli.console import YesOption
-from reports.cli.options import (
+from dess.reports.cli import console, options
+from dess.reports.cli.console import YesOption
+from dess.reports.cli.options import (
     JsonOption,
     ScenarioOption,
     SeedOption,
@@ -41,10 +41,10 @@ def evaluate(
         engine: batch is faster, and both engines give the same records; continuous arrivals
             need events.  [default: batch, or events where it is needed]
     """
-    from analysis.execution.evaluation import Asked, check_evaluation, means
-    from analysis.study.study import engine_of
+    from dess.analysis.execution.evaluation import Asked, check_evaluation, means
+    from dess.analysis.study.study import engine_of
+    from dess.policies.registry import typed
     from dess.record import measures_of
-    from policies.registry import typed
 
     space, policy = load_space(scenario, settings), typed(policy)
     engine = engine_of([space], engine)

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from dess.errors import cut
-from reports.cli import console, options
-from reports.cli.options import JsonOption, SetOption, command, load_space
+from dess.reports.cli import console, options
+from dess.reports.cli.options import JsonOption, SetOption, command, load_space
 
 policies = typer.Typer(invoke_without_command=True)
 scenarios = typer.Typer(invoke_without_command=True)
@@ -17,7 +17,7 @@ studies = typer.Typer(invoke_without_command=True)
 @policies.callback()
 def list_policies(context: typer.Context) -> None:
     """List the policies, or show one."""
-    from policies.registry import descriptions
+    from dess.policies.registry import descriptions
 
     if context.invoked_subcommand is None:
         console.print_list(descriptions().items())
@@ -35,7 +35,7 @@ def show_policy(
     Args:
         name: A policy, by name, folder of a training or file.
     """
-    from policies.about import about
+    from dess.policies.about import about
 
     found = about(name)
     if as_json:
@@ -74,7 +74,7 @@ def show_scenario(
         name: A shipped scenario, a generated one such as archipelago:7, or a TOML file.
         everything: Show the defaults and what is allowed as well, in full.
     """
-    from analysis.names import fields
+    from dess.analysis.names import fields
     from dess.scenario import scenario_description
 
     space, description = load_space(name, settings), scenario_description(name)
@@ -100,7 +100,7 @@ def show_scenario(
 @studies.callback()
 def list_studies(context: typer.Context) -> None:
     """List the shipped studies, or show one."""
-    from analysis.study.study import study_descriptions
+    from dess.analysis.study.study import study_descriptions
 
     if context.invoked_subcommand is None:
         console.print_list(study_descriptions().items())
@@ -118,7 +118,7 @@ def show_study(
     """
     import tomli_w
 
-    from analysis.study.study import load_study
+    from dess.analysis.study.study import load_study
 
     data = load_study(name).model_dump(mode="json", exclude_none=True)
     print(json.dumps(data, indent=2) if as_json else tomli_w.dumps(data).strip())

@@ -17,7 +17,7 @@ from dess.files.parsing import parse_toml
 
 def policies(start: str) -> list[str]:
     """Names of policies; of a team ``P,P,...`` the last one."""
-    from policies import names
+    from dess.policies import names
 
     before, comma, last = start.rpartition(",")
     return [f"{before}{comma}{name}" for name in _beginning(names(), last)]
@@ -33,14 +33,14 @@ def scenarios(start: str) -> list[str]:
 
 def studies(start: str) -> list[str]:
     """Names of shipped studies."""
-    from analysis import study_names
+    from dess.analysis import study_names
 
     return _beginning(study_names(), start)
 
 
 def configs(start: str) -> list[str]:
     """Names of shipped configs of trainings."""
-    from policies.learner.config import config_names
+    from dess.policies.learner.config import config_names
 
     return _beginning(config_names(), start)
 
@@ -208,7 +208,7 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
     Raises:
         InputError: If the text has another form, or a range is none.
     """
-    from analysis.ask.question import listed
+    from dess.analysis.ask.question import listed
 
     field, equals, values = (part.strip() for part in text.partition("="))
     if equals:
@@ -229,7 +229,7 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
 
 def _range(field: str, text: str, low: str, high: str, count: str | None) -> Any:
     """The values of ``low..high`` or ``low..high:count``."""
-    from analysis.study.design import INTEGERS
+    from dess.analysis.study.design import INTEGERS
 
     first, last = _number(text, low), _number(text, high)
     if first > last:
@@ -247,7 +247,7 @@ def _range(field: str, text: str, low: str, high: str, count: str | None) -> Any
 
 def _spaced(text: str, first: Decimal, last: Decimal, count: str, is_integer: bool) -> list[Any]:
     """Evenly spaced numbers, both ends included."""
-    from analysis.study.design import MAX_SIZE
+    from dess.analysis.study.design import MAX_SIZE
 
     number = int(count) if count.strip().isdecimal() else 0
     if not 2 <= number <= MAX_SIZE:

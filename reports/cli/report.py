@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dess import InputError
-from reports.cli import console
-from reports.cli.console import YesOption
-from reports.cli.options import PAGES, PARAMETER, RESULTS, JsonOption, command, setting
+from dess.reports.cli import console
+from dess.reports.cli.console import YesOption
+from dess.reports.cli.options import PAGES, PARAMETER, RESULTS, JsonOption, command, setting
 
 if TYPE_CHECKING:
-    from reports.pages.kernels import Progress
-    from reports.pages.verify import Check
+    from dess.reports.pages.kernels import Progress
+    from dess.reports.pages.verify import Check
 
 WHAT_IF = "what-if"  # the only report that has --set
 
@@ -56,8 +56,8 @@ def report(
         values.setdefault("baseline", {})  # the scenario itself, not that of the default question
     if yes:  # a parameter of the notebooks that simulate missions
         values["yes"] = True
-    from reports.pages.notebook import NAMES
-    from reports.pages.render import render, render_study
+    from dess.reports.pages.notebook import NAMES
+    from dess.reports.pages.render import render, render_study
 
     folders = [n for n in names or [] if os.sep in n or (n not in NAMES and os.path.isdir(n))]
     reports = [name for name in names or [] if name not in folders]
@@ -71,7 +71,7 @@ def report(
 @contextmanager
 def rendering() -> "Iterator[Progress]":
     """A bar for the progress of pages; a notebook that fails is one line and exit code 1."""
-    from reports.pages.render import ReportError
+    from dess.reports.pages.render import ReportError
 
     try:
         with console.compile_notice(), console.counted_bar("step") as progress:
@@ -100,7 +100,7 @@ def verify(
     """
     import secrets
 
-    from reports.pages.verify import verify_page, verify_results
+    from dess.reports.pages.verify import verify_page, verify_results
 
     seed = secrets.randbelow(2**32) if seed is None else seed
     check = verify_results if path.is_dir() else verify_page

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from dess.errors import InputError, one_of, shown
-from reports.cli import console, options
-from reports.cli.console import YesOption
+from dess.reports.cli import console, options
+from dess.reports.cli.console import YesOption
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from dess.policies.base import Policy
     from dess.record import MissionRecord
     from dess.scenario import Scenario, ScenarioSpace
-    from policies.base import Policy
 
 FIGURES = (".png", ".pdf", ".svg")
 ANIMATIONS = (".gif", ".mp4", ".html")
@@ -64,11 +64,11 @@ def simulate(
         animation: Write the mission as an animation: .gif, .mp4 (needs ffmpeg), or .html, a
             page with its player.
     """
-    from analysis.execution.effort import check_missions
     from dess import simulate
+    from dess.analysis.execution.effort import check_missions
     from dess.files.writing import writable
+    from dess.policies.registry import TypedByUser, load_team
     from dess.state import check_seed, sample_scenario
-    from policies.registry import TypedByUser, load_team
 
     if of:
         _refuse_given(context, "scenario", "settings", "seed")
@@ -85,7 +85,7 @@ def simulate(
     _check_suffix("--figure", figure, FIGURES, "a picture")
     _check_suffix("--animation", animation, ANIMATIONS, "an animation")
     if animation and animation.suffix == ".mp4":
-        from reports.player.animation import check_ffmpeg
+        from dess.reports.player.animation import check_ffmpeg
 
         check_ffmpeg()
     writers = {events: _write_log, figure: _draw, animation: _animate}
@@ -142,9 +142,9 @@ def _of_study(
     folder: Path, point: int | None, policy: str | None, replication: int | None
 ) -> _Asked:
     """What a results folder says of a mission; a line on stderr if it may be another one now."""
-    from analysis.results.chunks import MANIFEST
-    from analysis.results.manifest import Manifest
-    from policies.registry import TypedByUser, load_team
+    from dess.analysis.results.chunks import MANIFEST
+    from dess.analysis.results.manifest import Manifest
+    from dess.policies.registry import TypedByUser, load_team
 
     manifest = Manifest.read(folder / MANIFEST)
     policies, named = [team.policy for team in manifest.policies], [policy] if policy else []
@@ -204,8 +204,8 @@ class _Mission:
 
     @property
     def outcome(self) -> str:
-        from analysis.numbers import percent
-        from analysis.results.event_log import causes
+        from dess.analysis.numbers import percent
+        from dess.analysis.results.event_log import causes
 
         ends = [uav["end"] for uav in self.record.uav_rows()]
         outcome = (
@@ -226,13 +226,13 @@ def _write_log(mission: _Mission, path: Path, kind: str) -> None:
 
 
 def _draw(mission: _Mission, path: Path, kind: str) -> None:
-    from analysis.figures.missions import mission_figure
+    from dess.analysis.figures.missions import mission_figure
 
     mission_figure(mission.log, mission.scenario).savefig(path, format=kind)
 
 
 def _animate(mission: _Mission, path: Path, kind: str) -> None:
-    from reports.player.animation import write_animation
+    from dess.reports.player.animation import write_animation
 
     if kind == "html":
         _write_page(mission, path)
@@ -243,8 +243,8 @@ def _animate(mission: _Mission, path: Path, kind: str) -> None:
 def _write_page(mission: _Mission, path: Path) -> None:
     """Write a page with the player of the mission; the same mission gives the same bytes."""
     from dess.files import writing
-    from reports import player
-    from reports.pages.html import fill
+    from dess.reports import player
+    from dess.reports.pages.html import fill
 
     caption = player.reading(mission.scenario)
     played = player.player(mission.log, mission.scenario, "mission", caption=caption)
@@ -255,8 +255,8 @@ def _write_page(mission: _Mission, path: Path) -> None:
 
 
 def _print_mission(mission: _Mission) -> None:
-    from analysis.metrics import MEASURES
-    from analysis.results.event_log import causes
+    from dess.analysis.metrics import MEASURES
+    from dess.analysis.results.event_log import causes
 
     record = mission.record
     metrics = record.metrics

@@ -11,19 +11,26 @@ import typer
 
 from dess.code.libraries import needs
 from dess.errors import InputError, one_of
-from reports.cli import console, options
-from reports.cli.console import YesOption, complete
-from reports.cli.options import PAGES, RESULTS, JsonOption, WorkersOption, all_settings, command
-from reports.cli.report import rendering
-from reports.folders import PREFIX, check_pages
+from dess.reports.cli import console, options
+from dess.reports.cli.console import YesOption, complete
+from dess.reports.cli.options import (
+    PAGES,
+    RESULTS,
+    JsonOption,
+    WorkersOption,
+    all_settings,
+    command,
+)
+from dess.reports.cli.report import rendering
+from dess.reports.folders import PREFIX, check_pages
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analysis.answers.diff import Diff
-    from analysis.execution.effort import Planned
-    from analysis.results.tables import Results
-    from analysis.study.study import Study
+    from dess.analysis.answers.diff import Diff
+    from dess.analysis.execution.effort import Planned
+    from dess.analysis.results.tables import Results
+    from dess.analysis.study.study import Study
 
 TARGET = "a metric and its least mean, such as success=0.99, or its largest, such as age=40"
 
@@ -68,8 +75,8 @@ def run(
         dry_run: Only print the plan and the range of its time.
         accept_code: Keep missions that other code has simulated; the results say so.
     """
-    from analysis.execution.effort import check_run, plan_study
-    from analysis.study.study import load_study
+    from dess.analysis.execution.effort import check_run, plan_study
+    from dess.analysis.study.study import load_study
 
     changes = {"missions": missions, "policies": policy}
     given = {key: value for key, value in changes.items() if value is not None}
@@ -93,7 +100,7 @@ def run(
     for study, folder in runs:
         _run(study, folder, workers, scheduler, accept_code)
     if page:
-        from reports.pages.render import render_study
+        from dess.reports.pages.render import render_study
 
         with rendering() as progress:
             for folder in folders:
@@ -102,8 +109,8 @@ def run(
 
 def _run(study: "Study", out: Path, workers: int, scheduler: str | None, accept: bool) -> None:
     """Run a study, and print its summary."""
-    from analysis.execution.runner import run_study
-    from reports.cli.tables import print_summary
+    from dess.analysis.execution.runner import run_study
+    from dess.reports.cli.tables import print_summary
 
     results = complete(
         study.name,
@@ -117,7 +124,7 @@ def _run(study: "Study", out: Path, workers: int, scheduler: str | None, accept:
 
 def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
     """Print the missions that a run would simulate, and the range of its time."""
-    from analysis.execution.effort import budget, total
+    from dess.analysis.execution.effort import budget, total
 
     rows = [[p.policy, f"{p.missions:,}", f"{p.present:,}", str(p.seconds)] for p in plan]
     console.print_table(["policy", "missions", "present", "time on one core"], rows)
@@ -157,10 +164,10 @@ def show(
         everything: Show the tables of all metrics, not of the product alone.
         as_csv: Print the means as CSV: a row per policy, design point and metric.
     """
-    from analysis import numbers
-    from analysis.answers import summary
-    from analysis.results.tables import load_results
-    from reports.cli import tables as printed
+    from dess.analysis import numbers
+    from dess.analysis.answers import summary
+    from dess.analysis.results.tables import load_results
+    from dess.reports.cli import tables as printed
 
     if as_csv and as_json:
         raise InputError("--csv: not with --json; allowed: one of them")
@@ -188,7 +195,7 @@ def show(
 
 def _targets(texts: Iterable[str]) -> dict[str, float]:
     """Metric -> the least mean, or the largest of a metric of which less is better."""
-    from analysis.metrics import ALIASES, MEASURES, METRICS
+    from dess.analysis.metrics import ALIASES, MEASURES, METRICS
 
     targets = {}
     for name, share in all_settings(texts, "--target", TARGET).items():
@@ -212,7 +219,7 @@ def _tables(
     """All tables, by their names in the JSON."""
     import pandas as pd
 
-    from analysis.answers import costs, optimality, summary
+    from dess.analysis.answers import costs, optimality, summary
 
     policy = policy or summary.best_policy(results.missions)
     return {
@@ -270,9 +277,9 @@ def diff(
         b: Another results folder.
         most: Number of most changed missions to show.
     """
-    from analysis.answers import diff
-    from analysis.results.tables import load_results
-    from reports.cli.tables import print_diff
+    from dess.analysis.answers import diff
+    from dess.analysis.results.tables import load_results
+    from dess.reports.cli.tables import print_diff
 
     found = diff.diff(load_results(a), load_results(b))
     if as_json:
@@ -283,7 +290,7 @@ def diff(
 
 def _diff_document(found: "Diff", most: int) -> dict:
     """All that is found, as plain data."""
-    from analysis.answers import diff
+    from dess.analysis.answers import diff
 
     identity = ["policy_a", "policy_b", "point_a", "point_b", "replication", "fields"]
     tables = {
@@ -319,9 +326,9 @@ def export(
         page: The page of the results.  [default: it is rendered for the crate]
         licence: Licence of the results, by its SPDX identifier.
     """
-    from analysis.results.tables import load_results
-    from reports.crate import check_page, licence_of, write_crate
-    from reports.pages.render import render_study
+    from dess.analysis.results.tables import load_results
+    from dess.reports.crate import check_page, licence_of, write_crate
+    from dess.reports.pages.render import render_study
 
     results, licence = load_results(folder), licence_of(licence)
     if page:

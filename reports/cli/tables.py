@@ -5,15 +5,15 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis import numbers
-from analysis.answers import costs, diff, optimality, summary
-from analysis.answers.settings import in_words, setting_of
-from analysis.metrics import MEASURES, METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
-from analysis.paper import values
-from analysis.results.tables import Results
-from analysis.tables import compared, counts
-from analysis.tables import means as means_table
-from reports.cli import console
+from dess.analysis import numbers
+from dess.analysis.answers import costs, diff, optimality, summary
+from dess.analysis.answers.settings import in_words, setting_of
+from dess.analysis.metrics import MEASURES, METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
+from dess.analysis.paper import values
+from dess.analysis.results.tables import Results
+from dess.analysis.tables import compared, counts
+from dess.analysis.tables import means as means_table
+from dess.reports.cli import console
 
 _SHORT = {name: metric_of(metric).head for metric, name in METRICS.items()}
 _QUANTILES = (0.05, 0.5, 0.95)

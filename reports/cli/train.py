@@ -10,11 +10,11 @@ import typer
 
 from dess.code.libraries import missing, needs
 from dess.errors import InputError, shown
-from reports.cli import console, options
-from reports.cli.options import SetOption, command, setting
+from dess.reports.cli import console, options
+from dess.reports.cli.options import SetOption, command, setting
 
 if TYPE_CHECKING:
-    from policies.learner.training import Training
+    from dess.policies.learner.training import Training
 
 app = typer.Typer()
 MEASURED = 5.0  # seconds of training after which it is said how long it will take
@@ -48,8 +48,8 @@ def train(
         start: Trained policy whose weights the training begins with; with --resume, it has begun.
         yes: Train even if it takes more memory than is available.
     """
-    from policies.learner.config import CHECKPOINT, load_config, resume_command
-    from policies.registry import folder_of
+    from dess.policies.learner.config import CHECKPOINT, load_config, resume_command
+    from dess.policies.registry import folder_of
 
     fields = dict(setting(text) for text in settings or [])
     changes: dict[str, Any] = {} if seed is None else {"seed": seed}
@@ -61,8 +61,8 @@ def train(
             f"--from: {shown(start)} is no trained policy; allowed: one, or its folder"
         )
     needs("learning", "dess train")
-    from policies.learner.session import EVENTS, train
-    from policies.learner.training import DivergenceError
+    from dess.policies.learner.session import EVENTS, train
+    from dess.policies.learner.training import DivergenceError
 
     def announce(memory: int) -> None:
         """Print how much memory [bytes] the missions take, and how to see the curves."""
@@ -106,7 +106,7 @@ def train(
 @contextmanager
 def _bar(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
     """Progress of a training, with the metrics of its last evaluation and how long it will take."""
-    from analysis import numbers
+    from dess.analysis import numbers
 
     with console.bar("tick", ticks) as bar:
         first: tuple[int, float] | None = None  # without the first tick, which compiles

@@ -21,11 +21,11 @@ heuristic = None  # the policy to compare it with; None for the best that is not
 # %%
 from IPython.display import display
 
-from analysis import load_results, tables
-from analysis.answers import comparison as answers
-from analysis.answers import missions as logged
-from analysis.answers import summary
-from reports.pages import html
+from dess.analysis import load_results, tables
+from dess.analysis.answers import comparison as answers
+from dess.analysis.answers import missions as logged
+from dess.analysis.answers import summary
+from dess.reports.pages import html
 
 # %%
 study = load_results(f"{results}/comparison")

@@ -20,10 +20,10 @@ results = "../../results"  # folder with the results folder of explorer
 # %%
 from pathlib import Path
 
-from analysis import load_results, metrics, numbers
-from analysis.answers.settings import in_words
-from reports.explorer import Grid, explorer
-from reports.pages import html
+from dess.analysis import load_results, metrics, numbers
+from dess.analysis.answers.settings import in_words
+from dess.reports.explorer import Grid, explorer
+from dess.reports.pages import html
 
 # %%
 study = load_results(Path(results) / "explorer")

@@ -19,11 +19,11 @@ trained = None  # folder with curves.parquet and a folder per policy; None for t
 # %%
 from pathlib import Path
 
-from analysis import numbers
-from analysis.answers import learning as answers
-from analysis.paper import measures, scorecard, values
-from policies.registry import TRAINED
-from reports.pages import html
+from dess.analysis import numbers
+from dess.analysis.answers import learning as answers
+from dess.analysis.paper import measures, scorecard, values
+from dess.policies.registry import TRAINED
+from dess.reports.pages import html
 
 # %%
 folder = Path(str(trained or TRAINED))

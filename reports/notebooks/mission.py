@@ -22,13 +22,13 @@ replication = 0  # the replication to show; the study must have stored its event
 # %%
 from IPython.display import display
 
-from analysis import load_results, numbers
-from analysis.answers import missions, summary
-from analysis.metrics import RATIO
-from analysis.paper import values
-from analysis.results.resimulate import Mission
-from reports.pages import html
-from reports.player import READING, library, player, together
+from dess.analysis import load_results, numbers
+from dess.analysis.answers import missions, summary
+from dess.analysis.metrics import RATIO
+from dess.analysis.paper import values
+from dess.analysis.results.resimulate import Mission
+from dess.reports.pages import html
+from dess.reports.player import READING, library, player, together
 
 # %%
 fig1, fig4 = (load_results(f"{results}/{name}") for name in ("fig1", "fig4"))

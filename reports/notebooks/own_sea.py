@@ -28,14 +28,14 @@ workers = 1  # processes
 yes = False  # True if the sweep may take more than an hour
 
 # %%
-from analysis import sweep
-from analysis.answers import costs
-from analysis.figures import settings as figures
-from analysis.figures.missions import mission_figure, sea_figure
-from analysis.results.resimulate import mission_of
 from dess import load_scenario
-from policies import load_team
-from reports.pages import html
+from dess.analysis import sweep
+from dess.analysis.answers import costs
+from dess.analysis.figures import settings as figures
+from dess.analysis.figures.missions import mission_figure, sea_figure
+from dess.analysis.results.resimulate import mission_of
+from dess.policies import load_team
+from dess.reports.pages import html
 
 # %%
 sea = load_scenario(scenario)

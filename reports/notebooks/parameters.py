@@ -21,12 +21,12 @@ heuristic = None  # the other policy to show; None for the best that is not lear
 # %%
 from pathlib import Path
 
-from analysis import load_results, metrics, names, numbers
-from analysis.answers import main_effects, summary
-from analysis.figures import settings
-from analysis.paper import scorecard, values
-from analysis.stats.intervals import LEVEL
-from reports.pages import html
+from dess.analysis import load_results, metrics, names, numbers
+from dess.analysis.answers import main_effects, summary
+from dess.analysis.figures import settings
+from dess.analysis.paper import scorecard, values
+from dess.analysis.stats.intervals import LEVEL
+from dess.reports.pages import html
 
 # %%
 folder = Path(results)

@@ -22,13 +22,13 @@ from pathlib import Path
 
 from IPython.display import display
 
-from analysis import load_results, numbers, summary, tables
-from analysis.answers import optimality
-from analysis.answers import summary as questions
-from analysis.figures import comparison, settings
-from analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
-from analysis.paper import values
-from reports.pages import html
+from dess.analysis import load_results, numbers, summary, tables
+from dess.analysis.answers import optimality
+from dess.analysis.answers import summary as questions
+from dess.analysis.figures import comparison, settings
+from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
+from dess.analysis.paper import values
+from dess.reports.pages import html
 
 # %%
 table4, fig4 = (load_results(Path(results) / name) for name in ("table4", "fig4"))

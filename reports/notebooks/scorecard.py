@@ -24,18 +24,18 @@ from pathlib import Path
 
 from IPython.display import display
 
-from analysis import load_results, numbers
-from analysis.answers.learning import read_curves
-from analysis.figures.comparison import claims
-from analysis.paper import scorecard
-from analysis.results.chunks import MANIFEST
+from dess.analysis import load_results, numbers
+from dess.analysis.answers.learning import read_curves
+from dess.analysis.figures.comparison import claims
+from dess.analysis.paper import scorecard
+from dess.analysis.results.chunks import MANIFEST
 from dess.files.reading import paths_in
-from policies.learner.description import read_description
-from reports.pages import html
-from reports.pages.scorecard import as_html
+from dess.policies.learner.description import read_description
+from dess.reports.pages import html
+from dess.reports.pages.scorecard import as_html
 
 # %%
-folder = Path(str(trained or files("policies") / "trained"))
+folder = Path(str(trained or files("dess.policies") / "trained"))
 smaller = paths_in(Path(results), f"*{scorecard.SMALLER}/{MANIFEST}")
 names = ("table4", "fig4", "fig5", "sweet-spot", *(path.parent.name for path in smaller))
 studies = {name: load_results(Path(results) / name) for name in names}

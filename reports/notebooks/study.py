@@ -23,12 +23,12 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis import distribution, load_results, tables
-from analysis.answers import costs, settings, summary
-from analysis.figures import settings as figures
-from analysis.metrics import METRICS, metric_of
-from reports.pages import html
-from reports.pages import study as page
+from dess.analysis import distribution, load_results, tables
+from dess.analysis.answers import costs, settings, summary
+from dess.analysis.figures import settings as figures
+from dess.analysis.metrics import METRICS, metric_of
+from dess.reports.pages import html
+from dess.reports.pages import study as page
 
 # %%
 study = load_results(Path(results))

@@ -24,10 +24,10 @@ workers = 1  # processes; more than one is worth its start time from thousands o
 yes = False  # True if the missions may take more than an hour
 
 # %%
-from analysis import sweep
-from analysis.answers import settings
-from analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
-from reports.pages import html, study
+from dess.analysis import sweep
+from dess.analysis.answers import settings
+from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
+from dess.reports.pages import html, study
 
 # %%
 answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **fields)

@@ -21,13 +21,13 @@ block = 100  # missions of a block, for the coverage of confidence intervals
 # %%
 from IPython.display import Markdown, display
 
-from analysis import numbers
-from analysis.names import parameter
-from analysis.stats.intervals import LEVEL
-from analysis.verification import checks, draws
-from analysis.verification import figures as drawings
-from analysis.verification.suite import Suite
-from reports.pages import html, stress_des
+from dess.analysis import numbers
+from dess.analysis.names import parameter
+from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.verification import checks, draws
+from dess.analysis.verification import figures as drawings
+from dess.analysis.verification.suite import Suite
+from dess.reports.pages import html, stress_des
 
 # %%
 suite = Suite(results)

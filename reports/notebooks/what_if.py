@@ -28,10 +28,10 @@ shown = None  # the policy whose missions are drawn; None for the best in the va
 # %%
 from IPython.display import display
 
-from analysis import metrics, what_if
-from analysis.ask.answer import measured
-from analysis.metrics import metric_of
-from reports.pages import html
+from dess.analysis import metrics, what_if
+from dess.analysis.ask.answer import measured
+from dess.analysis.metrics import metric_of
+from dess.reports.pages import html
 
 # %%
 asked = what_if(

@@ -17,9 +17,9 @@ from nbformat import NotebookNode
 from pygments.formatters import HtmlFormatter
 
 import dess
-from reports.pages.html import JINJA, PART, indexed
-from reports.pages.notebook import SCORECARD, Report
-from reports.pages.page import CARD, Card, Page, Picture, hidden
+from dess.reports.pages.html import JINJA, PART, indexed
+from dess.reports.pages.notebook import SCORECARD, Report
+from dess.reports.pages.page import CARD, Card, Page, Picture, hidden
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 FOLDED = "How this page was made"  # the heading of the section with method and provenance

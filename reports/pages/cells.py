@@ -3,7 +3,7 @@
 The process imports what the notebooks import, once for all. It is the other end of ``kernels``, and
 imports nothing that only rendering needs::
 
-    python -m reports.pages.cells < notebooks.json
+    python -m dess.reports.pages.cells < notebooks.json
 """
 
 import ast
@@ -26,7 +26,7 @@ from IPython.core.displaypub import CapturingDisplayPublisher
 from IPython.core.interactiveshell import InteractiveShell
 from traitlets.config import Config
 
-from analysis.results.tables import keep
+from dess.analysis.results.tables import keep
 from dess.errors import InputError
 
 AT_ONCE = 2

@@ -28,14 +28,14 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 import dess
-from analysis import numbers
-from analysis.numbers import span
-from analysis.results.resimulate import Evidence, learned_files
-from analysis.results.tables import Results
-from analysis.study.study import budget_of
-from analysis.tables import Table
+from dess.analysis import numbers
+from dess.analysis.numbers import span
+from dess.analysis.results.resimulate import Evidence, learned_files
+from dess.analysis.results.tables import Results
+from dess.analysis.study.study import budget_of
+from dess.analysis.tables import Table
 from dess.errors import printable
-from reports.pages.page import FILES, STUDY, Learned, Page, hidden
+from dess.reports.pages.page import FILES, STUDY, Learned, Page, hidden
 
 SHORT = 12  # characters of a hash that are shown
 PART = "application/vnd.dess.part+json"  # type of the output of a cell that contains a ``Part``
@@ -91,7 +91,7 @@ def template(name: str, **filters: Callable[..., str]) -> Template:
             terms; elsewhere ``explained`` text is the same text.
     """
     finalize = _in_markdown if name.endswith(".md") else None
-    loader = PackageLoader("reports", "templates")
+    loader = PackageLoader("dess.reports", "templates")
     environment = Environment(loader=loader, finalize=finalize, trim_blocks=True, **JINJA)
     environment.filters |= {"indexed": indexed, "explained": Markup.escape, **filters}
     return environment.get_template(name)

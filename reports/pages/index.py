@@ -13,11 +13,11 @@ from markupsafe import Markup
 
 from dess import InputError
 from dess.files.reading import paths_in
-from reports.folders import INDEX, PREFIX
-from reports.pages import html
-from reports.pages.html import fill, template
-from reports.pages.notebook import GROUPS, SCORECARD
-from reports.pages.page import FILES, Page
+from dess.reports.folders import INDEX, PREFIX
+from dess.reports.pages import html
+from dess.reports.pages.html import fill, template
+from dess.reports.pages.notebook import GROUPS, SCORECARD
+from dess.reports.pages.page import FILES, Page
 
 log = logging.getLogger(__name__)
 

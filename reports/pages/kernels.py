@@ -14,15 +14,15 @@ from typing import IO, Any
 import matplotlib as mpl
 from nbformat import from_dict
 
-from analysis.answers import comparison
-from analysis.answers.missions import keep_logs
-from analysis.results.tables import load_results
-from analysis.verification import measurements
 from dess import InputError
+from dess.analysis.answers import comparison
+from dess.analysis.answers.missions import keep_logs
+from dess.analysis.results.tables import load_results
+from dess.analysis.verification import measurements
 from dess.files.writing import temporary_folder
-from reports.pages import cells
-from reports.pages.cells import kill
-from reports.pages.notebook import Report
+from dess.reports.pages import cells
+from dess.reports.pages.cells import kill
+from dess.reports.pages.notebook import Report
 
 log = logging.getLogger(__name__)
 
@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 Progress = Callable[[int, int, str], None]
 
 HOME = "dess-pages-"  # beginning of the name of the folder in which the notebooks run
-PACKAGES = Path(__file__).parents[2]  # the folder from which this package was imported
+PACKAGES = Path(__file__).parents[3]  # the folder from which this package was imported
 
 
 def run(

@@ -22,7 +22,7 @@ from nbformat import NotebookNode
 
 from dess.errors import InputError, one_of, shown
 from dess.files.reading import paths_in, read_text
-from policies.registry import is_path
+from dess.policies.registry import is_path
 
 SHIPPED = Path(__file__).parents[1] / "notebooks"
 SCORECARD = "scorecard"

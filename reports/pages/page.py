@@ -7,7 +7,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from analysis.results.resimulate import Evidence
+from dess.analysis.results.resimulate import Evidence
 from dess.files.documents import Document
 from dess.files.reading import read_text
 

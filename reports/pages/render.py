@@ -14,23 +14,29 @@ from typing import Any
 
 import nbformat
 
-from analysis.results.chunks import MANIFEST
-from analysis.results.manifest import Manifest
 from dess import InputError
-from dess.code.sources import OURS
+from dess.analysis.results.chunks import MANIFEST
+from dess.analysis.results.manifest import Manifest
 from dess.files.documents import LIMIT
 from dess.files.reading import paths_in, read_bytes
 from dess.files.writing import delete, locked, write_files
-from reports.folders import INDEX, LOCK, check_pages
-from reports.pages import kernels
-from reports.pages.body import page_of
-from reports.pages.index import index_of, pages_in, with_bars
-from reports.pages.kernels import Progress
-from reports.pages.notebook import SHIPPED, Report, check_parameters, names_in, read, with_paths
-from reports.pages.page import Page
-from reports.pages.study import report_of
+from dess.reports.folders import INDEX, LOCK, check_pages
+from dess.reports.pages import kernels
+from dess.reports.pages.body import page_of
+from dess.reports.pages.index import index_of, pages_in, with_bars
+from dess.reports.pages.kernels import Progress
+from dess.reports.pages.notebook import (
+    SHIPPED,
+    Report,
+    check_parameters,
+    names_in,
+    read,
+    with_paths,
+)
+from dess.reports.pages.page import Page
+from dess.reports.pages.study import report_of
 
-PACKAGES = Path(__file__).parents[2]
+PACKAGE = Path(__file__).parents[2]  # dess
 
 
 def key_of(report: Report, studies: Mapping[str, Path]) -> str:
@@ -58,14 +64,15 @@ def has_key(page: Path, key: str) -> bool:
 
 @lru_cache
 def _software() -> str:
-    """A hash of the files of the four packages and of the versions of all libraries."""
-    folders = [PACKAGES / name for name in (*sorted(OURS), "analysis", "reports")]
+    """A hash of the files of this package and of the versions of all libraries."""
+    # In a checkout, the folders in it are links, which ``**`` does not follow.
+    folders = [PACKAGE, *(path for path in PACKAGE.iterdir() if path.is_symlink())]
     paths = [path for folder in folders for path in paths_in(folder, "**/*.*") if path.is_file()]
-    files = [
-        (path.relative_to(PACKAGES).as_posix(), _hash(path))
+    files = sorted(
+        (path.relative_to(PACKAGE).as_posix(), _hash(path))
         for path in paths
         if path.parent.name != "__pycache__"
-    ]
+    )
     versions = sorted(f"{library.name} {library.version}" for library in metadata.distributions())
     return repr([sys.version, versions, files])
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from IPython.display import HTML
 
-from analysis.paper import scorecard
-from reports.pages.html import template
+from dess.analysis.paper import scorecard
+from dess.reports.pages.html import template
 
 
 def as_html(rows: Sequence[scorecard.Row], caption: str) -> HTML:

@@ -17,12 +17,12 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from analysis import numbers
-from analysis.numbers import level
-from analysis.stats.intervals import LEVEL
+from dess.analysis import numbers
+from dess.analysis.numbers import level
+from dess.analysis.stats.intervals import LEVEL
 from dess.record import EVENT_NAMES
+from dess.reports.pages.html import Marked, code, marked, template, text
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace, fields_of
-from reports.pages.html import Marked, code, marked, template, text
 
 Manifest = Mapping[str, Any]
 

@@ -8,15 +8,15 @@ from typing import Any
 
 import pandas as pd
 
-from analysis import numbers
-from analysis.answers import costs, settings, summary
-from analysis.names import parameter, value_text
-from analysis.results.tables import Results, load_results
-from analysis.study.cheapest import Cheapest
-from analysis.study.selection import Selection
-from reports.folders import PREFIX
-from reports.pages import html, notebook
-from reports.pages.notebook import SHIPPED, Report, tags_of
+from dess.analysis import numbers
+from dess.analysis.answers import costs, settings, summary
+from dess.analysis.names import parameter, value_text
+from dess.analysis.results.tables import Results, load_results
+from dess.analysis.study.cheapest import Cheapest
+from dess.analysis.study.selection import Selection
+from dess.reports.folders import PREFIX
+from dess.reports.pages import html, notebook
+from dess.reports.pages.notebook import SHIPPED, Report, tags_of
 
 _BEST = "Which setting is the best for {}?"
 _MOST_VALUES = 12  # the largest number of values of a field in a list

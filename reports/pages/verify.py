@@ -15,21 +15,27 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from analysis.bound import upper_bound
-from analysis.execution.effort import check_missions
-from analysis.results import tables
-from analysis.results.chunks import MANIFEST
-from analysis.results.parquet import EVENTS
-from analysis.results.resimulate import Evidence, SampleMission, chosen, difference, learned_files
-from analysis.results.store import Store
-from analysis.results.tables import Results, results_of
 from dess import InputError, simulate
+from dess.analysis.bound import upper_bound
+from dess.analysis.execution.effort import check_missions
+from dess.analysis.results import tables
+from dess.analysis.results.chunks import MANIFEST
+from dess.analysis.results.parquet import EVENTS
+from dess.analysis.results.resimulate import (
+    Evidence,
+    SampleMission,
+    chosen,
+    difference,
+    learned_files,
+)
+from dess.analysis.results.store import Store
+from dess.analysis.results.tables import Results, results_of
 from dess.files.reading import paths_in
+from dess.policies.base import Policy
+from dess.policies.registry import confirmed, load_team
 from dess.record import PARAMETER_EVENTS
+from dess.reports.pages.page import ALLOWED, LIMIT, Page
 from dess.scenario import ScenarioSpace
-from policies.base import Policy
-from policies.registry import confirmed, load_team
-from reports.pages.page import ALLOWED, LIMIT, Page
 
 BOUNDS_CHECKED = 3  # upper bounds that are computed again at most, since each takes seconds
 

@@ -11,11 +11,11 @@ from collections.abc import Iterable
 
 from IPython.display import HTML
 
-from analysis.figures import style
-from analysis.results.event_log import Events
+from dess.analysis.figures import style
+from dess.analysis.results.event_log import Events
+from dess.reports.pages.html import Part, figures, template
+from dess.reports.player.playback import Playback
 from dess.scenario import Scenario
-from reports.pages.html import Part, figures, template
-from reports.player.playback import Playback
 
 READING = (
     "A disc shows the data left at a node, and its ring the most that it ever had. A numbered dot "

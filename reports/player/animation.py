@@ -17,11 +17,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from analysis.figures import missions, style
-from analysis.results.event_log import Events
 from dess import InputError
+from dess.analysis.figures import missions, style
+from dess.analysis.results.event_log import Events
+from dess.reports.player.playback import TRAIL, Playback
 from dess.scenario import Scenario
-from reports.player.playback import TRAIL, Playback
 
 GIF, MP4 = "gif", "mp4"
 SLOTS_PER_SECOND = 10

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.figures.style import node_colours, uav_colours
-from analysis.results.event_log import (
+from dess import InputError
+from dess.analysis.figures.style import node_colours, uav_colours
+from dess.analysis.results.event_log import (
     Events,
     ages,
     battery_levels,
@@ -14,7 +15,6 @@ from analysis.results.event_log import (
     residual_data,
     uav_slots,
 )
-from dess import InputError
 from dess.scenario import Scenario
 
 TRAIL = 12  # number of last moves that are drawn behind a UAV

@@ -1,6 +1,6 @@
 import pytest
 
-from analysis.execution import runner
+from dess.analysis.execution import runner
 
 
 @pytest.fixture(autouse=True)

@@ -10,10 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from analysis.results import parquet
-from analysis.results.chunks import FOLDERS, Chunk, Part, check_parts, parts_of, rows_of, stacked
-from analysis.results.manifest import Manifest
-from analysis.results.store import Store
+from dess.analysis.results import parquet
+from dess.analysis.results.chunks import (
+    FOLDERS,
+    Chunk,
+    Part,
+    check_parts,
+    parts_of,
+    rows_of,
+    stacked,
+)
+from dess.analysis.results.manifest import Manifest
+from dess.analysis.results.store import Store
 
 LONGEST = 120  # bytes of a file's name that are made of the text
 

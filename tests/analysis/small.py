@@ -7,10 +7,10 @@ from typing import Any
 
 import tomli_w
 
-from analysis import load_study
-from analysis.ask.answer import WhatIf, best_policy
-from analysis.ask.question import what_if_question
-from analysis.study.study import Study
+from dess.analysis import load_study
+from dess.analysis.ask.answer import WhatIf, best_policy
+from dess.analysis.ask.question import what_if_question
+from dess.analysis.study.study import Study
 
 SCENARIO: dict[str, Any] = {
     "grid": 8,

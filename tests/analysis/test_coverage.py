@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.metrics import PRODUCT, REWARD
-from analysis.stats.differences import adjust, paired
-from analysis.stats.distribution import quantile_interval
-from analysis.stats.intervals import bounded_ends, mean_interval, stratified
-from analysis.stats.learners import crossed
+from dess.analysis.metrics import PRODUCT, REWARD
+from dess.analysis.stats.differences import adjust, paired
+from dess.analysis.stats.distribution import quantile_interval
+from dess.analysis.stats.intervals import bounded_ends, mean_interval, stratified
+from dess.analysis.stats.learners import crossed
 
 Drawing = tuple[Callable[[np.random.Generator, tuple[int, int]], np.ndarray], float]
 Intervals = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]

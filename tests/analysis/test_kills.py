@@ -9,14 +9,14 @@ import time
 import psutil
 import pytest
 
-from analysis import load_study, run_study
-from analysis.execution.runner import CHUNK
+from dess.analysis import load_study, run_study
+from dess.analysis.execution.runner import CHUNK
 from tests.analysis.small import environment, files_of, small_study
 
 RUN = """
 import sys
-from analysis import load_study, run_study
-from analysis.execution import runner
+from dess.analysis import load_study, run_study
+from dess.analysis.execution import runner
 runner.CHUNK["batch"] = int(sys.argv[4])
 run_study(load_study(sys.argv[1], missions=int(sys.argv[5])), sys.argv[2], int(sys.argv[3]))
 """

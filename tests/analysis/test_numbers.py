@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from analysis import numbers
+from dess.analysis import numbers
 
 
 def test_shares_are_in_percent_with_a_proper_minus() -> None:

@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from analysis import numbers, tables
-from analysis.metrics import METRICS, PRODUCT
+from dess.analysis import numbers, tables
+from dess.analysis.metrics import METRICS, PRODUCT
 
 
 def test_a_comparison_has_marks_and_a_learner_the_interval_of_one_new_training():

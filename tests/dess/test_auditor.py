@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from hypothesis import given
 
-import policies as shipped
 from dess import load_scenario
+from dess import policies as shipped
 from dess.mission import simulate
 from dess.record import MISSION_RECORD, MissionRecord
 from dess.scenario import Scenario, ScenarioSpace

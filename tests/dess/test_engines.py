@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from dess import InputError, batch
 from dess.batch import BATCH_SIZE, MOST_WORK, simulate_batch
 from dess.mission import simulate
+from dess.policies import load
 from dess.record import EVENT_NAMES, FAILURE_EVENTS, PACKET_EVENTS, MissionRecord, Records
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.sea.families import FAMILIES
 from dess.state import BATTERY, HOVER, QUOTA, TRUNCATED, sample_scenario
 from dess.view import View
-from policies import load
 from tests.drawn import (
     Commuter,
     Fidget,

@@ -2,7 +2,7 @@
 
 from hashlib import sha256
 
-import policies
+from dess import policies
 from dess.batch import simulate_batch
 from dess.scenario import load_scenario
 

@@ -9,15 +9,15 @@ import numpy as np
 from hypothesis import assume, event, given, settings
 from hypothesis import strategies as st
 
-import policies
+from dess import policies
 from dess.channel import world_of
 from dess.guard import guard
 from dess.observations.reach import reach_of
+from dess.policies.heuristics import _AGE, _GREEDY, _NEAREST
 from dess.rules import launch
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y, State, starts_of, state_of
 from dess.view import View
-from policies.heuristics import _AGE, _GREEDY, _NEAREST
 from tests import compiled
 from tests.drawn import Cell, reached, spaces
 

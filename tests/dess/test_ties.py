@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-import policies
-from dess import channel, simulate
+from dess import channel, policies, simulate
 from dess.code.kernels import kernel
+from dess.policies import heuristics
+from dess.policies.planner import rates
 from dess.scenario import ScenarioSpace
 from dess.state import state_of
-from policies import heuristics
-from policies.planner import rates
 
 CELLS = [[x, y] for x in range(13) for y in range(13)]
 SEA = {

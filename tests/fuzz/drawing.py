@@ -7,7 +7,7 @@ from itertools import count, islice
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis.strategies import SearchStrategy
 
-from reports.pages.notebook import NAMES
+from dess.reports.pages.notebook import NAMES
 from tests.fuzz.case import Case
 from tests.fuzz.strategies.changes import evil, odd
 from tests.fuzz.strategies.command_lines import command_lines

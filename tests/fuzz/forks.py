@@ -18,7 +18,7 @@ from pathlib import Path
 import psutil
 import pyarrow as pa
 
-from reports.cli import main
+from dess.reports.cli import main
 from tests.fuzz import child
 from tests.fuzz.case import FOLDERS, HOME, LOG, SECRET, SECRET_FILE, Case
 from tests.fuzz.snapshot import Snapshot, taken

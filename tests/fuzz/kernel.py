@@ -15,10 +15,10 @@ import IPython.display
 from nbformat.v4 import new_output
 
 from dess import InputError
-from reports.pages import html, kernels
-from reports.pages.html import PART, Part
-from reports.pages.kernels import Progress
-from reports.pages.notebook import Report
+from dess.reports.pages import html, kernels
+from dess.reports.pages.html import PART, Part
+from dess.reports.pages.kernels import Progress
+from dess.reports.pages.notebook import Report
 
 HTML = "text/html"
 

@@ -11,11 +11,9 @@ from importlib import import_module
 
 import tqdm
 
-import analysis
 import dess
-import policies
-import reports
-from reports.cli import main
+from dess import analysis, policies, reports
+from dess.reports.cli import main
 
 _MISSION = ("simulate", "--policy", "ddqn", "--json")
 _POLICIES = ("--policy=random", "--policy=nearest", "--policy=greedy", "--policy=tour")

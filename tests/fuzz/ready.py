@@ -4,12 +4,12 @@ import shutil
 from importlib.resources import files
 from pathlib import Path
 
-from analysis import load_study, run_study
-from analysis.answers.missions import FOLDER
-from analysis.verification import measurements
-from policies import registry
-from reports.pages import kernels
-from reports.pages.notebook import NAMES
+from dess.analysis import load_study, run_study
+from dess.analysis.answers.missions import FOLDER
+from dess.analysis.verification import measurements
+from dess.policies import registry
+from dess.reports.pages import kernels
+from dess.reports.pages.notebook import NAMES
 from tests.fuzz.case import OUT, Case
 from tests.fuzz.child import STDERR
 from tests.fuzz.forks import Forks
@@ -78,8 +78,8 @@ def write_texts(ready: Path) -> None:
     ready.mkdir(parents=True)
     shipped = (
         files("dess") / "scenarios",
-        files("analysis") / "study/shipped",
-        files("policies") / "learner/configs",
+        files("dess.analysis") / "study/shipped",
+        files("dess.policies") / "learner/configs",
     )
     for file in (file for folder in (TEXTS, *shipped) for file in folder.iterdir()):
         (ready / file.name).write_bytes(file.read_bytes())

@@ -20,11 +20,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pyarrow.types import is_floating
 
-from analysis.results.chunks import name_of, short_hash
-from analysis.results.parquet import INDICES
-from policies.learner import tensors
-from policies.learner.session import CHECKPOINT
-from reports.pages.page import Page
+from dess.analysis.results.chunks import name_of, short_hash
+from dess.analysis.results.parquet import INDICES
+from dess.policies.learner import tensors
+from dess.policies.learner.session import CHECKPOINT
+from dess.reports.pages.page import Page
 from tests.analysis.hostile import hostile_folder
 from tests.fuzz.case import CWD, READY, SECRET_FILE
 

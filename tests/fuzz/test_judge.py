@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.pages.notebook import NAMES
+from dess.reports.pages.notebook import NAMES
 from tests.fuzz import drawing, ready
 from tests.fuzz.case import Case
 from tests.fuzz.forks import Forks

@@ -8,7 +8,7 @@ import pytest
 
 import dess
 from dess import ScenarioSpace
-from policies.adapter import Adapter
+from dess.policies.adapter import Adapter
 
 torch = pytest.importorskip("torch")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import rliable_scores, run_study
+from dess.analysis import rliable_scores, run_study
 from tests.analysis.small import grid, small_study
 
 pytest.importorskip("rliable")

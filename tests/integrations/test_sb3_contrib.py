@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import dess
-import policies
-from dess import InputError, ScenarioSpace
+from dess import InputError, ScenarioSpace, policies
 from dess.state import HOVER
 
 sb3_contrib = pytest.importorskip("sb3_contrib")

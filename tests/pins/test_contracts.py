@@ -7,9 +7,9 @@ from typing import Any
 import typer
 from click.testing import CliRunner
 
-from analysis.results import parquet
+from dess.analysis.results import parquet
 from dess.record import EVENT_COLUMNS
-from reports.cli.commands import app
+from dess.reports.cli.commands import app
 from tests.pins.pinned import pinned
 from tests.reports.cli.conftest import dess, dess_json
 

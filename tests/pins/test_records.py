@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-import policies
+from dess import policies
 from dess.batch import simulate_batch
 from dess.scenario import load_scenario
 from tests.pins.pinned import pinned

@@ -226,8 +226,8 @@ def judged(
 
 def main(arguments: Sequence[str]) -> None:
     """Judge the mission that the command line names: SEA POLICY SEED REPLICATION KEY=VALUE..."""
-    from policies.registry import load
-    from reports.cli.options import load_space
+    from dess.policies.registry import load
+    from dess.reports.cli.options import load_space
 
     sea, policy, seed, replication, *settings = arguments
     space = ScenarioSpace.of(load_space(sea, settings))

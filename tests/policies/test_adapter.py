@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import dess
-from analysis.results.provenance import team_of
 from dess import InputError, ScenarioSpace
+from dess.analysis.results.provenance import team_of
 from dess.observations.observer import KINDS
-from policies.adapter import Adapter
-from policies.registry import TypedByUser
+from dess.policies.adapter import Adapter
+from dess.policies.registry import TypedByUser
 
 QUICK = ScenarioSpace.of(uavs=[1, 3], flying_time=[5, 30], quota=60, max_slots=40)
 
@@ -70,7 +70,7 @@ def test_what_is_not_allowed_is_refused_with_one_line() -> None:
 def test_results_tell_the_weights_apart(tmp_path: Path) -> None:
     weights, code = tmp_path / "weights.bin", tmp_path / "own_policy_with_weights.py"
     code.write_text(
-        "from policies.adapter import Adapter\n"
+        "from dess.policies.adapter import Adapter\n"
         "class Own(Adapter):\n"
         "    def __init__(self):\n"
         f"        super().__init__('own', None, weights={str(weights)!r})\n"

@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import policies
+from dess import policies
 from dess.batch import simulate_batch
 from dess.env.stepper import MissionStepper
 from dess.guard import guard
 from dess.mission import simulate
+from dess.policies.registry import HEURISTICS
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from dess.state import HOVER
 from dess.view import View
-from policies.registry import HEURISTICS
 from tests.drawn import NORTH, SOUTH, Checked, replications, seeds, spaces
 from tests.policies.flown import assert_same_alone, cells_of
 

@@ -12,10 +12,10 @@ import pytest
 from dess import load_scenario
 from dess.batch import simulate_batch
 from dess.mission import simulate
+from dess.policies.registry import load
 from dess.scenario import Scenario, ScenarioSpace
 from dess.sea.families import FAMILIES
 from dess.state import BATTERY, END_NAMES
-from policies.registry import load
 from tests.dess.flights import flown
 from tests.drawn import Script
 from tests.policies.judge import judged

@@ -10,17 +10,16 @@ import numpy as np
 import pytest
 
 import dess
-import policies
-from dess import InputError
+from dess import InputError, policies
 from dess.mission import simulate
+from dess.policies import registry
+from dess.policies.about import about
+from dess.policies.base import Policy
+from dess.policies.heuristics import Greedy
+from dess.policies.learner.config import config_of
+from dess.policies.learner.trained import build, save_policy
+from dess.policies.registry import SHIPPED, TypedByUser
 from dess.scenario import Scenario, load_scenario, scenario_names
-from policies import registry
-from policies.about import about
-from policies.base import Policy
-from policies.heuristics import Greedy
-from policies.learner.config import config_of
-from policies.learner.trained import build, save_policy
-from policies.registry import SHIPPED, TypedByUser
 
 ROOT = Path(__file__).parents[2]
 
@@ -181,7 +180,9 @@ def test_files_without_such_a_policy_are_named(file: Path, name: str, complaint:
 
 
 def test_an_edited_file_has_another_fingerprint(file: Path) -> None:
-    script = "from analysis.results.provenance import team_of; from policies.registry import "
+    script = (
+        "from dess.analysis.results.provenance import team_of; from dess.policies.registry import "
+    )
     script += f"TypedByUser; t = team_of(TypedByUser('{file}:Eager'))"
     script += "; m = t.members[0]; print(m.name, m.class_, m.code)"
 
@@ -208,7 +209,7 @@ def test_what_a_policy_is_and_can_simulate(file: Path) -> None:
     greedy = about("greedy")
     assert greedy.scenarios == scenario_names()
     assert (greedy.requires, greedy.trained_on) == ({}, {})
-    assert greedy.code == "policies.heuristics:Greedy"
+    assert greedy.code == "dess.policies.heuristics:Greedy"
     assert greedy.origin == f"shipped with dess {dess.__version__}"
     assert about(f"{file}:Eager").origin == f"the file {file}"
 

@@ -13,15 +13,15 @@ import IPython.display
 import numpy as np
 import pytest
 
-from analysis import load_study, run_study
-from analysis.bound import Bound
-from analysis.execution import jobs
-from analysis.verification import measurements
+from dess.analysis import load_study, run_study
+from dess.analysis.bound import Bound
+from dess.analysis.execution import jobs
+from dess.analysis.verification import measurements
+from dess.policies.planner import Budget, Planner
+from dess.reports.pages import html
+from dess.reports.pages.notebook import Report, read
+from dess.reports.player import library
 from dess.scenario import ScenarioSpace
-from policies.planner import Budget, Planner
-from reports.pages import html
-from reports.pages.notebook import Report, read
-from reports.player import library
 
 EMBEDDED = re.compile("data:image/svg\\+xml;base64,([A-Za-z0-9+/=]+)")
 

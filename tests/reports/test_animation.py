@@ -12,12 +12,10 @@ from matplotlib.collections import PathCollection
 from PIL import Image
 
 import dess
-import policies
-from analysis.figures import style
-from analysis.results.event_log import residual_data, uav_slots
-from dess.scenario import Scenario
-from dess.state import sample_scenario
-from reports.player.animation import (
+from dess import policies
+from dess.analysis.figures import style
+from dess.analysis.results.event_log import residual_data, uav_slots
+from dess.reports.player.animation import (
     GIF,
     LAST_SECONDS,
     MP4,
@@ -25,6 +23,8 @@ from reports.player.animation import (
     Film,
     write_animation,
 )
+from dess.scenario import Scenario
+from dess.state import sample_scenario
 
 
 @pytest.fixture(scope="module")

@@ -12,11 +12,11 @@ import requests
 from rocrate_validator import services
 from rocrate_validator.utils.http import HttpRequester
 
-from analysis import load_results, load_study, run_study
-from analysis.results.manifest import Manifest
-from analysis.results.tables import Results
 from dess import InputError
-from reports.crate import licence_of, write_crate
+from dess.analysis import load_results, load_study, run_study
+from dess.analysis.results.manifest import Manifest
+from dess.analysis.results.tables import Results
+from dess.reports.crate import licence_of, write_crate
 from tests.analysis.small import grid, small_study
 from tests.reports.small import quick
 

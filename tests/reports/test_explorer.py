@@ -8,12 +8,12 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser, Locator, Page
 
-from analysis import run_study
-from analysis.metrics import METRICS
-from analysis.results.tables import Results
-from analysis.stats.intervals import interval_of
 from dess import InputError
-from reports.explorer import explorer
+from dess.analysis import run_study
+from dess.analysis.metrics import METRICS
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.intervals import interval_of
+from dess.reports.explorer import explorer
 from tests.analysis.small import grid, small_study
 from tests.reports.browser import Visit
 

@@ -10,8 +10,8 @@ import time
 
 import pytest
 
-from reports import cli
-from reports.interrupts import AGAIN, Interrupts
+from dess.reports import cli
+from dess.reports.interrupts import AGAIN, Interrupts
 from tests.analysis.small import environment, files_of, small_study
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends signals")
@@ -123,7 +123,7 @@ def test_a_signal_during_the_imports_ends_the_command(tmp_path):
         "class Signal(importlib.abc.MetaPathFinder):\n"
         "    def find_spec(self, name, path, target=None):\n"
         f"        if name == 'typer': os.kill(os.getpid(), {int(signal.SIGTERM)})\n"
-        "from reports.cli import main\n"
+        "from dess.reports.cli import main\n"
         "sys.meta_path.insert(0, Signal())\n"
         "sys.exit(main())\n"
     )
@@ -139,7 +139,7 @@ BUSY = """
 import hashlib, pathlib, sys
 import dess.mission
 from dess.files.writing import replacing
-from reports.cli import main
+from dess.reports.cli import main
 
 def busy(*_, **__):
     with replacing(pathlib.Path("there")) as temporary:

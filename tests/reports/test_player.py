@@ -12,9 +12,9 @@ import pytest
 from playwright.sync_api import expect
 
 import dess
-import policies
-from analysis.figures.style import node_colours
-from analysis.results.event_log import (
+from dess import InputError, policies
+from dess.analysis.figures.style import node_colours
+from dess.analysis.results.event_log import (
     ages,
     battery_levels,
     duration,
@@ -22,10 +22,9 @@ from analysis.results.event_log import (
     residual_data,
     uav_slots,
 )
-from dess import InputError
+from dess.reports.player import AGE_READING, library, player, reading
+from dess.reports.player.playback import TRAIL
 from dess.state import sample_scenario
-from reports.player import AGE_READING, library, player, reading
-from reports.player.playback import TRAIL
 from tests.reports.browser import Visit
 
 # One UAV; three in a queue for one pad, of which one has its battery depleted long before the

@@ -17,10 +17,10 @@
 results = "../../results"  # folder with the results folder of the study age
 
 # %%
-from analysis import load_results, numbers, tables
-from analysis.answers import operations
-from analysis.metrics import AGE, RATIO, metric_of
-from reports.pages import html
+from dess.analysis import load_results, numbers, tables
+from dess.analysis.answers import operations
+from dess.analysis.metrics import AGE, RATIO, metric_of
+from dess.reports.pages import html
 
 # %%
 study = load_results(f"{results}/age")

@@ -19,10 +19,10 @@ results = "../../results"  # folder with the results folder of the study failure
 # %%
 from IPython.display import display
 
-from analysis import load_results, numbers, tables
-from analysis.answers import operations
-from analysis.metrics import PRODUCT, RATIO, SUCCESS, metric_of
-from reports.pages import html
+from dess.analysis import load_results, numbers, tables
+from dess.analysis.answers import operations
+from dess.analysis.metrics import PRODUCT, RATIO, SUCCESS, metric_of
+from dess.reports.pages import html
 
 # %%
 study, rate, repair = load_results(f"{results}/failures"), operations.RATE, operations.REPAIR

@@ -20,10 +20,10 @@ margin = 0.02  # a loss of the product that does not matter, as a share
 # %%
 from IPython.display import display
 
-from analysis import load_results, numbers, tables
-from analysis.answers import operations
-from analysis.metrics import PRODUCT, SUCCESS, metric_of
-from reports.pages import html
+from dess.analysis import load_results, numbers, tables
+from dess.analysis.answers import operations
+from dess.analysis.metrics import PRODUCT, SUCCESS, metric_of
+from dess.reports.pages import html
 
 # %%
 study = load_results(f"{results}/pads")

@@ -20,12 +20,12 @@ longer = "planner-long"  # the same with a longer search, if the study has it
 learner = "ddqn"  # the policy that has learned
 
 # %%
-from analysis import load_results, numbers, tables
-from analysis.answers import comparison, optimality
-from analysis.answers import planner as answers
-from analysis.figures import Drawing
-from analysis.figures.comparison import gaps
-from reports.pages import html
+from dess.analysis import load_results, numbers, tables
+from dess.analysis.answers import comparison, optimality
+from dess.analysis.answers import planner as answers
+from dess.analysis.figures import Drawing
+from dess.analysis.figures.comparison import gaps
+from dess.reports.pages import html
 
 # %%
 study = load_results(f"{results}/gap")

@@ -20,10 +20,10 @@ reference = "planner"  # a slow policy that is hard to beat
 heuristic = "greedy"  # a fast policy without learning
 
 # %%
-from analysis import load_results, tables
-from analysis.answers import comparison, seas
-from analysis.metrics import METRICS, SUCCESS
-from reports.pages import html
+from dess.analysis import load_results, tables
+from dess.analysis.answers import comparison, seas
+from dess.analysis.metrics import METRICS, SUCCESS
+from dess.reports.pages import html
 
 # %%
 study = load_results(f"{results}/seas")

@@ -7,15 +7,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import run_study
-from analysis.answers import comparison
-from analysis.answers.comparison import AHEAD, BEHIND, CALLS, COLOURS, OF_BASELINE, Pair
-from analysis.metrics import METRICS, PRODUCT
-from analysis.names import PARAMETERS
-from analysis.stats.differences import adjust, paired
-from analysis.stats.verdict import INCONCLUSIVE
 from dess import InputError, simulate
-from policies import load
+from dess.analysis import run_study
+from dess.analysis.answers import comparison
+from dess.analysis.answers.comparison import AHEAD, BEHIND, CALLS, COLOURS, OF_BASELINE, Pair
+from dess.analysis.metrics import METRICS, PRODUCT
+from dess.analysis.names import PARAMETERS
+from dess.analysis.stats.differences import adjust, paired
+from dess.analysis.stats.verdict import INCONCLUSIVE
+from dess.policies import load
 from tests.analysis.small import grid, small_study
 
 PAIR = Pair("ours", "theirs", 1)
@@ -257,7 +257,7 @@ class Ticks:
 def timed_study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("times")
     (folder / "timed_here.py").write_text(
-        "from policies.heuristics import Greedy\nclass Mine(Greedy):\n    pass\n"
+        "from dess.policies.heuristics import Greedy\nclass Mine(Greedy):\n    pass\n"
     )
     policies = ["greedy", f"{folder / 'timed_here.py'}:Mine", "random,greedy"]
     return run_study(small_study(folder, policies=policies, missions=2), folder / "trial")

@@ -2,11 +2,11 @@
 
 import pytest
 
-from analysis import run_study
-from analysis.answers import costs, summary
-from analysis.stats.choices import on_front
-from analysis.study.study import CHECK
 from dess import InputError
+from dess.analysis import run_study
+from dess.analysis.answers import costs, summary
+from dess.analysis.stats.choices import on_front
+from dess.analysis.study.study import CHECK
 from tests.analysis.small import small_study
 
 PRICES = {"uav": 1000, "pad": 100, "charge": 2, "hour": 6, "lost_uav": 1000}

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from scipy import stats
 
-from analysis import load_results, run_study
-from analysis.answers.diff import at_hand, diff, effects, most_changed, origins
-from analysis.results import provenance
-from analysis.results.tables import Results
 from dess import InputError
+from dess.analysis import load_results, run_study
+from dess.analysis.answers.diff import at_hand, diff, effects, most_changed, origins
+from dess.analysis.results import provenance
+from dess.analysis.results.tables import Results
 from dess.code import sources
 from tests.analysis.small import grid, small_study
 

@@ -10,14 +10,14 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis import load_results, marl_eval_data, rliable_scores, run_study
-from analysis.answers import learning
-from analysis.answers.learning import CURVE, CURVES, FINAL, difference, read_curve, read_curves
-from analysis.metrics import METRICS
-from analysis.results.tables import Results
-from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess import InputError
-from policies.registry import TRAINED
+from dess.analysis import load_results, marl_eval_data, rliable_scores, run_study
+from dess.analysis.answers import learning
+from dess.analysis.answers.learning import CURVE, CURVES, FINAL, difference, read_curve, read_curves
+from dess.analysis.metrics import METRICS
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
+from dess.policies.registry import TRAINED
 from tests.analysis.small import grid, small_study
 from tests.policies.learner.tiny import tiny
 

@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import run_study
-from analysis.answers import main_effects
-from analysis.answers.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
-from analysis.metrics import PRODUCT, SUCCESS
-from analysis.stats.differences import adjust, paired
-from analysis.stats.intervals import by_replication
 from dess import InputError
+from dess.analysis import run_study
+from dess.analysis.answers import main_effects
+from dess.analysis.answers.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
+from dess.analysis.metrics import PRODUCT, SUCCESS
+from dess.analysis.stats.differences import adjust, paired
+from dess.analysis.stats.intervals import by_replication
 from tests.analysis.small import grid, small_study
 
 

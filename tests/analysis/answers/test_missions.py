@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis import run_study
-from analysis.answers import missions
-from analysis.results.resimulate import Mission
-from analysis.results.tables import Results
+from dess.analysis import run_study
+from dess.analysis.answers import missions
+from dess.analysis.results.resimulate import Mission
+from dess.analysis.results.tables import Results
 from tests.analysis.small import grid, small_study
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import run_study
-from analysis.answers import operations
-from analysis.metrics import AGE, PRODUCT
-from analysis.stats.differences import relative_change
 from dess import InputError
+from dess.analysis import run_study
+from dess.analysis.answers import operations
+from dess.analysis.metrics import AGE, PRODUCT
+from dess.analysis.stats.differences import relative_change
 from tests.analysis.small import grid, small_study
 
 

@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import run_study
-from analysis.answers import optimality
-from analysis.bound import Bound
-from analysis.execution import jobs
-from analysis.metrics import BOUND, GAP, PRODUCT
+from dess.analysis import run_study
+from dess.analysis.answers import optimality
+from dess.analysis.bound import Bound
+from dess.analysis.execution import jobs
+from dess.analysis.metrics import BOUND, GAP, PRODUCT
 from tests.analysis.small import small_study
 
 

@@ -6,15 +6,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import numbers, run_study
-from analysis.answers import planner
-from analysis.answers.optimality import ALL
-from analysis.bound import Bound
-from analysis.execution import jobs
-from analysis.metrics import PRODUCT
-from analysis.results.event_log import uav_slots
 from dess import load_scenario
-from policies.planner import Budget, Planner
+from dess.analysis import numbers, run_study
+from dess.analysis.answers import planner
+from dess.analysis.answers.optimality import ALL
+from dess.analysis.bound import Bound
+from dess.analysis.execution import jobs
+from dess.analysis.metrics import PRODUCT
+from dess.analysis.results.event_log import uav_slots
+from dess.policies.planner import Budget, Planner
 from tests.analysis.small import small_study
 
 LOGGED = 3

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import load_results, numbers, run_study
-from analysis.answers import seas
-from analysis.answers.comparison import Cost, Times
-from analysis.metrics import BOUND, PRODUCT, SUCCESS
-from analysis.results.tables import Results
 from dess import InputError
+from dess.analysis import load_results, numbers, run_study
+from dess.analysis.answers import seas
+from dess.analysis.answers.comparison import Cost, Times
+from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
+from dess.analysis.results.tables import Results
 from tests.analysis.small import small_study
 
 SEAS = ("scattered:2", "scattered:5", "coast:2", "dense:2")

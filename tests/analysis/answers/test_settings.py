@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis import compare, run_study
-from analysis.answers import settings
-from analysis.metrics import METRICS, PRODUCT
-from analysis.stats.intervals import bounded_interval
 from dess import InputError
+from dess.analysis import compare, run_study
+from dess.analysis.answers import settings
+from dess.analysis.metrics import METRICS, PRODUCT
+from dess.analysis.stats.intervals import bounded_interval
 from tests.analysis.small import grid, small_study
 
 

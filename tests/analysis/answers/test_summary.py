@@ -10,18 +10,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import run_study
-from analysis.answers import summary
-from analysis.answers.summary import index_table, sensitivity
-from analysis.figures.settings import sensitivity as figure
-from analysis.metrics import PRODUCT, RATIO
-from analysis.numbers import why_nan
-from analysis.study.design import Saltelli
 from dess import InputError
-from policies import load
-from policies.learner.dqn import DQNTraining
-from policies.learner.trained import save_policy
-from reports import cli
+from dess.analysis import run_study
+from dess.analysis.answers import summary
+from dess.analysis.answers.summary import index_table, sensitivity
+from dess.analysis.figures.settings import sensitivity as figure
+from dess.analysis.metrics import PRODUCT, RATIO
+from dess.analysis.numbers import why_nan
+from dess.analysis.study.design import Saltelli
+from dess.policies import load
+from dess.policies.learner.dqn import DQNTraining
+from dess.policies.learner.trained import save_policy
+from dess.reports import cli
 from tests.analysis.small import grid, small_study, write_scenario
 from tests.policies.learner.tiny import CPU, PHASES, tiny
 

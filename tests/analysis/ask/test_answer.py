@@ -1,4 +1,4 @@
-"""``analysis.sweep`` and ``analysis.what_if``: what the answers to questions offer."""
+"""``dess.analysis.sweep`` and ``dess.analysis.what_if``: what the answers to questions offer."""
 
 from dataclasses import replace
 from functools import partial
@@ -10,14 +10,14 @@ import tqdm.auto
 from matplotlib.figure import Figure
 from scipy import stats
 
-from analysis import load_study, sweep, what_if
-from analysis.answers.settings import varied
-from analysis.ask import answer as found
-from analysis.ask.answer import BASELINE, VARIATION, Example, WhatIf
-from analysis.metrics import PRODUCT
-from analysis.stats.intervals import LEVEL
-from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE
 from dess import InputError
+from dess.analysis import load_study, sweep, what_if
+from dess.analysis.answers.settings import varied
+from dess.analysis.ask import answer as found
+from dess.analysis.ask.answer import BASELINE, VARIATION, Example, WhatIf
+from dess.analysis.metrics import PRODUCT
+from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE
 from tests.analysis.small import asked, files_of, write_scenario
 
 POLICIES = ["random", "greedy"]

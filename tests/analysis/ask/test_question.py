@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import load_results, load_study, run_study
-from analysis.ask.question import sweep_question, values_of, what_if_question
-from analysis.execution import effort
-from analysis.execution.effort import BASELINE, SECONDS
 from dess import InputError, load_scenario
+from dess.analysis import load_results, load_study, run_study
+from dess.analysis.ask.question import sweep_question, values_of, what_if_question
+from dess.analysis.execution import effort
+from dess.analysis.execution.effort import BASELINE, SECONDS
 from tests.analysis.small import files_of, write_scenario
 
 FIELDS = {"uavs": [1, 2], "quota": [20, 40], "pads": 2}

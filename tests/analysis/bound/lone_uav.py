@@ -6,8 +6,8 @@ collected (relaxation 2 of docs/concepts/bound.md). That can hide an error in th
 
 import numpy as np
 
-from analysis.bound.paths import bound_paths
-from analysis.bound.prices import Bounds, Detail, known_of
+from dess.analysis.bound.paths import bound_paths
+from dess.analysis.bound.prices import Bounds, Detail, known_of
 from dess.scenario import ScenarioSpace
 
 

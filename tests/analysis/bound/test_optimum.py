@@ -5,12 +5,12 @@ from itertools import product
 import numpy as np
 import pytest
 
-from analysis.bound import upper_bound
 from dess import load_scenario, rules, simulate_batch
+from dess.analysis.bound import upper_bound
 from dess.channel import empty_scratch, world_of
+from dess.policies import load
 from dess.scenario import ScenarioSpace
 from dess.state import State, starts_of, state_of
-from policies import load
 from tests import compiled
 from tests.analysis.bound.tiny_sea import TinySea, contraction
 

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from analysis.bound import upper_bound
+from dess.analysis.bound import upper_bound
 from dess.scenario import ScenarioSpace
 from tests.analysis.bound.lone_uav import bound_of_data
 from tests.analysis.bound.test_optimum import TWO, optimum, shadowed

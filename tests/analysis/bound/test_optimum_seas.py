@@ -6,7 +6,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from analysis.bound import upper_bound
+from dess.analysis.bound import upper_bound
 from dess.errors import InputError
 from dess.scenario import ScenarioSpace
 from tests.analysis.bound.lone_uav import bound_of_data

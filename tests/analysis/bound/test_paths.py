@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from analysis.bound.paths import blocks_of
-from analysis.bound.prices import Bounds, Detail, improve, known_of
 from dess import load_scenario
+from dess.analysis.bound.paths import blocks_of
+from dess.analysis.bound.prices import Bounds, Detail, improve, known_of
 from dess.scenario import ScenarioSpace
 from tests.analysis.bound.lone_uav import bound_of_data
 

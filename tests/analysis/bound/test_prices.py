@@ -7,10 +7,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import policies
-from analysis.bound import upper_bound
-from analysis.bound.prices import Bounds, Detail, ceilings_memory, known_of
-from dess import load_scenario, simulate_batch
+from dess import load_scenario, policies, simulate_batch
+from dess.analysis.bound import upper_bound
+from dess.analysis.bound.prices import Bounds, Detail, ceilings_memory, known_of
 from dess.errors import InputError
 from dess.scenario import ScenarioSpace
 

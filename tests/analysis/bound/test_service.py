@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from analysis.bound.service import POINTS, rates_of, spread, step_takings, step_values
 from dess import load_scenario
+from dess.analysis.bound.service import POINTS, rates_of, spread, step_takings, step_values
 from dess.channel import world_of
 from dess.state import EAST, HOVER, WEST, constants_of
 

@@ -12,16 +12,16 @@ from contextlib import ExitStack
 
 import pytest
 
-from analysis import run_study
-from analysis.execution import cluster as clusters
-from analysis.execution.cluster import Cluster, _checked
-from analysis.execution.jobs import MissionsJob
-from analysis.execution.runner import CHUNK
-from analysis.results.chunks import Chunk, Part
-from analysis.results.manifest import Manifest
-from analysis.results.provenance import engine_code, members_of
 from dess import InputError
-from reports import cli
+from dess.analysis import run_study
+from dess.analysis.execution import cluster as clusters
+from dess.analysis.execution.cluster import Cluster, _checked
+from dess.analysis.execution.jobs import MissionsJob
+from dess.analysis.execution.runner import CHUNK
+from dess.analysis.results.chunks import Chunk, Part
+from dess.analysis.results.manifest import Manifest
+from dess.analysis.results.provenance import engine_code, members_of
+from dess.reports import cli
 from tests.analysis.execution.test_workers import failing
 from tests.analysis.small import environment, files_of, small_study
 

@@ -13,9 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis import run_study
-from analysis.execution import effort
-from analysis.execution.effort import (
+from dess import InputError, load_scenario, simulate
+from dess.analysis import run_study
+from dess.analysis.execution import effort
+from dess.analysis.execution.effort import (
     BASELINE,
     BOUND,
     EVENT,
@@ -36,11 +37,10 @@ from analysis.execution.effort import (
     policies_for,
     total,
 )
-from dess import InputError, load_scenario, simulate
 from dess.channel import world_of
 from dess.code import memory
-from policies import load_team
-from policies.registry import names
+from dess.policies import load_team
+from dess.policies.registry import names
 from tests.analysis.small import environment, files_of, grid, small_study
 
 FASTER = [*SECONDS]
@@ -147,7 +147,9 @@ def test_every_mission_ends_or_is_refused(fields):
 
 def test_a_worker_ends_with_a_killed_parent_before_it_has_loaded_anything():
     """The parent starts a process as joblib does, which is busy, and is killed."""
-    busy = "import os, time; from analysis.execution.orphans import live_and_die_with as live; "
+    busy = (
+        "import os, time; from dess.analysis.execution.orphans import live_and_die_with as live; "
+    )
     busy += "live(int(os.sys.argv[1])); print(os.getpid(), flush=True); time.sleep(60)"
     script = "import os, subprocess, sys; subprocess.run([sys.executable, '-c', sys.argv[1], "
     script += "str(os.getpid())])"
@@ -163,7 +165,7 @@ def test_a_worker_ends_with_a_killed_parent_before_it_has_loaded_anything():
             os.kill(worker, 0)
             time.sleep(0.01)
     loaded = subprocess.run(
-        [sys.executable, "-c", "import analysis.execution.orphans, sys; print(*sys.modules)"],
+        [sys.executable, "-c", "import dess.analysis.execution.orphans, sys; print(*sys.modules)"],
         capture_output=True, text=True, check=True, env=environment(),
     )  # fmt: skip
     assert not {"numpy", "numba", "pandas", "joblib"} & {*loaded.stdout.split()}
@@ -195,8 +197,8 @@ DECISIONS = 2 * 60 / 4  # of a mission of the small scenario
 
 
 def test_the_time_is_a_range_and_nothing_is_simulated(tmp_path, monkeypatch):
-    monkeypatch.setattr("analysis.execution.jobs.simulate", None)
-    monkeypatch.setattr("analysis.execution.jobs.simulate_batch", None)
+    monkeypatch.setattr("dess.analysis.execution.jobs.simulate", None)
+    monkeypatch.setattr("dess.analysis.execution.jobs.simulate_batch", None)
     study = small_study(tmp_path, policies=["greedy", "planner"])
     plan = plan_study(study, tmp_path / "out")
     expected = [10 * DECISIONS * each for each in (2e-6, 4e-4)]

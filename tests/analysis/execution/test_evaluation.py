@@ -2,11 +2,11 @@
 
 import pytest
 
-from analysis.execution import effort, evaluation
-from analysis.execution.evaluation import Asked, check_evaluation, evaluate, means
-from analysis.metrics import ALWAYS
-from analysis.stats.intervals import interval_of, post_stratified
 from dess import InputError, load_scenario
+from dess.analysis.execution import effort, evaluation
+from dess.analysis.execution.evaluation import Asked, check_evaluation, evaluate, means
+from dess.analysis.metrics import ALWAYS
+from dess.analysis.stats.intervals import interval_of, post_stratified
 from dess.code import memory
 
 SPACE = load_scenario("paper", quota=30)

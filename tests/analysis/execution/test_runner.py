@@ -6,18 +6,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import evaluate, load_results, load_study, resimulate, run_study
-from analysis.answers.summary import sensitivity
-from analysis.execution import jobs
-from analysis.results import parquet
-from analysis.study.study import CHECK
 from dess import InputError, load_scenario, simulate
+from dess.analysis import evaluate, load_results, load_study, resimulate, run_study
+from dess.analysis.answers.summary import sensitivity
+from dess.analysis.execution import jobs
+from dess.analysis.results import parquet
+from dess.analysis.study.study import CHECK
+from dess.policies import load_team
+from dess.policies.heuristics import Greedy
 from dess.record import MISSION_RECORD, UAV_RECORD
+from dess.reports import cli
+from dess.reports.cli.options import setting
 from dess.state import END_NAMES
-from policies import load_team
-from policies.heuristics import Greedy
-from reports import cli
-from reports.cli.options import setting
 from tests.analysis.small import files_of, grid, small_study
 
 

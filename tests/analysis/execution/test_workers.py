@@ -3,9 +3,9 @@ import shlex
 
 import pytest
 
-from analysis import load_results, run_study
-from analysis.execution.runner import ChunkError
 from dess import InputError
+from dess.analysis import load_results, run_study
+from dess.analysis.execution.runner import ChunkError
 from tests.analysis.small import files_of, small_study
 
 

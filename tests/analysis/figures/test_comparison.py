@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.ask import answer
-from analysis.figures import comparison
-from analysis.metrics import BOUND, METRICS, PRODUCT
+from dess.analysis.ask import answer
+from dess.analysis.figures import comparison
+from dess.analysis.metrics import BOUND, METRICS, PRODUCT
 from tests.analysis.answers.test_comparison import drawn_interval
 from tests.analysis.small import asked
 

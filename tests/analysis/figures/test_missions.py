@@ -11,10 +11,10 @@ from matplotlib.colors import to_hex
 from matplotlib.quiver import Quiver
 
 import dess
-import policies
-from analysis.figures import missions
-from analysis.figures.style import MUTED, node_colours
-from analysis.results.event_log import uav_slots
+from dess import policies
+from dess.analysis.figures import missions
+from dess.analysis.figures.style import MUTED, node_colours
+from dess.analysis.results.event_log import uav_slots
 from dess.state import sample_scenario
 
 

@@ -7,14 +7,14 @@ import pandas as pd
 import pytest
 from matplotlib.patches import Rectangle
 
-from analysis import run_study
-from analysis.answers import settings
-from analysis.figures import settings as figures
-from analysis.figures import style
-from analysis.metrics import METRICS, PRODUCT, SUCCESS
-from analysis.numbers import percent
-from analysis.study.design import NOISE
 from dess import InputError
+from dess.analysis import run_study
+from dess.analysis.answers import settings
+from dess.analysis.figures import settings as figures
+from dess.analysis.figures import style
+from dess.analysis.metrics import METRICS, PRODUCT, SUCCESS
+from dess.analysis.numbers import percent
+from dess.analysis.study.design import NOISE
 from tests.analysis.answers.test_main_effects import pairs_of
 from tests.analysis.small import grid, small_study
 
@@ -136,7 +136,7 @@ def test_many_values_have_panels_that_are_spread_evenly():
 
 
 def summary(by: dict[str, list]) -> pd.DataFrame:
-    """Rows as of ``analysis.summary``, with different numbers."""
+    """Rows as of ``dess.analysis.summary``, with different numbers."""
     rows = pd.DataFrame(by).merge(pd.DataFrame({"metric": list(METRICS)}), how="cross")
     mean = np.linspace(0.2, 0.8, len(rows))
     return rows.assign(mean=mean, low=mean - 0.03, high=mean + 0.01, n=100)

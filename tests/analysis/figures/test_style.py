@@ -7,8 +7,8 @@ import matplotlib as mpl
 import pandas as pd
 import pytest
 
-from analysis.figures import style
-from analysis.figures.style import KNOWN_POLICIES, node_colours, policy_colours, signed_points
+from dess.analysis.figures import style
+from dess.analysis.figures.style import KNOWN_POLICIES, node_colours, policy_colours, signed_points
 
 
 @pytest.mark.parametrize("count", [1, 9, 25, 40])

@@ -6,11 +6,11 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from analysis.verification import closed_forms, measurements
-from analysis.verification import figures as drawings
-from analysis.verification.checks import Fit
-from analysis.verification.figures import MISS, SEEN
 from dess import load_scenario
+from dess.analysis.verification import closed_forms, measurements
+from dess.analysis.verification import figures as drawings
+from dess.analysis.verification.checks import Fit
+from dess.analysis.verification.figures import MISS, SEEN
 
 SPACE = load_scenario("paper")
 TABLE = pd.DataFrame(

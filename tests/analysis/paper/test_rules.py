@@ -5,14 +5,14 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.answers.learning import Transfer
-from analysis.answers.main_effects import FALLS, LEVELS, PEAK, RISES, VALLEY, Shape
-from analysis.paper import rules, values
-from analysis.paper.measures import Pairs, negated
-from analysis.paper.scorecard import RULES
-from analysis.stats.intervals import Interval
-from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
-from analysis.study.selection import Choice
+from dess.analysis.answers.learning import Transfer
+from dess.analysis.answers.main_effects import FALLS, LEVELS, PEAK, RISES, VALLEY, Shape
+from dess.analysis.paper import rules, values
+from dess.analysis.paper.measures import Pairs, negated
+from dess.analysis.paper.scorecard import RULES
+from dess.analysis.stats.intervals import Interval
+from dess.analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
+from dess.analysis.study.selection import Choice
 from tests.analysis.answers.test_main_effects import pairs_of
 
 

@@ -8,10 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import load_study, run_study
-from analysis.metrics import PRODUCT
-from analysis.paper import values as paper
-from analysis.paper.measures import (
+from dess import InputError
+from dess.analysis import load_study, run_study
+from dess.analysis.metrics import PRODUCT
+from dess.analysis.paper import values as paper
+from dess.analysis.paper.measures import (
     EXCEEDS,
     FALLS_SHORT,
     MATCHES,
@@ -20,7 +21,7 @@ from analysis.paper.measures import (
     VERDICTS,
     Finding,
 )
-from analysis.paper.scorecard import (
+from dess.analysis.paper.scorecard import (
     NULLS,
     PAPERS_NETWORK,
     TRAININGS,
@@ -29,11 +30,10 @@ from analysis.paper.scorecard import (
     departures,
     scorecard,
 )
-from analysis.results.tables import Results
-from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
-from dess import InputError
-from policies.learner.description import read_description
-from policies.registry import TRAINED
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
+from dess.policies.learner.description import read_description
+from dess.policies.registry import TRAINED
 from tests.analysis.small import grid, small_study
 
 NOTEBOOKS = Path(__file__).parents[3] / "reports" / "notebooks"

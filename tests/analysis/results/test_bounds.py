@@ -7,13 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import load_results, run_study
-from analysis.bound import Bound
-from analysis.execution import jobs, runner
-from analysis.results.chunks import Chunk, Part
-from analysis.results.parquet import table_of_bounds, write
-from analysis.results.store import Store
 from dess import InputError
+from dess.analysis import load_results, run_study
+from dess.analysis.bound import Bound
+from dess.analysis.execution import jobs, runner
+from dess.analysis.results.chunks import Chunk, Part
+from dess.analysis.results.parquet import table_of_bounds, write
+from dess.analysis.results.store import Store
 from tests.analysis.small import files_of, small_study
 
 NODES = 3  # of the small scenario

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dess
-import policies
-from analysis.results.event_log import (
+from dess import policies
+from dess.analysis.results.event_log import (
     ages,
     battery_levels,
     causes,

@@ -7,15 +7,15 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from analysis import run_study, summary
-from analysis.execution.evaluation import Asked, means
-from analysis.metrics import MEASURES, measured_in
-from analysis.results.resimulate import difference, recorded, resimulate
-from analysis.stats.differences import compare
-from analysis.stats.intervals import interval_of
 from dess import load_scenario, simulate_batch
-from policies import load
-from reports.cli.options import load_space
+from dess.analysis import run_study, summary
+from dess.analysis.execution.evaluation import Asked, means
+from dess.analysis.metrics import MEASURES, measured_in
+from dess.analysis.results.resimulate import difference, recorded, resimulate
+from dess.analysis.stats.differences import compare
+from dess.analysis.stats.intervals import interval_of
+from dess.policies import load
+from dess.reports.cli.options import load_space
 from tests.analysis.small import grid, small_study
 
 MEASURED = {"charging.measured": True, "age.measured": True}

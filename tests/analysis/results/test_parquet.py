@@ -13,13 +13,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from analysis import load_results, run_study
-from analysis.results import event_log, parquet
-from analysis.results.chunks import name_of, short_hash
-from analysis.results.store import Store
 from dess import InputError
+from dess.analysis import load_results, run_study
+from dess.analysis.results import event_log, parquet
+from dess.analysis.results.chunks import name_of, short_hash
+from dess.analysis.results.store import Store
 from dess.record import PARAMETER_EVENTS
-from reports.cli import main
+from dess.reports.cli import main
 from tests.analysis.small import files_of, small_study
 
 Forge = Callable[[pa.Table], pa.Table]

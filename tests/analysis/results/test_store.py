@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis import load_results, run_study
-from analysis.results import parquet, provenance
-from analysis.results.chunks import Chunk, Part, gaps, split
-from analysis.results.manifest import Cell
-from analysis.results.store import Failure, Store
 from dess import InputError, simulate_batch
-from policies import load
+from dess.analysis import load_results, run_study
+from dess.analysis.results import parquet, provenance
+from dess.analysis.results.chunks import Chunk, Part, gaps, split
+from dess.analysis.results.manifest import Cell
+from dess.analysis.results.store import Failure, Store
+from dess.policies import load
 from tests.analysis.small import files_of, grid, small_study, write_scenario
 
 
@@ -108,7 +108,7 @@ def test_the_scenario_counts_not_its_name(out, tmp_path):
 
 
 def small_study_again(folder, **changes):
-    from analysis import load_study
+    from dess.analysis import load_study
 
     return load_study(folder / "trial.toml", **changes)
 
@@ -158,9 +158,13 @@ def test_other_weights_are_refused_whatever_is_accepted(out, tmp_path):
 
 def test_a_policy_depends_on_the_modules_of_what_it_holds():
     learned = provenance.code_behind(["ddqn"])
-    held = {"policies.learner.policy", "policies.learner.network", "dess.observations.vector"}
+    held = {
+        "dess.policies.learner.policy",
+        "dess.policies.learner.network",
+        "dess.observations.vector",
+    }
     assert held <= learned.keys()
-    assert "policies.learner.training" not in learned
+    assert "dess.policies.learner.training" not in learned
 
 
 def test_an_output_that_cannot_be_written(tmp_path):

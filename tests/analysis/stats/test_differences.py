@@ -6,9 +6,9 @@ import pytest
 from pandas.testing import assert_frame_equal
 from scipy import stats
 
-from analysis.metrics import PRODUCT, REWARD, SUCCESS
-from analysis.stats.differences import Paired, adjust, compare, paired
 from dess import InputError
+from dess.analysis.metrics import PRODUCT, REWARD, SUCCESS
+from dess.analysis.stats.differences import Paired, adjust, compare, paired
 from tests.analysis.stats.matched_missions import METRIC, STUDY, ratios
 
 

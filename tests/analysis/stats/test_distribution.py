@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.stats.distribution import distribution, quantile_interval, tail_mean
-from analysis.stats.intervals import bootstrap_interval, bounded_interval
 from dess import InputError
+from dess.analysis.stats.distribution import distribution, quantile_interval, tail_mean
+from dess.analysis.stats.intervals import bootstrap_interval, bounded_interval
 
 
 def test_the_median_lies_between_order_statistics():

@@ -7,13 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from analysis.answers.summary import best_policy
-from analysis.execution.evaluation import Asked, evaluate, means
-from analysis.metrics import PRODUCT, RATIO, REWARD, SUCCESS
-from analysis.stats import intervals
-from analysis.stats.differences import compare
-from analysis.stats.distribution import quantile_interval
-from analysis.stats.intervals import (
+from dess.analysis.answers.summary import best_policy
+from dess.analysis.execution.evaluation import Asked, evaluate, means
+from dess.analysis.metrics import PRODUCT, RATIO, REWARD, SUCCESS
+from dess.analysis.stats import intervals
+from dess.analysis.stats.differences import compare
+from dess.analysis.stats.distribution import quantile_interval
+from dess.analysis.stats.intervals import (
     bootstrap_interval,
     bounded_interval,
     by_replication,

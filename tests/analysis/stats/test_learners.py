@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from pandas.testing import assert_frame_equal
 
-from analysis.stats.differences import adjust, compare
-from analysis.stats.intervals import mean_interval
-from analysis.stats.learners import compare_learners, crossed
 from dess import InputError
+from dess.analysis.stats.differences import adjust, compare
+from dess.analysis.stats.intervals import mean_interval
+from dess.analysis.stats.learners import compare_learners, crossed
 from tests.analysis.stats.matched_missions import METRIC, STUDY, ratios, rng
 
 pytestmark = pytest.mark.filterwarnings("error")

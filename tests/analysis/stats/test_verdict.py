@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.stats.intervals import Interval
-from analysis.stats.verdict import (
+from dess.analysis.stats.intervals import Interval
+from dess.analysis.stats.verdict import (
     ABOVE,
     BELOW,
     HOLDS,

@@ -8,9 +8,9 @@ import pytest
 from pydantic import ValidationError
 from scipy import stats
 
-from analysis import load_study
-from analysis.results.manifest import Manifest
-from analysis.study.cheapest import PARTS, Cheapest, Costs, MeanTest, Setting, _Search
+from dess.analysis import load_study
+from dess.analysis.results.manifest import Manifest
+from dess.analysis.study.cheapest import PARTS, Cheapest, Costs, MeanTest, Setting, _Search
 from dess.scenario import ScenarioSpace, load_scenario
 from tests.analysis.study.test_selection import check_that_interruptions_leave_no_trace
 

@@ -6,14 +6,14 @@ import tomli_w
 from pydantic import BaseModel, ConfigDict, ValidationError
 from scipy.stats import qmc
 
-from analysis.study.design import (
+from dess import InputError
+from dess.analysis.study.design import (
     MAX_SIZE,
     Design,
     Grid,
     LatinHypercube,
     Saltelli,
 )
-from dess import InputError
 from dess.errors import validation_line
 from dess.files.parsing import parse_toml
 from dess.scenario import load_scenario

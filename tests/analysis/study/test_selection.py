@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from analysis.study import selection
-from analysis.study.selection import Selection
+from dess.analysis.study import selection
+from dess.analysis.study.selection import Selection
 
 METRIC = "collection_ratio"
 

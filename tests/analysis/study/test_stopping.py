@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from analysis.metrics import ALWAYS, METRICS, metric_of
-from analysis.stats.intervals import interval_of, mean_interval, wilson
-from analysis.study.stopping import Precision, running_interval
+from dess.analysis.metrics import ALWAYS, METRICS, metric_of
+from dess.analysis.stats.intervals import interval_of, mean_interval, wilson
+from dess.analysis.study.stopping import Precision, running_interval
 
 
 def rule(**fields):

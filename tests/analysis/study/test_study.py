@@ -7,10 +7,10 @@ import pytest
 import tomli_w
 from pydantic import ValidationError
 
-from analysis import load_study, run_study, study_names
-from analysis.study.study import Study, budget_of
 from dess import InputError, load_scenario
-from policies.registry import TypedByUser, load_team
+from dess.analysis import load_study, run_study, study_names
+from dess.analysis.study.study import Study, budget_of
+from dess.policies.registry import TypedByUser, load_team
 from tests.analysis.small import grid, small_study, write_scenario
 
 
@@ -183,7 +183,7 @@ def test_a_study_takes_what_was_typed_to_its_workers_and_leaves_it_out_of_its_da
     tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "typed_words.py").write_text("from policies.heuristics import Greedy")
+    (tmp_path / "typed_words.py").write_text("from dess.policies.heuristics import Greedy")
     study = small_study(tmp_path, policies=["greedy", "greedy , typed_words.py:Greedy"])
     sent = pickle.loads(pickle.dumps(study))
     assert sent.policies == ("greedy", "greedy,typed_words.py:Greedy")

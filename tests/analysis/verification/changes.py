@@ -3,8 +3,8 @@
 from dataclasses import replace
 from typing import Any
 
-from analysis.results.tables import Results
-from analysis.verification.measurements import Log
+from dess.analysis.results.tables import Results
+from dess.analysis.verification.measurements import Log
 
 
 def altered(logs: list[Log], event: str, which: int = 0, **columns: Any) -> list[Log]:

@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
-from analysis import run_study
-from analysis.results.tables import Results
-from analysis.verification import measurements
-from analysis.verification.measurements import CrossCheck, Log
+from dess.analysis import run_study
+from dess.analysis.results.tables import Results
+from dess.analysis.verification import measurements
+from dess.analysis.verification.measurements import CrossCheck, Log
 from tests.analysis.small import small_study
 
 # Two groups of communication slots, a queue for one pad, all nodes emptied now and then.

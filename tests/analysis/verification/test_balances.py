@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from hypothesis import given
 
-from analysis.results.tables import Results
-from analysis.verification import balances, draws, measurements
-from analysis.verification.measurements import CrossCheck, Log
+from dess.analysis.results.tables import Results
+from dess.analysis.verification import balances, draws, measurements
+from dess.analysis.verification.measurements import CrossCheck, Log
 from dess.mission import simulate
 from dess.scenario import ScenarioSpace
 from dess.state import sample_scenario

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
-from analysis.verification.checks import (
+from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
+from dess.analysis.verification.checks import (
     ALPHA,
     Check,
     judge,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.stats.intervals import wilson
-from analysis.verification import closed_forms
+from dess.analysis.stats.intervals import wilson
+from dess.analysis.verification import closed_forms
 from dess.scenario import Scenario
 
 WORLD = Scenario()

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.verification import balances, draws
-from analysis.verification.measurements import Log
 from dess import load_scenario
+from dess.analysis.verification import balances, draws
+from dess.analysis.verification.measurements import Log
 from dess.scenario import SAMPLED
 from tests.analysis.verification.changes import altered
 from tests.analysis.verification.verdicts import failing, fails

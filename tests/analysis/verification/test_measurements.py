@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import run_study
-from analysis.results.tables import Results
-from analysis.verification import balances, draws, measurements
-from analysis.verification.measurements import FILE, STUDY, CrossCheck, Log
-from analysis.verification.suite import Suite
 from dess import InputError, load_scenario
+from dess.analysis import run_study
+from dess.analysis.results.tables import Results
+from dess.analysis.verification import balances, draws, measurements
+from dess.analysis.verification.measurements import FILE, STUDY, CrossCheck, Log
+from dess.analysis.verification.suite import Suite
 from tests.analysis.small import small_study
 from tests.analysis.verification.verdicts import failing
 

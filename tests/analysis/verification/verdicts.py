@@ -1,7 +1,7 @@
 """Which of some checks fail."""
 
-from analysis.stats.verdict import HOLDS, REFUTED
-from analysis.verification.checks import Check, judge
+from dess.analysis.stats.verdict import HOLDS, REFUTED
+from dess.analysis.verification.checks import Check, judge
 
 
 def failing(checks: list[Check]) -> set[str]:

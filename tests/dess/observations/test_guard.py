@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import event, given
 
-import policies
-from dess import streams
+from dess import policies, streams
 from dess.batch import simulate_batch
 from dess.guard import guard
 from dess.mission import simulate

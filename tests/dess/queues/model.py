@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import simpy
 
-from analysis.verification import closed_forms
-from analysis.verification.measurements import Hovering
 from dess import simulate
+from dess.analysis.verification import closed_forms
+from dess.analysis.verification.measurements import Hovering
 from dess.mission import ChargingZone
 from dess.record import OPERATIONS, MissionRecord
 from dess.scenario import ScenarioSpace

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.verification.closed_forms import Moments
+from dess.analysis.verification.closed_forms import Moments
 from dess.scenario import ScenarioSpace, load_scenario
 from tests.dess.queues import theory
 from tests.dess.queues.model import (

@@ -6,7 +6,7 @@ The functions are written from the equations with numpy; they use no code of the
 import numpy as np
 from scipy import stats
 
-from analysis.verification.closed_forms import Moments
+from dess.analysis.verification.closed_forms import Moments
 
 
 def erlang_c(servers: int, load: float) -> float:

@@ -7,14 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import policies
-from dess import simulate
+from dess import policies, simulate
 from dess.observations.reach import reach_of
+from dess.policies.registry import HEURISTICS
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import parking_of
 from dess.sections.wind import Wind, surcharges
 from dess.state import BATTERY, constants_of
-from policies.registry import HEURISTICS
 from tests.dess.flights import batteries, flown
 from tests.drawn import reached, replications, seeds, spaces
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import typer
 
-from reports.cli.commands import app
-from reports.pages.notebook import NAMES
+from dess.reports.cli.commands import app
+from dess.reports.pages.notebook import NAMES
 from tests.fuzz import ready
 from tests.fuzz.strategies.sections import PLAIN as SETTINGS
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from hypothesis import strategies as st
 
-from reports.pages.notebook import NAMES
+from dess.reports.pages.notebook import NAMES
 from tests.fuzz import ready
 from tests.fuzz.case import Case
 from tests.fuzz.steps import copy

@@ -2,7 +2,7 @@
 
 from hypothesis import strategies as st
 
-from reports.pages.notebook import read
+from dess.reports.pages.notebook import read
 from tests.fuzz import ready
 from tests.fuzz.case import Case, Step
 from tests.fuzz.steps import copy

@@ -2,7 +2,7 @@
 
 from hypothesis import strategies as st
 
-from analysis.metrics import MEASURES
+from dess.analysis.metrics import MEASURES
 from tests.fuzz import ready
 from tests.fuzz.case import Case
 from tests.fuzz.steps import copy, write

@@ -2,7 +2,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from policies.learner.dqn import DQNTraining
+from dess.policies.learner.dqn import DQNTraining
 from tests.policies.learner.tiny import CPU, PHASES, one_thread, tiny
 
 

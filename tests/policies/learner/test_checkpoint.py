@@ -14,14 +14,14 @@ from safetensors.torch import load_file, save_file
 
 from dess import InputError
 from dess.errors import printable
+from dess.policies.learner import tensors as files
+from dess.policies.learner.checkpoint import load_training, save_training
+from dess.policies.learner.config import CHECKPOINT
+from dess.policies.learner.description import MODEL
+from dess.policies.learner.dqn import DQNTraining
+from dess.policies.learner.trained import load_policy, save_policy
+from dess.policies.learner.training import Training
 from dess.state import MISSION, SENSOR, UAV
-from policies.learner import tensors as files
-from policies.learner.checkpoint import load_training, save_training
-from policies.learner.config import CHECKPOINT
-from policies.learner.description import MODEL
-from policies.learner.dqn import DQNTraining
-from policies.learner.trained import load_policy, save_policy
-from policies.learner.training import Training
 from tests.analysis.small import files_of, write_scenario
 from tests.policies.learner.tiny import CPU, assert_same, refusal_of, tiny
 

@@ -5,10 +5,9 @@ from typing import Any
 
 import pytest
 
-import policies
-from dess import InputError
+from dess import InputError, policies
+from dess.policies.learner.config import config_names, learner_of, load_config, resume_command
 from dess.scenario import load_scenario
-from policies.learner.config import config_names, learner_of, load_config, resume_command
 from tests.policies.learner.tiny import PHASES, TINY, tiny, tiny_on_seas, write_config
 
 PHASE = PHASES[0]

@@ -7,7 +7,7 @@ import torch
 from torch import nn
 
 from dess.observations.states import masks
-from policies.learner.dqn import Batch, DQNLearner, DQNTraining
+from dess.policies.learner.dqn import Batch, DQNLearner, DQNTraining
 from tests.policies.learner.tiny import CPU, PHASES, tiny
 
 LOSSES = {"mse": lambda e: e**2, "huber": lambda e: e**2 / 2 if e < 1 else e - 0.5}

@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from policies.learner.network import DuelingNetwork, PaperNetwork
+from dess.policies.learner.network import DuelingNetwork, PaperNetwork
 
 SHAPES = ((4, 17, 17), (4, 21, 21), (1,))
 

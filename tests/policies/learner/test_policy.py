@@ -19,10 +19,10 @@ from dess.mission import simulate
 from dess.observations.sets import Sets, sea_of
 from dess.observations.states import ACTIVE, Layout, compact_states, layout_of
 from dess.observations.vector import Vector
+from dess.policies.learner.network import DuelingNetwork, SetNetwork
+from dess.policies.learner.policy import LearnedPolicy
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import constants_of
-from policies.learner.network import DuelingNetwork, SetNetwork
-from policies.learner.policy import LearnedPolicy
 from tests.drawn import PLAIN_SEA, Checked, Recorder, Wanderer, replications, seeds, spaces
 from tests.policies.flown import assert_same_alone, cells_of
 

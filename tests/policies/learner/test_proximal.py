@@ -7,9 +7,8 @@ import pytest
 import torch
 
 from dess.observations.states import layout_of, masks
-from dess.scenario import load_scenario
-from policies.learner.checkpoint import load_training, new_training, save_training
-from policies.learner.ppo import (
+from dess.policies.learner.checkpoint import load_training, new_training, save_training
+from dess.policies.learner.ppo import (
     CLIP,
     TRACE,
     WORTH,
@@ -17,6 +16,7 @@ from policies.learner.ppo import (
     _advantages,
     _with_range,
 )
+from dess.scenario import load_scenario
 from tests.policies.learner.tiny import CPU, assert_same, tiny_on_seas, weights_of
 
 

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from dess.observations.states import empty_states
-from policies.learner.dqn import Batch, ReplayMemory
+from dess.policies.learner.dqn import Batch, ReplayMemory
 
 SLOT, ENVIRONMENT = 0, 1  # what the columns of the missions hold here
 

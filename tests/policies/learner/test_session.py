@@ -13,14 +13,14 @@ import pyarrow.parquet as pq
 import pytest
 import torch
 
-import policies
-from policies.learner import session
-from policies.learner.checkpoint import load_training
-from policies.learner.config import CHECKPOINT
-from policies.learner.description import CONFIG, MODEL
-from policies.learner.dqn import DQNTraining
-from policies.learner.session import CURVE, LOCK, SIGNALS, device_of, train
-from policies.learner.training import DivergenceError, Training
+from dess import policies
+from dess.policies.learner import session
+from dess.policies.learner.checkpoint import load_training
+from dess.policies.learner.config import CHECKPOINT
+from dess.policies.learner.description import CONFIG, MODEL
+from dess.policies.learner.dqn import DQNTraining
+from dess.policies.learner.session import CURVE, LOCK, SIGNALS, device_of, train
+from dess.policies.learner.training import DivergenceError, Training
 from tests.analysis.small import files_of
 from tests.policies.learner.tiny import (
     CPU,

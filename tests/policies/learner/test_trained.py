@@ -13,11 +13,11 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from dess.batch import simulate_batch
-from policies.learner import trained
-from policies.learner.description import CONFIG, MODEL
-from policies.learner.dqn import DQNTraining
-from policies.learner.trained import load_policy, save_policy
-from policies.learner.training import Training
+from dess.policies.learner import trained
+from dess.policies.learner.description import CONFIG, MODEL
+from dess.policies.learner.dqn import DQNTraining
+from dess.policies.learner.trained import load_policy, save_policy
+from dess.policies.learner.training import Training
 from tests.analysis.small import files_of
 from tests.policies.learner.tiny import CPU, Killed, kill_after, refusal_of, tiny
 

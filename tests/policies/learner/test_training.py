@@ -9,13 +9,13 @@ import pytest
 import torch
 
 from dess.observations.states import ACTIVE, CHARGING, compact_states, masks
+from dess.policies.learner import training as module
+from dess.policies.learner.checkpoint import load_training, save_training
+from dess.policies.learner.config import MISSION_SEED
+from dess.policies.learner.dqn import Batch, DQNTraining
+from dess.policies.learner.training import SELECT_BY, Training
 from dess.record import empty_records
 from dess.scenario import ScenarioSpace
-from policies.learner import training as module
-from policies.learner.checkpoint import load_training, save_training
-from policies.learner.config import MISSION_SEED
-from policies.learner.dqn import Batch, DQNTraining
-from policies.learner.training import SELECT_BY, Training
 from tests.policies.learner.tiny import (
     CPU,
     PHASES,

@@ -11,8 +11,8 @@ import tomli_w
 import torch
 
 from dess import InputError
-from policies.learner.config import TrainingConfig, config_of
-from policies.learner.training import Training
+from dess.policies.learner.config import TrainingConfig, config_of
+from dess.policies.learner.training import Training
 
 CPU = torch.device("cpu")
 PHASES: list[dict[str, Any]] = [

@@ -10,11 +10,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dess.scenario import Scenario
-from policies.planner.fluid import CRAFT, MOST_SLOTS, Flight, begin, empty_flight, fly
-from policies.planner.plan import CHARGE, MOST_WAYPOINTS, NEVER, Plan, empty_plan, insert
-from policies.planner.rates import rates_of
-from policies.planner.search import (
+from dess.policies.planner.fluid import CRAFT, MOST_SLOTS, Flight, begin, empty_flight, fly
+from dess.policies.planner.plan import CHARGE, MOST_WAYPOINTS, NEVER, Plan, empty_plan, insert
+from dess.policies.planner.rates import rates_of
+from dess.policies.planner.search import (
     _CHARGE,
     _CROSS,
     _INSERT,
@@ -33,6 +32,7 @@ from policies.planner.search import (
     empty_workspace,
     improve,
 )
+from dess.scenario import Scenario
 from tests.drawn import reached, scenarios, seeds
 from tests.policies.flown import first_view
 

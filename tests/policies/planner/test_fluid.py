@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from dess import Scenario, ScenarioSpace, load_scenario, simulate
+from dess.policies.planner.fluid import MOST_SLOTS, begin, empty_flight, fly
+from dess.policies.planner.plan import CHARGE, NEVER, Plan, empty_plan, insert
+from dess.policies.planner.rates import rates_of
+from dess.policies.planner.search import BEST, TRIED, empty_workspace, improve
 from dess.view import View
-from policies.planner.fluid import MOST_SLOTS, begin, empty_flight, fly
-from policies.planner.plan import CHARGE, NEVER, Plan, empty_plan, insert
-from policies.planner.rates import rates_of
-from policies.planner.search import BEST, TRIED, empty_workspace, improve
 from tests.policies.flown import first_view
 
 CALM = {"shadowing_variance": 0.0, "arrival_rate": 0.0}

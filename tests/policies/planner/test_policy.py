@@ -8,14 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import policies
-from dess import load_scenario, simulate, simulate_batch
+from dess import load_scenario, policies, simulate, simulate_batch
 from dess.guard import guard
+from dess.policies.planner import Planner, plan_of
+from dess.policies.planner import policy as module
+from dess.policies.planner.policy import _MEMORIES, Budget, memory_of
 from dess.scenario import ScenarioSpace
 from dess.view import View
-from policies.planner import Planner, plan_of
-from policies.planner import policy as module
-from policies.planner.policy import _MEMORIES, Budget, memory_of
 from tests.drawn import Checked, extended_spaces, replications, seeds, spaces
 from tests.policies.flown import assert_same_alone, cells_of, first_view
 

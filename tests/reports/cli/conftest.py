@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from reports import cli
+from dess.reports import cli
 from tests.analysis.small import files_of, small_study
 
 # What a command may tell before it refuses: steps on a busy machine, what a training will take,

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from analysis import load_results, load_study
-from analysis.ask.question import Question
-from analysis.execution import runner
-from reports.pages import notebook, render
+from dess.analysis import load_results, load_study
+from dess.analysis.ask.question import Question
+from dess.analysis.execution import runner
+from dess.reports.pages import notebook, render
 from tests.analysis.small import files_of
 from tests.reports.small import words
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.execution import evaluation, runner
+from dess.analysis.execution import evaluation, runner
 from dess.mission import MissionModel
 
 SWEEP = "sweep --scenario small.toml --set uavs=1,2 --missions 3"

@@ -8,8 +8,8 @@ import pytest
 from numba import njit
 from numba.core.event import trigger_event
 
-from reports import cli
-from reports.cli import console
+from dess.reports import cli
+from dess.reports.cli import console
 from tests.analysis.small import environment
 
 # Colours, a new title of the window, and a name that is written from right to left.
@@ -59,7 +59,7 @@ def test_no_control_character_reaches_the_terminal(tell, capsys):
 def test_a_warning_is_a_line_of_printable_characters(monkeypatch, capsys):
     monkeypatch.setattr(logging.root, "handlers", [])  # those of pytest
     assert cli.main(["scenarios"]) == 0
-    logging.getLogger("policies.learner").warning("%s\nuses other settings", RAW)
+    logging.getLogger("dess.policies.learner").warning("%s\nuses other settings", RAW)
     err = capsys.readouterr().err
     assert is_printable(err)
     assert err.count("\n") == 1

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 import safetensors
 
-from analysis import run_study
+from dess.analysis import run_study
 from tests.analysis.small import files_of, small_study
 from tests.killing import Command, kill
 from tests.policies.learner.tiny import PHASES, write_config
@@ -33,9 +33,10 @@ def seeded(*words):
 
 # --- studies ---
 
-CHUNKS = (
-    "from analysis.execution import runner\nrunner.CHUNK['events'] = 5\nrunner.BOUNDS_CHUNK = 2"
-)
+CHUNKS = """\
+from dess.analysis.execution import runner
+runner.CHUNK['events'] = 5
+runner.BOUNDS_CHUNK = 2"""
 
 
 def a_study(folder, workers, missions, bounds=False):
@@ -91,7 +92,7 @@ def test_studies_that_are_killed_in_their_bounds_equal_an_undisturbed_one(
 CHECKPOINT = "checkpoint.safetensors"
 EVERY_TICK = (
     "sys.modules['torch.utils.tensorboard'] = None\n"
-    "from policies.learner import session; session.CHECKPOINT_EVERY = 0"
+    "from dess.policies.learner import session; session.CHECKPOINT_EVERY = 0"
 )
 
 

@@ -7,10 +7,10 @@ import sys
 import pytest
 
 import dess as dess_package
-from analysis import load_study
 from dess import ScenarioSpace, load_scenario
+from dess.analysis import load_study
+from dess.policies.registry import SHIPPED, trained_names
 from dess.scenario import fields_of, scenario_families, scenario_names
-from policies.registry import SHIPPED, trained_names
 from tests.analysis.small import environment
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from dess import InputError
-from reports.cli.options import values_of
+from dess.reports.cli.options import values_of
 
 VALUES = {
     "uavs=2..5": (2, 3, 4, 5),

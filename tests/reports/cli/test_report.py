@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.pages import notebook, render
+from dess.reports.pages import notebook, render
 
 
 @pytest.fixture
@@ -102,8 +102,8 @@ def odd(path: Path, kind: str) -> None:
 def test_a_folder_of_pages_is_checked_before_the_first_cell(
     refusal, monkeypatch, tmp_path, name, kind
 ):
-    monkeypatch.delattr("reports.pages.kernels.run")
-    monkeypatch.setattr("reports.pages.render._lacking", lambda *_: {})
+    monkeypatch.delattr("dess.reports.pages.kernels.run")
+    monkeypatch.setattr("dess.reports.pages.render._lacking", lambda *_: {})
     odd(tmp_path / "pages" / name, kind)
     line = refusal("report", "mission", "--out", "pages")
     assert f"pages/{name}: " in line and "; allowed: " in line
@@ -113,7 +113,7 @@ def test_a_parameter_that_the_study_refuses_is_refused_before_any_cell(dess, ref
     def fail(*_):
         raise AssertionError("a cell runs")
 
-    monkeypatch.setattr("reports.pages.kernels.run", fail)
+    monkeypatch.setattr("dess.reports.pages.kernels.run", fail)
     assert dess("study", "run", "trial.toml", "--missions", 2, "--out", "out")[0] == 0
     for value, words in {
         "baseline=99": "baseline: 99 is not a design point; allowed: 0..0",

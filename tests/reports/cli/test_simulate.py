@@ -11,7 +11,7 @@ from contextlib import contextmanager
 import pyarrow.parquet as pq
 import pytest
 
-from analysis import load_results
+from dess.analysis import load_results
 from dess.record import EventLog
 from tests.analysis.small import files_of
 

@@ -7,18 +7,18 @@ from pathlib import Path
 
 import pytest
 
-from analysis import load_study, run_study
-from analysis.answers.diff import at_hand
-from analysis.execution.jobs import MissionsJob
-from analysis.results.chunks import parts_of, split
-from analysis.results.resimulate import Evidence, resimulate
-from analysis.results.tables import Results, load_results
-from analysis.verification import measurements
-from analysis.verification.balances import engine_check
 from dess import InputError
-from reports.cli import main
-from reports.pages import html
-from reports.pages.page import Page
+from dess.analysis import load_study, run_study
+from dess.analysis.answers.diff import at_hand
+from dess.analysis.execution.jobs import MissionsJob
+from dess.analysis.results.chunks import parts_of, split
+from dess.analysis.results.resimulate import Evidence, resimulate
+from dess.analysis.results.tables import Results, load_results
+from dess.analysis.verification import measurements
+from dess.analysis.verification.balances import engine_check
+from dess.reports.cli import main
+from dess.reports.pages import html
+from dess.reports.pages.page import Page
 from tests.analysis.hostile import hostile_folder
 from tests.analysis.small import small_study
 from tests.reports.small import words_of

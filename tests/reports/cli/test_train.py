@@ -14,14 +14,14 @@ import pytest
 import tomli_w
 import torch
 
-import policies
+from dess import policies
 from dess.code import memory
-from policies.learner import session
-from policies.learner.checkpoint import load_training
-from policies.learner.config import load_config
-from policies.learner.dqn import DQNTraining
-from policies.learner.ppo import ProximalTraining
-from reports.cli import train
+from dess.policies.learner import session
+from dess.policies.learner.checkpoint import load_training
+from dess.policies.learner.config import load_config
+from dess.policies.learner.dqn import DQNTraining
+from dess.policies.learner.ppo import ProximalTraining
+from dess.reports.cli import train
 from tests.analysis.small import files_of
 from tests.policies.learner.tiny import (
     CPU,

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from analysis import load_study, run_study
-from analysis.execution import jobs
-from analysis.stats.verdict import HOLDS, REFUTED
-from analysis.verification.measurements import simulate_missions, write
 from dess import simulate, simulate_batch
+from dess.analysis import load_study, run_study
+from dess.analysis.execution import jobs
+from dess.analysis.stats.verdict import HOLDS, REFUTED
+from dess.analysis.verification.measurements import simulate_missions, write
 from dess.scenario import ScenarioSpace
 from tests.reports.small import said_by
 

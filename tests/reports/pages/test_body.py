@@ -7,11 +7,11 @@ from IPython.display import HTML, DisplayObject
 from matplotlib.figure import Figure
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from reports.pages import html
-from reports.pages.body import FOLDED, TERMS, page_of
-from reports.pages.html import PART, Part
-from reports.pages.notebook import Report
-from reports.pages.page import Page
+from dess.reports.pages import html
+from dess.reports.pages.body import FOLDED, TERMS, page_of
+from dess.reports.pages.html import PART, Part
+from dess.reports.pages.notebook import Report
+from dess.reports.pages.page import Page
 
 
 def page(*cells: str | DisplayObject) -> Page:

@@ -12,13 +12,13 @@ import pandas as pd
 import pytest
 from nbconvert.filters import markdown2html
 
-from analysis import numbers, run_study
-from analysis.figures import style
-from reports.pages import html
-from reports.pages.index import index_of, pages_in, with_bars
-from reports.pages.notebook import values_of, with_values
-from reports.pages.page import CARD, Page
-from reports.pages.render import render_study
+from dess.analysis import numbers, run_study
+from dess.analysis.figures import style
+from dess.reports.pages import html
+from dess.reports.pages.index import index_of, pages_in, with_bars
+from dess.reports.pages.notebook import values_of, with_values
+from dess.reports.pages.page import CARD, Page
+from dess.reports.pages.render import render_study
 from tests.analysis.hostile import hostile_folder
 from tests.analysis.small import small_study
 from tests.reports.browser import Visit

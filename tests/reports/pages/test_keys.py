@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from analysis import run_study
-from reports.pages import kernels, render
-from reports.pages.render import render as render_pages
-from reports.pages.render import render_study
+from dess.analysis import run_study
+from dess.reports.pages import kernels, render
+from dess.reports.pages.render import render as render_pages
+from dess.reports.pages.render import render_study
 from tests.analysis.small import small_study
 from tests.reports.pages.test_render import MISSION, SCORECARD, results, write_notebooks
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reports.pages.notebook import values_of, with_paths, with_values
+from dess.reports.pages.notebook import values_of, with_paths, with_values
 
 CELL = """results = "../../results"  # the folder
 settings = {

@@ -17,13 +17,13 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
-from analysis import run_study
 from dess import InputError
-from reports.cli import main
-from reports.pages import kernels
-from reports.pages.body import page_of
-from reports.pages.notebook import Report, read
-from reports.pages.render import ReportError, render
+from dess.analysis import run_study
+from dess.reports.cli import main
+from dess.reports.pages import kernels
+from dess.reports.pages.body import page_of
+from dess.reports.pages.notebook import Report, read
+from dess.reports.pages.render import ReportError, render
 from tests.analysis.small import environment, small_study
 from tests.reports.small import Links, words_of
 
@@ -49,9 +49,9 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from analysis import load_results
+from dess.analysis import load_results
 from dess import InputError
-from reports.pages import html
+from dess.reports.pages import html
 
 study = load_results(Path(results) / "trial")
 if policy not in study.policies:
@@ -279,7 +279,7 @@ def test_processes_of_a_command_import_nothing_of_the_working_directory(
 
     monkeypatch.chdir(trap)
     monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
-    monkeypatch.setattr("reports.cli.commands.app", start_a_process)
+    monkeypatch.setattr("dess.reports.cli.commands.app", start_a_process)
     assert main([]) == 0
     assert not (trap / "hit").exists() and "PYTHONSAFEPATH" not in os.environ
 
@@ -399,8 +399,8 @@ def rendering(results: Path, folder: Path) -> Iterator[subprocess.Popen]:
     write_notebooks(folder / "notebooks", mission=FAILING.replace("raise", cell))
     (folder / "tmp").mkdir()
     script = (
-        "from pathlib import Path; from reports.interrupts import Interrupts; "
-        "from reports.pages.render import render\nwith Interrupts(is_last=False): "
+        "from pathlib import Path; from dess.reports.interrupts import Interrupts; "
+        "from dess.reports.pages.render import render\nwith Interrupts(is_last=False): "
         f"render([], {str(results)!r}, 'out', notebooks=Path('notebooks'))"
     )
 

@@ -12,17 +12,16 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
-import reports
-from analysis import load_results
-from analysis.answers import comparison
-from analysis.answers.comparison import Cost, Times
-from analysis.answers.missions import FOLDER
-from analysis.results.tables import Results
-from dess import InputError
-from reports.pages.notebook import NAMES, read
-from reports.pages.page import STUDY, Page
-from reports.pages.render import render
-from reports.player import library
+from dess import InputError, reports
+from dess.analysis import load_results
+from dess.analysis.answers import comparison
+from dess.analysis.answers.comparison import Cost, Times
+from dess.analysis.answers.missions import FOLDER
+from dess.analysis.results.tables import Results
+from dess.reports.pages.notebook import NAMES, read
+from dess.reports.pages.page import STUDY, Page
+from dess.reports.pages.render import render
+from dess.reports.player import library
 from tests.pins.pinned import pinned
 from tests.reports.browser import Visit
 from tests.reports.pages.test_render import another_environment

@@ -3,12 +3,12 @@
 import re
 from typing import Any
 
-from analysis import load_study
-from analysis.results.manifest import Manifest
-from analysis.stats.intervals import LEVEL
-from analysis.verification import figures as drawings
+from dess.analysis import load_study
+from dess.analysis.results.manifest import Manifest
+from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.verification import figures as drawings
+from dess.reports.pages import stress_des
 from dess.scenario import GEOMETRY, SECTIONS, Scenario
-from reports.pages import stress_des
 
 # Monks et al. (2019), Table 1.
 CHECKLIST = {"1": 3, "2": 4, "2.5": 5, "3": 4, "4": 3, "5": 4, "6": 1}

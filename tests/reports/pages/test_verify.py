@@ -14,19 +14,19 @@ import pyarrow.parquet as pq
 import pytest
 from nbformat.v4 import new_output
 
-from analysis import load_study, run_study
-from analysis.bound import Bound
-from analysis.results.resimulate import Evidence, learned_files
-from analysis.results.tables import load_results
 from dess import InputError
-from policies.registry import TRAINED
-from reports.cli import main
-from reports.pages import html, verify
-from reports.pages.body import page_of
-from reports.pages.index import index_of, pages_in
-from reports.pages.notebook import read
-from reports.pages.page import STUDY, Page
-from reports.pages.verify import verify_page, verify_results
+from dess.analysis import load_study, run_study
+from dess.analysis.bound import Bound
+from dess.analysis.results.resimulate import Evidence, learned_files
+from dess.analysis.results.tables import load_results
+from dess.policies.registry import TRAINED
+from dess.reports.cli import main
+from dess.reports.pages import html, verify
+from dess.reports.pages.body import page_of
+from dess.reports.pages.index import index_of, pages_in
+from dess.reports.pages.notebook import read
+from dess.reports.pages.page import STUDY, Page
+from dess.reports.pages.verify import verify_page, verify_results
 from tests.analysis.small import small_study
 from tests.reports.small import made_up, quick
 

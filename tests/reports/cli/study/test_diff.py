@@ -7,7 +7,7 @@ import shutil
 
 import pyarrow.parquet as pq
 
-from analysis.results.parquet import content_hash, short_hash
+from dess.analysis.results.parquet import content_hash, short_hash
 from tests.analysis.small import files_of
 
 

@@ -11,7 +11,7 @@ from functools import partial
 
 import pytest
 
-from analysis import load_results
+from dess.analysis import load_results
 from tests.analysis import troublesome
 from tests.analysis.small import environment, files_of
 
@@ -97,7 +97,7 @@ def test_pages_that_cannot_be_written_are_refused_before_the_run(refusal, tmp_pa
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 def test_ctrl_c_leaves_a_folder_that_a_second_run_completes(dess, tmp_path):
-    command = [sys.executable, "-m", "reports", "study", "run", "trial.toml", "--out", "out"]
+    command = [sys.executable, "-m", "dess", "study", "run", "trial.toml", "--out", "out"]
     with open("trial.toml", "a") as study:  # slow enough to be caught in the middle
         study.write('engine = "events"\n')
     missions = ("--missions", "1000")

@@ -12,13 +12,13 @@ import nbformat
 import pandas as pd
 import pytest
 
-from analysis import load_results, run_study
-from analysis.answers import settings
 from dess import InputError
-from reports.pages import html
-from reports.pages.page import STUDY, Page
-from reports.pages.render import render_study
-from reports.pages.verify import verify_page
+from dess.analysis import load_results, run_study
+from dess.analysis.answers import settings
+from dess.reports.pages import html
+from dess.reports.pages.page import STUDY, Page
+from dess.reports.pages.render import render_study
+from dess.reports.pages.verify import verify_page
 from tests.analysis.small import files_of, grid, small_study
 from tests.reports.small import Links
 

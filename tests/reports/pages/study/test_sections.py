@@ -5,9 +5,9 @@ from html import unescape
 
 import pytest
 
-from analysis import run_study
-from reports.pages.notebook import SHIPPED
-from reports.pages.study import parts, report_of
+from dess.analysis import run_study
+from dess.reports.pages.notebook import SHIPPED
+from dess.reports.pages.study import parts, report_of
 from tests.analysis.small import grid, small_study
 from tests.reports.small import shown_by
 
