@@ -307,7 +307,9 @@ def test_the_readme_quotes_the_answer_of_its_command(
 @pytest.mark.slow
 def test_the_table_by_fleet_is_what_its_commands_print(capsys: pytest.CaptureFixture[str]) -> None:
     printed = table(POLICIES, "policy | I = 1")
-    by_fleet = [a for a in command_lines("dess") if "tour" in a and a[2].startswith("uavs=")]
+    by_fleet = [
+        a for a in command_lines("dess") if a[0] == "evaluate" and "tour" in a and "uavs=" in a[2]
+    ]
     assert len(by_fleet) == 3
     for column, arguments in enumerate(by_fleet):
         for row in evaluated(arguments, capsys):

@@ -36,7 +36,7 @@ A4 = 688
 BEYOND = """[...document.querySelectorAll("main *")].filter(
     e => e.checkVisibility() && e.getBoundingClientRect().right > {} + 1
 ).map(e => e.outerHTML.slice(0, 80))"""
-GALLERY = r'<div class="gallery">(.*?)</div>(?:<p class="note">(.*?)</p>)?'
+GALLERY = r'<div class="gallery">(.*?)</div>\s*(?:<p class="note">(.*?)</p>)?'
 # The drawings of every page of the small results.
 FIGURES = {
     "mission": 4,
