@@ -1,5 +1,6 @@
 """The command ``dess``, also as ``python -m dess``."""
 
+import os
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -20,4 +21,7 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    # ``python -m`` puts the working directory, which may be a results folder, first on the path.
+    if sys.path[0] == os.getcwd() != str(Path(__file__).absolute().parents[1]):
+        del sys.path[0]
     sys.exit(main())

@@ -66,7 +66,7 @@ def has_key(page: Path, key: str) -> bool:
 def _software() -> str:
     """A hash of the files of this package and of the versions of all libraries."""
     # In a checkout, the folders in it are links, which ``**`` does not follow.
-    folders = [PACKAGE, *(path for path in PACKAGE.iterdir() if path.is_symlink())]
+    folders = [PACKAGE, *(path for path in paths_in(PACKAGE) if path.is_symlink())]
     paths = [path for folder in folders for path in paths_in(folder, "**/*.*") if path.is_file()]
     files = sorted(
         (path.relative_to(PACKAGE).as_posix(), _hash(path))

@@ -96,7 +96,7 @@ ENDS = {
 @pytest.mark.parametrize("line", ENDS)
 def test_output_that_nobody_takes_ends_the_command_without_a_traceback(line):
     arguments, redirection = line.rsplit(" ", 1) if "|" not in line else line.split(" | ")
-    command = f"{sys.executable} -m reports {arguments}"
+    command = f"{sys.executable} -m dess {arguments}"
     pipe = "| (exec <&-; sleep 3)" if "|" in line else redirection
     script = f"{command} {pipe}; exit ${{PIPESTATUS[0]}}"
     variables = {k: v for k, v in environment().items() if k != "PYTHONUNBUFFERED"}

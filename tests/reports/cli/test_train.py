@@ -192,7 +192,7 @@ def test_ctrl_c_leaves_a_training_that_resumes_to_the_same_weights(dess, tmp_pat
     phases = [PHASES[0] | {"ticks": 40}, PHASES[1] | {"ticks": 300}]
     config = write_config(tmp_path, phases=phases, evaluate_every=100)
     arguments = ("train", "tiny.toml", "--device", "cpu", "--out")
-    command = [sys.executable, "-m", "reports", *arguments, "out"]
+    command = [sys.executable, "-m", "dess", *arguments, "out"]
     environment = {"PYTHONPATH": os.pathsep.join(sys.path), "OMP_NUM_THREADS": "1"}
     # A background job of a shell ignores SIGINT, and its children with it: not this one.
     heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)

@@ -77,9 +77,11 @@ def test_other_code_and_libraries_change_all_pages(
     if what == "library":
         monkeypatch.setattr(render.metadata, "distributions", list)
     else:
-        root = shutil.copytree(render.PACKAGES / "reports", tmp_path / "code" / "reports").parent
-        (root / "reports" / "templates" / "style.css").write_text("")
-        monkeypatch.setattr(render, "PACKAGES", root)
+        shutil.copytree(render.PACKAGE / "reports", tmp_path / "reports")
+        (tmp_path / "reports/templates/style.css").write_text("")
+        (tmp_path / "dess").mkdir()
+        (tmp_path / "dess/reports").symlink_to("../reports")
+        monkeypatch.setattr(render, "PACKAGE", tmp_path / "dess")
     assert folder.render() == {"mission", "scorecard"}
     render._software.cache_clear()
 

@@ -286,7 +286,7 @@ def test_processes_of_a_command_import_nothing_of_the_working_directory(
 
 def test_the_command_imports_nothing_of_the_working_directory(trap: Path) -> None:
     variables = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
-    command = [sys.executable, "-m", "reports", "--version"]
+    command = [sys.executable, "-m", "dess", "--version"]
     subprocess.run(command, cwd=trap, check=True, env=variables)
     assert not (trap / "hit").exists()
 
