@@ -18,8 +18,18 @@ import numpy as np
 from dess.code.kernels import inlined, kernel
 from dess.guard import guard, must_charge
 from dess.policies.heuristics import step_towards
-from dess.policies.planner.fluid import CRAFT, MOST_SLOTS, begin, fly
-from dess.policies.planner.plan import CHARGE, MOST_WAYPOINTS, WAYPOINT, Plan, insert, remove
+from dess.policies.planner.fluid import (
+    CHARGE,
+    CRAFT,
+    MOST_SLOTS,
+    MOST_WAYPOINTS,
+    WAYPOINT,
+    Plan,
+    begin,
+    fly,
+    insert,
+    remove,
+)
 from dess.policies.planner.rates import rates_of
 from dess.policies.planner.search import TRIED, empty_workspace, improve
 from dess.state import HOVER, STEP_X, State

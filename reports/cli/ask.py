@@ -27,7 +27,7 @@ from dess.reports.cli.options import (
 )
 from dess.reports.cli.report import WHAT_IF, rendering
 from dess.reports.cli.studies import print_plan
-from dess.reports.folders import PREFIX, check_pages
+from dess.reports.pages import PREFIX, check_pages
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -15,7 +15,7 @@ from dess.analysis.study.design import (
     Saltelli,
 )
 from dess.errors import validation_line
-from dess.files.parsing import parse_toml
+from dess.files.reading import parse_toml
 from dess.scenario import load_scenario
 from dess.sea.families import seas_of
 from dess.streams import MAX_REPLICATION, MAX_SEED
