@@ -29,14 +29,7 @@ from PIL import Image
 from dess import InputError
 from dess.analysis.figures import missions, style
 from dess.analysis.figures.style import node_colours, uav_colours
-from dess.analysis.results.event_log import (
-    Events,
-    ages,
-    battery_levels,
-    mean_age,
-    residual_data,
-    uav_slots,
-)
+from dess.analysis.results import event_log
 from dess.reports.pages.html import Part, figures, template
 from dess.scenario import Scenario
 
@@ -54,7 +47,7 @@ class Playback:
             mission has ended.
     """
 
-    def __init__(self, events: Events, scenario: Scenario):
+    def __init__(self, events: event_log.Events, scenario: Scenario):
         """Compute the states.
 
         Raises:
@@ -63,14 +56,14 @@ class Playback:
         self._log, self.scenario = pd.DataFrame(events), scenario
         _check(self._log, scenario)
         # Residual data may be -1e-16.
-        self.residual = residual_data(self._log).clip(lower=0).to_numpy()
+        self.residual = event_log.residual_data(self._log).clip(lower=0).to_numpy()
         self.end = len(self.residual) - 1
         self.fleet = self._fleet()
         self.uav_colours = uav_colours(scenario.uavs)
         self.node_colours = node_colours(len(scenario.nodes))
 
     def _fleet(self) -> dict[str, np.ndarray]:
-        slots, levels = uav_slots(self._log), battery_levels(self._log)
+        slots, levels = event_log.uav_slots(self._log), event_log.battery_levels(self._log)
         first = slots.groupby("uav", as_index=False).first()
         full = levels.groupby("uav")["battery"].first().to_numpy()
         absent = {"node": -1, "charging": False, "waiting": False}
@@ -110,8 +103,8 @@ class Playback:
             "fleet": {name: (1 * values).tolist() for name, values in self.fleet.items()},
             "residual": self.residual.round(2).tolist(),
             "status": [self.status(slot) for slot in range(self.end + 1)],
-            "ages": ages(log).round(2).to_numpy().tolist() if aged else None,
-            "meanAge": mean_age(log).round(2).to_numpy().tolist() if aged else None,
+            "ages": event_log.ages(log).round(2).to_numpy().tolist() if aged else None,
+            "meanAge": event_log.mean_age(log).round(2).to_numpy().tolist() if aged else None,
         }
 
 
@@ -158,7 +151,7 @@ def together(players: Iterable[Part]) -> Part:
 
 
 def player(
-    events: Events, scenario: Scenario, name: str, title: str = "", caption: str = ""
+    events: event_log.Events, scenario: Scenario, name: str, title: str = "", caption: str = ""
 ) -> Part:
     """A player of a mission: it can be played, paused and shown slot by slot.
 
@@ -187,7 +180,7 @@ NODE_SIZE, UAV_SIZE, PAD_SIZE = 20, 12, 17  # diameters, and the side of a squar
 
 
 def write_animation(
-    events: Events, scenario: Scenario, file: str | Path, kind: str, title: str = ""
+    events: event_log.Events, scenario: Scenario, file: str | Path, kind: str, title: str = ""
 ) -> None:
     """Write a mission as an animation; the same mission gives the same bytes of a GIF.
 
@@ -270,7 +263,7 @@ class Film:
         InputError: If the log is not that of a whole mission of this scenario.
     """
 
-    def __init__(self, events: Events, scenario: Scenario, title: str = ""):
+    def __init__(self, events: event_log.Events, scenario: Scenario, title: str = ""):
         self.playback = Playback(events, scenario)
         self.end, curves = self.playback.end, missions.curves(scenario)
         self.figure = Figure(figsize=(WIDTH / DPI, HEIGHT * len(curves) / DPI), dpi=DPI)

@@ -66,16 +66,14 @@ MAY_RUN_FILES = {
     "dess.policies.load_team": set(),
     "dess.policies.registry.about": {"dess.reports.cli.lists"},
     "dess.analysis.execution.evaluation.evaluate": {"dess.analysis"},
-    "dess.analysis.ask.question.sweep_question": {
-        "dess.analysis.ask.answer",
-        "dess.reports.cli.ask",
+    **{
+        f"dess.analysis.ask.question.{name}_question": {
+            *(f"dess.analysis.ask.{name}", "dess.reports.cli.ask"),
+        }
+        for name in ("sweep", "what_if")
     },
-    "dess.analysis.ask.question.what_if_question": {
-        "dess.analysis.ask.answer",
-        "dess.reports.cli.ask",
-    },
-    "dess.analysis.ask.answer.sweep": {"dess.analysis"},
-    "dess.analysis.ask.answer.what_if": {"dess.analysis"},
+    "dess.analysis.ask.sweep.sweep": {"dess.analysis"},
+    "dess.analysis.ask.what_if.what_if": {"dess.analysis"},
     **{f"dess.analysis.{name}": set() for name in ("evaluate", "sweep", "what_if")},
 }
 

@@ -20,14 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess import InputError, rules
-from dess.analysis.bound.paths import (
-    Phases,
-    blocks_of,
-    bound_paths,
-    early_charges,
-    most_flying,
-    phases_of,
-)
+from dess.analysis.bound import paths
 from dess.analysis.bound.service import POINTS, rates_of, spread, step_values
 from dess.analysis.bound.slopes import add_slopes
 from dess.channel import empty_scratch, world_of
@@ -135,7 +128,7 @@ class Known(NamedTuple):
     nodes: np.ndarray
     rates: np.ndarray
     below: np.ndarray
-    phases: Phases
+    phases: paths.Phases
     zones: np.ndarray
     to_zone: np.ndarray
 
@@ -180,9 +173,9 @@ def check_scenario(scenario: ScenarioSpace) -> None:
 
 def ceilings_memory(scenario: ScenarioSpace, detail: Detail) -> int:
     """The memory [bytes] of ``Bounds.ceilings`` in the mission that takes the most."""
-    slots, near = most_flying(scenario), min(detail.near, max(len(scenario.nodes) - 1, 1))
+    slots, near = paths.most_flying(scenario), min(detail.near, max(len(scenario.nodes) - 1, 1))
     battery = scenario.flying_time[0], scenario.charge_start[1], scenario.charge_complete[0]
-    phases = 2 + len(early_charges(slots, *battery)) if scenario.flight_cost else 1
+    phases = 2 + len(paths.early_charges(slots, *battery)) if scenario.flight_cost else 1
     return math.prod(_shape(slots, phases, scenario.size, near, detail)) * np.dtype(float).itemsize
 
 
@@ -197,7 +190,7 @@ def _shape(
 def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
     """What seed and replication tell of a mission."""
     sampled = sample_scenario(scenario, seed, replication)
-    phases = phases_of(sampled)
+    phases = paths.phases_of(sampled)
     state = state_of([scenario], 1)
     rules.launch(state, 0, starts_of([scenario], seed), 0, replication)
     record = state.missions[0]
@@ -234,7 +227,7 @@ class Bounds:
     def __init__(self, known: Known, detail: Detail):
         self.known = known
         size, (phases, slots) = known.to_zone.shape, known.phases.clock.shape
-        self.blocks = blocks_of(known.nodes, size, detail.near, np.array(detail.levels))
+        self.blocks = paths.blocks_of(known.nodes, size, detail.near, np.array(detail.levels))
         self.parts = np.array(detail.local)
         last = int(known.phases.clock.max())
         inner = np.array([int(part * last) for part in detail.cuts], np.int64)
@@ -254,7 +247,7 @@ class Bounds:
         service = (known.nodes, known.rates, known.below)
         step_values(worth, local, known.nodes, self.blocks.home, *service[1:], self.values)
         before = (known.to_zone, known.phases, data, self.period, self.blocks, local)
-        bound_paths(*before, self.values, waiting, self.ceilings)
+        paths.bound_paths(*before, self.values, waiting, self.ceilings)
         bound = total + (prices[:-1] * data[cuts]).sum()
         slope, takings = np.zeros(prices.shape), np.zeros(prices.shape)
         slope[:-1] = data[cuts]

@@ -19,8 +19,8 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from dess import InputError
+from dess.analysis.execution import live_and_die_with
 from dess.analysis.execution.jobs import Job, Problem, Progress, attempt, first_failing
-from dess.analysis.execution.orphans import live_and_die_with
 from dess.analysis.results.provenance import Member, engine_code
 from dess.code.libraries import needs
 

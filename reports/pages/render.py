@@ -26,20 +26,10 @@ from dess.analysis.results.manifest import Manifest
 from dess.files.documents import LIMIT
 from dess.files.reading import paths_in, read_bytes
 from dess.files.writing import delete, locked, write_files
-from dess.reports.pages import INDEX, LOCK, PREFIX, check_pages, html, kernels
+from dess.reports.pages import INDEX, LOCK, PREFIX, check_pages, html, kernels, notebook
 from dess.reports.pages.body import page_of
 from dess.reports.pages.html import fill, template
 from dess.reports.pages.kernels import Progress
-from dess.reports.pages.notebook import (
-    GROUPS,
-    SCORECARD,
-    SHIPPED,
-    Report,
-    check_parameters,
-    names_in,
-    read,
-    with_paths,
-)
 from dess.reports.pages.page import FILES, Page
 from dess.reports.pages.study import report_of
 
@@ -61,7 +51,7 @@ def index_of(
         left_out: Titles of reports whose results are missing, with the commands that make these.
     """
     cards = {name: pages[name].card for name in in_order(pages)}
-    scorecard = cards.get(f"{SCORECARD}.html")
+    scorecard = cards.get(f"{notebook.SCORECARD}.html")
     shown = Page("".join(pages[name].text for name in cards))
     return fill(
         INDEX,
@@ -70,7 +60,7 @@ def index_of(
             (text, page) for page, text in TILES.items() if page in cards and cards[page].number
         ],
         picture=scorecard and scorecard.picture,
-        groups=[(head, names) for head in GROUPS if (names := in_order(pages, head))],
+        groups=[(head, names) for head in notebook.GROUPS if (names := in_order(pages, head))],
         left_out=left_out,
         origins=Markup(html.carrying(shown.evidence, shown.hidden(FILES)).data),
     )
@@ -81,9 +71,11 @@ def in_order(pages: Iterable[str], group: str | None = None) -> list[str]:
     known = {*pages}
     studies = sorted(name for name in known if _OF_STUDY.fullmatch(name))
     order = []
-    for heading, names in GROUPS.items():
+    for heading, names in notebook.GROUPS.items():
         if group in (None, heading):
-            order += [*(studies if heading == [*GROUPS][0] else ()), *(f"{n}.html" for n in names)]
+            if heading == next(iter(notebook.GROUPS)):
+                order += studies
+            order += [f"{name}.html" for name in names]
     return [name for name in order if name in known]
 
 
@@ -124,7 +116,7 @@ log = logging.getLogger(__name__)
 PACKAGE = Path(__file__).parents[2]  # dess
 
 
-def key_of(report: Report, studies: Mapping[str, Path]) -> str:
+def key_of(report: notebook.Report, studies: Mapping[str, Path]) -> str:
     """The key of a page whose notebook has its default parameters.
 
     Args:
@@ -180,7 +172,7 @@ def render(
     out: str | Path,
     progress: Progress | None = None,
     parameters: Mapping[str, Any] | None = None,
-    notebooks: Path = SHIPPED,
+    notebooks: Path = notebook.SHIPPED,
 ) -> Path:
     """Run reports on the results of studies and write their pages, their notebooks and an index.
 
@@ -207,10 +199,10 @@ def render(
             up to the cell that failed.
     """
     results, out, given = Path(results), Path(out), parameters or {}
-    values = {name: with_paths(value, os.path.abspath) for name, value in given.items()}
+    values = {name: notebook.with_paths(value, os.path.abspath) for name, value in given.items()}
     asked = [*dict.fromkeys(names)]
-    reports = [read(name, notebooks) for name in asked or names_in(notebooks)]
-    check_parameters(reports, values)
+    reports = [notebook.read(name, notebooks) for name in asked or notebook.names_in(notebooks)]
+    notebook.check_parameters(reports, values)
     lacking = {report.name: _lacking(report, results) for report in reports}
     for name, errors in lacking.items():
         for error in errors.values():
@@ -249,14 +241,14 @@ def render_study(
     """
     folder, out, values = Path(folder), Path(out), parameters or {}
     report = report_of(folder, values)
-    check_parameters([report], values)
+    notebook.check_parameters([report], values)
     report.set({"results": str(folder.absolute()), **values})
     _write([report], folder, out, progress, values)
     return out / report.page
 
 
 def _write(
-    reports: Sequence[Report],
+    reports: Sequence[notebook.Report],
     results: Path,
     out: Path,
     progress: Progress | None,
@@ -287,14 +279,14 @@ def _write(
         raise ReportError("; ".join(lines))
 
 
-def _folders(report: Report, results: Path) -> dict[str, Path]:
+def _folders(report: notebook.Report, results: Path) -> dict[str, Path]:
     """The results folders that a report reads, by name."""
     found = (paths_in(results, f"{name}/{MANIFEST}") for name in report.optional)
     others = [path.parent.name for paths in found for path in paths]
     return {name: results / name for name in (*report.studies, *others)}
 
 
-def _lacking(report: Report, results: Path) -> dict[str, InputError]:
+def _lacking(report: notebook.Report, results: Path) -> dict[str, InputError]:
     """The results that a report lacks: the command that makes them, and what is wrong."""
     errors = {}
     for study in report.studies:

@@ -7,13 +7,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from scipy.stats import qmc
 
 from dess import InputError
-from dess.analysis.study.design import (
-    MAX_SIZE,
-    Design,
-    Grid,
-    LatinHypercube,
-    Saltelli,
-)
+from dess.analysis.study.design import MAX_SIZE, Design, Grid, LatinHypercube, Saltelli
 from dess.errors import validation_line
 from dess.files.reading import parse_toml
 from dess.scenario import load_scenario
