@@ -56,33 +56,6 @@ def test_each_condition_has_a_front_of_its_own(fixed, metric):
         assert rows["probability"].sum() >= 1
 
 
-def test_the_answer_says_why_no_cheaper_fleet_will_do(searched, monkeypatch):
-    """The rows are made by hand, on the frame of the study, whose guarantee is left out."""
-    monkeypatch.setattr(costs, "_trust", lambda *_: "")
-    table = costs.judged(searched)
-    one = table[(table["condition"] == "communication quota 60") & (table["policy"] == "greedy")]
-    one = one.iloc[:3].assign(
-        fleet=["1 UAV", "2 UAVs", "3 UAVs"],
-        cost=[21_000.0, 48_000.0, 69_000.0],
-        success=[0.5, 0.71, 0.997],
-        success_low=[0.4, 0.66, 0.991],
-        success_high=[0.6, 0.76, 0.999],
-        verdict=["missed", "missed", "met"],
-        selected=[False, False, True],
-    )
-    (text,) = costs.answers(searched, one)
-    assert text == (
-        "Communication quota 60, `greedy`: the cheapest setting that meets the requirements is "
-        "**3 UAVs** for 69,000 EUR with success 99.7 % [99.1, 99.9] (80 % required). The next "
-        "cheaper one, **2 UAVs** for 48,000 EUR with success 71.0 % [66.0, 76.0] (80 % required), "
-        "misses the requirements."
-    )
-    (text,) = costs.answers(searched, one.assign(verdict="open", selected=False))
-    assert "no setting is known to meet the requirements. The closest one, **3 UAVs** for" in text
-    (text,) = costs.answers(searched, one.iloc[2:])
-    assert text.endswith("(80 % required).")  # no setting is cheaper
-
-
 def test_a_search_is_kept_told_and_checked(searched):
     manifest, table = searched.store.manifest, costs.judged(searched)
     selections = summary.selections(searched)

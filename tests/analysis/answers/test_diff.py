@@ -155,12 +155,6 @@ def test_a_record_of_a_uav_that_differs_is_found(field, value, results):
     assert mission.fields == f"uav {field}"
 
 
-def test_a_uav_that_is_missing_is_a_difference(results):
-    found = diff(results, replace(results, uavs=results.uavs[:-1]))
-    (mission,) = found.changed.itertuples()
-    assert (mission.policy_a, mission.point_a, mission.replication) == ("random", 1, 9)
-
-
 def test_design_points_are_matched_by_their_scenarios(results, tmp_path):
     """Whatever their numbers, and which of their fields the design sets."""
     other = results_of(tmp_path, "other", design=grid(quota=[60, 40]), missions=6)
@@ -175,20 +169,6 @@ def test_design_points_are_matched_by_their_scenarios(results, tmp_path):
         ("A", "policy random at communication quota 60, replications 6 to 9", 4),
         ("B", "communication quota 40", 12),
     ]
-
-
-def test_single_policies_are_compared_whatever_their_names(tmp_path, installed):
-    """Two trainings, say."""
-    installed(5)
-    a = results_of(tmp_path, "a", policies=["steady"])
-    b = results_of(tmp_path, "b", policies=["other"])
-    assert diff(a, b).identical
-    c = results_of(tmp_path, "c", policies=["greedy"])
-    found = diff(a, c)
-    assert len(found.changed) == 10
-    row = most_changed(found, 1).iloc[0]
-    assert "--policy steady" in row["command_a"]
-    assert "--policy greedy" in row["command_b"]
 
 
 def test_equal_design_points_count_once(results, tmp_path):

@@ -54,28 +54,6 @@ def test_intervals_of_shares_end_where_these_do() -> None:
     assert (base["new_low"], base["new_high"]) == (0.0, 1.0)
 
 
-def test_the_ablation_shows_trainings_means_and_intervals() -> None:
-    """Of three trainings, of one, and of two that came to nothing."""
-    ended = finals(base=[0.7, 0.8, 0.75], once=[0.6], lost=[0.0, 0.0])
-    table = learning.ablation(ended, "base")
-    (ax,) = learning.variants(table, ended, "base", "").figure.axes
-    dots = {a.get_gid(): a.get_offsets()[:, 0].tolist() for a in ax.collections if a.get_gid()}
-    assert dots == {"base": [0.7, 0.8, 0.75], "once": [0.6]}
-    (bar,) = ax.containers  # one training has no interval
-    base = table.iloc[0]
-    assert bar.lines[0].get_xdata() == pytest.approx([base["mean"]])
-    ends = bar.lines[2][0].get_segments()[0][:, 0]
-    assert ends == pytest.approx([base["low"], base["high"]])
-    marks = {line.get_gid(): line for line in ax.lines if line.get_gid()}
-    assert {*marks} == {"lost", "baseline"} and marks["lost"].get_marker() == "<"
-    assert set(marks["baseline"].get_xdata()) == {base["mean"]}
-    left, right = ax.get_xlim()
-    assert 0 < left < base["low"] < base["high"] < right
-    notes = [text.get_text() for text in ax.texts]
-    assert notes == ["75.0%, n = 3", "60.0%, n = 1", "0.0%, n = 2"]
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["base", "once", "lost"]
-
-
 METRIC = "evaluation_reward"
 STEPS = [1000, 2000, 3000, 4000]
 
@@ -170,13 +148,6 @@ def test_transfer_is_judged_by_the_interval_of_the_end(using, without, level, ve
     averages = learning.smoothed(both, METRIC)
     short = learning.transfer(averages, "with", "without", shortest=STEPS[-1] + 1)
     assert (short.verdict, short.length) == (INCONCLUSIVE, STEPS[-1])
-
-
-def test_trainings_that_all_agree_have_no_interval():
-    key, equal = ("equal", learning.LEARNED_PRODUCT), compared([0.5, 0.5], [0.5, 0.5])
-    (row,) = learning.transfer_table({key: equal}, {key: HOLDS}).to_numpy().tolist()
-    assert row[:2] == ["Equal", "2 and 2"]
-    assert row[4:] == ["ends below, or level", "0.0, the same in all trainings"]
 
 
 Change = Callable[[pd.DataFrame], Any]

@@ -3,11 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from dess import load_scenario
-from dess.analysis import numbers, run_study
+from dess.analysis import run_study
 from dess.analysis.answers import planner
 from dess.analysis.answers.optimality import ALL
 from dess.analysis.bound import Bound
@@ -50,18 +48,6 @@ def test_the_answer_says_which_is_better_and_by_how_much(results):
     assert planner.answer(turned, "greedy")[0].startswith("The learner is better: the product")
     text, _ = planner.answer(table.assign(low=-0.01), "greedy")
     assert text.startswith("The missions do not tell which is better")
-
-
-def test_differences_are_beside_each_other_by_fleet() -> None:
-    table = pd.DataFrame(
-        {"policy": [*"aabb"], "uavs": [1, ALL] * 2, "baseline": "c", "metric": PRODUCT, "n": 9}
-        | {"difference": [0.1, 0.2, 0.3, 0.4], "low": 0.0, "high": 0.5}
-    )
-    (ax,) = planner.by_fleet(table).figure.axes
-    drawn = [bar.lines[0].get_ydata().tolist() for bar in ax.containers]
-    assert drawn == [[0.1, 0.2], [0.3, 0.4]]
-    assert [label.get_text() for label in ax.get_xticklabels()] == ["1 UAV", "all"]
-    assert ax.get_title(loc="left") == "Difference from c (paired)"
 
 
 def test_coverage_is_what_the_logs_say_was_collected(results):
@@ -110,15 +96,3 @@ def test_the_plan_begins_where_the_uavs_start(results, monkeypatch):
     assert len(cells) and cells.min() >= 0 and cells.max() < 8
     unplanned = planner.plan(results, mission)
     assert not any("plan" in str(line.get_gid()) for line in unplanned.figure.axes[0].lines)
-
-
-@pytest.mark.parametrize("signed", [False, True])
-def test_values_are_written_at_the_nodes_in_the_colour_of_their_sign(signed):
-    space, values = load_scenario("paper"), np.linspace(-1.0 * signed, 0.96, 25)
-    (ax,) = planner.node_map(space, "Values", values, signed, "{:.2f}".format).axes
-    shown = [numbers.difference(v, 0) if signed else f"{v:.2f}" for v in values]
-    assert [text.get_text() for text in ax.texts] == shown
-    assert [text.xy for text in ax.texts] == [*space.nodes]
-    (nodes,) = ax.collections
-    red, _, blue, _ = np.transpose(nodes.to_rgba(nodes.get_array()))
-    assert np.array_equal(blue > red, values > 0) or not signed

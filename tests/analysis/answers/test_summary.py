@@ -1,7 +1,5 @@
 """The summary of a study: tables of means, comparisons, selections and the worst missions."""
 
-import json
-import shlex
 import warnings
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,15 +11,12 @@ import pytest
 from dess import InputError
 from dess.analysis import run_study
 from dess.analysis.answers import summary
-from dess.analysis.answers.summary import index_table, sensitivity
-from dess.analysis.figures.settings import sensitivity as figure
-from dess.analysis.metrics import PRODUCT, RATIO
-from dess.analysis.numbers import why_nan
+from dess.analysis.answers.summary import sensitivity
+from dess.analysis.metrics import PRODUCT
 from dess.analysis.study.design import Saltelli
 from dess.policies import load
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.trained import save_policy
-from dess.reports import cli
 from tests.analysis.small import grid, small_study, write_scenario
 from tests.policies.learner.tiny import CPU, PHASES, tiny
 
@@ -80,25 +75,6 @@ def test_known_shares_of_parameters_and_noise(case):
         assert (high - low < 0.25).all()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("case", KNOWN)
-def test_intervals_cover_what_they_claim(case):
-    function, *truths = KNOWN[case]
-    level, runs = 0.95, 300
-    hits = np.zeros((2, len(truths[0])))
-    for seed in range(runs):
-        design = unit(len(truths[0]) - 1, base=256, seed=seed)
-        missions = evaluated(design, y=function)
-        table = sensitivity(design, missions, ["y"])
-        for row, (index, truth) in enumerate(zip(("first", "total"), truths, strict=True)):
-            hits[row] += (table[f"{index}_low"] <= truth) & (truth <= table[f"{index}_high"])
-    # Four standard errors of the binomial. Intervals of smooth parameters are wider than need be:
-    # the design is more even than the resamples know. The noise has no such help.
-    error = 4 * np.sqrt(level * (1 - level) / runs)
-    assert (hits / runs > level - error).all()
-    assert hits[0, -1] / runs < level + error
-
-
 def test_a_metric_without_variance_has_no_shares():
     design = unit(2, base=16)
     missions = evaluated(
@@ -140,17 +116,6 @@ def test_indices_depend_on_nothing_else():
     np.random.seed(2)
     both = sensitivity(design, missions, ["other", "y"])
     pd.testing.assert_frame_equal(alone, both.iloc[2:].reset_index(drop=True))
-
-
-def test_the_indices_of_a_constant_metric_are_nan_in_its_table_and_its_figure():
-    design = unit(1, 4)
-    missions = evaluated(design, **{RATIO: lambda x, noise: np.full_like(x, 0.5)})
-    table = sensitivity(design, missions, [RATIO]).assign(policy="tour")
-    shown = index_table(table).cells
-    assert len(shown) == 2
-    assert {*shown["Alone"]} == {"nan % [nan, nan]"}
-    assert why_nan(shown.to_numpy().flat).startswith("nan: ")
-    assert figure(table, "tour").axes
 
 
 @pytest.fixture(scope="module")
@@ -196,14 +161,6 @@ def test_targets_are_met_by_the_lower_end():
     assert [*zip(left["policy"], left["point"], strict=True)] == [("a", 0), ("b", 0)] * 2
     assert summary.meeting(table, {PRODUCT: 0.9, "success": 0.6})["policy"].tolist() == ["b"] * 2
     assert summary.meeting(table, {}).equals(table)
-
-
-def test_the_command_of_a_mission_gives_its_row(results, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    worst = summary.worst(results, "random", 1, folder=results.store.folder).iloc[0]
-    assert cli.main([*shlex.split(worst["command"])[1:], "--json"]) == 0
-    printed = json.loads(capsys.readouterr().out)
-    assert printed["collection_ratio"] == worst["collection_ratio"]
 
 
 def test_policies_are_ranked_by_the_mean_over_design_points():
@@ -280,12 +237,3 @@ def test_the_selected_point_and_its_check(tmp_path):
     rewards = results.checks.query("policy == 'greedy'")["reward"]
     assert checks.loc[("greedy", "reward"), "mean"] == pytest.approx(np.mean(rewards))
     assert summary.comparisons(results).empty  # each policy has missions of its own
-
-
-def test_with_one_policy_there_is_no_comparison(tmp_path):
-    design = grid(initial_data=[5, [5, 7.5]])
-    study = small_study(tmp_path, policies=["greedy"], missions=1, design=design)
-    results = run_study(study, tmp_path / "out")
-    assert summary.comparisons(results).empty
-    assert summary.learned_against_heuristic(results).empty
-    assert summary.selections(results).empty

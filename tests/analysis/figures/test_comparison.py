@@ -4,36 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess.analysis.ask import answer
 from dess.analysis.figures import comparison
-from dess.analysis.metrics import BOUND, METRICS, PRODUCT
-from tests.analysis.answers.test_comparison import drawn_interval
-from tests.analysis.small import asked
-
-POLICIES = ["random", "greedy"]
-
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    return asked(tmp_path_factory.mktemp("what-if"), 5).results
-
-
-def test_figures_show_the_means_and_the_gains(results):
-    table, answers = answer.means(results), answer.answers(results)
-    sides = ["baseline\nuavs 2\npads 6", "variation\nuavs 6\npads 1"]
-    for metric in METRICS:
-        (ax,) = comparison.means(table, metric, sides).axes
-        ticks = [tick.get_text() for tick in ax.get_xticklabels()]
-        assert ticks == sides
-        for bar, policy in zip(ax.containers, POLICIES, strict=True):
-            own = table[(table["metric"] == metric) & (table["policy"] == policy)]
-            assert bar.lines[0].get_ydata() == pytest.approx(own["mean"])
-            assert drawn_interval(bar, 1) == pytest.approx(own[["low", "high"]].to_numpy())
-    (ax,) = comparison.gains(answers).axes
-    for bar, policy in zip(ax.containers, POLICIES, strict=True):
-        own = answers[answers["policy"] == policy].set_index("metric").loc[[*METRICS]]
-        assert bar.lines[0].get_ydata() == pytest.approx(own["difference"])
-        assert drawn_interval(bar, 1) == pytest.approx(own[["low", "high"]].to_numpy())
+from dess.analysis.metrics import BOUND, PRODUCT
 
 
 def test_the_spread_is_the_share_of_missions_up_to_a_difference():

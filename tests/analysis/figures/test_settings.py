@@ -158,18 +158,6 @@ def test_performance_shows_means_intervals_and_the_printed_figure(metric: str = 
     assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first on top
 
 
-def test_by_fleet_shows_a_curve_per_policy_and_the_printed_ones() -> None:
-    table = summary({"policy": ["one"] * 3 + ["two"] * 3, "uavs": [1, 2, 3] * 2})
-    (ax,) = figures.by_fleet(table, "success", {3: 0.9, 1: 0.5}).axes
-    rows = table[table["metric"] == "success"]
-    assert len(ax.containers) == 2
-    for bar, (_, means) in zip(ax.containers, rows.groupby("policy", sort=False), strict=True):
-        assert bar.lines[0].get_ydata() == pytest.approx(means["mean"])
-        assert [round(x) for x in bar.lines[0].get_xdata()] == [1, 2, 3]
-    (printed,) = (line for line in ax.lines if line.get_label() == "paper")
-    assert (list(printed.get_xdata()), list(printed.get_ydata())) == ([1, 3], [0.5, 0.9])
-
-
 VALUES = {"initial_data": ["5–7.5", "7.5–10", "10–12.5"], "uavs": ["1", "2"]}
 CHANGES = {"mine": pairs_of([0.1, -0.2]), "other": pairs_of([0.05, 0.01])}
 POLICIES = ["third", "mine", "other"]
@@ -205,14 +193,6 @@ def test_the_last_panel_shows_the_changes_from_the_first_value(panels):
     ticks = [label.get_text() for label in panels[-1].get_xticklabels()]
     assert ticks == VALUES["initial_data"]
     assert panels[-1].get_xlabel() == "Initial data per node [data units]"
-
-
-def test_a_policy_keeps_its_colour_whoever_else_is_drawn(table, panels):
-    alone = table[table["policy"] == "other"]
-    changes = {"other": CHANGES["other"]}
-    other = figures.effect(alone, "initial_data", changes, POLICIES).axes[0]
-    (mine,) = other.containers
-    assert mine.lines[0].get_color() == panels[0].containers[1].lines[0].get_color()
 
 
 @pytest.fixture

@@ -97,16 +97,6 @@ def test_ages_of_a_log_are_those_of_the_record_and_those_that_policies_see(
     assert of_nodes.loc[duration(log)].mean() == pytest.approx(age[-1], abs=1e-9)
 
 
-def test_packets_of_nodes_that_begin_empty_have_ages() -> None:
-    space = dess.load_scenario("paper", initial_data=0, arrivals={"process": "continuous"}, uavs=3)
-    witness = _Witness()
-    record = dess.simulate(space, witness, 3, events=True)
-    of_nodes = ages(pd.DataFrame(record.events.columns()))
-    assert (of_nodes.loc[[*witness.seen]] % 1 > 0).any(axis=None)  # a packet was delivered
-    for slot, seen in witness.seen.items():
-        assert np.allclose(of_nodes.loc[slot], seen, rtol=0, atol=1e-9)
-
-
 def test_the_node_of_a_slot_is_the_one_served_most_and_last() -> None:
     log = {
         "time": [0, 0, 0, 0.25, 0.5, 0.75, 1.0, 1, 1.25, 1.5, 1.75, 2.0, 2, 3],

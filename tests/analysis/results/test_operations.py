@@ -7,10 +7,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from dess import load_scenario, simulate_batch
+from dess import simulate_batch
 from dess.analysis import run_study, summary
-from dess.analysis.execution.evaluation import Asked, means
-from dess.analysis.metrics import MEASURES, measured_in
+from dess.analysis.metrics import measured_in
 from dess.analysis.results.resimulate import difference, recorded, resimulate
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import interval_of
@@ -74,17 +73,6 @@ def test_missions_without_a_value_are_left_out_of_means_and_comparisons(results)
     assert ("greedy", 0, "failures") not in rows.index  # nothing can fail there
     table = compare(missions[missions["point"] == 1], "greedy", ["queue"])
     assert table["n"].tolist() == [9]
-
-
-def test_evaluations_have_them_beside_the_metrics_of_the_paper():
-    space = load_scenario("paper", quota=30, **MEASURED)
-    found = means(Asked(space, "greedy", 20, 5))
-    records = simulate_batch(space, load("greedy"), 5, 20).operations
-    for name in ("age", "peak_age", "utilisation"):
-        values = records[name][~np.isnan(records[name])]
-        assert found.moments[name].interval(name) == interval_of(name, values)
-    assert "latency" not in found.moments
-    assert not {*means(Asked(load_scenario("paper", quota=30), "greedy", 5)).moments} & {*MEASURES}
 
 
 def test_tables_of_sections_are_fields_of_a_study(tmp_path):

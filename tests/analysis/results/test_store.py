@@ -167,17 +167,6 @@ def test_a_policy_depends_on_the_modules_of_what_it_holds():
     assert "dess.policies.learner.training" not in learned
 
 
-def test_an_output_that_cannot_be_written(tmp_path):
-    study = small_study(tmp_path)
-    before = files_of(tmp_path)
-    for path in (tmp_path / "trial.toml", tmp_path / "trial.toml" / "out"):
-        with pytest.raises(InputError, match=f"{path}: cannot be written"):
-            run_study(study, path)
-    with pytest.raises(InputError, match="holds other files and no manifest.json"):
-        run_study(study, tmp_path)
-    assert files_of(tmp_path) == before
-
-
 def test_two_runs_of_one_folder_at_once(tmp_path):
     study = small_study(tmp_path)
     with Store.open(study, tmp_path / "out"):

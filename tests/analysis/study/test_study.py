@@ -8,8 +8,8 @@ import tomli_w
 from pydantic import ValidationError
 
 from dess import InputError, load_scenario
-from dess.analysis import load_study, run_study, study_names
-from dess.analysis.study.study import Study, budget_of
+from dess.analysis import load_study, run_study
+from dess.analysis.study.study import Study
 from dess.policies.registry import TypedByUser, load_team
 from tests.analysis.small import grid, small_study, write_scenario
 
@@ -21,19 +21,6 @@ def test_a_study_takes_the_engine_that_one_of_its_points_needs(tmp_path):
     assert small_study(tmp_path, design=design, engine="events").engine == "events"
     with pytest.raises(InputError, match=r"arrivals\.process: continuous needs the SimPy engine"):
         small_study(tmp_path, design=design, engine="batch")
-
-
-def test_the_shipped_studies():
-    studies = {name: load_study(name) for name in study_names()}
-    assert [study.name for study in studies.values()] == [*studies]
-    kinds = {study.design.kind for study in studies.values() if study.design}
-    assert kinds == {"grid", "one-at-a-time", "seas", "latin-hypercube", "saltelli"}
-    assert any(study.precision for study in studies.values())
-    rules = [study.selection for study in studies.values()]
-    assert {rule.procedure for rule in rules if rule} == {"kn", "kn-bounded"}
-    table4, fig4 = studies["table4"], studies["fig4"]
-    assert (table4.scenario, table4.missions, table4.seed) == ("paper", 1000, 2022)
-    assert [space.uavs for space in fig4.scenarios] == [(1, 1), (2, 2), (3, 3)]
 
 
 def test_teams_are_written_alike(tmp_path):
@@ -135,16 +122,6 @@ def test_fewer_missions_than_event_logs_keep_a_log_each():
     assert load_study("fig4", missions=logged).logged == logged
     with pytest.raises(InputError, match="logged: 3 is more than the missions"):
         load_study("fig4", missions=2, logged=3)
-
-
-def test_the_budget_says_what_differs_from_the_shipped_study(tmp_path):
-    few = load_study("fig5", missions=3, policies=["greedy"])
-    others = load_study("fig5", seed=3, policies=["greedy", "greedy,tour"])
-    words = [budget_of(study) for study in (load_study("fig5"), few, others)]
-    assert words[0] == "full"
-    assert words[1] == "1 of 7 policies, 3 instead of 300 missions"
-    assert words[2] == "other policies, another seed"
-    assert budget_of(small_study(tmp_path)) == "as asked"
 
 
 def test_nodes_of_a_file_stay_where_they_are(tmp_path):

@@ -70,13 +70,6 @@ def test_the_command_of_a_sweep_asks_it_again(dess, unrendered, tmp_path):
     assert files_of(tmp_path / "results") == before
 
 
-def test_only_what_is_new_is_simulated(dess, unrendered):
-    assert dess(*ASKED, *FIELDS)[0] == 0
-    assert "48 missions, 48 of them present" in dess(*ASKED, *FIELDS)[2]
-    assert "72 missions, 48 of them present" in dess(*ASKED, "--set", "uavs=1..3", *FIELDS[2:])[2]
-    assert "24 missions, 24 of them present" in dess(*ASKED, "--set", "uavs=3", *FIELDS[2:])[2]
-
-
 def test_the_cheapest_fleet_is_named(dess, unrendered):
     asked = ["sweep", "--scenario", "small.toml", "--set", "uavs=1,2", "--set", "quota=20,40"]
     asked += ["--price", "uav=20000", "--require", "ratio=0.1", "--missions", 5]
@@ -181,13 +174,3 @@ def test_bad_input_gets_one_line_and_leaves_nothing(arguments, refusal):
     command, *words = arguments.split(" ")
     given = ["--scenario", "small.toml", "--missions", "300", "--policy", "greedy,random"]
     assert BAD[arguments] in refusal(command, *given, *words)
-
-
-def test_a_study_of_very_many_points_is_refused(refusal, tmp_path):
-    four = ("quota", "max_slots", "cell_size", "altitude")
-    values = "".join(f"values.{field} = {[*range(1, 1001)]}\n" for field in four)
-    text = (tmp_path / "trial.toml").read_text()
-    (tmp_path / "huge.toml").write_text(f"{text}\n[design]\nkind = 'grid'\n{values}")
-    for more in ([], ["--yes"], ["--dry-run"]):
-        line = refusal("study", "run", "huge.toml", *more)
-        assert "1,000,000,000,000" in line and "allowed: 100,000" in line

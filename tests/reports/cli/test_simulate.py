@@ -110,18 +110,6 @@ def test_a_video_needs_ffmpeg(refusal, monkeypatch):
     assert "animation: .mp4 needs the program ffmpeg, which is not installed; allowed" in line
 
 
-def test_a_failed_simulation_keeps_the_old_log(dess, tmp_path, monkeypatch):
-    def fail(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("dess.mission.simulate", fail)
-    (tmp_path / "log.parquet").write_text("old")
-    before = files_of(tmp_path)
-    line = "interrupted: run the same command again to complete it\n"
-    assert dess("simulate", "--events", "log.parquet") == (130, "", line)
-    assert files_of(tmp_path) == before
-
-
 OUTPUTS = {"events": "log.parquet", "figure": "mission.png", "animation": "mission.gif"}
 
 

@@ -6,7 +6,6 @@ from typing import Any
 from dess.analysis import load_study
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.stats.intervals import LEVEL
-from dess.analysis.verification import figures as drawings
 from dess.reports.pages import stress_des
 from dess.scenario import GEOMETRY, SECTIONS, Scenario
 
@@ -105,19 +104,3 @@ def test_no_number_of_the_model_is_typed() -> None:
         numbers.append(set(re.findall(r"\d+(?:[.,]\d+)*", text)))
     assert set.intersection(*numbers) == {f"{100 * LEVEL:g}"}
     assert all(len(of_scenario) > 30 for of_scenario in numbers)
-
-
-def test_scarce_pads_make_a_queue() -> None:
-    queue = items(manifest(set={"pads": 1}))["2.5.4"]
-    assert "With 1 pad for 1 to 3 UAVs, UAVs may have to wait" in queue
-    assert "no UAV ever waits" in items(manifest())["2.5.4"]
-
-
-def test_no_text_of_the_diagram_leaves_its_box() -> None:
-    for changes in ({}, OTHER):
-        figure = drawings.slot(*stress_des.describe(manifest(set=changes)).overview)
-        figure.canvas.draw()
-        (ax,) = figure.axes
-        for text in ax.texts:
-            ends = text.get_window_extent().transformed(ax.transData.inverted())
-            assert ends.x1 <= (10 if text.get_rotation() == 0 else ax.get_xlim()[1]), text
