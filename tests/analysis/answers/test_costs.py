@@ -24,19 +24,15 @@ RULE = {
 
 
 @pytest.fixture(scope="module")
-def fixed(tmp_path_factory):
+def fixed(studied):
     """A study of as many missions at every design point."""
-    folder = tmp_path_factory.mktemp("fixed")
-    study = small_study(folder, missions=40, design=DESIGN, costs=PRICES)
-    return run_study(study, folder / "out")
+    return studied(missions=40, design=DESIGN, costs=PRICES)
 
 
 @pytest.fixture(scope="module")
-def searched(tmp_path_factory):
+def searched(studied):
     """A study that looks for the cheapest setting."""
-    folder = tmp_path_factory.mktemp("searched")
-    study = small_study(folder, selection=RULE, design=DESIGN, costs=PRICES)
-    return run_study(study, folder / "out")
+    return studied(selection=RULE, design=DESIGN, costs=PRICES)
 
 
 def test_parts_add_up(fixed):
@@ -80,8 +76,8 @@ def test_a_search_is_kept_told_and_checked(searched):
     assert "All conditions together, `greedy`" in "\n".join(costs.answers(searched, table))
 
 
-def test_bad_questions_get_one_line(fixed, tmp_path):
-    free = run_study(small_study(tmp_path, missions=5), tmp_path / "free")
+def test_bad_questions_get_one_line(fixed, studied):
+    free = studied(missions=5)
     for ask in (costs.priced, costs.parts, costs.front, costs.judged):
         with pytest.raises(InputError, match=r"no prices; allowed: one with a table \[costs\]"):
             ask(free)
@@ -91,9 +87,8 @@ def test_bad_questions_get_one_line(fixed, tmp_path):
         costs.judged(fixed)
 
 
-def test_prices_of_zero_leave_what_is_paid_for(tmp_path):
-    study = small_study(tmp_path, missions=5, costs={"uav": 10.5}, set={"uavs": 2})
-    results = run_study(study, tmp_path / "out")
+def test_prices_of_zero_leave_what_is_paid_for(studied):
+    results = studied(missions=5, costs={"uav": 10.5}, set={"uavs": 2})
     assert set(results.missions["cost"]) == {21.0}
     table = costs.front(results)
     assert table["fleet"].tolist() == ["2 UAVs"] * 2  # what has a price is named
@@ -144,8 +139,8 @@ def test_the_answer_is_the_cheapest_fleet_of_any_policy(first, tmp_path):
     assert "Of the values" not in costs.answer(found)  # one UAV is the least of all
 
 
-def test_an_answer_says_what_would_have_settled_it(tmp_path):
-    ratio = run_study(small_study(tmp_path, missions=400, policies=["random"]), tmp_path / "known")
+def test_an_answer_says_what_would_have_settled_it(studied, tmp_path):
+    ratio = studied(missions=400, policies=["random"])
     near = round(float(ratio.missions["collection_ratio"].mean()), 3)
     values = {"uavs": [[1, 3]], "pads": [1]}
     short = {"tolerance": 0.02, "budget": 40}

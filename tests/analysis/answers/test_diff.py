@@ -76,16 +76,6 @@ def results(tmp_path):
     return results_of(tmp_path, "out", design=grid(quota=[20, 60]))
 
 
-def test_results_are_identical_with_themselves(results):
-    found = diff(results, load_results(results.store.folder))
-    assert found.identical
-    assert len(found.missions) == 40
-    assert found.changed.empty
-    assert found.alone.empty
-    assert origins(found) == []
-    assert at_hand(results) == "made by the code, weights and libraries that are here"
-
-
 def test_after_a_constant_has_changed_the_missions_that_differ_are_named(tmp_path, installed):
     policies = ["greedy", "steady"]
     installed(5)
@@ -179,24 +169,6 @@ def test_equal_design_points_count_once(results, tmp_path):
     assert found.identical
     assert len(found.missions) == 2 * 10 * len({p.quota for p in twice.store.manifest.scenarios})
     assert len(found.missions) < len(twice.missions)
-
-
-def test_the_missions_that_check_a_selection_are_compared(tmp_path):
-    rule = {
-        "procedure": "kn",
-        "metric": "collection_ratio",
-        "first": 8,
-        "indifference": 0.05,
-        "budget": 900,
-        "check": 9,
-    }
-    results = results_of(tmp_path, "out", selection=rule, design=grid(quota=[20, 60]))
-    found = diff(results, results)
-    assert found.identical
-    assert len(found.missions) == len(results.missions) + 2 * 9
-    checks = results.checks.copy()
-    checks.loc[4, "slots"] += 1
-    assert len(diff(results, replace(results, checks=checks)).changed) == 1
 
 
 def test_other_seeds_have_nothing_in_common(results, tmp_path):

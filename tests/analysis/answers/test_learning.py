@@ -14,7 +14,6 @@ from dess import InputError
 from dess.analysis import load_results, marl_eval_data, rliable_scores, run_study
 from dess.analysis.answers import learning
 from dess.analysis.answers.learning import CURVE, CURVES, FINAL, difference, read_curve, read_curves
-from dess.analysis.metrics import METRICS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess.policies.registry import TRAINED
@@ -73,33 +72,6 @@ def several(variant, ends, level=0.0, before=0):
         training(variant, seed, np.linspace(level, end, len(STEPS)), before)
         for seed, end in enumerate(ends)
     )
-
-
-@pytest.fixture(scope="module")
-def drawn():
-    """Three trainings of one variant, in two phases, and two of another."""
-    parts = [several("one", [0.5, 0.6, 0.7], 0.2, before=2), several("two", [0.55, 0.9], 0.2)]
-    name = learning.LEARNED_PRODUCT
-    return pd.concat(parts, ignore_index=True).rename(columns={METRIC: name})
-
-
-def test_fig_3_shows_every_training_and_its_phases(drawn):
-    averages = learning.smoothed(drawn, learning.LEARNED_PRODUCT)
-    labels = {"one": "with", "two": "without"}
-    (ax,) = learning.trainings(drawn, learning.LEARNED_PRODUCT, labels).axes
-    expected = [own["value"].tolist() for _, own in averages.groupby(["variant", "seed", "phase"])]
-    lines = [line for line in ax.lines if line.get_gid() is None]
-    assert sorted(line.get_ydata().tolist() for line in lines) == sorted(expected)
-    assert [line.get_linestyle() for line in lines] == [":", "-"] * 3 + ["--"] * 2
-    names = [text.get_text() for text in ax.figure.legends[0].get_texts()]
-    assert names == ["with, n = 3", "without, n = 2"]
-    (begun,) = [line for line in ax.lines if line.get_gid() == "last phase"]
-    assert set(begun.get_xdata()) == {2000}
-    assert ax.get_title(loc="left") == METRICS["collection_ratio_and_communication"]
-    ax.figure.draw_without_rendering()
-    (slots,) = ax.child_axes  # the axis at the top
-    assert slots.get_xlim() == pytest.approx([500e-6 * end for end in ax.get_xlim()])
-    assert averages["value"].between(*ax.get_ylim()).all()
 
 
 def compared(using, without, **options):
@@ -238,10 +210,10 @@ def test_marl_eval_has_the_same_scores_at_every_level(results, monkeypatch) -> N
                 assert [*values] == ["success", OF_RUNS]
 
 
-def test_what_has_no_scores_is_refused(results, tmp_path, monkeypatch) -> None:
+def test_what_has_no_scores_is_refused(results, studied, monkeypatch) -> None:
     with pytest.raises(InputError, match="metric: 'sucess' is unknown"):
         rliable_scores(results, "sucess")
-    few = run_study(small_study(tmp_path, missions=9), tmp_path / "out")
+    few = studied(missions=9)
     with pytest.raises(InputError, match="missions: 9 for 10 runs"):
         rliable_scores(few)
     unequal = {"a": ["greedy"] * 2, "b": ["tour"] * 3}

@@ -16,10 +16,8 @@ from tests.analysis.small import grid, small_study
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
-    folder = tmp_path_factory.mktemp("study")
-    study = small_study(folder, design=grid(uavs=[1, 3]), logged=2, missions=6)
-    return run_study(study, folder / "out")
+def results(studied) -> Results:
+    return studied(design=grid(uavs=[1, 3]), logged=2, missions=6)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 from dess import InputError
-from dess.analysis import run_study
 from dess.analysis.answers import summary
 from dess.analysis.answers.summary import sensitivity
 from dess.analysis.metrics import PRODUCT
@@ -17,7 +16,7 @@ from dess.analysis.study.design import Saltelli
 from dess.policies import load
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.trained import save_policy
-from tests.analysis.small import grid, small_study, write_scenario
+from tests.analysis.small import write_scenario
 from tests.policies.learner.tiny import CPU, PHASES, tiny
 
 FIELDS = ("edge_snr", "arrival_rate", "path_loss_exponent")  # names only: nothing is simulated
@@ -118,13 +117,6 @@ def test_indices_depend_on_nothing_else():
     pd.testing.assert_frame_equal(alone, both.iloc[2:].reset_index(drop=True))
 
 
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("study")
-    study = small_study(folder, design=grid(uavs=[1, 2], quota=[20, 60]), missions=20)
-    return run_study(study, folder / "out")
-
-
 def stub(**policies):
     """Results of one design point: the products of every policy in the same replications."""
     tables = [
@@ -195,45 +187,17 @@ def trained_twice(tmp_path):
     return folders
 
 
-def test_checkpoints_of_one_learner_are_one_learner(tmp_path, trained_twice):
+def test_checkpoints_of_one_learner_are_one_learner(studied, trained_twice):
     first, second, other = trained_twice
     assert load(first).learner == load(second).learner != load(other).learner
     policies = ["greedy", "random", first, second]
-    results = run_study(small_study(tmp_path, policies=policies), tmp_path / "out")
+    results = studied(policies=policies)
     assert summary.learners(results) == {"tiny": [first, second]}
     policies = ["greedy", first, other, f"{first},greedy"]
-    mixed = run_study(small_study(tmp_path, policies=policies), tmp_path / "mixed")
+    mixed = studied(policies=policies)
     assert sorted(summary.learners(mixed).values()) == sorted([[first], [other]])
     table = summary.learned_against_heuristic(results)
     assert set(table["about"]) == {"the learner"}
     assert set(table["trainings"]) == {2}
-    alone = run_study(small_study(tmp_path, policies=["greedy", first]), tmp_path / "alone")
+    alone = studied(policies=["greedy", first])
     assert set(summary.learned_against_heuristic(alone)["about"]) == {"this checkpoint"}
-
-
-def test_the_selected_point_and_its_check(tmp_path):
-    rule = {
-        "procedure": "kn",
-        "metric": "collection_ratio",
-        "first": 8,
-        "indifference": 0.02,
-        "budget": 2000,
-        "check": 9,
-    }
-    study = small_study(tmp_path, selection=rule, design=grid(quota=[20, 40, 80]))
-    results = run_study(study, tmp_path / "out")
-    table = summary.selections(results)
-    assert table["policy"].tolist() == ["greedy", "random"]
-    for row in table.itertuples():
-        assert row.setting == f"communication quota {study.points[row.point].values['quota']}"
-        counts = results.missions.query("policy == @row.policy").groupby("point").size()
-        assert row.missions == counts.sum()
-        value = study.points[row.point].values["quota"]
-        end = {20: "least", 80: "largest"}.get(value, "")
-        at_end = f"quota {value} is the {end}; a better one may lie beyond."
-        assert row.guarantee.endswith(at_end) == bool(end)
-    checks = summary.checks(results).set_index(["policy", "metric"])
-    assert set(checks["n"]) == {9}
-    rewards = results.checks.query("policy == 'greedy'")["reward"]
-    assert checks.loc[("greedy", "reward"), "mean"] == pytest.approx(np.mean(rewards))
-    assert summary.comparisons(results).empty  # each policy has missions of its own

@@ -38,7 +38,6 @@ CASES = {
 CORNER = {"zone": (0, 0, 1, 1), "nodes": ((0, 0),), "edge_snr": -30.0}
 PLENTY = {"grid": 2, "initial_data": 300.0, "arrival_rate": 0.0} | CORNER
 FAR = PLENTY | {"nodes": ((1, 1),), "edge_snr": -40.0}
-FLOOD = CORNER | {"grid": 2, "initial_data": 1.0, "arrival_rate": 8.0, "edge_snr": 300.0}
 PAIR = {"grid": 2, "initial_data": 60.0, "arrival_rate": 0.2} | CORNER | {"nodes": ((0, 0), (1, 1))}
 SEAS = {
     "a node with plenty": PLENTY,
@@ -85,22 +84,6 @@ def test_the_bound_is_above_the_optimum_where_uavs_charge(sea: str) -> None:
     print(f"{sea}: {np.mean(found):.3f} above the optimum on average, {max(found):.3f} at most")
     assert min(found) >= -1e-12, min(gaps, key=lambda key: gaps[key])
     assert np.mean(found) <= 0.25
-
-
-@pytest.mark.parametrize(
-    "name",
-    some_slow(
-        ("no flight before the charge", "no battery decrease", "up to the next percent"),
-        *("no battery decrease", "up to the next percent"),
-    ),
-)
-def test_the_bound_is_above_the_optimum_whenever_the_mission_is_cut(name: str) -> None:
-    values, ends = BATTERIES[name]
-    for sea, end in product((FLOOD, PAIR, SEAS["a node out of reach"]), range(1, ends[0])):
-        space = shadowed(**sea | values, max_slots=end, shadowing_variance=0.0)
-        exact = TinySea(space, 4, contraction(1))
-        assert exact.optimum - 1e-12 <= upper_bound(space, 4, 0).ratio, end
-        assert exact.most_collected - 1e-9 <= bound_of_data(space, 4), end
 
 
 def test_the_bound_is_above_the_optimum_where_uavs_share_a_pad() -> None:

@@ -128,12 +128,6 @@ def check_that_an_interrupted_run_is_completed(study, folder, after, workers):
     assert files_of(folder / "out") == files_of(folder / "undisturbed")
 
 
-@pytest.mark.parametrize("after", [1, 14])
-def test_an_interrupted_run_is_completed(after, tmp_path):
-    study = small_study(tmp_path, logged=1)
-    check_that_an_interrupted_run_is_completed(study, tmp_path, after, workers=1)
-
-
 def test_event_logs_are_those_of_the_missions(tmp_path):
     study = small_study(tmp_path, design=grid(uavs=[1, 2]), logged=2)
     results = run_study(study, tmp_path / "out")
@@ -203,10 +197,6 @@ def test_an_interrupt_in_compiled_code_is_an_interrupt(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         run_study(small_study(tmp_path), tmp_path / "out")
     assert not [*(tmp_path / "out" / "failures").iterdir()]
-    assert (
-        cli.main(["study", "run", str(tmp_path / "trial.toml"), "--out", str(tmp_path / "b")])
-        == 130
-    )
 
 
 @pytest.mark.parametrize("kind", [precise, selecting])

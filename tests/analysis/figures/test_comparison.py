@@ -4,8 +4,29 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess.analysis.figures import comparison
-from dess.analysis.metrics import BOUND, PRODUCT
+from dess.analysis.figures import comparison, settings
+from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
+
+
+@pytest.mark.parametrize(
+    ("draw", "axis"),
+    [
+        (lambda rows: settings.performance(rows.assign(policy=[*"abcd"]), SUCCESS), 0),
+        (lambda rows: settings.by_fleet(rows, SUCCESS, {}), 1),
+        (lambda rows: comparison.means(rows, SUCCESS, ["before", "after"]), 1),
+    ],
+    ids=["performance", "by fleet", "means"],
+)
+def test_bars_are_the_means_and_the_intervals_of_the_table(draw, axis):
+    rows = pd.DataFrame({"policy": [*"aabb"], "uavs": [1, 2] * 2, "mean": [0.2, 0.5, 0.4, 0.7]})
+    rows = rows.assign(point=rows["uavs"] - 1, metric=SUCCESS, n=9)
+    rows = rows.assign(low=rows["mean"] - 0.03, high=rows["mean"] + 0.01)
+    (ax,) = draw(rows).axes
+    bars = [bar.lines for bar in ax.containers]
+    means = np.concatenate([line.get_data()[axis] for line, *_ in bars])
+    ends = np.array([arm[:, axis] for bar in bars for arm in bar[2][0].get_segments()])
+    assert means == pytest.approx(rows["mean"].to_numpy())
+    assert ends == pytest.approx(rows[["low", "high"]].to_numpy())
 
 
 def test_the_spread_is_the_share_of_missions_up_to_a_difference():

@@ -30,7 +30,7 @@ from dess.analysis.paper.scorecard import (
 )
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
-from tests.analysis.small import grid, small_study
+from tests.analysis.small import grid
 
 NOTEBOOKS = Path(__file__).parents[3] / "reports" / "notebooks"
 POLICIES = ["greedy", "random", "random-unguarded", "ddqn"]
@@ -200,7 +200,7 @@ def test_the_best_learned_policy_is_judged(tmp_path: Path) -> None:
     assert row.findings[0] == row.findings[1] and row.findings[0].policy == "ddqn-paper"
 
 
-def test_studies_of_another_kind_never_break_it(tmp_path: Path) -> None:
+def test_studies_of_another_kind_never_break_it(studied, tmp_path: Path) -> None:
     """One number of UAVs, two fields at a time, a single mission."""
     designs = {"fig4": grid(uavs=[2], flying_time=[70, 80]), "fig5": grid(uavs=[2])}
     changes = {"policies": ["ddqn"], "missions": 1, "logged": 1}
@@ -212,5 +212,5 @@ def test_studies_of_another_kind_never_break_it(tmp_path: Path) -> None:
     assert learned(judged, "dramatically").verdict == NO_RESULTS
     assert learned(judged, "best, and the sweet spot").verdict == NO_RESULTS
     assert learned(judged, "two sectors").verdict in VERDICTS
-    small = run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "small")
+    small = studied(policies=["greedy"])
     assert all(row.findings[0].verdict == NO_RESULTS for row in scorecard({"fig4": small}, NONE))

@@ -55,13 +55,11 @@ def _rewrite(out, **changes):
 FOREIGN = {
     "binary": (lambda out: (out / "manifest.json").write_bytes(b"\xff\xfe"), "it is not text"),
     "no JSON": (lambda out: (out / "manifest.json").write_text("{"), "not valid JSON"),
-    "a list": (lambda out: (out / "manifest.json").write_text("[]"), "manifest.json"),
     "other version": (
         lambda out: _rewrite(out, version="0.0.9"),
         r"has version '0\.0\.9', not",
     ),
     "other schema": (lambda out: _rewrite(out, schema_version=99), "has schema_version 99, not"),
-    "other keys": (lambda out: _rewrite(out, colour="blue"), "colour"),
     "no study": (lambda out: _rewrite(out, study={}), "study.name: is missing"),
 }
 

@@ -29,13 +29,9 @@ def test_teams_are_written_alike(tmp_path):
 
 BAD = {
     "missions = 0": ["missions: 0 is out of range; allowed: an integer 1.."],
-    "missions = true": ["missions: True is not an integer"],
     "seed = -1": ["seed: -1 is out of range; allowed: an integer 0.."],
     "logged = 2000": ["logged: 2000", "0..1000"],
-    "policies = ['greedy', 'gredy']": ["'gredy' is unknown", "did you mean greedy"],
     "policies = ['greedy', 'greedy']": ["greedy is listed twice"],
-    "set.uavs = 99": ["uavs: 99", "1..16"],
-    "set.uavz = 2": ["uavz: unknown key (did you mean uavs?)"],
     "design = {kind = 'grid', values.uavs = [1, 20]}": ["at uavs=20", "1..16"],
     "design = {kind = 'grid', values.uavs = [[1, 1], 1]}": ["uavs=1 is listed twice"],
     "design = {kind = 'one-at-a-time', values.arrival_rate = [0.0, -0.0]}": ["is listed twice"],
@@ -61,7 +57,6 @@ BAD = {
     "selection = {procedure = 'cheapest', requirements.success = 0.99, indifference = 1}": [
         "costs: are missing; allowed: a table of prices"
     ],
-    "missions = 1\n[design": ["not valid TOML"],
 }
 
 

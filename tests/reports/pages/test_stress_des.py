@@ -9,9 +9,6 @@ from dess.analysis.stats.intervals import LEVEL
 from dess.reports.pages import stress_des
 from dess.scenario import GEOMETRY, SECTIONS, Scenario
 
-# Monks et al. (2019), Table 1.
-CHECKLIST = {"1": 3, "2": 4, "2.5": 5, "3": 4, "4": 3, "5": 4, "6": 1}
-
 # Another value of every field of the paper's scenario.
 OTHER: dict[str, Any] = {
     "grid": 41,
@@ -66,24 +63,6 @@ def words(data: dict[str, Any], *others: dict[str, Any]) -> str:
 def in_backticks(text: str) -> str:
     """Code in backticks, as it stands in the template."""
     return re.sub("</?code>", "`", text)
-
-
-def items(data: dict[str, Any], *others: dict[str, Any]) -> dict[str, str]:
-    """The texts of the items, each in one line, by their numbers."""
-    sections = "\n".join(stress_des.describe(data, others).sections.values())
-    parts = re.split(r"^(?:\*\*([\d.]+) [^*]+\.\*\*|### .*)", sections, flags=re.M)[1:]
-    pairs = zip(parts[::2], parts[1::2], strict=True)
-    return {number: " ".join(in_backticks(text).split()) for number, text in pairs if number}
-
-
-def test_every_item_of_the_checklist_is_on_the_page() -> None:
-    texts = items(manifest())
-    expected = [
-        f"{section}.{n}" for section, count in CHECKLIST.items() for n in range(1, count + 1)
-    ]
-    assert sorted(texts) == sorted(expected)
-    assert all(texts.values())
-    assert [*stress_des.describe(manifest()).sections] == ["1", "2", "3", "4", "5", "6"]
 
 
 def test_every_input_parameter_is_in_the_table() -> None:

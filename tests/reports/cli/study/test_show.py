@@ -61,14 +61,6 @@ def test_targets_leave_what_meets_them_by_the_lower_end(shown, dess_json):
     assert len({*listed}) == len(passed)
 
 
-def test_no_setting_may_meet_a_target(shown, dess_json):
-    asked = ("study", "show", "out", "--target", "success=1")
-    assert shown(*asked) == (
-        0, "0 of 8 settings meet success of 1 or more, by the whole interval\n", ""
-    )  # fmt: skip
-    assert dess_json(*asked)["means"] == []
-
-
 # Options, and what the line on stderr must name.
 BAD = {
     "--target succes=0.9": "--target: 'succes' is unknown (did you mean success?); allowed: ",

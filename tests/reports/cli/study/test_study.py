@@ -5,16 +5,8 @@ import shlex
 
 import pytest
 
-from dess.analysis import load_results
 from tests.analysis import troublesome
 from tests.analysis.small import files_of
-
-
-def test_a_study_lands_in_the_results_by_default(dess, tmp_path):
-    code, out, _ = dess("study", "run", "trial.toml", "--missions", 3)
-    assert code == 0
-    assert out.startswith("results/trial: 6 missions of study trial")
-    assert len(load_results(tmp_path / "results" / "trial").missions) == 6
 
 
 def test_a_dry_run_tells_the_plan_and_writes_nothing(dess, tmp_path):

@@ -124,13 +124,3 @@ def test_latex_has_what_the_table_has_and_no_letter_that_it_lacks():
         r"5--7 & 0.333333 \\",
         r"$-$1 \& $\triangle$ &  \\",
     ]
-
-
-def test_links_are_named_after_what_they_hold():
-    frame, data = pd.DataFrame({"a": [1]}), pd.DataFrame({"b": [2]})
-    files = Downloads(html.table(frame, 'Means of "x" & <y>: all', data=data).data).files
-    assert {*files} == {"means-of-x-y.csv", "means-of-x-y.tex"}
-    label = 'Means of "x" & <y>: all: CSV'
-    assert files["means-of-x-y.csv"] == (label, "text/csv", "b\n2\n")
-    assert "\na " in files["means-of-x-y.tex"][2]
-    assert not Downloads(html.table(frame, "Means").data).files

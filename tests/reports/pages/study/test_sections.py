@@ -27,11 +27,6 @@ STUDIES = {
         ["Effects of the fields", "n = 10 missions per point; bars", "Comparison with a baseline"],
         ["Orange frames", "One panel for each"],
     ),
-    "a list": (
-        {"design": grid(initial_data=[[5, 7.5], 10]), "set": {"nodes": [[1, 1], [2, 2]]}},
-        ["initial data per node [data units]: 5–7.5, 10", "sensor nodes of 2 cells"],
-        [],
-    ),
     "two fields": (
         {"design": grid(uavs=[1, 2], pads=[1, 2]), "policies": ["greedy"]},
         ["Orange frames: cells that are not significantly worse", "n = 10 missions per cell"],
