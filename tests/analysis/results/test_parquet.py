@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -19,8 +20,9 @@ from dess.analysis.results.chunks import name_of, short_hash
 from dess.analysis.results.store import Store
 from dess.record import PARAMETER_EVENTS
 from dess.reports.cli import main
-from tests.analysis.forging import Forge, column
 from tests.analysis.small import files_of, small_study
+
+Forge = Callable[[pa.Table], pa.Table]
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +50,15 @@ def forged(sound: Path, out: Path, kinds: str, forge: Forge) -> Path:
 def parts(text: Any) -> Forge:
     content = text if isinstance(text, bytes) else json.dumps(text).encode()
     return lambda table: table.replace_schema_metadata({"dess.parts": content})
+
+
+def column(name: str, change: Callable[[np.ndarray], Any]) -> Forge:
+    def forge(table: pa.Table) -> pa.Table:
+        place = table.schema.get_field_index(name)
+        values = pa.array(change(np.array(table[name].to_pylist())))
+        return table.set_column(place, name, values)
+
+    return forge
 
 
 KEY = "0123456789abcdef"

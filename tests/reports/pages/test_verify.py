@@ -3,11 +3,14 @@
 import json
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 from nbformat.v4 import new_output
 
@@ -24,7 +27,6 @@ from dess.reports.pages.index import index_of, pages_in
 from dess.reports.pages.notebook import read
 from dess.reports.pages.page import STUDY, Page
 from dess.reports.pages.verify import verify_page, verify_results
-from tests.analysis.forging import column, forged
 from tests.analysis.small import small_study
 from tests.reports.small import made_up, quick
 
@@ -99,8 +101,18 @@ def test_a_page_whose_missions_were_altered_is_found_by_simulating_them(
     assert line.endswith(f"--seed 2022 --replication {mission['replication']}")
 
 
+def forged(path: Path, column: str, change: Callable[[float], float], to: Path) -> None:
+    """Change a column of a parquet file, and give the file the name that belongs to its bytes."""
+    table = pq.read_table(path, partitioning=None)
+    number = table.schema.get_field_index(column)
+    values = [change(value) for value in table[column].to_pylist()]
+    pq.write_table(table.set_column(number, table.schema.field(number), [values]), to)
+    digest = sha256(to.read_bytes()).hexdigest()[:16]
+    to.rename(to.with_name(f"{path.stem.rpartition('-')[0]}-{digest}.parquet"))
+
+
 @pytest.mark.parametrize(
-    ("study", "kind", "name", "differing", "found"),
+    ("study", "kind", "column", "differing", "found"),
     [
         ("table4", "missions", "collection_ratio", 12, "collection_ratio is "),
         ("fig4", "uavs", "slots_charging", 36, "uav 1 slots_charging"),
@@ -108,12 +120,12 @@ def test_a_page_whose_missions_were_altered_is_found_by_simulating_them(
     ],
 )
 def test_forged_records_and_logs_are_found_by_simulating_their_missions(
-    results: Path, tmp_path: Path, study: str, kind: str, name: str, differing: int, found: str
+    results: Path, tmp_path: Path, study: str, kind: str, column: str, differing: int, found: str
 ) -> None:
     """A file that is sound in itself, with the name that belongs to its bytes."""
     folder = shutil.copytree(results / study, tmp_path / study)
     path = sorted((folder / kind).rglob("*.parquet"))[0]
-    forged(path, column(name, lambda values: values / 2 if kind == "missions" else values + 1))
+    forged(path, column, lambda value: value / 2 if kind == "missions" else value + 1, path)
     lines = lines_of(folder)
     assert len(lines) == differing
     assert all(found in line for line in lines) or kind == "uavs" and found in lines[0]
@@ -122,9 +134,7 @@ def test_forged_records_and_logs_are_found_by_simulating_their_missions(
 def test_two_files_that_tell_two_things_are_both_damaged(results: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(results / "table4", tmp_path / "table4")
     path = sorted((folder / "missions").rglob("*.parquet"))[0]
-    whole = path.read_bytes()
-    forged(path, column("reward", lambda values: values + 1))
-    path.write_bytes(whole)
+    forged(path, "reward", lambda value: value + 1, path.with_name("second.parquet"))
     lines = lines_of(folder)
     assert len(lines) == 2 and f"{path}: has been changed since it was written" in lines
     with pytest.raises(InputError, match="incomplete"):
