@@ -118,7 +118,7 @@ class Command:
             assert code in (130, 0), text
             assert len(lines) == (code == 130), text
             assert all(line.startswith("interrupted") and len(line) <= 300 for line in lines)
-        _wait(lambda: not [*self._processes()], 0.1)
+        _wait(lambda: not [*self.processes()], 0.1)
         if number != signal.SIGKILL:
             assert self._temporaries() == []
             assert not [path for path in self.out.rglob(".*") if not path.name.endswith("lock")]
@@ -129,7 +129,7 @@ class Command:
         """The temporary files of the command, but for the cache that torch keeps there."""
         return [path for path in self.temporary.iterdir() if "torch" not in path.name]
 
-    def _processes(self) -> Iterator[psutil.Process]:
+    def processes(self) -> Iterator[psutil.Process]:
         """The processes of the command that are still there."""
         for process in psutil.process_iter():
             with suppress(psutil.Error):

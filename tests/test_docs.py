@@ -119,10 +119,6 @@ def test_the_readme_opens_with_four_lines_and_the_two_commands() -> None:
     assert sessions == f"{set_up} reports\n{set_up} tests\n"
 
 
-def test_the_readme_fits_two_screens() -> None:
-    assert len(README.splitlines()) <= 90
-
-
 @pytest.mark.usefixtures("outside")
 @pytest.mark.parametrize("arguments", command_lines("dess"), ids=" ".join)
 def test_commands_are_accepted(arguments: list[str]) -> None:

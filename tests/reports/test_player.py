@@ -228,16 +228,3 @@ def test_a_click_on_a_curve_goes_to_its_slot_and_the_pointer_reads_the_map(
         opened.page.mouse.move(box["x"] + x, box["y"] + x)
         titles.append(canvas.get_attribute("title") or "")
     assert any(re.fullmatch(r"node \d+: \d+\.\d data units", title) for title in titles)
-
-
-def test_the_curves_stand_beside_the_map_where_there_is_room(
-    visit: Callable[[Path, int], Visit], document: Path
-) -> None:
-    opened = visit(document, 390)
-    canvas = "document.querySelector('#first canvas')"
-    below = f"{canvas}.clientHeight > 1.5 * {canvas}.clientWidth"
-    opened.page.wait_for_function(below)
-    opened.resize(1200)
-    opened.page.wait_for_function(f"!({below})")
-    opened.resize(390)
-    opened.page.wait_for_function(below)

@@ -10,7 +10,7 @@ import pytest
 from dess import InputError, simulate
 from dess.analysis import run_study
 from dess.analysis.answers import comparison
-from dess.analysis.answers.comparison import AHEAD, BEHIND, CALLS, COLOURS, OF_BASELINE, Pair
+from dess.analysis.answers.comparison import AHEAD, BEHIND, CALLS, OF_BASELINE, Pair
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.names import PARAMETERS
 from dess.analysis.stats.differences import adjust, paired
@@ -22,10 +22,8 @@ PAIR = Pair("ours", "theirs", 1)
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("study")
-    study = small_study(folder, policies=["random", "greedy", "nearest"], missions=40)
-    return run_study(study, folder / "out")
+def results(studied):
+    return studied(policies=["random", "greedy", "nearest"], missions=40)
 
 
 @pytest.mark.parametrize(
@@ -54,36 +52,27 @@ def test_the_pair_is_the_best_learned_policy_and_the_best_other(
     )
 
 
-def test_what_is_no_pair_is_refused(results, tmp_path):
+def test_what_is_no_pair_is_refused(results, studied):
     with pytest.raises(InputError, match="learned: 'ddqn' is not in the study; allowed: random, "):
         comparison.pair_of(results, learned="ddqn")
     with pytest.raises(InputError, match="no two policies to compare among random, "):
         comparison.pair_of(results, "greedy", "greedy")
-    alone = run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "out")
+    alone = studied(policies=["greedy"])
     with pytest.raises(InputError, match="no two policies to compare among greedy; allowed: two"):
         comparison.pair_of(alone)
 
 
-def test_duels_of_several_design_points_are_refused(tmp_path):
-    study = small_study(tmp_path, design=grid(uavs=[1, 2]), missions=2)
-    results = run_study(study, tmp_path / "out")
+def test_duels_of_several_design_points_are_refused(studied):
+    results = studied(design=grid(uavs=[1, 2]), missions=2)
     with pytest.raises(InputError, match="study trial: 2 design points; allowed: one"):
         comparison.duels(results, Pair("greedy", "random", 1))
-
-
-@pytest.mark.parametrize(
-    ("reduction", "words"), [(8 / 9, "9 times as many"), (1.0, "infinitely many")]
-)
-def test_common_missions_are_worth_the_variance_that_they_save(reduction, words):
-    gains = pd.DataFrame({"metric": [*METRICS], "variance_reduction": reduction})
-    assert comparison.pairing(gains) == words
 
 
 def test_missions_are_won_tied_lost_and_failed():
     missions = missions_of(lambda t: 0, n=10).assign(
         difference=[1, 1, 1, 1, 1, 0, 0, 0, -1, -1],
         success=[1] * 8 + [0, 0],
-        success_baseline=[0] + [1] * 8 + [0],
+        success_baseline=[0, 0] + [1] * 7 + [0],
     )
     table = comparison.outcomes(missions, PAIR)
     assert dict(zip(table["Outcome"], table["Missions"], strict=True)) == {
@@ -91,7 +80,7 @@ def test_missions_are_won_tied_lost_and_failed():
         "level": "3",
         "ours behind": "2",
         "only ours fails": "1",
-        "only theirs fails": "1",
+        "only theirs fails": "2",
     }
     assert table["Share"].iloc[2] == "20.0 % [5.7, 51.0]"  # Wilson's interval of 2 in 10
 
@@ -181,45 +170,6 @@ def test_dependence_finds_what_the_difference_depends_on():
     assert (none["p"] == 1).all() and (none["explained"] == 0).all()
 
 
-def drawn_interval(bar, axis):
-    """(N, 2) the ends of error bars."""
-    return np.array([segment[:, axis] for segment in bar.lines[2][0].get_segments()])
-
-
-def test_a_dot_per_bin_with_its_interval_and_its_verdict():
-    missions = missions_of(lambda t: 0.05 * (2 - t["uavs"]))  # ahead, level, behind
-    table = comparison.along(missions)
-    axes = [drawing.figure.axes[0] for drawing in comparison.leads(missions, table, PAIR)]
-    ((low, high),) = {ax.get_ylim() for ax in axes}
-    assert low < table["low"].min() < 0 < table["high"].max() < high
-    assert axes[-1].get_title(loc="left") == "Flying time [mission slots]"
-    rows = table[table["field"] == "uavs"]
-    for bar, (verdict, own) in zip(axes[0].containers, rows.groupby("verdict"), strict=True):
-        dot = bar.lines[0]
-        assert dot.get_xdata().tolist() == own["position"].tolist()
-        assert dot.get_ydata() == pytest.approx(own["mean"])
-        assert drawn_interval(bar, 1) == pytest.approx(own[["low", "high"]].to_numpy())
-        assert dot.get_color() == COLOURS[verdict]
-        assert (dot.get_fillstyle() == "none") == (verdict == INCONCLUSIVE)
-    assert [label.get_text() for label in axes[0].get_xticklabels()] == ["1", "2", "3"]
-    mean = missions["difference"].mean()
-    assert {(0, 0), (mean, mean)} <= {tuple(line.get_ydata()) for line in axes[0].lines}
-
-
-def test_the_curve_is_the_share_of_missions_up_to_a_difference():
-    missions = missions_of(lambda t: 0.05 * (2 - t["uavs"]))
-    (ax,) = comparison.distribution(missions, PAIR).figure.axes
-    (curve,) = (line for line in ax.lines if line.get_gid() == "shares")
-    x, y = curve.get_data()
-    for value in (-0.05, 0.0, 0.03):
-        at = y[np.searchsorted(x, value, side="right") - 1]
-        assert at == pytest.approx((missions["difference"] <= value).mean())
-    assert {text.get_gid(): text.get_text() for text in ax.texts} == {
-        BEHIND: f"ours behind: {(missions['difference'] < 0).mean():.1%}",
-        AHEAD: f"ours ahead: {(missions['difference'] > 0).mean():.1%}",
-    }
-
-
 def test_the_band_holds_the_whole_curve():
     """Of many samples, at most about 5 % leave the band of the distribution that they are of."""
     generator, outside = np.random.default_rng(1), 0
@@ -305,12 +255,3 @@ def test_they_are_measured_once_for_the_same_results(timed_study, tmp_path, monk
     monkeypatch.delattr(comparison, "measure")
     comparison.make(tmp_path, timed_study)
     assert comparison.read(tmp_path, timed_study) == kept
-
-
-def test_remarks_compare_the_pair_and_name_what_was_not_timed(measured, timed_study):
-    text = comparison.remarks(measured, timed_study, Pair("random,greedy", "greedy", 1))
-    assert "random,greedy takes 1 times as long as greedy." in text
-    assert text.endswith(f"Not timed: {timed_study.policies[1]}.")
-    assert measured.processor in text
-    without = comparison.remarks(measured, timed_study, Pair("greedy", "tour", 1))
-    assert "times as long" not in without

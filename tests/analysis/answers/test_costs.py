@@ -24,19 +24,15 @@ RULE = {
 
 
 @pytest.fixture(scope="module")
-def fixed(tmp_path_factory):
+def fixed(studied):
     """A study of as many missions at every design point."""
-    folder = tmp_path_factory.mktemp("fixed")
-    study = small_study(folder, missions=40, design=DESIGN, costs=PRICES)
-    return run_study(study, folder / "out")
+    return studied(missions=40, design=DESIGN, costs=PRICES)
 
 
 @pytest.fixture(scope="module")
-def searched(tmp_path_factory):
+def searched(studied):
     """A study that looks for the cheapest setting."""
-    folder = tmp_path_factory.mktemp("searched")
-    study = small_study(folder, selection=RULE, design=DESIGN, costs=PRICES)
-    return run_study(study, folder / "out")
+    return studied(selection=RULE, design=DESIGN, costs=PRICES)
 
 
 def test_parts_add_up(fixed):
@@ -54,33 +50,6 @@ def test_each_condition_has_a_front_of_its_own(fixed, metric):
         assert rows["on_front"].tolist() == expected.tolist()
         assert rows["probability"].between(0, 1).all()
         assert rows["probability"].sum() >= 1
-
-
-def test_the_answer_says_why_no_cheaper_fleet_will_do(searched, monkeypatch):
-    """The rows are made by hand, on the frame of the study, whose guarantee is left out."""
-    monkeypatch.setattr(costs, "_trust", lambda *_: "")
-    table = costs.judged(searched)
-    one = table[(table["condition"] == "communication quota 60") & (table["policy"] == "greedy")]
-    one = one.iloc[:3].assign(
-        fleet=["1 UAV", "2 UAVs", "3 UAVs"],
-        cost=[21_000.0, 48_000.0, 69_000.0],
-        success=[0.5, 0.71, 0.997],
-        success_low=[0.4, 0.66, 0.991],
-        success_high=[0.6, 0.76, 0.999],
-        verdict=["missed", "missed", "met"],
-        selected=[False, False, True],
-    )
-    (text,) = costs.answers(searched, one)
-    assert text == (
-        "Communication quota 60, `greedy`: the cheapest setting that meets the requirements is "
-        "**3 UAVs** for 69,000 EUR with success 99.7 % [99.1, 99.9] (80 % required). The next "
-        "cheaper one, **2 UAVs** for 48,000 EUR with success 71.0 % [66.0, 76.0] (80 % required), "
-        "misses the requirements."
-    )
-    (text,) = costs.answers(searched, one.assign(verdict="open", selected=False))
-    assert "no setting is known to meet the requirements. The closest one, **3 UAVs** for" in text
-    (text,) = costs.answers(searched, one.iloc[2:])
-    assert text.endswith("(80 % required).")  # no setting is cheaper
 
 
 def test_a_search_is_kept_told_and_checked(searched):
@@ -107,8 +76,8 @@ def test_a_search_is_kept_told_and_checked(searched):
     assert "All conditions together, `greedy`" in "\n".join(costs.answers(searched, table))
 
 
-def test_bad_questions_get_one_line(fixed, tmp_path):
-    free = run_study(small_study(tmp_path, missions=5), tmp_path / "free")
+def test_bad_questions_get_one_line(fixed, studied):
+    free = studied(missions=5)
     for ask in (costs.priced, costs.parts, costs.front, costs.judged):
         with pytest.raises(InputError, match=r"no prices; allowed: one with a table \[costs\]"):
             ask(free)
@@ -118,9 +87,8 @@ def test_bad_questions_get_one_line(fixed, tmp_path):
         costs.judged(fixed)
 
 
-def test_prices_of_zero_leave_what_is_paid_for(tmp_path):
-    study = small_study(tmp_path, missions=5, costs={"uav": 10.5}, set={"uavs": 2})
-    results = run_study(study, tmp_path / "out")
+def test_prices_of_zero_leave_what_is_paid_for(studied):
+    results = studied(missions=5, costs={"uav": 10.5}, set={"uavs": 2})
     assert set(results.missions["cost"]) == {21.0}
     table = costs.front(results)
     assert table["fleet"].tolist() == ["2 UAVs"] * 2  # what has a price is named
@@ -171,8 +139,8 @@ def test_the_answer_is_the_cheapest_fleet_of_any_policy(first, tmp_path):
     assert "Of the values" not in costs.answer(found)  # one UAV is the least of all
 
 
-def test_an_answer_says_what_would_have_settled_it(tmp_path):
-    ratio = run_study(small_study(tmp_path, missions=400, policies=["random"]), tmp_path / "known")
+def test_an_answer_says_what_would_have_settled_it(studied, tmp_path):
+    ratio = studied(missions=400, policies=["random"])
     near = round(float(ratio.missions["collection_ratio"].mean()), 3)
     values = {"uavs": [[1, 3]], "pads": [1]}
     short = {"tolerance": 0.02, "budget": 40}

@@ -76,16 +76,6 @@ def results(tmp_path):
     return results_of(tmp_path, "out", design=grid(quota=[20, 60]))
 
 
-def test_results_are_identical_with_themselves(results):
-    found = diff(results, load_results(results.store.folder))
-    assert found.identical
-    assert len(found.missions) == 40
-    assert found.changed.empty
-    assert found.alone.empty
-    assert origins(found) == []
-    assert at_hand(results) == "made by the code, weights and libraries that are here"
-
-
 def test_after_a_constant_has_changed_the_missions_that_differ_are_named(tmp_path, installed):
     policies = ["greedy", "steady"]
     installed(5)
@@ -155,12 +145,6 @@ def test_a_record_of_a_uav_that_differs_is_found(field, value, results):
     assert mission.fields == f"uav {field}"
 
 
-def test_a_uav_that_is_missing_is_a_difference(results):
-    found = diff(results, replace(results, uavs=results.uavs[:-1]))
-    (mission,) = found.changed.itertuples()
-    assert (mission.policy_a, mission.point_a, mission.replication) == ("random", 1, 9)
-
-
 def test_design_points_are_matched_by_their_scenarios(results, tmp_path):
     """Whatever their numbers, and which of their fields the design sets."""
     other = results_of(tmp_path, "other", design=grid(quota=[60, 40]), missions=6)
@@ -177,20 +161,6 @@ def test_design_points_are_matched_by_their_scenarios(results, tmp_path):
     ]
 
 
-def test_single_policies_are_compared_whatever_their_names(tmp_path, installed):
-    """Two trainings, say."""
-    installed(5)
-    a = results_of(tmp_path, "a", policies=["steady"])
-    b = results_of(tmp_path, "b", policies=["other"])
-    assert diff(a, b).identical
-    c = results_of(tmp_path, "c", policies=["greedy"])
-    found = diff(a, c)
-    assert len(found.changed) == 10
-    row = most_changed(found, 1).iloc[0]
-    assert "--policy steady" in row["command_a"]
-    assert "--policy greedy" in row["command_b"]
-
-
 def test_equal_design_points_count_once(results, tmp_path):
     """Those of a Latin hypercube may fall together."""
     design = {"kind": "latin-hypercube", "size": 8, "seed": 1, "ranges": {"quota": [20, 22]}}
@@ -199,24 +169,6 @@ def test_equal_design_points_count_once(results, tmp_path):
     assert found.identical
     assert len(found.missions) == 2 * 10 * len({p.quota for p in twice.store.manifest.scenarios})
     assert len(found.missions) < len(twice.missions)
-
-
-def test_the_missions_that_check_a_selection_are_compared(tmp_path):
-    rule = {
-        "procedure": "kn",
-        "metric": "collection_ratio",
-        "first": 8,
-        "indifference": 0.05,
-        "budget": 900,
-        "check": 9,
-    }
-    results = results_of(tmp_path, "out", selection=rule, design=grid(quota=[20, 60]))
-    found = diff(results, results)
-    assert found.identical
-    assert len(found.missions) == len(results.missions) + 2 * 9
-    checks = results.checks.copy()
-    checks.loc[4, "slots"] += 1
-    assert len(diff(results, replace(results, checks=checks)).changed) == 1
 
 
 def test_other_seeds_have_nothing_in_common(results, tmp_path):

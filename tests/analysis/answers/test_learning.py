@@ -14,7 +14,6 @@ from dess import InputError
 from dess.analysis import load_results, marl_eval_data, rliable_scores, run_study
 from dess.analysis.answers import learning
 from dess.analysis.answers.learning import CURVE, CURVES, FINAL, difference, read_curve, read_curves
-from dess.analysis.metrics import METRICS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess.policies.registry import TRAINED
@@ -54,28 +53,6 @@ def test_intervals_of_shares_end_where_these_do() -> None:
     assert (base["new_low"], base["new_high"]) == (0.0, 1.0)
 
 
-def test_the_ablation_shows_trainings_means_and_intervals() -> None:
-    """Of three trainings, of one, and of two that came to nothing."""
-    ended = finals(base=[0.7, 0.8, 0.75], once=[0.6], lost=[0.0, 0.0])
-    table = learning.ablation(ended, "base")
-    (ax,) = learning.variants(table, ended, "base", "").figure.axes
-    dots = {a.get_gid(): a.get_offsets()[:, 0].tolist() for a in ax.collections if a.get_gid()}
-    assert dots == {"base": [0.7, 0.8, 0.75], "once": [0.6]}
-    (bar,) = ax.containers  # one training has no interval
-    base = table.iloc[0]
-    assert bar.lines[0].get_xdata() == pytest.approx([base["mean"]])
-    ends = bar.lines[2][0].get_segments()[0][:, 0]
-    assert ends == pytest.approx([base["low"], base["high"]])
-    marks = {line.get_gid(): line for line in ax.lines if line.get_gid()}
-    assert {*marks} == {"lost", "baseline"} and marks["lost"].get_marker() == "<"
-    assert set(marks["baseline"].get_xdata()) == {base["mean"]}
-    left, right = ax.get_xlim()
-    assert 0 < left < base["low"] < base["high"] < right
-    notes = [text.get_text() for text in ax.texts]
-    assert notes == ["75.0%, n = 3", "60.0%, n = 1", "0.0%, n = 2"]
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["base", "once", "lost"]
-
-
 METRIC = "evaluation_reward"
 STEPS = [1000, 2000, 3000, 4000]
 
@@ -95,33 +72,6 @@ def several(variant, ends, level=0.0, before=0):
         training(variant, seed, np.linspace(level, end, len(STEPS)), before)
         for seed, end in enumerate(ends)
     )
-
-
-@pytest.fixture(scope="module")
-def drawn():
-    """Three trainings of one variant, in two phases, and two of another."""
-    parts = [several("one", [0.5, 0.6, 0.7], 0.2, before=2), several("two", [0.55, 0.9], 0.2)]
-    name = learning.LEARNED_PRODUCT
-    return pd.concat(parts, ignore_index=True).rename(columns={METRIC: name})
-
-
-def test_fig_3_shows_every_training_and_its_phases(drawn):
-    averages = learning.smoothed(drawn, learning.LEARNED_PRODUCT)
-    labels = {"one": "with", "two": "without"}
-    (ax,) = learning.trainings(drawn, learning.LEARNED_PRODUCT, labels).axes
-    expected = [own["value"].tolist() for _, own in averages.groupby(["variant", "seed", "phase"])]
-    lines = [line for line in ax.lines if line.get_gid() is None]
-    assert sorted(line.get_ydata().tolist() for line in lines) == sorted(expected)
-    assert [line.get_linestyle() for line in lines] == [":", "-"] * 3 + ["--"] * 2
-    names = [text.get_text() for text in ax.figure.legends[0].get_texts()]
-    assert names == ["with, n = 3", "without, n = 2"]
-    (begun,) = [line for line in ax.lines if line.get_gid() == "last phase"]
-    assert set(begun.get_xdata()) == {2000}
-    assert ax.get_title(loc="left") == METRICS["collection_ratio_and_communication"]
-    ax.figure.draw_without_rendering()
-    (slots,) = ax.child_axes  # the axis at the top
-    assert slots.get_xlim() == pytest.approx([500e-6 * end for end in ax.get_xlim()])
-    assert averages["value"].between(*ax.get_ylim()).all()
 
 
 def compared(using, without, **options):
@@ -170,13 +120,6 @@ def test_transfer_is_judged_by_the_interval_of_the_end(using, without, level, ve
     averages = learning.smoothed(both, METRIC)
     short = learning.transfer(averages, "with", "without", shortest=STEPS[-1] + 1)
     assert (short.verdict, short.length) == (INCONCLUSIVE, STEPS[-1])
-
-
-def test_trainings_that_all_agree_have_no_interval():
-    key, equal = ("equal", learning.LEARNED_PRODUCT), compared([0.5, 0.5], [0.5, 0.5])
-    (row,) = learning.transfer_table({key: equal}, {key: HOLDS}).to_numpy().tolist()
-    assert row[:2] == ["Equal", "2 and 2"]
-    assert row[4:] == ["ends below, or level", "0.0, the same in all trainings"]
 
 
 Change = Callable[[pd.DataFrame], Any]
@@ -267,10 +210,10 @@ def test_marl_eval_has_the_same_scores_at_every_level(results, monkeypatch) -> N
                 assert [*values] == ["success", OF_RUNS]
 
 
-def test_what_has_no_scores_is_refused(results, tmp_path, monkeypatch) -> None:
+def test_what_has_no_scores_is_refused(results, studied, monkeypatch) -> None:
     with pytest.raises(InputError, match="metric: 'sucess' is unknown"):
         rliable_scores(results, "sucess")
-    few = run_study(small_study(tmp_path, missions=9), tmp_path / "out")
+    few = studied(missions=9)
     with pytest.raises(InputError, match="missions: 9 for 10 runs"):
         rliable_scores(few)
     unequal = {"a": ["greedy"] * 2, "b": ["tour"] * 3}

@@ -17,11 +17,10 @@ from tests.analysis.small import grid, small_study
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("study")
+def results(studied):
     values = {"uavs": [1, 2], "initial_data": [[5, 7.5], 10, [2, 20]]}
     design = {"kind": "one-at-a-time", "values": values}
-    return run_study(small_study(folder, design=design, missions=20), folder / "out")
+    return studied(design=design, missions=20)
 
 
 @pytest.fixture(scope="module")

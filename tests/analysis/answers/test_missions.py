@@ -1,6 +1,5 @@
 """How a team shares out the nodes, on layouts worked by hand."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +16,8 @@ from tests.analysis.small import grid, small_study
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
-    folder = tmp_path_factory.mktemp("study")
-    study = small_study(folder, design=grid(uavs=[1, 3]), logged=2, missions=6)
-    return run_study(study, folder / "out")
+def results(studied) -> Results:
+    return studied(design=grid(uavs=[1, 3]), logged=2, missions=6)
 
 
 @pytest.fixture(scope="module")
@@ -62,18 +59,6 @@ def test_logs_of_other_results_and_of_other_records_are_not_shown(
     other.missions["slots"] += 1  # as of other code
     missions.keep_logs(other, WANTED[:1], tmp_path, print)
     assert missions.kept_missions(other, WANTED[:1], tmp_path) == []
-
-
-def test_a_caption_says_what_ended_a_mission(shown: list[Mission]) -> None:
-    mission = shown[1]
-    filled = mission.events.assign(
-        event=mission.events["event"].replace("battery_empty", "quota_filled")
-    )
-    assert ": All UAVs filled their quota. " in replace(mission, events=filled).caption
-    end = (filled["event"] == "quota_filled") & (filled["uav"] == 2)
-    failed = filled.assign(event=filled["event"].mask(end, "battery_empty"))
-    assert ": UAV 3 ran empty after " in replace(mission, events=failed).caption
-    assert f". {mission.collected} in {mission.record.slots} mission slots." in mission.caption
 
 
 SQUARE = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])

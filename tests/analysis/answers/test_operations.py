@@ -7,11 +7,10 @@ import pandas as pd
 import pytest
 
 from dess import InputError
-from dess.analysis import run_study
 from dess.analysis.answers import operations
 from dess.analysis.metrics import AGE, PRODUCT
 from dess.analysis.stats.differences import relative_change
-from tests.analysis.small import grid, small_study
+from tests.analysis.small import grid
 
 
 def planted(results, metric, value):
@@ -21,12 +20,14 @@ def planted(results, metric, value):
 
 
 @pytest.fixture(scope="module")
-def pads(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("pads")
-    study = small_study(folder, policies=["greedy"], missions=40, logged=2,
-                        set={"charging.measured": True},
-                        design=grid(uavs=[2, 4], pads=[1, 2, 3, 4]))  # fmt: skip
-    return run_study(study, folder / "out")
+def pads(studied):
+    return studied(
+        policies=["greedy"],
+        missions=40,
+        logged=2,
+        set={"charging.measured": True},
+        design=grid(uavs=[2, 4], pads=[1, 2, 3, 4]),
+    )
 
 
 def test_a_change_is_the_paired_difference_from_the_same_setting(pads):
@@ -85,10 +86,13 @@ def test_a_relative_change_is_that_of_the_means():
     assert (change.mean - change.low, change.high - change.mean) == pytest.approx((half, half))
 
 
-def test_the_age_is_compared_with_the_published_effect(tmp_path):
-    study = small_study(tmp_path, policies=["greedy"], missions=5, set={"age.measured": True},
-                        design=grid(uavs=[1, 2, 3], arrival_rate=[0.1, 0.5]))  # fmt: skip
-    results = run_study(study, tmp_path / "out")
+def test_the_age_is_compared_with_the_published_effect(studied):
+    results = studied(
+        policies=["greedy"],
+        missions=5,
+        set={"age.measured": True},
+        design=grid(uavs=[1, 2, 3], arrival_rate=[0.1, 0.5]),
+    )
     halved = planted(results, AGE, lambda row: (80 + row["replication"]) / row["uavs"])
     table = operations.age_changes(halved)
     assert table["mean"].tolist() == pytest.approx([-1 / 2, -2 / 3, -1 / 2, -2 / 3])
@@ -99,10 +103,9 @@ def test_the_age_is_compared_with_the_published_effect(tmp_path):
     assert "to 27.3 [26.7, 28.0] slots at an arrival rate of 0.5" in text
 
 
-def test_failures_are_compared_with_none(tmp_path):
+def test_failures_are_compared_with_none(studied):
     fields = {"uavs": [2, 3], "failures.uav_rate": [0.0, 0.01], "failures.uav_repair": [0.0, 5.0]}
-    study = small_study(tmp_path, policies=["greedy"], missions=5, design=grid(**fields))
-    results = run_study(study, tmp_path / "out")
+    results = studied(policies=["greedy"], missions=5, design=grid(**fields))
 
     def value(row):
         lost = 30 * row["failures.uav_rate"] / (1 + row["failures.uav_repair"])

@@ -59,21 +59,8 @@ def test_rows_are_by_number_of_uavs_then_over_all(made):
     assert table[GAP].tolist() == pytest.approx([0.2, 0.15, 0.2, 0.05, 0.2, 0.11])
 
 
-def test_the_sentence_is_about_fleets_whose_bound_says_something(made, monkeypatch):
-    text = optimality.in_words(made)
-    assert text.startswith("`high` is at most 39.8 points with 1 UAV (mean gap 15.0 [")
-    assert optimality.in_words(made, "low").startswith("`low` is at most 44.8 points")
-    table = optimality.by_fleet(made)
-    certain = table.assign(**{BOUND: table[BOUND].mask(table["uavs"] == 2, 1.0)})
-    assert {*optimality.useful(certain)["uavs"]} == {1}
-    monkeypatch.setattr(optimality, "by_fleet", lambda _: certain)
-    text = optimality.in_words(made)
-    assert "with 2 UAVs" not in text
-    assert text.endswith("The upper bound is 100 % for 2 UAVs, so there is no useful bound.")
-
-
-def test_results_without_bounds_have_no_gap(tmp_path, monkeypatch):
-    plain = run_study(small_study(tmp_path, missions=2), tmp_path / "plain")
+def test_results_without_bounds_have_no_gap(studied, tmp_path, monkeypatch):
+    plain = studied(missions=2)
     assert optimality.by_fleet(plain).empty
     bound = Bound(0.9, np.zeros((1, 3)), np.array([30]), 0)
     monkeypatch.setattr(jobs, "upper_bound", lambda *_, **__: bound)

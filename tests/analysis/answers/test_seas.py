@@ -1,7 +1,6 @@
 """What policies reach on many seas, where a sea counts once."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -75,7 +74,7 @@ def test_the_summary_has_shares_of_references_and_of_bounds_below_one(
     assert "Of planner" not in table
 
 
-def test_a_study_of_one_sea_is_refused(tmp_path: Path) -> None:
-    study = run_study(small_study(tmp_path, missions=2), tmp_path / "trial")
+def test_a_study_of_one_sea_is_refused(studied) -> None:
+    study = studied(missions=2)
     with pytest.raises(InputError, match="no study of seas"):
         seas.quality(study)

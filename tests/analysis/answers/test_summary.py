@@ -1,7 +1,5 @@
 """The summary of a study: tables of means, comparisons, selections and the worst missions."""
 
-import json
-import shlex
 import warnings
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,18 +9,14 @@ import pandas as pd
 import pytest
 
 from dess import InputError
-from dess.analysis import run_study
 from dess.analysis.answers import summary
-from dess.analysis.answers.summary import index_table, sensitivity
-from dess.analysis.figures.settings import sensitivity as figure
-from dess.analysis.metrics import PRODUCT, RATIO
-from dess.analysis.numbers import why_nan
+from dess.analysis.answers.summary import sensitivity
+from dess.analysis.metrics import PRODUCT
 from dess.analysis.study.design import Saltelli
 from dess.policies import load
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.trained import save_policy
-from dess.reports import cli
-from tests.analysis.small import grid, small_study, write_scenario
+from tests.analysis.small import write_scenario
 from tests.policies.learner.tiny import CPU, PHASES, tiny
 
 FIELDS = ("edge_snr", "arrival_rate", "path_loss_exponent")  # names only: nothing is simulated
@@ -80,25 +74,6 @@ def test_known_shares_of_parameters_and_noise(case):
         assert (high - low < 0.25).all()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("case", KNOWN)
-def test_intervals_cover_what_they_claim(case):
-    function, *truths = KNOWN[case]
-    level, runs = 0.95, 300
-    hits = np.zeros((2, len(truths[0])))
-    for seed in range(runs):
-        design = unit(len(truths[0]) - 1, base=256, seed=seed)
-        missions = evaluated(design, y=function)
-        table = sensitivity(design, missions, ["y"])
-        for row, (index, truth) in enumerate(zip(("first", "total"), truths, strict=True)):
-            hits[row] += (table[f"{index}_low"] <= truth) & (truth <= table[f"{index}_high"])
-    # Four standard errors of the binomial. Intervals of smooth parameters are wider than need be:
-    # the design is more even than the resamples know. The noise has no such help.
-    error = 4 * np.sqrt(level * (1 - level) / runs)
-    assert (hits / runs > level - error).all()
-    assert hits[0, -1] / runs < level + error
-
-
 def test_a_metric_without_variance_has_no_shares():
     design = unit(2, base=16)
     missions = evaluated(
@@ -142,24 +117,6 @@ def test_indices_depend_on_nothing_else():
     pd.testing.assert_frame_equal(alone, both.iloc[2:].reset_index(drop=True))
 
 
-def test_the_indices_of_a_constant_metric_are_nan_in_its_table_and_its_figure():
-    design = unit(1, 4)
-    missions = evaluated(design, **{RATIO: lambda x, noise: np.full_like(x, 0.5)})
-    table = sensitivity(design, missions, [RATIO]).assign(policy="tour")
-    shown = index_table(table).cells
-    assert len(shown) == 2
-    assert {*shown["Alone"]} == {"nan % [nan, nan]"}
-    assert why_nan(shown.to_numpy().flat).startswith("nan: ")
-    assert figure(table, "tour").axes
-
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("study")
-    study = small_study(folder, design=grid(uavs=[1, 2], quota=[20, 60]), missions=20)
-    return run_study(study, folder / "out")
-
-
 def stub(**policies):
     """Results of one design point: the products of every policy in the same replications."""
     tables = [
@@ -198,14 +155,6 @@ def test_targets_are_met_by_the_lower_end():
     assert summary.meeting(table, {}).equals(table)
 
 
-def test_the_command_of_a_mission_gives_its_row(results, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    worst = summary.worst(results, "random", 1, folder=results.store.folder).iloc[0]
-    assert cli.main([*shlex.split(worst["command"])[1:], "--json"]) == 0
-    printed = json.loads(capsys.readouterr().out)
-    assert printed["collection_ratio"] == worst["collection_ratio"]
-
-
 def test_policies_are_ranked_by_the_mean_over_design_points():
     rows = [
         ("a", 0, 0.9),
@@ -238,54 +187,17 @@ def trained_twice(tmp_path):
     return folders
 
 
-def test_checkpoints_of_one_learner_are_one_learner(tmp_path, trained_twice):
+def test_checkpoints_of_one_learner_are_one_learner(studied, trained_twice):
     first, second, other = trained_twice
     assert load(first).learner == load(second).learner != load(other).learner
     policies = ["greedy", "random", first, second]
-    results = run_study(small_study(tmp_path, policies=policies), tmp_path / "out")
+    results = studied(policies=policies)
     assert summary.learners(results) == {"tiny": [first, second]}
     policies = ["greedy", first, other, f"{first},greedy"]
-    mixed = run_study(small_study(tmp_path, policies=policies), tmp_path / "mixed")
+    mixed = studied(policies=policies)
     assert sorted(summary.learners(mixed).values()) == sorted([[first], [other]])
     table = summary.learned_against_heuristic(results)
     assert set(table["about"]) == {"the learner"}
     assert set(table["trainings"]) == {2}
-    alone = run_study(small_study(tmp_path, policies=["greedy", first]), tmp_path / "alone")
+    alone = studied(policies=["greedy", first])
     assert set(summary.learned_against_heuristic(alone)["about"]) == {"this checkpoint"}
-
-
-def test_the_selected_point_and_its_check(tmp_path):
-    rule = {
-        "procedure": "kn",
-        "metric": "collection_ratio",
-        "first": 8,
-        "indifference": 0.02,
-        "budget": 2000,
-        "check": 9,
-    }
-    study = small_study(tmp_path, selection=rule, design=grid(quota=[20, 40, 80]))
-    results = run_study(study, tmp_path / "out")
-    table = summary.selections(results)
-    assert table["policy"].tolist() == ["greedy", "random"]
-    for row in table.itertuples():
-        assert row.setting == f"communication quota {study.points[row.point].values['quota']}"
-        counts = results.missions.query("policy == @row.policy").groupby("point").size()
-        assert row.missions == counts.sum()
-        value = study.points[row.point].values["quota"]
-        end = {20: "least", 80: "largest"}.get(value, "")
-        at_end = f"quota {value} is the {end}; a better one may lie beyond."
-        assert row.guarantee.endswith(at_end) == bool(end)
-    checks = summary.checks(results).set_index(["policy", "metric"])
-    assert set(checks["n"]) == {9}
-    rewards = results.checks.query("policy == 'greedy'")["reward"]
-    assert checks.loc[("greedy", "reward"), "mean"] == pytest.approx(np.mean(rewards))
-    assert summary.comparisons(results).empty  # each policy has missions of its own
-
-
-def test_with_one_policy_there_is_no_comparison(tmp_path):
-    design = grid(initial_data=[5, [5, 7.5]])
-    study = small_study(tmp_path, policies=["greedy"], missions=1, design=design)
-    results = run_study(study, tmp_path / "out")
-    assert summary.comparisons(results).empty
-    assert summary.learned_against_heuristic(results).empty
-    assert summary.selections(results).empty

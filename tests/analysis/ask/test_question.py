@@ -161,14 +161,11 @@ GIVEN = [
     ("uavs", range(2, 6), (2, 3, 4, 5)),
     ("uavs", [[1, 3]], ([1, 3],)),
     ("uavs", np.array([2, 4]), (2, 4)),
-    ("arrival_rate", np.array([0.01, 0.02]), (0.01, 0.02)),
     ("forbid_swaps", [False, True], (False, True)),
-    ("initial_data", [5, 20], ([5, 20],)),
     ("initial_data", np.array([5, 20]), (5, 20)),
     ("initial_data", [[5, 7.5], [7.5, 10]], ([5, 7.5], [7.5, 10])),
     ("zone", [[26, 2, 4, 4], [0, 0, 2, 2]], ([26, 2, 4, 4], [0, 0, 2, 2])),
     ("nodes", [[1, 2], [3, 4]], ([[1, 2], [3, 4]],)),
-    ("nodes", [[[1, 2]], [[3, 4]]], ([[1, 2]], [[3, 4]])),
 ]
 
 
@@ -177,19 +174,6 @@ def test_one_value_is_fixed_and_several_are_swept(field, given, values):
     found = values_of(field, given)
     assert found == values
     assert [type(value) for value in found] == [type(value) for value in values]
-
-
-@pytest.mark.parametrize(
-    ("given", "line"),
-    [
-        ([], "uavs: has no values; allowed: 1 to 100,000"),
-        (range(0, 10**30, 3), "uavs: has 333,333,333,333,333,333,333,333,333,334 values"),
-        (range(10**30, 0, -(10**10)), "uavs: has 100,000,000,000,000,000,000 values"),
-    ],
-)
-def test_values_that_are_none(given, line):
-    with pytest.raises(InputError, match=line):
-        values_of("uavs", given)
 
 
 POLICIES = ["random", "greedy"]
@@ -231,25 +215,13 @@ def test_both_sides_measure_what_belongs_to_a_section(settings, baseline, measur
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        (
-            {"settings": {"uav": 5}},
-            r"scenario paper: uav: unknown key .did you mean uavs",
-        ),
         ({"settings": {"uavs": 99}}, r"uavs: 99 is out of range; allowed: 1\.\.16"),
         ({"baseline": {"quota": 0}}, r"scenario paper: quota: .*0"),
         ({"settings": {}}, r"settings: none is given; allowed: .*uavs"),
         ({"settings": {"uavs": [1, 3]}}, r"uavs is 1 to 3 in the baseline already; allowed: an"),
-        ({"settings": {"uavs": 2}, "baseline": {"uavs": 2}}, r"uavs is 2 in the baseline already"),
         ({"settings": {"pads": 16}}, r"pads is 16 in the baseline already"),
-        (
-            {"policies": ["gredy"]},
-            r"question: policies: .*'gredy' is unknown .did you mean greedy",
-        ),
         ({"policies": []}, r"question: policies: .*is too short"),
-        ({"policies": 3}, r"question: policies: 3 has the wrong form"),
         ({"policies": "greedy"}, r"question: policies: 'greedy' has the wrong form"),
-        ({"missions": 1}, r"missions: 1 is too few; allowed: 2 or more"),
-        ({"missions": "many"}, r"question: missions: .*'many'"),
         ({"seed": -1}, r"question: seed: .*-1"),
         ({"scenario": "papr"}, r"papr: no such scenario .did you mean paper"),
     ],

@@ -1,7 +1,6 @@
 """A cluster of dask: what is wrong with it is one line, and no mission is lost."""
 
 import os
-import shlex
 import signal
 import socket
 import subprocess
@@ -22,7 +21,6 @@ from dess.analysis.results.chunks import Chunk, Part
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.results.provenance import engine_code, members_of
 from dess.reports import cli
-from tests.analysis.execution.test_workers import failing
 from tests.analysis.small import environment, files_of, small_study
 
 distributed = pytest.importorskip("distributed")
@@ -38,13 +36,6 @@ if __name__ == "__main__":
 """
 
 
-@pytest.fixture
-def cluster():
-    """A dask cluster of two worker processes; its address."""
-    with distributed.LocalCluster(n_workers=2, **OPTIONS) as cluster:
-        yield cluster.scheduler_address
-
-
 def test_a_worker_with_other_code_or_weights_does_nothing(tmp_path):
     study = small_study(tmp_path)
     cell = Manifest.of(study).cells[0][0]
@@ -55,14 +46,6 @@ def test_a_worker_with_other_code_or_weights_does_nothing(tmp_path):
     for others in (("0" * 64, members), (code, members_of("random"))):
         with pytest.raises(InputError, match="a worker has other code"):
             _checked(job, *others)
-
-
-@pytest.mark.slow
-def test_dask_gives_up_a_chunk_that_kills_every_worker(plugin, cluster, tmp_path):
-    study = small_study(tmp_path, policies=["killed-always", "greedy"])
-    failure = failing(study, tmp_path / "out", scheduler=cluster)
-    assert "its workers died" in failure.error
-    assert shlex.split(failure.command)[-4:] == ["--policy", "killed-always", "--replication", "5"]
 
 
 @pytest.mark.slow

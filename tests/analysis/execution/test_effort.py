@@ -32,12 +32,10 @@ from dess.analysis.execution.effort import (
     check_run,
     check_workers,
     check_workers_memory,
-    mission_memory,
     plan_study,
     policies_for,
     total,
 )
-from dess.channel import world_of
 from dess.code import memory
 from dess.policies import load_team
 from dess.policies.registry import names
@@ -110,11 +108,6 @@ def test_numbers_of_workers_have_limits(workers):
     check_workers(MAX_WORKERS)
 
 
-def test_the_memory_of_the_channel_is_that_of_its_tables():
-    world = world_of(PAPER)
-    assert mission_memory(PAPER) == world.order.nbytes + world.means.nbytes
-
-
 def test_workers_need_the_memory_that_is_available(monkeypatch):
     monkeypatch.setattr(memory, "available_memory", lambda: 2**31)
     check_workers_memory("a study", 6, [PAPER], 0.0)
@@ -169,17 +162,6 @@ def test_a_worker_ends_with_a_killed_parent_before_it_has_loaded_anything():
     assert not {"numpy", "numba", "pandas", "joblib"} & {*loaded.stdout.split()}
 
 
-def test_a_plan_counts_and_writes_nothing(tmp_path):
-    study = small_study(tmp_path, design=grid(uavs=[1, 2]))
-    before = files_of(tmp_path)
-    plan = plan_study(study, tmp_path / "out")
-    assert [(p.policy, p.missions, p.present) for p in plan] == [
-        ("greedy", 20, 0),
-        ("random", 20, 0),
-    ]
-    assert files_of(tmp_path) == before
-
-
 def test_a_plan_knows_what_is_there(tmp_path):
     run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "out")
     before = files_of(tmp_path / "out")
@@ -209,15 +191,6 @@ def test_the_time_is_a_range_and_nothing_is_simulated(tmp_path, monkeypatch):
     assert str(Range(5.0, 240.0)) == "5 seconds to 4 minutes"
 
 
-def test_event_logs_take_time_as_well(tmp_path):
-    logged, plain = small_study(tmp_path, logged=4), small_study(tmp_path)
-    plans = [plan_study(study, tmp_path / "out") for study in (logged, plain)]
-    for more, less in zip(*plans, strict=True):
-        assert more.seconds.low - less.seconds.low == pytest.approx(4 * DECISIONS * 1.2e-5 / SPREAD)
-    run_study(logged, tmp_path / "out")
-    assert [p.seconds for p in plan_study(logged, tmp_path / "out")] == [(0.0, 0.0)] * 2
-
-
 def test_a_rule_has_a_least_and_a_most(tmp_path):
     targets = {"success": {"absolute": 0.1}}
     precise = {"first": 5, "look_ahead": 5, "budget": 50, "targets": targets}
@@ -239,13 +212,6 @@ def test_a_rule_has_a_least_and_a_most(tmp_path):
     run_study(study, tmp_path / "out")
     done = plan_study(study, tmp_path / "out")
     assert all(p.missions == p.present > 7 for p in done)
-
-
-def test_a_plan_refuses_what_a_run_would(tmp_path):
-    with pytest.raises(InputError, match="holds other files"):
-        plan_study(small_study(tmp_path), tmp_path)
-    with pytest.raises(InputError, match="workers: 0 is out of range"):
-        plan_study(small_study(tmp_path), tmp_path / "out", workers=0)
 
 
 def test_a_run_that_is_surely_long_has_to_be_confirmed(tmp_path, monkeypatch):

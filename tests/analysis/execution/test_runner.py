@@ -1,13 +1,12 @@
 import errno
-import shlex
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from dess import InputError, load_scenario, simulate
-from dess.analysis import evaluate, load_results, load_study, resimulate, run_study
+from dess import InputError, simulate
+from dess.analysis import evaluate, load_results, resimulate, run_study
 from dess.analysis.answers.summary import sensitivity
 from dess.analysis.execution import jobs
 from dess.analysis.results import parquet
@@ -16,7 +15,6 @@ from dess.policies import load_team
 from dess.policies.heuristics import Greedy
 from dess.record import MISSION_RECORD, UAV_RECORD
 from dess.reports import cli
-from dess.reports.cli.options import setting
 from dess.state import END_NAMES
 from tests.analysis.small import files_of, grid, small_study
 
@@ -130,12 +128,6 @@ def check_that_an_interrupted_run_is_completed(study, folder, after, workers):
     assert files_of(folder / "out") == files_of(folder / "undisturbed")
 
 
-@pytest.mark.parametrize("after", [1, 14])
-def test_an_interrupted_run_is_completed(after, tmp_path):
-    study = small_study(tmp_path, logged=1)
-    check_that_an_interrupted_run_is_completed(study, tmp_path, after, workers=1)
-
-
 def test_event_logs_are_those_of_the_missions(tmp_path):
     study = small_study(tmp_path, design=grid(uavs=[1, 2]), logged=2)
     results = run_study(study, tmp_path / "out")
@@ -195,17 +187,6 @@ def test_a_selection_is_checked_by_missions_that_did_not_select(tmp_path):
     assert len(results.checks) == 10
 
 
-def test_rounds_are_announced_before_their_missions(tmp_path):
-    told, done = [], []
-    run_study(selecting(tmp_path), tmp_path / "out", announce=told.append, progress=done.append)
-    assert [each.number for each in told] == [*range(len(told))]
-    assert told[-1].missions == sum(done)
-    assert len(told) > 2
-    again = []
-    run_study(selecting(tmp_path), tmp_path / "out", announce=again.append)
-    assert sum(each.present for each in again) == again[-1].missions == told[-1].missions
-
-
 def test_an_interrupt_in_compiled_code_is_an_interrupt(tmp_path, monkeypatch):
     """numba makes it a SystemError; the chunk has not failed."""
 
@@ -216,10 +197,6 @@ def test_an_interrupt_in_compiled_code_is_an_interrupt(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         run_study(small_study(tmp_path), tmp_path / "out")
     assert not [*(tmp_path / "out" / "failures").iterdir()]
-    assert (
-        cli.main(["study", "run", str(tmp_path / "trial.toml"), "--out", str(tmp_path / "b")])
-        == 130
-    )
 
 
 @pytest.mark.parametrize("kind", [precise, selecting])
@@ -241,25 +218,6 @@ def test_a_saltelli_design_runs_every_point_at_its_own_replication(tmp_path):
     assert missions["replication"].nunique() > 4
     indices = sensitivity(study.design, missions, ["reward"])
     assert np.isfinite(indices["total"]).all()
-
-
-def test_every_row_has_a_command_that_simulates_it_again(tmp_path, monkeypatch):
-    study = small_study(tmp_path, design=grid(initial_data=[5, [5, 9.5]]), set={"max_slots": 99})
-    results = run_study(study, tmp_path / "out")
-    program, command, *options = shlex.split(results.command("random", 1, 3))
-    assert (program, command) == ("dess", "simulate")
-    monkeypatch.chdir(tmp_path)
-    assert options[:2] == ["--scenario", "paper"]  # whose file needs not be there
-    settings = [value for key, value in zip(options, options[1:], strict=False) if key == "--set"]
-    ours = load_scenario("paper", **dict(setting(text) for text in settings))
-    assert ours == results.scenario(1)
-    assert ours.max_slots == 99
-    assert options[-6:] == ["--policy", "random", "--seed", "7", "--replication", "3"]
-    shipped = load_study("fig4", policies=["greedy"], missions=1, logged=0)
-    command = run_study(shipped, tmp_path / "fig4").command("greedy", 1, 0)
-    assert command == (
-        "dess simulate --scenario fig4 --set uavs=2 --policy greedy --seed 2022 --replication 0"
-    )
 
 
 def test_points_that_are_one_scenario_share_their_missions(tmp_path):

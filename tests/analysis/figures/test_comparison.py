@@ -4,36 +4,29 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess.analysis.ask import what_if
-from dess.analysis.figures import comparison
-from dess.analysis.metrics import BOUND, METRICS, PRODUCT
-from tests.analysis.answers.test_comparison import drawn_interval
-from tests.analysis.small import asked
-
-POLICIES = ["random", "greedy"]
+from dess.analysis.figures import comparison, settings
+from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 
 
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    return asked(tmp_path_factory.mktemp("what-if"), 5).results
-
-
-def test_figures_show_the_means_and_the_gains(results):
-    table, answers = what_if.means(results), what_if.answers(results)
-    sides = ["baseline\nuavs 2\npads 6", "variation\nuavs 6\npads 1"]
-    for metric in METRICS:
-        (ax,) = comparison.means(table, metric, sides).axes
-        ticks = [tick.get_text() for tick in ax.get_xticklabels()]
-        assert ticks == sides
-        for bar, policy in zip(ax.containers, POLICIES, strict=True):
-            own = table[(table["metric"] == metric) & (table["policy"] == policy)]
-            assert bar.lines[0].get_ydata() == pytest.approx(own["mean"])
-            assert drawn_interval(bar, 1) == pytest.approx(own[["low", "high"]].to_numpy())
-    (ax,) = comparison.gains(answers).axes
-    for bar, policy in zip(ax.containers, POLICIES, strict=True):
-        own = answers[answers["policy"] == policy].set_index("metric").loc[[*METRICS]]
-        assert bar.lines[0].get_ydata() == pytest.approx(own["difference"])
-        assert drawn_interval(bar, 1) == pytest.approx(own[["low", "high"]].to_numpy())
+@pytest.mark.parametrize(
+    ("draw", "axis"),
+    [
+        (lambda rows: settings.performance(rows.assign(policy=[*"abcd"]), SUCCESS), 0),
+        (lambda rows: settings.by_fleet(rows, SUCCESS, {}), 1),
+        (lambda rows: comparison.means(rows, SUCCESS, ["before", "after"]), 1),
+    ],
+    ids=["performance", "by fleet", "means"],
+)
+def test_bars_are_the_means_and_the_intervals_of_the_table(draw, axis):
+    rows = pd.DataFrame({"policy": [*"aabb"], "uavs": [1, 2] * 2, "mean": [0.2, 0.5, 0.4, 0.7]})
+    rows = rows.assign(point=rows["uavs"] - 1, metric=SUCCESS, n=9)
+    rows = rows.assign(low=rows["mean"] - 0.03, high=rows["mean"] + 0.01)
+    (ax,) = draw(rows).axes
+    bars = [bar.lines for bar in ax.containers]
+    means = np.concatenate([line.get_data()[axis] for line, *_ in bars])
+    ends = np.array([arm[:, axis] for bar in bars for arm in bar[2][0].get_segments()])
+    assert means == pytest.approx(rows["mean"].to_numpy())
+    assert ends == pytest.approx(rows[["low", "high"]].to_numpy())
 
 
 def test_the_spread_is_the_share_of_missions_up_to_a_difference():

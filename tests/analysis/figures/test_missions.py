@@ -62,13 +62,6 @@ def test_moves_and_crosses_have_the_colour_of_the_node_that_is_served(
         assert colours(cross) == [palette[node] for node in hovers["node"]]
 
 
-def test_stars_are_the_charging_slots(mission: Any, parts: Any) -> None:
-    record, _, _ = mission
-    stars = [len(star.get_offsets()) for star in drawn(parts[0], "charges")]
-    assert stars == record.uavs["slots_charging"].tolist()
-    assert sum(stars) > 0
-
-
 def test_nodes_zone_and_ends_lie_where_they_are(mission: Any, parts: Any) -> None:
     _, log, scenario = mission
     (nodes,) = drawn(parts[0], "nodes")

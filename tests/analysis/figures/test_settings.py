@@ -11,20 +11,16 @@ from dess import InputError
 from dess.analysis import run_study
 from dess.analysis.answers import settings
 from dess.analysis.figures import settings as figures
-from dess.analysis.figures import style
-from dess.analysis.metrics import METRICS, PRODUCT, SUCCESS
-from dess.analysis.numbers import percent
+from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.study.design import NOISE
-from tests.analysis.answers.test_main_effects import pairs_of
 from tests.analysis.small import grid, small_study
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
+def results(studied):
     """Numbers at uneven distances, ranges, and a third field."""
-    folder = tmp_path_factory.mktemp("grid")
     values = {"quota": [20, 40, 100], "initial_data": [[5, 7], 10], "uavs": [1, 2]}
-    return run_study(small_study(folder, design=grid(**values), missions=6), folder / "out")
+    return studied(design=grid(**values), missions=6)
 
 
 def curves(ax):
@@ -57,16 +53,6 @@ def test_a_second_field_has_a_curve_per_value_and_policies_have_panels(results):
     assert [t.get_text() for t in drawing.axes[-1].get_xticklabels()] == ["5–7", "10"]
     with pytest.raises(InputError, match="pads: has not several values in the study; allowed: qu"):
         figures.plot(results, "pads")
-
-
-def test_names_of_near_values_are_turned_so_that_they_do_not_touch():
-    rates = [0, 0.001, 0.002, 0.005, 0.01]
-    for values, angle in ((rates, 30), ([1, 2, 3, 10], 0)):
-        rows = pd.DataFrame({"rate": values, "policy": "greedy", "mean": 0.5, "low": 0.4})
-        with style.panels(3) as (figure, ax):
-            looks = style.policy_colours(["greedy"])
-            style.along(style.placed(rows.assign(high=0.6), "rate"), looks, "%", ax)
-        assert [t.get_rotation() for t in ax.get_xticklabels()] == [angle] * len(values)
 
 
 @pytest.mark.parametrize("facet", [None, "uavs"])
@@ -133,86 +119,6 @@ def test_many_values_have_panels_that_are_spread_evenly():
     assert figures.shown([1, 2, 3]) == [1, 2, 3]
     some = figures.shown([*range(100)])
     assert (len(some), some[0], some[-1]) == (figures.MOST_PANELS, 0, 99)
-
-
-def summary(by: dict[str, list]) -> pd.DataFrame:
-    """Rows as of ``dess.analysis.summary``, with different numbers."""
-    rows = pd.DataFrame(by).merge(pd.DataFrame({"metric": list(METRICS)}), how="cross")
-    mean = np.linspace(0.2, 0.8, len(rows))
-    return rows.assign(mean=mean, low=mean - 0.03, high=mean + 0.01, n=100)
-
-
-def test_performance_shows_means_intervals_and_the_printed_figure(metric: str = SUCCESS) -> None:
-    table = summary({"policy": ["one", "two", "three"]})
-    (ax,) = figures.performance(table, metric, 0.55).axes
-    rows = table[table["metric"] == metric]
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["one", "two", "three"]
-    for bar, (_, row) in zip(ax.containers, rows.iterrows(), strict=True):
-        assert bar.lines[0].get_xdata() == pytest.approx([row["mean"]])
-        (arm,) = bar.lines[2]
-        assert arm.get_segments()[0][:, 0] == pytest.approx([row["low"], row["high"]])
-    (printed,) = (line for line in ax.lines if line.get_label() == "paper 55.0 %")
-    assert list(printed.get_xdata()) == [0.55, 0.55]
-    assert ax.get_title(loc="left") == METRICS[metric]
-    assert [note.get_text() for note in ax.texts] == [*map(percent, rows["mean"])]
-    assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first on top
-
-
-def test_by_fleet_shows_a_curve_per_policy_and_the_printed_ones() -> None:
-    table = summary({"policy": ["one"] * 3 + ["two"] * 3, "uavs": [1, 2, 3] * 2})
-    (ax,) = figures.by_fleet(table, "success", {3: 0.9, 1: 0.5}).axes
-    rows = table[table["metric"] == "success"]
-    assert len(ax.containers) == 2
-    for bar, (_, means) in zip(ax.containers, rows.groupby("policy", sort=False), strict=True):
-        assert bar.lines[0].get_ydata() == pytest.approx(means["mean"])
-        assert [round(x) for x in bar.lines[0].get_xdata()] == [1, 2, 3]
-    (printed,) = (line for line in ax.lines if line.get_label() == "paper")
-    assert (list(printed.get_xdata()), list(printed.get_ydata())) == ([1, 3], [0.5, 0.9])
-
-
-VALUES = {"initial_data": ["5–7.5", "7.5–10", "10–12.5"], "uavs": ["1", "2"]}
-CHANGES = {"mine": pairs_of([0.1, -0.2]), "other": pairs_of([0.05, 0.01])}
-POLICIES = ["third", "mine", "other"]
-
-
-@pytest.fixture(scope="module")
-def table():
-    """Means with numbers of their own in every row."""
-    rows = [
-        (field, value, position, policy, metric)
-        for field, values in VALUES.items()
-        for position, value in enumerate(values)
-        for policy in CHANGES
-        for metric in METRICS
-    ]
-    frame = pd.DataFrame(rows, columns=["field", "value", "position", "policy", "metric"])
-    mean = np.linspace(0.3, 0.9, len(frame))
-    return frame.assign(mean=mean, low=mean - 0.03, high=mean + 0.01, n=100)
-
-
-@pytest.fixture(scope="module")
-def panels(table):
-    changes = CHANGES
-    return figures.effect(table, "initial_data", changes, POLICIES).axes
-
-
-def test_the_last_panel_shows_the_changes_from_the_first_value(panels):
-    for (_, y, ends), pairs in zip(curves(panels[-1]), CHANGES.values(), strict=True):
-        steps = pairs[pairs["first"] == 0]
-        assert y == pytest.approx([0, *steps["difference"]])
-        assert ends == pytest.approx(np.array([[0, 0], *steps[["low", "high"]].to_numpy()]))
-    assert "5–7.5" in panels[-1].get_title(loc="left")
-    ticks = [label.get_text() for label in panels[-1].get_xticklabels()]
-    assert ticks == VALUES["initial_data"]
-    assert panels[-1].get_xlabel() == "Initial data per node [data units]"
-
-
-def test_a_policy_keeps_its_colour_whoever_else_is_drawn(table, panels):
-    alone = table[table["policy"] == "other"]
-    changes = {"other": CHANGES["other"]}
-    other = figures.effect(alone, "initial_data", changes, POLICIES).axes[0]
-    (mine,) = other.containers
-    assert mine.lines[0].get_color() == panels[0].containers[1].lines[0].get_color()
 
 
 @pytest.fixture

@@ -35,19 +35,15 @@ def judged(rule: str, *arguments: object) -> str:
     ("rule", "mean", "half", "verdict"),
     [
         ("reached", 0.60, 0.01, HOLDS),  # wholly above
-        ("reached", 0.495, 0.01, HOLDS),  # around it
         ("reached", 0.49, 0.01, HOLDS),  # the upper end is the figure
         ("reached", 0.48, 0.01, IN_PART),  # wholly below, but near
         ("reached", 0.40, 0.20, INCONCLUSIVE),  # too few missions to say, but far
         ("reached", 0.51, 0.20, INCONCLUSIVE),  # too few missions to say, if near
-        ("reached", 0.44, 0.005, REFUTED),
         ("reached", 0.45, 0.01, REFUTED),  # wholly below, and not shown to be near
-        ("gained", 0.24, 0.01, HOLDS),
         ("gained", 0.195, 0.01, HOLDS),
         ("gained", 0.195, 0.19, IN_PART),  # it rises, but who knows how much
         ("gained", 0.09, 0.01, IN_PART),
         ("gained", 0.005, 0.01, REFUTED),  # perhaps it rises, but surely not that much
-        ("gained", -0.3, 0.01, REFUTED),
         ("gained", 0.14, 0.3, INCONCLUSIVE),
         ("higher", 0.02, 0.01, HOLDS),
         ("higher", -0.001, 0.01, INCONCLUSIVE),
@@ -59,11 +55,9 @@ def judged(rule: str, *arguments: object) -> str:
         ("slightly_lower", 0.0, 0.01, INCONCLUSIVE),
         ("slightly_lower", -0.05, 0.04, IN_PART),  # it falls, but who knows how much
         ("slightly_lower", -0.10, 0.01, REFUTED),  # more than slightly
-        ("slightly_lower", 0.02, 0.01, REFUTED),
         ("kept", 0.0, 0.009, HOLDS),
         ("kept", -0.005, 0.001, HOLDS),  # surely lower, but by less than matters
         ("kept", 0.0, 0.02, INCONCLUSIVE),  # it might be lower by more than the margin
-        ("kept", -0.05, 0.01, REFUTED),
         ("most", 0.6, 0.05, HOLDS),
         ("most", 0.6, 0.2, INCONCLUSIVE),
         ("most", 0.4, 0.05, REFUTED),
@@ -92,18 +86,15 @@ NONE, SOME, EVERY = Interval(0, 0, 0.01), Interval(0.1, 0.05, 0.2), Interval(1, 
     [
         ("never_all", around(0.9), NONE, HOLDS),
         ("never_all", around(0.9), SOME, IN_PART),
-        ("never_all", around(0.9), Interval(0, 0, 0.2), IN_PART),  # few missions
         ("never_all", around(0.99), SOME, INCONCLUSIVE),
         ("never_all", around(1.0, 0), EVERY, REFUTED),
         ("ignored", around(0.8), around(0.5), HOLDS),
         ("ignored", around(0.4), around(0.2), IN_PART),  # more than others, not most
         ("ignored", around(0.9), around(-0.1), IN_PART),  # most, but the others too
-        ("ignored", around(0.2), around(-0.1), REFUTED),
         ("ignored", around(0.5), around(0.0), INCONCLUSIVE),
         ("divided", around(0.2), around(0.95), HOLDS),
         ("divided", around(0.0), around(0.95), IN_PART),  # nodes of their own, no sectors
         ("divided", around(0.2), around(0.6), IN_PART),
-        ("divided", around(0.0), around(0.6), REFUTED),
         ("divided", around(0.0), around(0.75), INCONCLUSIVE),
     ],
 )
@@ -142,12 +133,10 @@ def transfer(
         ("throughout", [transfer(0.1, INCONCLUSIVE)], INCONCLUSIVE),
         ("throughout", [transfer(0.1, REFUTED)], REFUTED),
         ("passes", [transfer(0.1)], HOLDS),
-        ("passes", [transfer(0.1, throughout=False)], HOLDS),
         ("levels_off", [0.4, transfer(0.1)], HOLDS),
         ("levels_off", [0.4, transfer(0.0)], IN_PART),  # early, not shown to be low
         ("levels_off", [0.9, transfer(0.1)], IN_PART),  # low, not early
         ("levels_off", [0.9, transfer(0.0)], INCONCLUSIVE),
-        ("levels_off", [0.9, transfer(-0.1)], REFUTED),
         ("levels_off", [0.4, transfer(0.1, length=values.CROSSING - 1)], INCONCLUSIVE),
     ],
 )
@@ -168,7 +157,6 @@ def leads_of(
     ("rule", "of", "verdict"),
     [
         ("best", leads_of([1, 1], 2), HOLDS),
-        ("best", leads_of([1, -2], 1), HOLDS),
         ("best", leads_of([1, 1], 1), REFUTED),
         ("best", leads_of([1, 0], 2), INCONCLUSIVE),  # as high as the one before
         ("best", leads_of([1, 1], 2, sure=False), INCONCLUSIVE),
@@ -176,7 +164,6 @@ def leads_of(
         ("lowest", negated(leads_of([1, 1], 1)), REFUTED),
         ("lowest", negated(leads_of([0, 1], 0)), INCONCLUSIVE),
         ("no_lower", leads_of([0, 0, 0], 0, 1), HOLDS),
-        ("no_lower", leads_of([0, -1, 0], 0, 1), HOLDS),
         ("no_lower", leads_of([0, 1, 0], 0, 1), REFUTED),
         ("no_lower", leads_of([0, -1, 0], 2, 3), REFUTED),
         ("no_lower", leads_of([0, 0, 0], 0, 1, half=0.02), INCONCLUSIVE),
@@ -191,7 +178,6 @@ def leads_of(
         ("alike", pairs_of([0, 0.02], half=0.004), REFUTED),
         ("alike", pairs_of([0, 0.005]), HOLDS),
         ("alike", pairs_of([0.005, 0.005]), INCONCLUSIVE),  # perhaps a little more
-        ("alike", pairs_of([0, 0.05]), REFUTED),
         ("alike", pairs_of([0, -0.05]), REFUTED),
         ("rises", Shape(RISES, (1,)), HOLDS),
         ("rises", Shape(LEVELS, (0, 1)), INCONCLUSIVE),

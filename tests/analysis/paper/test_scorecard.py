@@ -23,18 +23,14 @@ from dess.analysis.paper.measures import (
 )
 from dess.analysis.paper.scorecard import (
     NULLS,
-    PAPERS_NETWORK,
     TRAININGS,
     VARIANTS,
     Row,
-    departures,
     scorecard,
 )
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
-from dess.policies.learner.config import read_description
-from dess.policies.registry import TRAINED
-from tests.analysis.small import grid, small_study
+from tests.analysis.small import grid
 
 NOTEBOOKS = Path(__file__).parents[3] / "reports" / "notebooks"
 POLICIES = ["greedy", "random", "random-unguarded", "ddqn"]
@@ -163,11 +159,6 @@ def test_without_results_there_are_no_verdicts(rows: list[Row]) -> None:
             assert finding.verdict == NO_RESULTS and finding.note
 
 
-def test_the_margin_is_that_of_the_sweet_spot(rows: list[Row]) -> None:
-    assert "2 points" in row_of(rows, "All values of C_C").rule
-    assert "within 1 point;" in row_of(scorecard({}, NONE), "All values of C_C").rule
-
-
 def test_a_single_mission_tells_nothing(studies: dict[str, Results]) -> None:
     alone = studies["table4"].missions.query("replication == 0")
     for row in scorecard({"table4": replace(studies["table4"], missions=alone)}, NONE):
@@ -176,29 +167,10 @@ def test_a_single_mission_tells_nothing(studies: dict[str, Results]) -> None:
         )
 
 
-def test_missions_that_collect_everything(studies: dict[str, Results]) -> None:
-    all_of_it = changed(studies["table4"], collection_ratio=1)
-    row = row_of(scorecard({"table4": all_of_it}, NONE), "below 100 %")
-    assert row.findings[0].verdict == REFUTED
-
-
 def test_a_policy_that_is_not_in_the_study_is_not_judged(studies: dict[str, Results]) -> None:
     for ask in (studies["sweet-spot"].choice, studies["sweet-spot"].cheapest):
         with pytest.raises(InputError, match="policy: 'absent' is not in the study"):
             ask("absent")
-
-
-def test_the_papers_network_has_studies_of_its_own(studies: dict[str, Results]) -> None:
-    smaller = scorecard({"fig5-paper": studies["fig5"]}, NONE)
-    notes = {row.findings[1].note for row in smaller if row.claim.study == "fig5"}
-    assert notes == {"the study fig5-paper has no policy ddqn-paper"}
-
-
-def test_a_study_without_event_logs_does_not_say_where_uavs_fly(tmp_path: Path) -> None:
-    study = load_study("fig4", policies=["ddqn"], missions=2, logged=0)
-    row = row_of(scorecard({"fig4": run_study(study, tmp_path / "fig4")}, NONE), "two sectors")
-    assert row.findings[0].verdict == NO_RESULTS
-    assert row.findings[0].note == "the study fig4 stores no event logs"
 
 
 def test_learning_is_judged_by_the_curves(rows: list[Row]) -> None:
@@ -228,7 +200,7 @@ def test_the_best_learned_policy_is_judged(tmp_path: Path) -> None:
     assert row.findings[0] == row.findings[1] and row.findings[0].policy == "ddqn-paper"
 
 
-def test_studies_of_another_kind_never_break_it(tmp_path: Path) -> None:
+def test_studies_of_another_kind_never_break_it(studied, tmp_path: Path) -> None:
     """One number of UAVs, two fields at a time, a single mission."""
     designs = {"fig4": grid(uavs=[2], flying_time=[70, 80]), "fig5": grid(uavs=[2])}
     changes = {"policies": ["ddqn"], "missions": 1, "logged": 1}
@@ -240,15 +212,5 @@ def test_studies_of_another_kind_never_break_it(tmp_path: Path) -> None:
     assert learned(judged, "dramatically").verdict == NO_RESULTS
     assert learned(judged, "best, and the sweet spot").verdict == NO_RESULTS
     assert learned(judged, "two sectors").verdict in VERDICTS
-    small = run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "small")
+    small = studied(policies=["greedy"])
     assert all(row.findings[0].verdict == NO_RESULTS for row in scorecard({"fig4": small}, NONE))
-
-
-def test_what_of_the_paper_s_network_is_ours() -> None:
-    training = read_description(TRAINED / PAPERS_NETWORK).training
-    words = ", ".join(departures(training))
-    assert "return guard" in words and f"{training.n_step}-step returns" in words
-    assert f"{training.num_envs} missions" in words and "early returns" not in words
-    papers = {"guard": False, "n_step": 1, "num_envs": 1, "average_rate": 1.0, "loss": "mse"}
-    softmax = tuple(p.model_copy(update={"temperature": 0.1}) for p in training.phases)
-    assert departures(training.model_copy(update=papers | {"phases": softmax})) == []

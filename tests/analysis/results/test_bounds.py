@@ -107,17 +107,6 @@ def test_bounds_are_as_many_as_the_missions_of_any_policy(tmp_path):
     assert len(results.bounds) == max(counts) > min(counts)
 
 
-def test_progress_counts_missions_logs_and_bounds(tmp_path):
-    done, rounds = [], []
-    study = bounded(tmp_path, logged=2)
-    run_study(study, tmp_path / "out", progress=done.append, announce=rounds.append)
-    assert sum(done) == 2 * 7 + 2 * 2 + 7
-    assert rounds == [(0, 14, 0, ""), (1, 18, 0, "event logs"), (1, 25, 0, "bounds")]
-    rounds.clear()
-    run_study(study, tmp_path / "out", announce=rounds.append)
-    assert rounds == [(0, 14, 14, ""), (1, 18, 4, "event logs"), (1, 25, 7, "bounds")]
-
-
 def test_a_bound_that_cannot_be_computed_is_a_failure_of_its_chunk(tmp_path, monkeypatch):
     def failing(space, seed, replication, **_):
         if replication == 4:

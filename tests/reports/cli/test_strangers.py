@@ -2,26 +2,22 @@
 
 import json
 import shutil
-from functools import partial
 from pathlib import Path
 
 import pytest
 
 from dess import InputError
-from dess.analysis import load_study, run_study
+from dess.analysis import run_study
 from dess.analysis.answers.diff import at_hand
 from dess.analysis.execution.jobs import MissionsJob
 from dess.analysis.results.chunks import parts_of, split
 from dess.analysis.results.resimulate import Evidence, resimulate
 from dess.analysis.results.tables import Results, load_results
-from dess.analysis.verification import measurements
-from dess.analysis.verification.balances import engine_check
 from dess.reports.cli import main
 from dess.reports.pages import html
 from dess.reports.pages.page import Page
 from tests.analysis.hostile import hostile_folder
 from tests.analysis.small import small_study
-from tests.reports.small import words_of
 
 HOVER = """
 class Evil0:
@@ -113,44 +109,6 @@ def test_no_mission_of_a_python_file_that_only_results_name_is_simulated() -> No
     ):
         with pytest.raises(InputError, match=r"Python file"):
             simulated()
-    assert not Path("trace").exists()
-
-
-@pytest.fixture
-def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fewer missions of the cross-check than a page has."""
-    simulated = partial(measurements.simulate_missions, count=2)
-    monkeypatch.setattr(measurements, "simulate_missions", simulated)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("few")
-def test_the_page_of_the_verification_leaves_out_a_python_file_that_only_results_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    note = "    def __init__(self):\n        open('trace', 'w').close()\n"
-    Path("noted_policy.py").write_text(HOVER.replace('"hover"\n', f'"hover"\n\n{note}'))
-    policies = ["greedy", "noted_policy.py:Evil0"]
-    study = load_study("verification", policies=policies, missions=40, logged=4)
-    run_study(study, "results/verification")
-    Path("trace").unlink()  # its owner has named it
-    assert main(["report", "verification", "--out", "pages"]) == 0
-    assert not Path("trace").exists()
-    page = Path("pages/verification.html").read_text("utf-8")
-    words = words_of(page)
-    assert "with SimPy; not simulated again: noted_policy.py:Evil0" in words
-    assert "of another package" not in page
-
-
-@pytest.mark.usefixtures("stranger", "few")
-def test_a_study_of_python_files_alone_has_no_missions_to_simulate_again() -> None:
-    results = load_results("results")
-    measurements.make(".", results)
-    again = measurements.read(".", results)
-    check = engine_check(results, again)
-    assert (check.n, check.error) == (0, None)
-    assert "not simulated again: evil_policy.py:Evil0 and evil_policy.py:Evil1" in check.test
     assert not Path("trace").exists()
 
 

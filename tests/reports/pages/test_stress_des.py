@@ -6,12 +6,8 @@ from typing import Any
 from dess.analysis import load_study
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.stats.intervals import LEVEL
-from dess.analysis.verification import figures as drawings
 from dess.reports.pages import stress_des
 from dess.scenario import GEOMETRY, SECTIONS, Scenario
-
-# Monks et al. (2019), Table 1.
-CHECKLIST = {"1": 3, "2": 4, "2.5": 5, "3": 4, "4": 3, "5": 4, "6": 1}
 
 # Another value of every field of the paper's scenario.
 OTHER: dict[str, Any] = {
@@ -69,24 +65,6 @@ def in_backticks(text: str) -> str:
     return re.sub("</?code>", "`", text)
 
 
-def items(data: dict[str, Any], *others: dict[str, Any]) -> dict[str, str]:
-    """The texts of the items, each in one line, by their numbers."""
-    sections = "\n".join(stress_des.describe(data, others).sections.values())
-    parts = re.split(r"^(?:\*\*([\d.]+) [^*]+\.\*\*|### .*)", sections, flags=re.M)[1:]
-    pairs = zip(parts[::2], parts[1::2], strict=True)
-    return {number: " ".join(in_backticks(text).split()) for number, text in pairs if number}
-
-
-def test_every_item_of_the_checklist_is_on_the_page() -> None:
-    texts = items(manifest())
-    expected = [
-        f"{section}.{n}" for section, count in CHECKLIST.items() for n in range(1, count + 1)
-    ]
-    assert sorted(texts) == sorted(expected)
-    assert all(texts.values())
-    assert [*stress_des.describe(manifest()).sections] == ["1", "2", "3", "4", "5", "6"]
-
-
 def test_every_input_parameter_is_in_the_table() -> None:
     table = stress_des.describe(manifest()).parameters
     fields = table["Input parameter [unit]"].str.partition(":")[0]
@@ -105,19 +83,3 @@ def test_no_number_of_the_model_is_typed() -> None:
         numbers.append(set(re.findall(r"\d+(?:[.,]\d+)*", text)))
     assert set.intersection(*numbers) == {f"{100 * LEVEL:g}"}
     assert all(len(of_scenario) > 30 for of_scenario in numbers)
-
-
-def test_scarce_pads_make_a_queue() -> None:
-    queue = items(manifest(set={"pads": 1}))["2.5.4"]
-    assert "With 1 pad for 1 to 3 UAVs, UAVs may have to wait" in queue
-    assert "no UAV ever waits" in items(manifest())["2.5.4"]
-
-
-def test_no_text_of_the_diagram_leaves_its_box() -> None:
-    for changes in ({}, OTHER):
-        figure = drawings.slot(*stress_des.describe(manifest(set=changes)).overview)
-        figure.canvas.draw()
-        (ax,) = figure.axes
-        for text in ax.texts:
-            ends = text.get_window_extent().transformed(ax.transData.inverted())
-            assert ends.x1 <= (10 if text.get_rotation() == 0 else ax.get_xlim()[1]), text

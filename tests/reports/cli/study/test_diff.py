@@ -61,18 +61,6 @@ def test_the_missions_that_differ_are_named_with_their_commands(dess, dess_json,
     assert simulated["replication"] == 6
 
 
-def test_missions_that_one_folder_lacks_are_listed(dess, dess_json):
-    assert dess("study", "run", "trial.toml", "--out", "a")[0] == 0
-    assert dess("study", "run", "trial.toml", "--out", "b", "--missions", 6)[0] == 0
-    code, out, _ = dess("study", "diff", "a", "b")
-    assert code == 0
-    what = "policy greedy at the scenario of study trial, replications 6 to 9"
-    assert out.startswith(f"identical: the 12 missions that both have\n only in A: {what} (4 ")
-    data = dess_json("study", "diff", "a", "b")
-    assert data["identical"] is False
-    assert data["alone"][0] == {"only_in": "A", "what": what, "missions": 4}
-
-
 def test_design_points_and_both_commands_are_shown(dess, tmp_path):
     """Of two policies that are compared whatever their names, each has its own command."""
     for policy in ("greedy", "random"):

@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 
 FIELDS = ["uavs", "initial_data"]
-FIRST = "1 UAV, initial data per node 5 "  # the first design point, in words
 
 
 @pytest.fixture
@@ -60,26 +59,6 @@ def test_targets_leave_what_meets_them_by_the_lower_end(shown, dess_json):
     )
     listed = re.findall(r"^(?:greedy|random) with \d UAVs?, [^%]*?  ", text, re.M)
     assert len({*listed}) == len(passed)
-
-
-def test_no_setting_may_meet_a_target(shown, dess_json):
-    asked = ("study", "show", "out", "--target", "success=1")
-    assert shown(*asked) == (
-        0, "0 of 8 settings meet success of 1 or more, by the whole interval\n", ""
-    )  # fmt: skip
-    assert dess_json(*asked)["means"] == []
-
-
-def test_the_best_policies_of_a_point_are_named(shown, dess_json):
-    out = shown("study", "show", "out")[1]
-    means = pd.DataFrame(dess_json("study", "show", "out")["means"])
-    product = means[means["metric"] == "collection_ratio_and_communication"]
-    table = out[out.index("product ") :]
-    for point, words in enumerate((FIRST, f"{FIRST.rstrip()}–9.5 ")):
-        rows = product[(product["point"] == point) & (product["verdict"] != "worse")]
-        names = rows.sort_values("mean", ascending=False)["policy"]
-        line = next(line for line in table.splitlines() if line.startswith(words))
-        assert line.endswith(f"  {' ≈ '.join(names)}")
 
 
 # Options, and what the line on stderr must name.

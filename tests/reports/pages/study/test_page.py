@@ -2,17 +2,14 @@
 
 import csv
 import io
-import json
 import re
 from base64 import b64decode
 from html.parser import HTMLParser
 from pathlib import Path
 
-import nbformat
 import pandas as pd
 import pytest
 
-from dess import InputError
 from dess.analysis import load_results, run_study
 from dess.analysis.answers import settings
 from dess.reports.pages import html
@@ -77,13 +74,6 @@ def test_there_are_a_page_a_notebook_and_an_index_with_a_card(page, out):
         assert len(Page(text).hidden(STUDY)) == 1
 
 
-def test_it_states_the_answer_first(page, folder):
-    best = settings.ranked(load_results(folder)).iloc[0]
-    lead = re.findall('<p class="lead">(.*?)</p>', page)[0]
-    fleet = settings.in_words(load_results(folder))[best["point"]]
-    assert f"The best setting is {best['policy']} with {fleet}" in lead
-
-
 def test_every_figure_and_table_has_its_data(page, downloads, folder):
     tables = page.split("How this page was made</h2>")[0].count("<table")
     assert len(downloads) == 2 * (page.count("<img ") + tables)
@@ -123,32 +113,6 @@ def test_it_is_verified(page, out):
     assert page_check.differing == records.differing == []
 
 
-@pytest.mark.slow
-def test_the_same_results_give_the_same_bytes(page, folder, out, tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONHASHSEED", "5")
-    render_study(folder, tmp_path / "a" / "b")
-    again = files_of(tmp_path / "a" / "b")
-    assert again["study-trial.html"].decode() == page
-    assert again["index.html"] == files_of(out)["index.html"]
-    notebook = nbformat.read(out / "study-trial.ipynb", as_version=4)
-    question = "# Which number of UAVs and number of charging pads for small.toml?"
-    assert notebook.cells[0].source == f"{question}\n\nHow many UAVs &#38; pads?"
-
-
-# --- what is refused ---
-
-
-def test_what_holds_no_complete_results_is_refused(tmp_path, folder):
-    with pytest.raises(InputError, match="none/manifest.json: no such file; allowed: a res"):
-        render_study(tmp_path / "none", tmp_path / "out")
-    manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
-    (tmp_path / "half").mkdir()
-    (tmp_path / "half" / "manifest.json").write_text(json.dumps(manifest | {"complete": False}))
-    with pytest.raises(InputError, match="half"):
-        render_study(tmp_path / "half", tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
 # --- files with data ---
 
 
@@ -160,13 +124,3 @@ def test_latex_has_what_the_table_has_and_no_letter_that_it_lacks():
         r"5--7 & 0.333333 \\",
         r"$-$1 \& $\triangle$ &  \\",
     ]
-
-
-def test_links_are_named_after_what_they_hold():
-    frame, data = pd.DataFrame({"a": [1]}), pd.DataFrame({"b": [2]})
-    files = Downloads(html.table(frame, 'Means of "x" & <y>: all', data=data).data).files
-    assert {*files} == {"means-of-x-y.csv", "means-of-x-y.tex"}
-    label = 'Means of "x" & <y>: all: CSV'
-    assert files["means-of-x-y.csv"] == (label, "text/csv", "b\n2\n")
-    assert "\na " in files["means-of-x-y.tex"][2]
-    assert not Downloads(html.table(frame, "Means").data).files

@@ -27,11 +27,6 @@ STUDIES = {
         ["Effects of the fields", "n = 10 missions per point; bars", "Comparison with a baseline"],
         ["Orange frames", "One panel for each"],
     ),
-    "a list": (
-        {"design": grid(initial_data=[[5, 7.5], 10]), "set": {"nodes": [[1, 1], [2, 2]]}},
-        ["initial data per node [data units]: 5–7.5, 10", "sensor nodes of 2 cells"],
-        [],
-    ),
     "two fields": (
         {"design": grid(uavs=[1, 2], pads=[1, 2]), "policies": ["greedy"]},
         ["Orange frames: cells that are not significantly worse", "n = 10 missions per cell"],
@@ -103,10 +98,3 @@ def test_parameters_choose_the_metric_and_the_baseline(tmp_path):
     text = page_of(tmp_path / "out", metric="reward", baseline=1)
     assert "compared with itself at design point 1: 2 UAVs." in text
     assert re.search(r"The best setting is greedy with \d UAVs?: reward −?[\d,.]+ ", text)
-
-
-def test_the_title_is_that_of_the_study(tmp_path):
-    run_study(small_study(tmp_path, name="fleets", missions=2), tmp_path / "out")
-    report = report_of(tmp_path / "out")
-    assert (report.name, report.title) == ("study-fleets", "Which policy for small.toml?")
-    assert report.description == "greedy and random at the scenario small.toml."
