@@ -7,7 +7,17 @@ import pytest
 from packaging.utils import canonicalize_name
 
 from tests.distributions import ROOT
-from tests.integrations import matrix
+from tests.integrations.matrix import (
+    BEGIN,
+    CHECK,
+    END,
+    FAILED,
+    MISSING,
+    NO_ENVIRONMENT,
+    PAGE,
+    YES,
+    row,
+)
 from tests.test_packaging import pins
 
 OWN_PINS = sorted((ROOT / "examples" / "requirements").glob("*.txt"))
@@ -16,48 +26,48 @@ TESTED = {path.stem.removeprefix("test_") for path in (ROOT / "tests/integration
 
 def suite(outcome: str) -> ElementTree.Element:
     """The report of a library whose test had an outcome."""
-    case = "" if outcome == "absent" else f'<testcase name="{matrix.CHECK}">{outcome}</testcase>'
+    case = "" if outcome == "absent" else f'<testcase name="{CHECK}">{outcome}</testcase>'
     library = '<properties><property name="library" value="ray 2.60.0"/></properties>'
     return ElementTree.fromstring(f"<testsuite>{library}{case}</testsuite>")
 
 
-OUTCOMES = [("", matrix.YES), ("<failure/>", matrix.FAILED), ("<error/>", matrix.FAILED)]
-OUTCOMES += [("<skipped/>", matrix.MISSING), ("absent", matrix.MISSING)]
+OUTCOMES = [("", YES), ("<failure/>", FAILED), ("<error/>", FAILED)]
+OUTCOMES += [("<skipped/>", MISSING), ("absent", MISSING)]
 
 
 @pytest.mark.parametrize(("outcome", "cell"), OUTCOMES)
-def test_a_row_has_the_outcome_of_every_check(outcome, cell):
-    assert matrix.row(suite(outcome), "rllib") == ["`rllib` (`ray`)", "2.60.0", cell]
+def test_a_row_has_the_outcome_of_every_check(outcome: str, cell: str) -> None:
+    assert row(suite(outcome), "rllib") == ["`rllib` (`ray`)", "2.60.0", cell]
 
 
-def test_one_case_that_fails_is_enough():
+def test_one_case_that_fails_is_enough() -> None:
     report = suite("absent")
     for name, inner in (("test_contract[fixed]", ""), ("test_contract[drawn]", "<failure/>")):
         report.append(ElementTree.fromstring(f'<testcase name="{name}">{inner}</testcase>'))
-    assert matrix.row(report, "rllib")[2] == matrix.FAILED
+    assert row(report, "rllib")[2] == FAILED
 
 
-def test_a_library_that_is_not_installed_is_seen():
+def test_a_library_that_is_not_installed_is_seen() -> None:
     skipped = ElementTree.fromstring("<testsuite><testcase><skipped/></testcase></testsuite>")
     skipped[0].attrib["name"] = "tests.integrations.test_rllib"
-    assert set(matrix.row(skipped, "rllib")[1:]) == {matrix.MISSING}
+    assert set(row(skipped, "rllib")[1:]) == {MISSING}
 
 
-def test_own_pins_are_exact_and_those_of_a_library_with_tests():
+def test_own_pins_are_exact_and_those_of_a_library_with_tests() -> None:
     for path in OWN_PINS:
         assert pins(path)
         assert path.stem in TESTED
 
 
-def test_the_page_has_a_green_row_for_every_library_in_its_pinned_version():
-    text = (ROOT / matrix.PAGE).read_text("utf-8").split(matrix.BEGIN)[1].split(matrix.END)[0]
+def test_the_page_has_a_green_row_for_every_library_in_its_pinned_version() -> None:
+    text = (ROOT / PAGE).read_text("utf-8").split(BEGIN)[1].split(END)[0]
     rows = [line.strip("| ").split(" | ") for line in text.strip().splitlines()[2:]]
     names = {re.findall(r"`(.+?)`", first)[0].replace("-", "_") for first, *_ in rows}
-    assert names == TESTED - matrix.NO_ENVIRONMENT
+    assert names == TESTED - NO_ENVIRONMENT
     of_all = pins(ROOT / "constraints.txt")
     for first, version, *cells in rows:
         name, *distribution = re.findall(r"`(.+?)`", first)
         own = ROOT / "examples" / "requirements" / f"{name}.txt"
         pinned = of_all | (pins(own) if own.exists() else {})
         assert version.split("+")[0] == pinned[canonicalize_name([name, *distribution][-1])]
-        assert cells == [matrix.YES], name
+        assert cells == [YES], name

@@ -12,8 +12,6 @@ from tests.policies.learner.tiny import PHASES, TINY, tiny, tiny_on_seas, write_
 
 PHASE = PHASES[0]
 BAD: list[tuple[dict[str, Any], str]] = [
-    ({"speed": 1}, "speed: unknown key"),
-    ({"observation": "radar"}, "observation: "),
     ({"phases": [PHASE | {"epsilon": [0.5, 2]}]}, "phases.0.epsilon.1: "),
     ({"phases": [PHASE, PHASE]}, "phases: ['harvest', 'harvest'] are not distinct"),
     ({"n_step": 60}, "learning_starts: 60 is too few; allowed: more than n_step 60"),

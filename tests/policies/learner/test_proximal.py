@@ -97,7 +97,7 @@ def test_what_brought_more_becomes_likelier_but_not_by_much_more():
     assert (signs * chances()).mean() > 0
     # Beyond the clip there is no gradient: one decision alone stops soon after it.
     alone = shown.picked(np.array([1]))
-    for _ in range(200):
+    for _ in range(100):
         training.learner.update([alone], temperature, 1e-3, True)
     assert np.log(1 + CLIP) < chances()[1] < np.log(1 + CLIP) + 0.5
 
