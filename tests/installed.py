@@ -42,7 +42,7 @@ def install(folder: Path, *packages: str) -> Path:
 
 
 @pytest.fixture(scope="session")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def installed(tmp_path_factory):
     """The command ``dess`` of an installed wheel; run it with the variables of ``environment``."""
     folder = tmp_path_factory.mktemp("installed")
     wheel = built("wheel", folder)

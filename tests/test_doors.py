@@ -74,7 +74,7 @@ def in_memory(call: ast.Call) -> bool:
     return bool(places & {"buffer", "sink"}) or any("BufferReader(" in place for place in places)
 
 
-def test_files_are_opened_read_written_and_listed_by_the_door_alone() -> None:
+def test_files_are_opened_read_written_and_listed_by_the_door_alone():
     """An exception that nothing needs any more goes."""
     past = {
         name: {what for what, call in called(tree) if not in_memory(call)}
@@ -91,7 +91,7 @@ THROUGH += ("pq.ParquetFile(pa.BufferReader(content))", "a.savefig(buffer, forma
 
 
 @pytest.mark.parametrize("source", PAST + THROUGH)
-def test_a_way_past_the_door_is_seen(source: str) -> None:
+def test_a_way_past_the_door_is_seen(source):
     past = [what for what, call in called(ast.parse(source)) if not in_memory(call)]
     assert len(past) == (source in PAST)
 
@@ -124,7 +124,7 @@ def parsed(tree: ast.Module) -> Iterator[str]:
                 yield name
 
 
-def test_documents_become_models() -> None:
+def test_documents_become_models():
     outside = {name: tree for name, tree in SOURCES.items() if not name.startswith(DOOR)}
     found = {name: {*parsed(tree)} for name, tree in outside.items()}
     assert {name: names for name, names in found.items() if names} == PARSED

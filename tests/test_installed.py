@@ -38,11 +38,11 @@ def check_commands(dess: Path, folder: Path) -> None:
     assert str(ROOT) not in page.read_text("utf-8")
 
 
-def test_the_wheel_runs_without_the_repository(installed: Path, tmp_path: Path) -> None:
+def test_the_wheel_runs_without_the_repository(installed, tmp_path):
     check_commands(installed, tmp_path)
 
 
-def test_a_checkout_without_links_says_how_to_make_them(tmp_path: Path) -> None:
+def test_a_checkout_without_links_says_how_to_make_them(tmp_path):
     (tmp_path / "dess").mkdir()
     for name in ("__init__.py", "__main__.py"):
         shutil.copy(ROOT / "dess" / name, tmp_path / "dess")
@@ -54,7 +54,7 @@ def test_a_checkout_without_links_says_how_to_make_them(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_sdist_builds_the_same_wheel(tmp_path: Path) -> None:
+def test_the_sdist_builds_the_same_wheel(tmp_path):
     shutil.unpack_archive(built("sdist", tmp_path / "sdist"), tmp_path)
     [source] = tmp_path.glob("dess-*")
     ours, theirs = (built("wheel", tmp_path / to, at) for to, at in (("a", ROOT), ("b", source)))
@@ -64,7 +64,7 @@ def test_the_sdist_builds_the_same_wheel(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_wheel_with_everything_runs_in_an_empty_environment(tmp_path: Path) -> None:
+def test_a_wheel_with_everything_runs_in_an_empty_environment(tmp_path):
     dess, folder = install_wheel(tmp_path, "[all]") / "dess", tmp_path
     check_commands(dess, folder)
     [page] = folder.glob("build/reports/*trial.html")

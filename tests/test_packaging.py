@@ -33,12 +33,12 @@ def pins(path: Path) -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> ZipFile:
+def wheel(tmp_path_factory):
     """The wheel of this source tree."""
     return ZipFile(built("wheel", tmp_path_factory.mktemp("wheel")))
 
 
-def test_the_wheel_holds_the_packages_with_all_their_files_and_nothing_else(wheel: ZipFile) -> None:
+def test_the_wheel_holds_the_packages_with_all_their_files_and_nothing_else(wheel):
     files = {
         f"{FOLDERS[folder]}{path.relative_to(ROOT).as_posix()}"
         for folder in FOLDERS
@@ -51,13 +51,13 @@ def test_the_wheel_holds_the_packages_with_all_their_files_and_nothing_else(whee
     assert "dess/py.typed" in held
 
 
-def test_trained_policies_have_their_curves_and_model_cards() -> None:
+def test_trained_policies_have_their_curves_and_model_cards():
     kinds = {"model.safetensors", "config.json", "training.parquet", "README.md"}
     for name in trained_names():
         assert {path.name for path in (TRAINED / name).iterdir()} == kinds
 
 
-def test_every_library_that_is_imported_is_asked_for() -> None:
+def test_every_library_that_is_imported_is_asked_for():
     imported = {
         (node.module if isinstance(node, ast.ImportFrom) else alias.name).split(".")[0]
         for folder in FOLDERS
@@ -73,21 +73,15 @@ def test_every_library_that_is_imported_is_asked_for() -> None:
     assert not wanted - set(requirements(*asked("all")))
 
 
-def test_every_requirement_of_the_sessions_is_pinned_within_its_range() -> None:
-    pinned = pins(CONSTRAINTS)
-    wanted = requirements(*ASKED)
-    assert set(wanted) <= set(pinned)
+def test_requirements_and_what_they_require_are_pinned_within_their_ranges():
+    pinned, wanted, needed = pins(CONSTRAINTS), requirements(*ASKED), closure(*ASKED)
+    assert len(needed) > len(wanted)
+    assert needed | set(wanted) <= set(pinned)
     for name, requirement in wanted.items():
         assert requirement.specifier.contains(pinned[name]), name
 
 
-def test_what_the_requirements_require_is_pinned_too() -> None:
-    needed_by_all = closure(*ASKED)
-    assert len(needed_by_all) > len(requirements(*ASKED))
-    assert not needed_by_all - set(pins(CONSTRAINTS))
-
-
-def test_pins_run_on_the_oldest_python_that_is_promised() -> None:
+def test_pins_run_on_the_oldest_python_that_is_promised():
     """Here are the pinned versions, as far as they are installed, so their metadata says it."""
     oldest = PROJECT["requires-python"].removeprefix(">=")
     here = {canonicalize_name(d.metadata["Name"]): d for d in distributions()}
@@ -101,40 +95,35 @@ def test_pins_run_on_the_oldest_python_that_is_promised() -> None:
             )
 
 
-def test_all_and_the_tests_have_every_extra_that_adds_something() -> None:
+def test_all_and_the_tests_have_every_extra_that_adds_something():
     everything = {line for extra in EXTRAS.keys() - APART for line in asked(extra)}
     assert set(asked("all")) == everything
     assert everything <= set(asked("test"))
 
 
-def test_the_citation_names_this_version_and_the_paper() -> None:
+def test_citation_and_changelog_have_this_version():
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
-    assert citation["version"] == PROJECT["version"]
-    assert citation["license"] == PROJECT["license"]
+    assert [citation[key] for key in ("version", "license")] == [PROJECT["version"], "MIT"]
     assert "Multi-UAV Trajectory Optimizer" in citation["references"][0]["title"]
-
-
-def test_the_changelog_has_an_entry_for_this_version() -> None:
     entries = re.findall(r"^## \[(.+?)\]", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
-    assert entries[0] == "Unreleased"
-    assert entries[1] == PROJECT["version"]
+    assert entries[:2] == ["Unreleased", PROJECT["version"]]
 
 
-def test_ci_runs_every_nox_session() -> None:
+def test_ci_runs_every_nox_session():
     defined = re.findall(r"^@nox\.session.*\ndef (\w+)", (ROOT / "noxfile.py").read_text(), re.M)
     lines = re.findall(r"^\S*nox .*-s ([\w ]+?)(?: --|$)", (ROOT / ".ci/run").read_text(), re.M)
     assert {"tests", "verify", "fuzz"} <= set(defined)
     assert sorted(" ".join(lines).split()) == sorted(defined)
 
 
-def test_the_hooks_before_a_commit_are_what_lint_runs() -> None:
+def test_the_hooks_before_a_commit_are_what_lint_runs():
     lint = (ROOT / "noxfile.py").read_text("utf-8").split("def lint(")[1].split("@nox")[0]
     commands = [words.replace('", "', " ") for words in re.findall(r'session\.run\("(.+)"\)', lint)]
     config = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text("utf-8"))
     assert [hook["entry"] for hook in config["repos"][0]["hooks"]] == commands
 
 
-def test_the_workflow_runs_every_python_that_is_promised() -> None:
+def test_the_workflow_runs_every_python_that_is_promised():
     jobs = yaml.safe_load((ROOT / ".github/workflows/tests.yml").read_text("utf-8"))["jobs"]
     pythons = jobs["all-sessions"]["strategy"]["matrix"]["python"]
     claimed = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["classifiers"]))

@@ -1,15 +1,18 @@
 """Missions that are flown by a script on both engines, and what their logs say."""
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from dess.batch import simulate_batch
+from dess.env.stepper import MissionStepper
 from dess.mission import simulate
-from dess.record import MissionRecord
+from dess.record import MissionRecord, Records
 from dess.scenario import Scenario, ScenarioSpace
+from dess.view import View, acting_rows
 from tests.drawn import Script
 
 Log = dict[str, np.ndarray]
@@ -36,12 +39,28 @@ def flown(
         begins = (log["event"] == "mission_start") & (log["uav"] >= 0)
         if starts in (None, list(zip(log["x"][begins], log["y"][begins], strict=True))):
             batch = simulate_batch(scenario, Script(*routes), 0, [replication])
-            assert batch.missions[0].tobytes() == record.metrics.tobytes()
-            assert batch.uavs[0].tobytes() == record.uavs.tobytes()
-            if record.operations is not None:
-                assert batch.operations[0].tobytes() == record.operations.tobytes()
+            assert is_same(batch, 0, record)
             return record, log
     raise AssertionError(f"no replication starts at {starts}")
+
+
+def is_same(records: Records, job: int, single: MissionRecord) -> bool:
+    """Whether a row of a batch is a single mission, to the last bit."""
+    uavs = np.zeros_like(records.uavs[job])
+    uavs[: len(single.uavs)] = single.uavs
+    pairs = [(records.missions[job], single.metrics), (records.uavs[job], uavs)]
+    if single.operations is not None:
+        pairs.append((records.operations[job], single.operations))
+    return all(one.tobytes() == other.tobytes() for one, other in pairs)
+
+
+def assert_same_alone(
+    space: ScenarioSpace, team: Any, seed: int, numbers: Sequence[int], **options: Any
+) -> None:
+    """Assert that missions in batches are those that are simulated alone, bit for bit."""
+    records = simulate_batch(space, team, seed, numbers, **options)
+    for job, number in enumerate(numbers):
+        assert is_same(records, job, simulate(space, team, seed, number))
 
 
 def rows_of(log: Log, event: str, *names: str) -> list:
@@ -49,6 +68,21 @@ def rows_of(log: Log, event: str, *names: str) -> list:
     chosen = log["event"] == event
     columns = [log[name][chosen].tolist() for name in names]
     return columns[0] if len(names) == 1 else list(zip(*columns, strict=True))
+
+
+def cells_of(record: MissionRecord) -> list[tuple[float, float]]:
+    """The cells of a lone UAV after each slot, of a mission with events."""
+    assert record.events is not None
+    return rows_of(record.events.columns(), "move", "x", "y")
+
+
+def first_view(scenario: Scenario | ScenarioSpace, seed: int = 1, replication: int = 0) -> View:
+    """The first slot of a mission."""
+    stepper = MissionStepper(scenario, 1, seed)
+    stepper.start_at(seed, replication)
+    stepper.launch(stepper.indices)
+    state = stepper.state
+    return View(state, stepper.world, *acting_rows(state.missions, state.uavs, 1, 0))
 
 
 def batteries(log: Log, uav: int = 0) -> list[float]:

@@ -1,6 +1,5 @@
 """Both engines, any grouping: the same mission is the same record, bit for bit."""
 
-from collections.abc import Sequence
 from threading import get_ident
 from typing import Any
 
@@ -9,15 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dess import InputError, batch
+from dess import batch
 from dess.batch import BATCH_SIZE, MOST_WORK, simulate_batch
 from dess.mission import simulate
 from dess.policies import load
-from dess.record import EVENT_NAMES, FAILURE_EVENTS, PACKET_EVENTS, MissionRecord, Records
+from dess.record import EVENT_NAMES, FAILURE_EVENTS, PACKET_EVENTS, Records
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.sea.families import FAMILIES
 from dess.state import BATTERY, HOVER, QUOTA, TRUNCATED, sample_scenario
 from dess.view import View
+from tests.dess.flights import assert_same_alone, is_same
 from tests.drawn import (
     Commuter,
     Fidget,
@@ -49,39 +49,24 @@ FAILING = {
 BOTH = pytest.mark.parametrize("run", [simulate, simulate_batch])
 
 
-def _is(records: Records, job: int, single: MissionRecord) -> bool:
-    """Whether a row of a batch is a single mission, to the last bit."""
-    uavs = np.zeros_like(records.uavs[job])
-    uavs[: len(single.uavs)] = single.uavs
-    pairs = [(records.missions[job], single.metrics), (records.uavs[job], uavs)]
-    if single.operations is not None:
-        pairs.append((records.operations[job], single.operations))
-    return all(one.tobytes() == other.tobytes() for one, other in pairs)
-
-
 def _equal(one: Records, other: Records) -> bool:
     return all(a.tobytes() == b.tobytes() for a, b in zip(one, other, strict=True))
 
 
 @given(extended_spaces(), teams, seeds, st.lists(replications, min_size=1, max_size=4))
-def test_both_engines_give_the_same_record(
-    space: ScenarioSpace, team: Sequence[Any], seed: int, numbers: list[int]
-) -> None:
-    team = team[: space.uavs[1]]
-    records = simulate_batch(space, team, seed, numbers, batch_size=2)
-    for job, replication in enumerate(numbers):
-        assert _is(records, job, simulate(space, team, seed, replication))
+def test_both_engines_give_the_same_record(space, team, seed, numbers):
+    assert_same_alone(space, team[: space.uavs[1]], seed, numbers, batch_size=2)
 
 
 @pytest.mark.parametrize("sections", [{}, FAILING])
-def test_both_engines_agree_where_everything_happens(sections: dict[str, Any]) -> None:
+def test_both_engines_agree_where_everything_happens(sections):
     space = ScenarioSpace.of(BUSY, forbid_swaps=not sections, **sections)
     seen, ends, fleets, waited = set(), set(), set(), 0
     for policy in (Wanderer(), Commuter(), Fidget()):
         records = simulate_batch(space, policy, 2**64 - 1, 25)
         for job in range(25):
             single = simulate(space, policy, 2**64 - 1, job, events=True)
-            assert _is(records, job, single) and single.events is not None
+            assert is_same(records, job, single) and single.events is not None
             seen.update(single.events.event)
             ends.update(single.uavs["end"].tolist())
             fleets.add(len(single.uavs))
@@ -93,16 +78,14 @@ def test_both_engines_agree_where_everything_happens(sections: dict[str, Any]) -
 
 
 @pytest.mark.parametrize("sea", [f"{family}:5" for family in FAMILIES] + ["german-bight"])
-def test_both_engines_agree_on_generated_seas_and_bays(sea: str) -> None:
-    space, greedy = load_scenario(sea), load("greedy")
-    records = simulate_batch(space, greedy, 3, range(2))
-    assert all(_is(records, job, simulate(space, greedy, 3, job)) for job in range(2))
+def test_both_engines_agree_on_generated_seas_and_bays(sea):
+    assert_same_alone(load_scenario(sea), load("greedy"), 3, range(2))
 
 
 # --- batches ---
 
 
-def test_a_batch_is_its_missions_in_any_order_and_grouping() -> None:
+def test_a_batch_is_its_missions_in_any_order_and_grouping():
     numbers, team = np.array([5, 3, 2**32 - 1, 0, 77, 3, 12, 8]), [Fidget(), Wanderer()]
     whole = simulate_batch(BUSY, team, 9, numbers)
     assert whole.missions["replication"].tolist() == numbers.tolist()
@@ -115,7 +98,7 @@ def test_a_batch_is_its_missions_in_any_order_and_grouping() -> None:
 
 
 @pytest.mark.parametrize("workers", [1, 2, 20])
-def test_workers_change_nothing(workers: int) -> None:
+def test_workers_change_nothing(workers):
     """And each mission is reported once."""
     finished: list[int] = []
     one, changes = simulate_batch(BUSY, Fidget(), 4, 30), {"batch_size": 4, "workers": workers}
@@ -141,7 +124,7 @@ class _FailsInOneThread:
         return np.full(len(view), HOVER)
 
 
-def test_an_error_in_one_thread_ends_the_others() -> None:
+def test_an_error_in_one_thread_ends_the_others():
     """So does Ctrl-C, which is raised in the main thread."""
     endless = ScenarioSpace.of(BUSY, flight_cost=0, quota=10**6, max_slots=100_000)
     policy = _FailsInOneThread()
@@ -150,7 +133,7 @@ def test_an_error_in_one_thread_ends_the_others() -> None:
     assert 0 < policy.last_slot < 90_000
 
 
-def test_a_batch_is_small_where_a_mission_is_large(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_batch_is_small_where_a_mission_is_large(monkeypatch):
     """A slot of all missions in progress is one call of compiled code, which cannot be ended."""
     advanced: list[int] = []
     original = batch._advance
@@ -171,9 +154,7 @@ def test_a_batch_is_small_where_a_mission_is_large(monkeypatch: pytest.MonkeyPat
 
 
 @given(st.lists(spaces(), min_size=2, max_size=3), st.data(), seeds, st.integers(1, 2))
-def test_scenarios_of_different_worlds_fly_in_one_batch(
-    worlds: list[ScenarioSpace], data: st.DataObject, seed: int, workers: int
-) -> None:
+def test_scenarios_of_different_worlds_fly_in_one_batch(worlds, data, seed, workers):
     # The same worlds again with other fleets, which share a world, and with nodes in another order.
     again = [ScenarioSpace.of(space, uavs=1) for space in worlds]
     again += [ScenarioSpace.of(space, nodes=space.nodes[::-1]) for space in worlds]
@@ -181,16 +162,14 @@ def test_scenarios_of_different_worlds_fly_in_one_batch(
     numbers = range(len(mixed))
     records = simulate_batch(mixed, Fidget(), seed, numbers, workers=workers, batch_size=2)
     for job, space in enumerate(mixed):
-        assert _is(records, job, simulate(space, Fidget(), seed, job))
+        assert is_same(records, job, simulate(space, Fidget(), seed, job))
 
 
 # --- random numbers ---
 
 
 @given(spaces(), seeds, replications)
-def test_a_mission_of_a_space_is_the_mission_of_its_drawn_scenario(
-    space: ScenarioSpace, seed: int, replication: int
-) -> None:
+def test_a_mission_of_a_space_is_the_mission_of_its_drawn_scenario(space, seed, replication):
     """And whether its events are kept changes nothing."""
     drawn = sample_scenario(space, seed, replication)
     one = simulate(space, Fidget(), seed, replication)
@@ -204,9 +183,7 @@ FATE = ("mission_start", "arrival", "node_failure", "node_repair", "pad_failure"
 
 
 @given(spaces(arrival_rate=0.3) | extended_spaces() | continuous_spaces(), seeds, replications)
-def test_two_policies_have_common_random_numbers(
-    space: ScenarioSpace, seed: int, replication: int
-) -> None:
+def test_two_policies_have_common_random_numbers(space, seed, replication):
     """Start cells, initial data, arrivals, and failures but for those of UAVs that fly or not."""
     records = [simulate(space, p, seed, replication, events=True) for p in (Wanderer(), Commuter())]
     until, kept = min(record.slots for record in records), []
@@ -222,23 +199,22 @@ def test_two_policies_have_common_random_numbers(
 # --- teams ---
 
 
-class _Watcher:
+class _Watcher(Script):
     """Hovers, and remembers whom it was asked for, and what it saw of the first UAV's decision."""
 
-    name = "watcher"
-
     def __init__(self) -> None:
+        super().__init__(*[""] * 5)
         self.uavs: set[int] = set()
         self.seen: set[int] = set()
 
     def act(self, view: View) -> np.ndarray:
         self.uavs.update(view.uav.tolist())
         self.seen.update(view.team["action"][:, 0].tolist())
-        return np.full(len(view), HOVER)
+        return super().act(view)
 
 
 @BOTH
-def test_uav_i_has_policy_i_modulo_the_team_and_sees_no_decision_of_the_slot(run: Any) -> None:
+def test_uav_i_has_policy_i_modulo_the_team_and_sees_no_decision_of_the_slot(run):
     one, other = _Watcher(), _Watcher()
     run(ScenarioSpace.of(BUSY, uavs=5), [one, other], 0)
     assert (one.uavs, other.uavs) == ({0, 2, 4}, {1, 3})
@@ -249,47 +225,34 @@ def test_uav_i_has_policy_i_modulo_the_team_and_sees_no_decision_of_the_slot(run
 # --- what is refused ---
 
 
-class _Answer:
-    name = "answer"
-
-    def __init__(self, actions: Any):
-        self.actions = actions
-
-    def act(self, view: View) -> Any:
-        return np.resize(self.actions, len(view) + (len(self.actions) - 1))
-
-
 # No action, too many, real numbers, truth values.
 @BOTH
 @pytest.mark.parametrize("actions", [[5], [-1], [0, 0], [1.0], [True]])
-def test_what_is_no_action_is_refused(run: Any, actions: Any) -> None:
-    with pytest.raises(ValueError, match="policy answer: act must return"):
-        run(BUSY, _Answer(actions), 0)
+def test_what_is_no_action_is_refused(run, actions):
+    policy = Script()
+    policy.act = lambda view: np.resize(actions, len(view) + len(actions) - 1)
+    with pytest.raises(ValueError, match="policy script: act must return"):
+        run(BUSY, policy, 0)
 
 
-@BOTH
-def test_bad_teams_and_seeds_are_refused(run: Any) -> None:
-    line = "policy: the team has 3 policies, but the largest fleet has 2 UAVs; allowed: 2 at most"
-    with pytest.raises(InputError, match=line):
-        run(ScenarioSpace.of(BUSY, uavs=[1, 2]), [Wanderer()] * 3, 0)
-    with pytest.raises(ValueError, match="at least one policy"):
-        run(BUSY, [], 0)
-    with pytest.raises(InputError, match="seed: -1 is out of range"):
-        run(BUSY, Wanderer(), -1)
-    with pytest.raises(TypeError):
-        run(BUSY, Wanderer(), 1.5)
+OF_BOTH: list[tuple[dict[str, Any], str]] = [
+    ({"policy": [Wanderer()] * 7}, "has 7 policies, but the largest fleet has 6 UAVs; allowed: 6"),
+    ({"policy": []}, "at least one policy"),
+    ({"seed": -1}, "seed: -1 is out of range"),
+    ({"seed": 1.5}, "integer"),
+]
+OF_BATCHES: list[tuple[dict[str, Any], str]] = [
+    ({"replications": [0, 2**32]}, "replication: 4294967296 is out of range"),
+    ({"replications": [-1, 4]}, "replication: -1 is out of range"),
+    ({"replications": [0.5]}, "integers"),
+    ({"workers": 0}, "at least 1"),
+    ({"batch_size": 0}, "at least 1"),
+]
+REFUSED = [(run, *row) for run in (simulate, simulate_batch) for row in OF_BOTH]
+REFUSED += [(simulate_batch, *row) for row in OF_BATCHES]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "line"),
-    [
-        ({"replications": [0, 2**32]}, "replication: 4294967296 is out of range"),
-        ({"replications": [-1, 4]}, "replication: -1 is out of range"),
-        ({"replications": [0.5]}, "integers"),
-        ({"workers": 0}, "at least 1"),
-        ({"batch_size": 0}, "at least 1"),
-    ],
-)
-def test_bad_replications_and_workers_are_refused(arguments: Any, line: str) -> None:
-    with pytest.raises(ValueError, match=line):
-        simulate_batch(BUSY, Wanderer(), **arguments)
+@pytest.mark.parametrize(("run", "arguments", "line"), REFUSED)
+def test_bad_arguments_are_refused(run, arguments, line):
+    with pytest.raises((ValueError, TypeError), match=line):
+        run(**{"scenario": BUSY, "policy": Wanderer()} | arguments)

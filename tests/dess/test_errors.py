@@ -25,7 +25,7 @@ FIRST = ", ".join(MANY[:18])
         ("speed", ["x" * 4000, "y"], "", f"; allowed: {'x' * 4000} and 1 others"),
     ],
 )
-def test_a_close_name_comes_first(name: object, names: list[str], also: str, end: str) -> None:
+def test_a_close_name_comes_first(name, names, also, end):
     assert one_of(name, names, also) == end
 
 
@@ -67,7 +67,7 @@ LINES: list[tuple[dict, str]] = [
 
 
 @pytest.mark.parametrize(("values", "line"), LINES)
-def test_an_error_is_a_line_about_the_innermost_field(values: dict, line: str) -> None:
+def test_an_error_is_a_line_about_the_innermost_field(values, line):
     with pytest.raises(ValidationError) as error:
         Whole.model_validate({"name": "x"} | values if values else {})
     found = validation_line(error.value, "plan", Whole)

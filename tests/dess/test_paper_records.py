@@ -10,7 +10,7 @@ from dess.scenario import load_scenario
 BEFORE = "f3c1634a34e33836a3d63a14af7134091e2631ebccac9b9c5179f732d5ab18de"
 
 
-def test_without_sections_the_records_of_the_paper_stay_the_same_to_the_bit() -> None:
+def test_without_sections_the_records_of_the_paper_stay_the_same_to_the_bit():
     records = simulate_batch(load_scenario("paper"), policies.load("greedy"), 2022, 200)
     assert len(records.operations) == 0
     assert sha256(records.missions.tobytes() + records.uavs.tobytes()).hexdigest() == BEFORE

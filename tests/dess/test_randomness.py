@@ -80,13 +80,11 @@ def _check(scenario: Scenario, policy: Any, seed: int, replication: int) -> None
 
 
 @given(scenarios(initial_data=(0.1, 15.0), max_slots=50), policies, seeds, replications)
-def test_a_mission_has_the_random_numbers_of_its_coordinates(
-    scenario: Scenario, policy: object, seed: int, replication: int
-) -> None:
+def test_a_mission_has_the_random_numbers_of_its_coordinates(scenario, policy, seed, replication):
     _check(scenario, policy, seed, replication)
 
 
-def test_so_have_those_in_which_shadowing_decides() -> None:
+def test_so_have_those_in_which_shadowing_decides():
     """From high above, all of 36 nodes are about as near: the best one is seldom the nearest."""
     nodes = [[x, y] for x in range(6) for y in range(6)]
     values = {"grid": 6, "zone": [2, 2, 2, 1], "nodes": nodes, "uavs": 2, "altitude": 2000}

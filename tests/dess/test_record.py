@@ -15,7 +15,7 @@ from tests.drawn import Commuter, continuous_spaces, extended_spaces, policies, 
 NOT_ALWAYS = {"latency", "latency_p99", "peak_age", "waiting"}
 
 
-def test_metrics_and_the_columns_of_a_log_are_attributes() -> None:
+def test_metrics_and_the_columns_of_a_log_are_attributes():
     record = simulate(ScenarioSpace.of(), Commuter(), 3, 4, events=True)
     assert (record.seed, record.replication) == (3, 4) and isinstance(record.success, int)
     for name in set(MISSION_RECORD.names or ()) - {"uavs"}:
@@ -30,8 +30,6 @@ def test_metrics_and_the_columns_of_a_log_are_attributes() -> None:
 
 
 @given(extended_spaces() | continuous_spaces(), policies, seeds, replications)
-def test_a_record_has_what_the_scenario_measures(
-    space: ScenarioSpace, policy: object, seed: int, replication: int
-) -> None:
+def test_a_record_has_what_the_scenario_measures(space, policy, seed, replication):
     measured, known = {*simulate(space, policy, seed, replication).measured}, {*measures_of(space)}
     assert known - NOT_ALWAYS <= measured <= known

@@ -1,38 +1,31 @@
 """The safety controller, which every mission asks once a slot."""
 
+from typing import Any
+
 import pytest
 
-from dess import rules
-from dess.scenario import Scenario, ScenarioSpace
-from dess.state import HOVER, STEP_X, STEP_Y, starts_of, state_of
+from dess.state import HOVER, STEP_X, STEP_Y
 from tests import compiled
+from tests.dess.env.episodes import placed
 from tests.drawn import EAST, NORTH, SOUTH, WEST
 
 STEPS = list(zip(STEP_X.tolist(), STEP_Y.tolist(), strict=True))
 
 
-def _resolve(
-    grid: int, uavs: list[tuple[tuple[int, int], int]], forbid_swaps: bool
-) -> tuple[list[tuple[int, int]], list[bool]]:
-    """The cells and the overruled flags after UAVs ``(cell, action)`` acted."""
-    scenario = Scenario.of(
-        **{"grid": grid, "zone": [0, 0, grid, grid], "nodes": [[0, 0]]},
-        uavs=len(uavs),
-        forbid_swaps=forbid_swaps,
+def _resolve(uavs: list[tuple[tuple[int, int], int]], **fields: Any) -> tuple[list, list[bool]]:
+    """The cells and the overruled flags after UAVs ``(cell, action)`` acted on 4 x 4 cells."""
+    state, chart = placed(
+        [{"x": x, "y": y, "action": action} for (x, y), action in uavs],
+        **{"grid": 4, "zone": [0, 0, 4, 4], "nodes": [[0, 0]]} | fields,
     )
-    space = ScenarioSpace.of(scenario)
-    state = state_of([space], 1)
-    rules.launch(state, 0, starts_of([space]), 0, 0)
     team = state.uavs[0]
-    for i, ((x, y), action) in enumerate(uavs):
-        team[i]["x"], team[i]["y"], team[i]["action"] = x, y, action
-    compiled.resolve(state.missions[0], team, space.chart)
-    after = list(zip(team["x"].tolist(), team["y"].tolist(), strict=True))
-    for u in team[team["active"]]:
+    compiled.resolve(state.missions[0], team, chart)
+    for u in team:
         dx, dy = STEPS[u["executed"]]
         assert (u["from_x"] + dx, u["from_y"] + dy) == (u["x"], u["y"])
         assert u["overruled"] == (u["action"] != u["executed"])
-    return after, team["overruled"].tolist()
+    cells = list(zip(team["x"].tolist(), team["y"].tolist(), strict=True))
+    return cells, team["overruled"].tolist()
 
 
 COLUMN = [((x, 0), EAST) for x in range(4)]
@@ -41,12 +34,9 @@ RING = [((0, 0), EAST), ((1, 0), SOUTH), ((1, 1), WEST), ((0, 1), NORTH)]
 TRAIN = [((0, 0), EAST), ((1, 0), EAST), ((2, 0), WEST)]
 
 
+# The cells after the actions; who does not hover and stays was overruled.
 @pytest.mark.parametrize(
-    (
-        "uavs",
-        "forbid_swaps",
-        "after",
-    ),  # the cells after it; who does not hover and stays was overruled
+    ("uavs", "forbid_swaps", "after"),
     [
         # y grows to the south, x to the east.
         ([((1, 1), NORTH)], False, [(1, 0)]),
@@ -74,11 +64,9 @@ TRAIN = [((0, 0), EAST), ((1, 0), EAST), ((2, 0), WEST)]
         ([((0, 1), EAST), ((1, 1), HOVER)], False, [(0, 1), (1, 1)]),
     ],
 )
-def test_the_safety_controller_by_hand(
-    uavs: list, forbid_swaps: bool, after: list[tuple[int, int]] | None
-) -> None:
+def test_the_safety_controller_by_hand(uavs, forbid_swaps, after):
     expected = after or [cell for cell, _ in uavs]
     overruled = [
         cell == to and action != HOVER for (cell, action), to in zip(uavs, expected, strict=True)
     ]
-    assert _resolve(4, uavs, forbid_swaps) == (expected, overruled)
+    assert _resolve(uavs, forbid_swaps=forbid_swaps) == (expected, overruled)

@@ -1,7 +1,6 @@
 """Scenarios: TOML in and out, refusals in one clear line, and the draws of a space."""
 
 import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from tests.drawn import continuous_spaces, extended_spaces, replications, seeds,
 
 
 @given(spaces() | extended_spaces() | continuous_spaces())
-def test_a_space_survives_toml(space: ScenarioSpace) -> None:
+def test_a_space_survives_toml(space):
     assert ScenarioSpace.of(**parse_toml(space.to_toml(), "text")) == space
 
 
@@ -34,7 +33,7 @@ BAYS += ("puget-sound", "san-francisco-bay", "saronic-gulf", "tokyo-bay")
 
 
 @pytest.mark.parametrize("name", BAYS)
-def test_bays_have_land_and_invented_nodes_within_reach(name: str) -> None:
+def test_bays_have_land_and_invented_nodes_within_reach(name):
     bay = load_scenario(name)
     assert 24 <= min(bay.size) <= max(bay.size) <= 64 and bay.rows
     assert 2 <= bay.uavs[0] <= bay.uavs[1] <= 5
@@ -44,15 +43,15 @@ def test_bays_have_land_and_invented_nodes_within_reach(name: str) -> None:
     assert "coarse" in scenario_description(name) and "invented" in scenario_description(name)
 
 
-def test_the_shipped_scenarios_are_the_papers_and_bays() -> None:
+def test_the_shipped_scenarios_are_the_papers_and_bays():
     assert scenario_names() == sorted(["bay", "fig1", "fig4", "paper", *BAYS])
     assert sum(len(load_scenario(name).zones) for name in BAYS) == 8
     paper, fig4 = load_scenario("paper"), load_scenario("fig4")
     assert paper == ScenarioSpace.of()  # Section VI-A, Table II and Table III are the defaults
-    assert (paper.uavs, paper.initial_data, paper.flying_time) == ((1, 3), (5.0, 20.0), (70, 80))
-    assert (paper.charge_start, paper.charge_complete) == ((10, 50), (60, 100))
-    assert (fig4.uavs, fig4.initial_data, fig4.flying_time) == ((1, 3), (12.5, 12.5), (80, 80))
-    assert (fig4.charge_start, fig4.charge_complete) == ((30, 30), (80, 80))
+    names = ("uavs", "initial_data", "flying_time", "charge_start", "charge_complete")
+    ranges = [[getattr(space, name) for name in names] for space in (paper, fig4)]
+    assert ranges[0] == [(1, 3), (5.0, 20.0), (70, 80), (10, 50), (60, 100)]
+    assert ranges[1] == [(1, 3), (12.5, 12.5), (80, 80), (30, 30), (80, 80)]
     assert (paper.grid, paper.cell_size, paper.altitude, paper.max_slots) == (32, 800, 10, 500)
     assert (paper.communication_slots, paper.quota, paper.arrival_rate) == (4, 440, 0.02)
     assert (paper.path_loss_exponent, paper.shadowing_variance) == (2.27, 2.0)
@@ -67,19 +66,14 @@ SPEEDS = [{"slots_per_cell": s} for s in (5, 7, 8)]
 FAILING = {"failures.pad_rate": 0.1}
 # Fields of the paper's scenario, and what the message says of the last of them, and allows.
 REFUSED: list[tuple[dict[str, Any], str, str]] = [
-    ({"speed": 3}, "unknown key", ""),
     *(({"uavs": value}, "", "") for value in (2.0, True, "2", [1, 2, 3])),
     *(({"uavs": value}, "", "1..16 (cells of the zone") for value in (0, 17, [3, 1])),
-    *(({"grid": value}, "is not an integer", "2..256") for value in ("32", 32.0)),
     ({"edge_snr": float("nan")}, "out of range", ""),
-    ({"nodes": []}, "too short", "[x, y] for each (of length 1..1,024)"),
     ({"nodes": [[0, 0], [32, 0]]}, "[32, 0] is off the grid", "0 <= x, y < 32"),
     ({"nodes": [[4, 5], [6, 7], [4, 5]]}, "[4, 5] is listed twice", "distinct"),
     *(({"zone": zone}, f"{zone}", "x + width") for zone in ([29, 2, 4, 4], [0, 0, 0, 4])),
     ({"zone": [-1, 2, 4, 4]}, "[-1, 2, 4, 4]", "0 <= x"),
     ({"pads": 17}, "17 is more than the zone has cells", "1..16"),
-    ({"pads": 0}, "out of range", "an integer from 1"),
-    ({"forbid_swaps": 1}, "1 is not a truth value", "true or false"),
     ({"initial_data": -1}, "is not a range", "0 <= low <= high"),
     ({"initial_data": [5, 4]}, "is not a range", "0 <= low <= high"),
     ({"flying_time": [0, 5]}, "[0, 5] is out of range", "1..100"),
@@ -87,19 +81,16 @@ REFUSED: list[tuple[dict[str, Any], str, str]] = [
     ({"grid": 256, "nodes": [[0, 0]], "fleet": SPEEDS, "communication_slots": 64}, "", "<= 1"),
     ({"max_slots": MOST_TEETH // 4 + 1, "age.measured": True}, "too many", f"<= {MOST_TEETH}"),
     ({"arrivals": {"buffer": 3}}, "slotted arrivals have no", "continuous"),
-    ({"arrivals": {"process": "poisson"}}, "'poisson' is unknown", "slotted, continuous"),
     ({"arrivals": {"process": "continuous", "rates": [0.1]}}, "there are 1", "25"),
     ({"arrivals": {"process": "continuous", "schedule": [[3, 1], [3, 2]]}}, "slot 3 comes", ""),
     ({"arrivals.process": "continuous", "arrival_rate": 99, "max_slots": 1000}, "packets", ""),
-    ({"failures.uav_rate": 1.5}, "1.5 is out of range", "a number 0..1"),
     ({"failures.pad_repair": 0.5}, "0.5 is less than a slot", "0, or 1 and more"),
     (FAILING | {"zone": [0, 0, 13, 5]}, "65 are too many to fail", "64 at most"),
-    ({"wind": 3}, "3 is not a table", ""),
 ]
 
 
 @pytest.mark.parametrize(("values", "problem", "allowed"), REFUSED, ids=lambda v: str(v)[:40])
-def test_bad_values_are_refused_in_one_line(values: dict, problem: str, allowed: str) -> None:
+def test_bad_values_are_refused_in_one_line(values, problem, allowed):
     with pytest.raises(InputError) as error:
         load_scenario("paper", **values)
     line = str(error.value)
@@ -108,27 +99,24 @@ def test_bad_values_are_refused_in_one_line(values: dict, problem: str, allowed:
     assert problem in told and allowed in end
 
 
-def test_what_just_fits_is_allowed() -> None:
+def test_what_just_fits_is_allowed():
     load_scenario("paper", max_slots=MOST_TEETH // 4, **{"age.measured": True})
     load_scenario("paper", zone=[0, 0, 13, 5], pads=64, **FAILING)
 
 
-@pytest.mark.parametrize(
-    ("content", "complaint"),
-    [
+def test_bad_files_are_named(tmp_path):
+    path = tmp_path / "bad.toml"
+    for content, complaint in (
         (b"uavs = 1\nuavs = 2\n", "not valid TOML"),
         (b"\xff\xfe\x00", "cannot be read"),
         (b"quotas = 3\n", "quotas: unknown key"),
-    ],
-)
-def test_bad_files_are_named(tmp_path: Path, content: bytes, complaint: str) -> None:
-    path = tmp_path / "bad.toml"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=f"^{path}: {complaint}.*$"):
-        load_scenario(path)
+    ):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=f"^{path}: {complaint}.*$"):
+            load_scenario(path)
 
 
-def test_missing_scenarios_are_refused() -> None:
+def test_missing_scenarios_are_refused():
     with pytest.raises(InputError, match="allowed: bay, biscay-corner, fig1, .* others, or a TOML"):
         load_scenario("none")
     with pytest.raises(InputError, match=r"no such scenario \(did you mean paper\?\)"):
@@ -136,7 +124,7 @@ def test_missing_scenarios_are_refused() -> None:
 
 
 @pytest.mark.parametrize("values", [(-1, 0), (2**64, 0), (0, -1), (0, 2**32)])
-def test_seeds_off_the_counter_are_refused(values: tuple[int, int]) -> None:
+def test_seeds_off_the_counter_are_refused(values):
     with pytest.raises(InputError, match="out of range; allowed: 0.."):
         check_seed(*values)
     check_seed(streams.MAX_SEED, streams.MAX_REPLICATION)
@@ -145,7 +133,7 @@ def test_seeds_off_the_counter_are_refused(values: tuple[int, int]) -> None:
 # --- sampling ---
 
 
-def test_both_ends_of_every_range_are_drawn_about_equally_often() -> None:
+def test_both_ends_of_every_range_are_drawn_about_equally_often():
     space = load_scenario("paper")
     drawn = [sample_scenario(space, 11, replication) for replication in range(3000)]
     for name in SAMPLED:
@@ -158,9 +146,7 @@ def test_both_ends_of_every_range_are_drawn_about_equally_often() -> None:
 
 
 @given(spaces(), seeds, replications, st.sampled_from(SAMPLED))
-def test_fixing_one_field_leaves_the_other_draws(
-    space: ScenarioSpace, seed: int, replication: int, name: str
-) -> None:
+def test_fixing_one_field_leaves_the_other_draws(space, seed, replication, name):
     free = sample_scenario(space, seed, replication)
     assert sample_scenario(spaces_of([free])[0], seed, replication) == free
     fixed = ScenarioSpace.of(space, **{name: getattr(space, name)[1]})
@@ -174,7 +160,7 @@ def test_fixing_one_field_leaves_the_other_draws(
 # --- limits ---
 
 
-def test_values_at_the_limits_are_allowed_and_those_beyond_are_not() -> None:
+def test_values_at_the_limits_are_allowed_and_those_beyond_are_not():
     space = ScenarioSpace.of(charge_start=10, charge_complete=100)
     fields = (*SAMPLED, "pads", "quota", "arrival_rate", "communication_slots", "edge_snr")
     for field in fields:
@@ -188,7 +174,7 @@ def test_values_at_the_limits_are_allowed_and_those_beyond_are_not() -> None:
                 ScenarioSpace.of(space, **{field: kind(refused)})
 
 
-def test_no_number_of_a_scenario_is_minus_zero() -> None:
+def test_no_number_of_a_scenario_is_minus_zero():
     """Compiled code divides by rates, and by -0.0 with another result than by 0.0."""
     space = load_scenario("paper")
     values: dict[str, Any] = {

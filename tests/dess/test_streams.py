@@ -17,12 +17,12 @@ KNOWN_ANSWERS = [
 
 
 @pytest.mark.parametrize("answer", KNOWN_ANSWERS)
-def test_philox_gives_the_published_answers(answer: str) -> None:
+def test_philox_gives_the_published_answers(answer):
     words = [np.uint64(int(word, 16)) for word in answer.split()]
     assert list(streams.philox(*words[:6])) == words[6:]
 
 
-def test_a_block_is_philox_of_its_coordinates() -> None:
+def test_a_block_is_philox_of_its_coordinates():
     seed, replication, stream, substream, slot, index = 2**64 - 2, 2**32 - 3, 4, 2**24 - 5, 6, 7
     counter = [index, slot, (stream << 24) + substream, replication]
     key = [seed % 2**32, seed // 2**32]
@@ -30,7 +30,7 @@ def test_a_block_is_philox_of_its_coordinates() -> None:
     assert streams.block(np.uint64(seed), replication, stream, substream, slot, index) == expected
 
 
-def test_normal_in_the_tails_is_exact_bounded_and_symmetric() -> None:
+def test_normal_in_the_tails_is_exact_bounded_and_symmetric():
     # Both sides of the switch between the approximations, |q| = 0.425, and the outermost words.
     switches = [int(p * 2**32) + step for p in (0.075, 0.925) for step in (-1, 0, 1)]
     words = EDGES + switches + [2**exponent for exponent in range(2, 32)]
@@ -43,7 +43,7 @@ def test_normal_in_the_tails_is_exact_bounded_and_symmetric() -> None:
 
 
 @pytest.mark.parametrize("rate", [0.02, 1.0, 7.5, 100.0])
-def test_poisson_matches_scipy(rate: float) -> None:
+def test_poisson_matches_scipy(rate):
     words = np.concatenate([EDGES, np.linspace(0, 2**32 - 1, 2000)]).astype(np.uint64)
     counts = [streams.poisson(word, rate) for word in words]
     np.testing.assert_array_equal(counts, stats.poisson.ppf((words + 0.5) / 2**32, rate))

@@ -22,7 +22,7 @@ def _sea(slots: int, nodes: list[list[int]]) -> ScenarioSpace:
 
 
 @pytest.mark.parametrize("slots", [3, 5, 6])
-def test_of_nodes_at_the_same_distance_the_first_is_served(slots: int) -> None:
+def test_of_nodes_at_the_same_distance_the_first_is_served(slots):
     policy, ties = policies.load("random-unguarded"), 0
     for seed in range(12):
         space = _sea(slots, np.random.default_rng(seed).permutation(CELLS)[:12].tolist())
@@ -37,7 +37,7 @@ def test_of_nodes_at_the_same_distance_the_first_is_served(slots: int) -> None:
 
 
 @pytest.mark.parametrize("slots", [3, 4, 5, 7])
-def test_the_planner_expects_the_same_rate_at_the_same_distance(slots: int) -> None:
+def test_the_planner_expects_the_same_rate_at_the_same_distance(slots):
     space = ScenarioSpace.model_validate({"communication_slots": slots})
     snr = channel.world_of(space).mean_snr
     table = rates._mean_rate(snr, 1 / slots, 1.4)
@@ -49,7 +49,7 @@ def test_the_planner_expects_the_same_rate_at_the_same_distance(slots: int) -> N
         assert (first[places] == values).all()
 
 
-def test_mirrored_nodes_are_as_stale_for_the_policy_age() -> None:
+def test_mirrored_nodes_are_as_stale_for_the_policy_age():
     lattice = [[x, y] for x in range(0, 13, 3) for y in range(0, 13, 3)]
     space = _sea(4, lattice)
     state, data, nodes = state_of([space], 1), np.ones(25), np.array(lattice)

@@ -12,12 +12,11 @@ from tests.fuzz.case import Case
 from tests.fuzz.strategies.changes import evil, odd
 from tests.fuzz.strategies.command_lines import command_lines
 from tests.fuzz.strategies.commands import COMMANDS, READING
-from tests.fuzz.strategies.dear import dear
+from tests.fuzz.strategies.dear import dear, signals
 from tests.fuzz.strategies.forged import forged
 from tests.fuzz.strategies.outputs import outputs
 from tests.fuzz.strategies.reports import reports
 from tests.fuzz.strategies.settings import duplicates, odd_fields, unfit
-from tests.fuzz.strategies.signals import signals
 from tests.fuzz.strategies.sizes import sizes, work
 
 # How many cases of each kind a round has. Those that start further processes are dear, so few.

@@ -25,7 +25,7 @@ _INNER = re.compile(
 )
 # What is allowed, or the words where there is no choice: of typer, of parsers, of damaged files.
 _CHOICE = re.compile(r"allowed|\(see dess|not valid (TOML|JSON)|(are|is) made by|damaged")
-_COUNT = re.compile(r"\b([\d,]+) of ([\d,]+)\b")
+_COUNT = re.compile(r"\b(\d[\d,]*) of (\d[\d,]*)\b")
 _BIDI = {*map(chr, range(0x202A, 0x202F)), *map(chr, range(0x2066, 0x206A))}
 _RAW = {"Cc", "Cs", "Zl", "Zp"}  # categories of characters that must not reach a terminal
 # Lines on standard error that say what a command does, and no error.
@@ -72,12 +72,9 @@ def _output(outcome: Outcome) -> Iterator[str]:
             yield f"a warning of Python on {stream}"
         if SECRET in text:
             yield f"the content of a file that the user has not named on {stream}"
-        if raw := sorted({c for c in text if _is_raw(c)} - {"\n", "\r", "\t"}):
+        odd = {*text} - {"\n", "\r", "\t"}
+        if raw := sorted(c for c in odd if unicodedata.category(c) in _RAW or c in _BIDI):
             yield f"raw characters on {stream}: {ascii(raw)[:LINE]}"
-
-
-def _is_raw(character: str) -> bool:
-    return unicodedata.category(character) in _RAW or character in _BIDI
 
 
 def _errors(outcome: Outcome) -> Iterator[str]:
@@ -87,8 +84,9 @@ def _errors(outcome: Outcome) -> Iterator[str]:
             yield "the memory did not suffice; a refusal has to come first"
         if len(line) > LINE:
             yield f"a line of {len(line)} characters on stderr: {line[:60]}"
-        if any(int(f[1].replace(",", "")) > int(f[2].replace(",", "")) for f in _counts(line)):
-            yield f"more than there are: {line[:LINE]}"
+        for part, whole in _COUNT.findall(line):
+            if int(part.replace(",", "")) > int(whole.replace(",", "")):
+                yield f"more than there are: {line[:LINE]}"
     errors = [line for line in lines if not _NEWS.fullmatch(line.strip())]
     if outcome.code in (2, 130) and len(errors) != 1:
         yield f"{len(errors)} lines in place of one error: {' | '.join(errors)[:LINE]}"
@@ -113,11 +111,9 @@ def _is_failed_page(outcome: Outcome, line: str) -> bool:
     return outcome.code == 1 and is_forged and _OF_PAGE.search(line) is not None
 
 
-def _counts(line: str) -> Iterator[re.Match[str]]:
-    return (found for found in _COUNT.finditer(line) if found[1].strip(",") and found[2].strip(","))
-
-
 def _files(outcome: Outcome) -> Iterator[str]:
+    # A full disk may be noticed after missions have been simulated.
+    is_refused = outcome.code == 2 and not (outcome.case.again or outcome.case.file_size)
     for path in sorted(outcome.before.keys() | outcome.after.keys()):
         before, after = outcome.before.get(path), outcome.after.get(path)
         is_allowed = any(_is_in(path, folder) for folder in outcome.case.allowed)
@@ -126,13 +122,8 @@ def _files(outcome: Outcome) -> Iterator[str]:
         if path.endswith((".ran", ".pyc")):
             yield f"{path}: code of the input was run"
             continue
-        if (
-            outcome.code == 2
-            and before is None
-            and _is_of_missions(path)
-            and not outcome.case.again
-            and not outcome.case.file_size  # a full disk may be noticed later
-        ):
+        is_of_missions = "/missions/" in path and path.endswith(".parquet")
+        if is_refused and before is None and is_of_missions:
             yield f"{path}: missions were simulated before the input was refused"
         if not is_allowed:
             yield f"{path}: was {before or 'not there'}, is {after or 'not there'}"
@@ -147,11 +138,6 @@ def _files(outcome: Outcome) -> Iterator[str]:
 def _is_in(path: str, folder: str) -> bool:
     """Whether it is below a folder, or one of the folders above it, which may be made."""
     return path.startswith(f"{folder}/") or folder.startswith(f"{path}/") or path == folder
-
-
-def _is_of_missions(path: str) -> bool:
-    """Whether it is a file of results."""
-    return "/missions/" in path and path.endswith(".parquet")
 
 
 def _is_temporary(path: str) -> bool:

@@ -38,6 +38,16 @@ ASKED_WITH = {
     "prices": "{uav=1000}",
 }
 TEXTS = Path(__file__).with_name("inputs")
+# What scenarios name beside them: nodes, polygons and a map of no-fly cells.
+SEAS = ("bay.csv", "oresund.csv", "oresund.geojson", "galway-bay.csv", "galway-bay.txt")
+# The ready inputs that most cases have.
+INPUTS = tuple(
+    copy(name, f"in/{name}")
+    for name in (
+        *(SCENARIO, SECTIONS, *SEAS, STUDY, SELECTION, STUDIED, TRAINING),
+        *(RESULTS, SELECTED, EXTENDED, POLICY, PAGE),
+    )
+)
 
 
 def make(forks: Forks) -> None:

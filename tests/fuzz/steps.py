@@ -91,7 +91,7 @@ def change_lines(box: Path, path: str, edits: tuple[tuple[int | str, str, str], 
 
     A place is a number, or the key of a line; without such a line it is before the first one.
     """
-    lines = _read_text(box / path).splitlines()
+    lines = _read(box / path).decode().splitlines()
     for place, action, text in edits:
         if isinstance(place, str):
             keys = [line.partition("=")[0].strip() for line in lines]
@@ -102,7 +102,7 @@ def change_lines(box: Path, path: str, edits: tuple[tuple[int | str, str, str], 
         key = lines[at].partition("=")[0] if lines else "key "
         new = {"value": [f"{key}= {text}"], "line": [text], "remove": []}
         lines[at : at + 1] = new.get(action, lines[at : at + 1] * 2)
-    _write_text(box / path, "\n".join(lines) + "\n")
+    _write(box / path, "\n".join(lines) + "\n")
 
 
 @_step
@@ -124,18 +124,18 @@ def change_json(box: Path, path: str, edits: Edits) -> None:
     document = box / path
     if document.is_dir() and (documents := sorted(document.rglob("*.json"))):
         document = documents[edits[0][0] % len(documents)]
-    _write_text(document, edited(_read_text(document), edits))
+    _write(document, edited(_read(document).decode(), edits))
 
 
 @_step
 def change_page(box: Path, path: str, block: int, edits: Edits, is_sealed: bool = True) -> None:
     """Change the evidence in a page, and its checksum with it."""
-    html = _read_text(box / path)
+    html = _read(box / path).decode()
     blocks = [*_BLOCK.finditer(html)]
     begin, end = blocks[block % len(blocks)].span(1)
     html = html[:begin] + edited(html[begin:end], edits) + html[end:]
     html = html.encode("utf-8", "replace").decode()
-    _write_text(box / path, Page(html).sealed.text if is_sealed else html)
+    _write(box / path, Page(html).sealed.text if is_sealed else html)
 
 
 @_step
@@ -156,7 +156,7 @@ def seal(box: Path, folder: str) -> None:
     content = json.loads(_read(description))
     model = _read(box / folder / "model.safetensors")
     content["model_sha256"] = [sha256(model).hexdigest()]
-    _write_text(description, json.dumps(content))
+    _write(description, json.dumps(content))
     header, data = _split(path)
     inner = json.loads(header["__metadata__"]["dess"])
     inner.pop("sha256", None)
@@ -259,8 +259,8 @@ def name_evil(box: Path, path: str) -> None:
     results = [manifest.parent for manifest in (box / path).rglob("manifest.json")]
     for file in [box / path] if (box / path).is_file() else (box / path).rglob("*"):
         if file.suffix in (".json", ".toml", ".html") and not {*results} & {*file.parents}:
-            text = _read_text(file).replace('"greedy"', f'"{EVIL}:Evil0"')
-            _write_text(file, Page(text).sealed.text if file.suffix == ".html" else text)
+            text = _read(file).decode().replace('"greedy"', f'"{EVIL}:Evil0"')
+            _write(file, Page(text).sealed.text if file.suffix == ".html" else text)
     for folder in results:
         hostile(str(folder.relative_to(box)), f"{EVIL}:Evil").do(box)
 
@@ -339,16 +339,10 @@ def _read(path: Path) -> bytes:
     return _regular(path).read_bytes()
 
 
-def _read_text(path: Path) -> str:
-    return _read(path).decode()
-
-
-def _write(path: Path, content: bytes) -> None:
+def _write(path: Path, content: bytes | str) -> None:
+    if isinstance(content, str):
+        content = content.encode("utf-8", "surrogateescape")
     _regular(path).write_bytes(content)
-
-
-def _write_text(path: Path, text: str) -> None:
-    _write(path, text.encode("utf-8", "surrogateescape"))
 
 
 def _remove(path: Path) -> None:

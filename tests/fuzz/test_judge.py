@@ -1,7 +1,6 @@
 """The judge finds planted faults, and finds nothing in commands that keep the contract."""
 
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -22,7 +21,7 @@ KINDS = ("odd field", "duplicate", "unfit", "work")  # of which many need no rea
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     """A folder of cases whose ready inputs are texts."""
     folder = tmp_path_factory.mktemp("fuzz")
     ready.write_texts(folder / "ready")
@@ -30,14 +29,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def box(folder: Path) -> Path:
+def box(folder):
     """The folder of a case."""
     (folder / "cases" / "box").mkdir(parents=True, exist_ok=True)
     return folder / "cases" / "box"
 
 
 @pytest.mark.slow
-def test_planted_faults_are_found(folder: Path) -> None:
+def test_planted_faults_are_found(folder):
     steps = (write("in/a.toml", b""), node("out/device", "fifo"))
     cases = [Case("planted", (fault,), steps, seconds=2) for fault in FAULTS]
     cases += [Case("planted", (fault,), steps, seconds=10, lasting=1.5) for fault in LASTING]
@@ -52,7 +51,7 @@ def test_planted_faults_are_found(folder: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.brief
-def test_fixed_cases_keep_the_contract(folder: Path) -> None:
+def test_fixed_cases_keep_the_contract(folder):
     drawn = [case for kind, _ in drawing.ROUND[-8:] for case in drawing.draw(kind, SEED, 20)]
     drawn = [case for case in drawn if case.kind in KINDS]
     cases = [drawn[n * len(drawn) // 50] for n in range(50)]
@@ -64,7 +63,7 @@ def test_fixed_cases_keep_the_contract(folder: Path) -> None:
     assert [(o.case.arguments, found) for o in outcomes if (found := findings(o))] == []
 
 
-def test_every_parameter_of_every_command_is_known() -> None:
+def test_every_parameter_of_every_command_is_known():
     """A new command or option needs a plain value, and the kinds of inputs that it reads."""
     known = [(words, parameter) for words, all_ in commands.COMMANDS for parameter in all_]
     assert all(commands.is_flag(p) or commands.plain(words, p) for words, p in known)
@@ -79,7 +78,7 @@ def test_every_parameter_of_every_command_is_known() -> None:
     assert unread - commands.OUTPUTS == {"--results", "--shown"}
 
 
-def test_a_round_has_every_command_and_every_report() -> None:
+def test_a_round_has_every_command_and_every_report():
     drawn = [case for kind, _ in drawing.ROUND for case in drawing.draw(kind, SEED, 1)]
     lines = [" ".join(case.arguments) for case in drawn]
     names = {" ".join(words) for words, _ in commands.COMMANDS}
@@ -89,7 +88,7 @@ def test_a_round_has_every_command_and_every_report() -> None:
 
 
 @pytest.mark.parametrize("kind", NODES)
-def test_steps_neither_read_nor_write_what_is_no_file(kind: str, box: Path) -> None:
+def test_steps_neither_read_nor_write_what_is_no_file(kind, box):
     node("in/manifest.json", kind).do(box)
     refused = [
         change_json("in/manifest.json", ((0, "replace", "1"),)),
@@ -104,7 +103,7 @@ def test_steps_neither_read_nor_write_what_is_no_file(kind: str, box: Path) -> N
     assert not [*(box / "in").iterdir()]
 
 
-def test_cases_depend_on_their_seed_and_number_only(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cases_depend_on_their_seed_and_number_only(monkeypatch):
     kind, most = drawing.ROUND[0][0], 20
     monkeypatch.setattr(drawing, "ROUND", ((kind, 2), (drawing.duplicates(), 2)))
     monkeypatch.setattr(drawing, "LENGTH", 4)

@@ -44,13 +44,3 @@ def test_contract(monkeypatch: pytest.MonkeyPatch) -> None:
     policy = Adapter("ppo", act, guarded=True)
     records = dess.simulate_batch(QUICK, policy, 2, 5)
     assert dess.simulate(QUICK, policy, 2, 4).metrics == records.missions[4]
-
-
-def test_what_comes_after_the_end_of_a_uav_changes_nothing_before() -> None:
-    rewards, values = torch.rand(5, ROWS), torch.rand(5, ROWS)
-    goes_on = torch.arange(5)[:, None] != 2
-    found = EXAMPLE.advantages(rewards, goes_on, values)
-    rewards[3:], values[3:] = 100.0, 50.0
-    again = EXAMPLE.advantages(rewards, goes_on, values)
-    assert torch.equal(found[:3], again[:3]) and not torch.equal(found[3:], again[3:])
-    assert torch.equal(found[2], (rewards - values)[2])

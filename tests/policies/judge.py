@@ -17,8 +17,7 @@ fills the quota.
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,8 +34,7 @@ LETTERS = np.array([*"NESW."])
 SAME = ("x", "y", "battery", "latch", "pad_request", "pad", "slots_left", "executed", "grounded")
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """What the judge found of a UAV whose battery ran empty.
 
     Attributes:
@@ -90,32 +88,17 @@ class Replay:
         """The record of a UAV before a slot."""
         return self.states[slot].uavs[0, i]
 
-    def lost(self) -> list[int]:
-        """The UAVs whose batteries ran empty."""
-        return np.nonzero(self.states[-1].uavs[0]["end"] == BATTERY)[0].tolist()
-
     def judge(self, i: int) -> Finding:
         """Search the last slots of a UAV whose battery ran empty for a way to live."""
         end = next(t for t, s in enumerate(self.states) if s.uavs[0, i]["end"] == BATTERY) - 1
-        charged = [t + 1 for t in range(end) if self._charges(t, i)]
+        sessions = [int(state.uavs[0, i]["slots_charging"]) for state in self.states]
+        charged = [t + 1 for t in range(end) if sessions[t + 1] > sessions[t]]
         since = max([end + 1 - SLOTS, 0, *charged[-1:]])
         cell = (int(self.uav(end + 1, i)["x"]), int(self.uav(end + 1, i)["y"]))
-        finding = Finding(i, end, cell, since)
-        low, high = since, end  # the mission's own moves lead from each of these slots to the next
-        while low <= high:
-            slot = (low + high) // 2 if finding.latest is not None else low
+        for slot in range(end, since - 1, -1):
             if way := self._way(i, slot):
-                finding = Finding(i, end, cell, since, slot, *way)
-                low = slot + 1
-            elif finding.latest is None:
-                break
-            else:
-                high = slot - 1
-        return finding
-
-    def _charges(self, slot: int, i: int) -> bool:
-        sessions = [self.uav(t, i)["slots_charging"] for t in (slot, slot + 1)]
-        return bool(sessions[1] > sessions[0])
+                return Finding(i, end, cell, since, slot, *way)
+        return Finding(i, end, cell, since)
 
     def _way(self, i: int, start: int) -> tuple[str, str] | None:
         """Moves of a UAV from a slot on with which it lives, and how, or None."""
@@ -125,14 +108,13 @@ class Replay:
             parents, actions, state = self._branches(state, i, slot)
             steps.append((parents, actions))
             own = state.uavs[:, i]
-            ways = {
-                f"it charges in slot {slot}": own["slots_charging"] > charged,
-                f"its quota is filled in slot {slot}": own["end"] == QUOTA,
-                "it flies until the horizon": own["end"] == TRUNCATED,
-            }
-            for how, lives in ways.items():
+            for how, lives in (
+                ("charges", own["slots_charging"] > charged),
+                ("has filled its quota", own["end"] == QUOTA),
+                ("has reached the horizon", own["end"] == TRUNCATED),
+            ):
                 if lives.any():
-                    return _moves(steps, int(lives.argmax())), how
+                    return _moves(steps, int(lives.argmax())), f"in slot {slot} it {how}"
             kept = self._kept(state, i)
             if not len(kept):
                 return None
@@ -159,14 +141,13 @@ class Replay:
             asked[:, i] = actions
             self.stepper.state = part
             self.stepper.step(asked)
-            ended = ~after["active"]
             same = np.ones(len(parents), bool)
             for name in ("x", "y", "slots_charging"):
                 differs = (part.uavs[name] != after[name]) & others & before["active"]
                 same &= ~differs.any(1)
             same &= ~(part.uavs[:, i]["end"] == BATTERY)
             part.uavs[:, others] = after[others]
-            part.missions["active"] = 1 + (~ended & others).sum()
+            part.missions["active"] = 1 + (after["active"] & others).sum()
             same = np.nonzero(same)[0]
             parts.append((parents[same], actions[same], _some(part, same)))
         parents, actions, states = zip(*parts, strict=True)
@@ -221,7 +202,9 @@ def judged(
 ) -> list[Finding]:
     """What the judge finds of each UAV of a mission whose battery ran empty."""
     replay = Replay(scenario, policy, seed, replication)
-    return [replay.judge(i) for i in replay.lost()]
+    return [
+        replay.judge(int(i)) for i in np.nonzero(replay.states[-1].uavs[0]["end"] == BATTERY)[0]
+    ]
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -1,7 +1,5 @@
 """A function of observations and masks flies as a policy of dess."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -25,7 +23,7 @@ def arbitrary(observations, masks) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("guarded", [False, True])
-def test_missions_are_those_of_the_environment(kind: str, guarded: bool) -> None:
+def test_missions_are_those_of_the_environment(kind, guarded):
     policy = Adapter("arbitrary", arbitrary, kind, guarded)
     expected = dess.simulate_batch(QUICK, policy, 3, 12)
     env = dess.vector_env(QUICK, 2, seed=3, observation=kind, guarded=guarded)
@@ -44,7 +42,7 @@ def test_missions_are_those_of_the_environment(kind: str, guarded: bool) -> None
     assert dess.simulate(QUICK, policy, 3, 4).metrics == expected.missions[4]
 
 
-def test_missions_with_other_zones_are_observed_with_their_own() -> None:
+def test_missions_with_other_zones_are_observed_with_their_own():
     spaces = [ScenarioSpace.of(QUICK, zone=zone) for zone in ((0, 0, 3, 3), (5, 5, 2, 4))]
     policy = Adapter("arbitrary", arbitrary)
     mixed = dess.simulate_batch(spaces * 4, policy, 1, 8).missions
@@ -53,21 +51,21 @@ def test_missions_with_other_zones_are_observed_with_their_own() -> None:
         assert np.array_equal(mixed[number::2], alone[number::2])
 
 
-def test_what_is_not_allowed_is_refused_with_one_line() -> None:
-    def fly(act, **options):
-        dess.simulate_batch(QUICK, Adapter("bad", act, **options), 1, 2)
-
-    with pytest.raises(InputError, match="observation: 'pixels' is unknown"):
-        fly(arbitrary, observation="pixels")
-    with pytest.raises(InputError, match=r"float64 of shape \(\d,\)"):
-        fly(lambda observations, masks: np.zeros(len(masks)))
-    with pytest.raises(InputError, match=r"int64 of shape \(1,\); .*integers of shape"):
-        fly(lambda observations, masks: np.zeros(1, np.int64))
-    with pytest.raises(InputError, match="5 is not an action"):
-        fly(lambda observations, masks: np.full(len(masks), 5))
+REFUSED = {
+    "observation: 'pixels' is unknown": {"act": arbitrary, "observation": "pixels"},
+    r"float64 of shape \(\d,\)": {"act": lambda observations, masks: np.zeros(len(masks))},
+    r"int64 of shape \(1,\); .*integers of shape": {"act": lambda *_: np.zeros(1, np.int64)},
+    "5 is not an action": {"act": lambda observations, masks: np.full(len(masks), 5)},
+}
 
 
-def test_results_tell_the_weights_apart(tmp_path: Path) -> None:
+@pytest.mark.parametrize("line", REFUSED)
+def test_what_is_not_allowed_is_refused_with_one_line(line):
+    with pytest.raises(InputError, match=line):
+        dess.simulate_batch(QUICK, Adapter("bad", **REFUSED[line]), 1, 2)
+
+
+def test_results_tell_the_weights_apart(tmp_path):
     weights, code = tmp_path / "weights.bin", tmp_path / "own_policy_with_weights.py"
     code.write_text(
         "from dess.policies.adapter import Adapter\n"

@@ -13,11 +13,11 @@ from dess.env.stepper import MissionStepper
 from dess.guard import guard
 from dess.mission import simulate
 from dess.policies.registry import HEURISTICS
-from dess.scenario import Scenario, ScenarioSpace, load_scenario
+from dess.scenario import Scenario, load_scenario
 from dess.state import HOVER
 from dess.view import View
+from tests.dess.flights import assert_same_alone, cells_of
 from tests.drawn import NORTH, SOUTH, Checked, replications, seeds, spaces
-from tests.policies.flown import assert_same_alone, cells_of
 
 NAMES = tuple(name for name in HEURISTICS if name != "random-unguarded")
 heuristics = st.sampled_from(NAMES).map(policies.load)
@@ -34,7 +34,7 @@ def _checked(policy: Any) -> Checked:
     return Checked(policy, allowed)
 
 
-def test_random_without_the_guard_is_legal_and_fails_nearly_all_missions() -> None:
+def test_random_without_the_guard_is_legal_and_fails_nearly_all_missions():
     """Both choose among the same moves, unless the guard forbids one."""
     paper, unguarded = load_scenario("paper"), policies.load("random-unguarded")
     simulate(paper, Checked(unguarded, lambda view: view.legal), 21, 0)
@@ -46,9 +46,7 @@ def test_random_without_the_guard_is_legal_and_fails_nearly_all_missions() -> No
 
 
 @given(spaces(), heuristics, seeds, replications)
-def test_heuristics_are_legal_safe_and_without_memory(
-    space: ScenarioSpace, policy: Any, seed: int, replication: int
-) -> None:
+def test_heuristics_are_legal_safe_and_without_memory(space, policy, seed, replication):
     simulate(space, _checked(policy), seed, replication)
 
 
@@ -59,9 +57,7 @@ def test_heuristics_are_legal_safe_and_without_memory(
     st.lists(replications, min_size=1, max_size=4),
     st.integers(1, 4),
 )
-def test_heuristics_do_the_same_in_any_batch(
-    space: ScenarioSpace, team: list[Any], seed: int, numbers: list[int], batch_size: int
-) -> None:
+def test_heuristics_do_the_same_in_any_batch(space, team, seed, numbers, batch_size):
     team = team[: space.uavs[1]]
     workers = 1 + batch_size % 2
     assert_same_alone(space, team, seed, numbers, batch_size=batch_size, workers=workers)
@@ -70,37 +66,36 @@ def test_heuristics_do_the_same_in_any_batch(
 # --- what each of them goes for ---
 
 
-def _path(name: str, slots: int, **scenario: Any) -> list[tuple[float, float]]:
-    """The cells of a lone UAV that starts at (8, 8), slot by slot."""
-    world = {"grid": 16, "zone": [8, 8, 1, 1], "uavs": 1, "max_slots": slots}
-    record = simulate(Scenario.of(**(world | scenario)), policies.load(name), 3, events=True)
-    return cells_of(record)
+@pytest.mark.parametrize(
+    ("name", "data", "ages", "action"),
+    [
+        # A third of the near node's data, or a fifth of the other's, whichever is more.
+        *(("greedy", (20, 30), (0, 0), NORTH), ("greedy", (20, 34), (0, 0), SOUTH)),
+        *(("greedy", (60, 99), (0, 0), NORTH), ("greedy", (60, 101), (0, 0), SOUTH)),
+        # At the end of the slot 30 / 3 + 0.1 * 50 / 9 > 50 / 5 + 0.1 * 30 / 11; not for 60 / 5.
+        *(("age", (5, 5), (30, 50), NORTH), ("age", (5, 5), (30, 60), SOUTH)),
+        ("age", (5, 0), (30, 60), NORTH),
+    ],
+)
+def test_the_node_that_is_worth_the_way(name, data, ages, action):
+    """One 2 cells to the north, the other 4 cells to the south."""
+    scenario = {"grid": 16, "zone": [8, 8, 1, 1], "uavs": 1, "nodes": [[8, 6], [8, 12]]}
+    stepper = MissionStepper(Scenario.of(**scenario), 1, 1)
+    stepper.launch(stepper.indices)
+    state, here = stepper.state, np.zeros(1, int)
+    state.missions["slot"], state.residual[0] = 99, data
+    state.sensors["newest"][0] = 100 - np.array(ages)
+    view = View(state, stepper.world, here, here)
+    assert policies.load(name).act(view).tolist() == [action]
 
 
-def test_greedy_weighs_data_against_distance() -> None:
-    nodes = [[8, 6], [8, 12]]  # 2 and 4 cells from (8, 8)
-    seen = set()
-    for seed in range(40):
-        world = {"grid": 16, "zone": [8, 8, 1, 1], "uavs": 1, "max_slots": 1, "nodes": nodes}
-        scenario = Scenario.of(**world, initial_data=[0.0, 100.0])
-        record = simulate(scenario, policies.load("greedy"), seed, events=True)
-        assert record.events is not None
-        log = record.events.columns()
-        data = log["value"][(log["event"] == "mission_start") & (log["node"] >= 0)]
-        ((_, y),) = cells_of(record)
-        near = data[0] / (2 + 1) > data[1] / (4 + 1)
-        if min(data) > 15:  # both worth a visit
-            assert y == (7 if near else 9)
-            seen.add(near)
-    assert seen == {True, False}
-
-
-def test_tour_visits_every_node_once_around() -> None:
+def test_tour_visits_every_node_once_around():
     # Eight nodes on a ring, listed in no order: the circuit takes them one after another.
     ring = [(2, 2), (8, 2), (14, 2), (14, 8), (14, 14), (8, 14), (2, 14), (2, 8)]
     nodes = [ring[k] for k in (3, 6, 0, 5, 1, 7, 4, 2)]
     world = {"nodes": nodes, "initial_data": 20, "flying_time": 100, "quota": 1000}
-    path = _path("tour", 80, **world, arrival_rate=0.0)
+    world |= {"grid": 16, "zone": [8, 8, 1, 1], "uavs": 1, "max_slots": 80, "arrival_rate": 0.0}
+    path = cells_of(simulate(Scenario.of(**world), policies.load("tour"), 3, events=True))
     visits = list(dict.fromkeys(ring.index(cell) for cell in path if cell in ring))
     assert sorted(visits) == list(range(8))
     steps = {(b - a) % 8 for a, b in zip(visits, visits[1:], strict=False)}
@@ -111,13 +106,13 @@ def test_tour_visits_every_node_once_around() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_lone_uav_never_fails(name: str) -> None:
-    records = simulate_batch(load_scenario("paper", uavs=1), policies.load(name), 31, 250)
+def test_a_lone_uav_never_fails(name):
+    records = simulate_batch(load_scenario("paper", uavs=1), policies.load(name), 31, 100)
     assert records.missions["success"].all()
     assert (records.uavs["slots_charging"] > 0).all()  # eq. 6: it takes at least one charge
 
 
-def test_the_best_heuristic_is_as_good_as_the_readme_says() -> None:
+def test_the_best_heuristic_is_as_good_as_the_readme_says():
     products = {}
     for name in NAMES:
         missions = simulate_batch(load_scenario("paper"), policies.load(name), 32, 500).missions
@@ -126,17 +121,3 @@ def test_the_best_heuristic_is_as_good_as_the_readme_says() -> None:
             assert missions["success"].mean() >= 0.99
     assert max(products.values()) >= 0.74
     assert min(products, key=lambda name: products[name]) == "random"
-
-
-def test_age_flies_to_the_stalest_node_for_the_distance() -> None:
-    # 2 cells to the north, age 30 at the end of the slot; 4 cells to the south, age 50 or 60.
-    scenario = {"grid": 16, "zone": [8, 8, 1, 1], "uavs": 1, "nodes": [[8, 6], [8, 12]]}
-    for age, data, action in ((50, 5, NORTH), (60, 5, SOUTH), (60, 0, NORTH)):
-        stepper = MissionStepper(Scenario.of(**scenario), 1, 1)
-        stepper.launch(stepper.indices)
-        state, here = stepper.state, np.zeros(1, int)
-        state.missions["slot"], state.residual[0] = 99, (5, data)
-        state.sensors["newest"][0] = 70, 100 - age
-        # 30 / 3 + 0.1 * 50 / 9 > 50 / 5 + 0.1 * 30 / 11, but 30 / 3 + ... < 60 / 5 + ...
-        (asked,) = policies.load("age").act(View(state, stepper.world, here, here))
-        assert asked == action

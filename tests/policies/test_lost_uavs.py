@@ -72,7 +72,7 @@ def failures(seed: int) -> tuple[int, list[str]]:
 
 
 @pytest.mark.slow
-def test_at_most_one_of_a_thousand_drawn_missions_fails() -> None:
+def test_at_most_one_of_a_thousand_drawn_missions_fails():
     missions, failed = failures(SEED)
     assert len(failed) <= missions / 1000, "\n".join(failed)
 
@@ -121,7 +121,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
-def test_the_judge_finds_the_last_moment(case: Case) -> None:
+def test_the_judge_finds_the_last_moment(case):
     """And with the moves that it finds, the UAV lives, and its teammates do what they did."""
     scenario = Scenario.of(**FIELDS | {"uavs": len(case.routes)} | case.fields)
     record, _ = flown(scenario, *case.routes, starts=case.starts)
@@ -136,5 +136,5 @@ def test_the_judge_finds_the_last_moment(case: Case) -> None:
         assert (saved.uavs[:lost]["slots_charging"] == record.uavs[:lost]["slots_charging"]).all()
 
 
-def test_mission_without_losses_has_no_findings() -> None:
+def test_mission_without_losses_has_no_findings():
     assert judged(Scenario.of(**FIELDS | {"uavs": 1, "quota": 4}), Script("N"), 0, 0) == []

@@ -32,9 +32,7 @@ def inner(x):
 """
 
 
-def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(tmp_path, monkeypatch):
     """However it is reached; a comment is no change."""
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
     # Python itself misses a change within the second in which it wrote its bytecode.
@@ -55,7 +53,7 @@ def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(
         assert done.stdout.strip() == printed
 
 
-def test_without_compilation_there_is_no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_compilation_there_is_no_simulator(monkeypatch):
     monkeypatch.setattr(config, "DISABLE_JIT", 1)
     with pytest.raises(InputError, match="NUMBA_DISABLE_JIT: the simulator runs only compiled"):
         kernel(abs)

@@ -15,7 +15,7 @@ ENGINES = ("dess.batch", "dess.mission")
 
 
 @pytest.fixture
-def tree(tmp_path: Path) -> Path:
+def tree(tmp_path):
     """A copy of the sources."""
     shutil.copytree(ROOT / "dess", tmp_path / "dess", ignore=shutil.ignore_patterns("__pyc*"))
     return tmp_path
@@ -30,7 +30,7 @@ def hashes(tree: Path, *modules: str) -> dict[str, str]:
     return json.loads(done.stdout)
 
 
-def test_comments_and_docstrings_change_nothing(tree: Path) -> None:
+def test_comments_and_docstrings_change_nothing(tree):
     before = hashes(tree, *ENGINES)
     path = tree / "dess/rules.py"
     text = path.read_text("utf-8").replace('    """', '    """Now: ', 1)
@@ -38,7 +38,7 @@ def test_comments_and_docstrings_change_nothing(tree: Path) -> None:
     assert hashes(tree, *ENGINES) == before
 
 
-def test_a_constant_changes_its_module_alone(tree: Path) -> None:
+def test_a_constant_changes_its_module_alone(tree):
     before, path = hashes(tree, *ENGINES), tree / "dess/state.py"
     path.write_text(path.read_text("utf-8").replace("HOVER = ", "HOVER = 1 + ", 1), "utf-8")
     after = hashes(tree, *ENGINES)
@@ -46,13 +46,13 @@ def test_a_constant_changes_its_module_alone(tree: Path) -> None:
     assert combined(before) != combined(after)
 
 
-def test_what_engines_do_not_import_does_not_count() -> None:
+def test_what_engines_do_not_import_does_not_count():
     code = code_of(*ENGINES)
     assert {"dess.rules", "dess.channel", "dess.scenario"} <= code.keys()
     assert not [name for name in code if name.startswith(("dess.env", "dess.policies", "numpy"))]
 
 
-def test_imports_of_all_forms_are_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_imports_of_all_forms_are_followed(tmp_path, monkeypatch):
     sources = {
         **{"__init__": "LIMIT = 1", "deep": "", "unused": "", "inner/__init__": ""},
         "far": "import numpy\nimport pack.deep as deep",

@@ -39,7 +39,13 @@ def arrays_of(space: ScenarioSpace, states: CompactStates, b: int, i: int) -> li
     return arrays
 
 
-def clip(value: int, low: int, high: int) -> int:
+def team_of(states: CompactStates, b: int) -> list[Uav]:
+    """The UAVs of mission ``b``."""
+    places = [getattr(column, name.upper()) for name in Uav._fields]
+    return [Uav(*row) for row in states.uavs[b][:, places].tolist()]
+
+
+def clip(value: Any, low: float, high: float) -> Any:
     """The value, or the bound that it exceeds."""
     return min(max(value, low), high)
 
@@ -65,8 +71,7 @@ class Seen:
 
     def __init__(self, space: ScenarioSpace, states: CompactStates, b: int, i: int):
         self.space, self.nodes, self.no_fly = space, space.nodes, frozen(space.no_fly)
-        places = [getattr(column, name.upper()) for name in Uav._fields]
-        team = [Uav(*row) for row in states.uavs[b][:, places].tolist()]
+        team = team_of(states, b)
         self.me, self.others = team[i], team[:i] + team[i + 1 :]
         self.mates = [mate for mate in self.others if mate.active]
         self.fliers = [(mate.x, mate.y) for mate in self.mates if not mate.charging]

@@ -1,7 +1,5 @@
 """Named components lie in their space and have the values worked out by hand."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -16,9 +14,7 @@ from tests.drawn import extended_spaces, seeds, spaces
 
 
 @given(spaces() | extended_spaces(fleet=[]), seeds)
-def test_observations_lie_in_their_space_and_masks_name_the_moves_on_the_grid(
-    space: ScenarioSpace, seed: int
-) -> None:
+def test_observations_lie_in_their_space_and_masks_name_the_moves_on_the_grid(space, seed):
     env = dess.parallel_env(space, seed, observation="state")
     names, zones = component_names(space), np.pad(space.chart.zones, 1, constant_values=NO_FLY)
     for step in play(env, 0):
@@ -33,7 +29,7 @@ def test_observations_lie_in_their_space_and_masks_name_the_moves_on_the_grid(
             assert observation["action_mask"].tolist() == expected.tolist()
 
 
-def test_an_observation_worked_out_by_hand() -> None:
+def test_an_observation_worked_out_by_hand():
     # A zone of two cells, (3, 0) and (4, 0): the UAVs start there, 30 % is above C_S, below C_C.
     scenario = small(zone=(3, 0, 2, 1), uavs=2, flying_time=30, initial_data=[0, 8], quota=400)
     env = dess.parallel_env(scenario, observation="state")
@@ -67,7 +63,7 @@ def test_an_observation_worked_out_by_hand() -> None:
         ),
     ],
 )
-def test_what_is_beyond_the_paper_by_hand(fields: dict[str, Any], found: dict[str, float]) -> None:
+def test_what_is_beyond_the_paper_by_hand(fields, found):
     scenario = ScenarioSpace.of(small(**fields))
     env = dess.parallel_env(scenario, observation="state")
     env.reset()

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from hypothesis import event, given
 
-from dess import policies, streams
+from dess import policies
 from dess.batch import simulate_batch
 from dess.guard import guard
 from dess.mission import simulate
-from dess.observations.states import HOME, compact_states, masks
+from dess.observations.states import HOME, compact_states
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import BATTERY, HOVER
 from dess.view import View
 from tests import compiled
 from tests.dess.env.episodes import placed
-from tests.drawn import EAST, NORTH, SOUTH, WEST, replications, seeds, spaces
+from tests.drawn import EAST, NORTH, SOUTH, WEST, random_actions, replications, seeds, spaces
 
 
 class Guarded:
@@ -27,22 +27,13 @@ class Guarded:
 
     def act(self, view: View) -> np.ndarray:
         mask = guard(view)
-        assert mask.shape == (len(view), 5)
-        assert mask.any(1).all()
+        assert mask.shape == (len(view), 5) and mask.any(1).all()
         assert not (mask & ~view.legal).any()
-        constants = zip(view.constants, view.uav, mask.sum(1), strict=True)
-        picks = []
-        for c, i, choices in constants:
-            place = (streams.POLICY, 1, c["slot"], i)
-            word = streams.block(c["seed"], c["replication"], *place)[0]
-            picks.append(streams.integer(word, 0, choices - 1))
-        return np.argmax(mask.cumsum(1) > np.array(picks)[:, None], 1)
+        return random_actions(view, mask)
 
 
 @given(spaces(uavs=1, initial_data=1e6), seeds, replications)
-def test_the_battery_of_a_guarded_lone_uav_is_never_depleted(
-    space: ScenarioSpace, seed: int, replication: int
-) -> None:
+def test_the_battery_of_a_guarded_lone_uav_is_never_depleted(space, seed, replication):
     record = simulate(space, Guarded(), seed, replication)
     assert (record.uavs["end"] != BATTERY).all()
     event(f"charged {record.uavs['slots_charging'][0] > 0}")
@@ -55,29 +46,42 @@ def _mask(*uavs: dict[str, Any], **scenario: Any) -> np.ndarray:
     return guard(View(state, SimpleNamespace(chart=chart), *rows))
 
 
-def test_at_the_last_moment_only_the_way_home_is_left() -> None:
-    # The corner of the zone (26, 5) is 6 + 5 = 11 steps from (20, 10), then one slot to charge in.
-    (mask,) = _mask({"x": 20, "y": 10, "battery": 12})
-    assert np.nonzero(mask)[0].tolist() == [NORTH, EAST]
-    # With plenty of battery all is open.
-    (mask,) = _mask({"x": 20, "y": 10, "battery": 60})
-    assert mask.all()
-    # Somewhere in between the guard closes in; never before it must.
-    opened = [_mask({"x": 20, "y": 10, "battery": b})[0].sum() for b in range(12, 30)]
+WALL = [[24, y] for y in range(12)]  # from the northern edge, between the UAV and the zone
+FAR: dict[str, Any] = {"x": 20, "y": 10}
+WAITING = {"x": 27, "y": 4, "battery": 20, "latch": True, "pad_request": 3}
+
+
+@pytest.mark.parametrize(
+    ("uavs", "no_fly", "moves"),
+    [
+        # The corner of the zone (26, 5) is 6 + 5 = 11 steps away, then one slot to charge in.
+        ([FAR | {"battery": 12}], [], [NORTH, EAST]),
+        ([FAR | {"battery": 60}], [], [NORTH, EAST, SOUTH, WEST, HOVER]),
+        # The edge of the grid and parked teammates are closed.
+        ([{"x": 0, "y": 0}], [], [EAST, SOUTH, HOVER]),
+        (
+            [{"x": 25, "y": 3}, {"x": 26, "y": 3, "latch": True, "battery": 20}],
+            *([], [NORTH, SOUTH, WEST, HOVER]),
+        ),
+        # Behind an island the way around it counts: 8 cells south, 6 east and 7 north.
+        ([{"x": 20, "y": 4, "battery": 22}], WALL, [EAST, SOUTH]),
+        ([{"x": 23, "y": 4, "battery": 60}], WALL, [NORTH, SOUTH, WEST, HOVER]),
+        ([{"x": 20, "y": 4, "battery": 22}], [], [NORTH, EAST, SOUTH, WEST, HOVER]),
+        # A UAV that waits in the queue keeps its place.
+        ([WAITING], [], [HOVER]),
+    ],
+)
+def test_the_moves_that_are_left_to_a_uav(uavs, no_fly, moves):
+    assert np.nonzero(_mask(*uavs, no_fly=no_fly)[0])[0].tolist() == moves
+
+
+def test_the_guard_closes_in_little_by_little_and_never_before_it_must():
+    opened = [_mask(FAR | {"battery": b})[0].sum() for b in range(12, 30)]
     assert opened == sorted(opened)
     assert opened[3:] == [5] * len(opened[3:])
 
 
-def test_the_edge_of_the_grid_and_parked_teammates_are_closed() -> None:
-    (mask,) = _mask({"x": 0, "y": 0})
-    assert np.nonzero(mask)[0].tolist() == [EAST, SOUTH, HOVER]
-    parked = {"x": 26, "y": 3, "latch": True, "battery": 20}
-    mask = _mask({"x": 25, "y": 3}, parked)[0]
-    assert not mask[EAST]
-    assert mask[[NORTH, SOUTH, WEST, HOVER]].all()
-
-
-def test_who_has_been_overruled_leaves_contested_cells_to_the_right_of_way() -> None:
+def test_who_has_been_overruled_leaves_contested_cells_to_the_right_of_way():
     # Both want the cell between them; the one with less battery goes first.
     first, second = {"x": 10, "y": 10, "battery": 50}, {"x": 10, "y": 12, "battery": 60}
     open_to_both = _mask(first, second)
@@ -88,19 +92,6 @@ def test_who_has_been_overruled_leaves_contested_cells_to_the_right_of_way() -> 
 
 
 # --- islands and zones ---
-
-WALL = [[24, y] for y in range(12)]  # from the northern edge, between the UAV and the zone
-
-
-def test_behind_an_island_the_way_around_it_counts() -> None:
-    # From (20, 4) to the corner (26, 5): 8 cells south, 6 east and 7 north.
-    (mask,) = _mask({"x": 20, "y": 4, "battery": 22}, no_fly=WALL)
-    assert np.nonzero(mask)[0].tolist() == [EAST, SOUTH]
-    (mask,) = _mask({"x": 23, "y": 4, "battery": 60}, no_fly=WALL)
-    assert np.nonzero(mask)[0].tolist() == [NORTH, SOUTH, WEST, HOVER]
-    (mask,) = _mask({"x": 20, "y": 4, "battery": 22})
-    assert mask.all()
-
 
 ROW = [[x, 5] for x in range(17, 24)]  # 4 cells around either end
 NEAR = {"zones": [{"cells": [20, 8, 1, 1]}]}
@@ -138,15 +129,13 @@ POOR = [{"x": x, "y": y, "battery": b} for x, y, b in ((3, 1, 11), (1, 4, 7), (1
         ([{"x": 3, "y": 4, "battery": 9, "latch": True}, *POOR], LAST_PAD, (3, 4, 0)),
     ],
 )
-def test_a_uav_charges_at_the_cell_where_it_can_soonest(
-    uavs: list[dict[str, Any]], scenario: dict[str, Any], home: tuple[int, ...]
-) -> None:
+def test_a_uav_charges_at_the_cell_where_it_can_soonest(uavs, scenario, home):
     state, chart = placed(uavs, **scenario)
     state.missions["pads_out"][0, 16] = 1  # the first pad of the second zone
     assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[:3] == home
 
 
-def test_the_battery_to_a_zone_farther_than_the_nearest_is_that_of_the_way_there() -> None:
+def test_the_battery_to_a_zone_farther_than_the_nearest_is_that_of_the_way_there():
     for uavs, needed in (([HERE, {}], 8), ([HERE, THERE], 12)):  # two slots per cell
         states = compact_states(*placed(uavs, **NEAR, fleet=[{"slots_per_cell": 2}]), True)
         assert states.uavs[0, 0, HOME] == needed
@@ -180,7 +169,7 @@ CORRIDORS = """
 
 
 @pytest.mark.parametrize("picture", [ISLANDS, CORRIDORS], ids=["islands", "corridors"])
-def test_hardly_any_guarded_uav_runs_dry_among_islands_and_no_lone_one_does(picture: str) -> None:
+def test_hardly_any_guarded_uav_runs_dry_among_islands_and_no_lone_one_does(picture):
     rows = picture.split()
     cells = {(x, y): kind for y, row in enumerate(rows) for x, kind in enumerate(row)}
     water = [cell for cell, kind in cells.items() if kind == "."]
@@ -232,9 +221,7 @@ OFF: dict[str, Any] = {"charging": {"plan_waits": False}}
         ([32, 30, 32], [1], {"zones": [{"cells": [24, 8, 1, 1]}]}, 0),  # 4 slots, not 2 + 3
     ],
 )
-def test_the_time_that_a_uav_expects_to_wait(
-    batteries: list[int], asked: list[int], scenario: dict[str, Any], slots: int
-) -> None:
+def test_the_time_that_a_uav_expects_to_wait(batteries, asked, scenario, slots):
     uavs = [
         {"battery": b, "pad_request": -1, "communications": 0, "x": 24, "y": 4} for b in batteries
     ]
@@ -244,21 +231,20 @@ def test_the_time_that_a_uav_expects_to_wait(
     assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[3] == slots
 
 
-def test_two_parked_teammates_side_by_side_are_flown_around() -> None:
+def test_two_parked_teammates_side_by_side_are_flown_around():
     """Without no-fly cells, too, they close all shortest ways to the cells behind them."""
     side_by_side = [{"x": x, "y": 5, "latch": True} for x in (26, 27)]
     state, chart = placed([{"x": 27, "y": 6}, *side_by_side])
     assert compiled.path(state.missions[0], state.uavs[0], 0, chart, 26, 4) == 5
 
 
-def test_a_uav_stays_in_its_parking_cell_whoever_is_near() -> None:
+def test_a_uav_stays_in_its_parking_cell_whoever_is_near():
     """Its teammate has the right of way, but flies around it: both must not move on and on."""
-    state, chart = placed([{"x": 27, "y": 6}, {"x": 27, "y": 5, "latch": True}])
-    state.uavs["battery"] = 5
-    assert masks(compact_states(state, chart, True), np.array([0]), np.array([1]))[0, HOVER]
+    team = {"x": 27, "y": 6, "battery": 5}, {"x": 27, "y": 5, "battery": 5, "latch": True}
+    assert _mask(*team)[1, HOVER]
 
 
-def test_where_no_pad_will_ever_work_no_uav_must_charge() -> None:
+def test_where_no_pad_will_ever_work_no_uav_must_charge():
     state, _ = placed([{"battery": 5}], **QUEUE, failures={"pad_rate": 0.1})
     mission, u = state.missions[0], state.uavs[0, 0]
     assert compiled.must_charge(mission, u, 1e6)
@@ -269,9 +255,7 @@ def test_where_no_pad_will_ever_work_no_uav_must_charge() -> None:
 
 
 @pytest.mark.parametrize(("uavs", "pads"), [(2, 1), (4, 2)])
-def test_with_a_pad_for_two_uavs_the_second_comes_early_enough_to_wait(
-    uavs: int, pads: int
-) -> None:
+def test_with_a_pad_for_two_uavs_the_second_comes_early_enough_to_wait(uavs, pads):
     space = load_scenario("paper", uavs=uavs, pads=pads)
     missions = simulate_batch(space, policies.load("greedy"), 777301, 200).missions
     assert missions["success"].mean() >= 0.99
@@ -309,14 +293,12 @@ SHARED |= {"wind": {"strength": 0.2, "direction": 268, "gusts": 0.1, "seed": 79}
         ("clustered:970026", {"uavs": 6, "pads": 3}, "planner-short", 2),
     ],
 )
-def test_a_uav_that_has_a_way_to_live_lives(
-    sea: str, changes: dict[str, Any], policy: str, replication: int
-) -> None:
+def test_a_uav_that_has_a_way_to_live_lives(sea, changes, policy, replication):
     space = load_scenario(sea, **changes)
     assert simulate_batch(space, policies.load(policy), 2600, [replication]).missions["success"][0]
 
 
-def test_a_uav_must_charge_if_no_data_are_left_for_its_quota_unless_it_lives_to_the_end() -> None:
+def test_a_uav_must_charge_if_no_data_are_left_for_its_quota_unless_it_lives_to_the_end():
     state, _ = placed([{"battery": 60}], arrival_rate=0.0, quota=440)
     mission, u = state.missions[0], state.uavs[0, 0]
     u["communications"] = 400  # 10 slots are enough if there are data
@@ -328,13 +310,7 @@ def test_a_uav_must_charge_if_no_data_are_left_for_its_quota_unless_it_lives_to_
     assert not compiled.must_charge(mission, u, 0.0)
 
 
-def test_a_uav_that_waits_in_the_queue_keeps_its_place() -> None:
-    state, chart = placed([{"x": 27, "y": 4, "battery": 20, "latch": True, "pad_request": 3}])
-    allowed = masks(compact_states(state, chart, True), np.array([0]), np.array([0]))[0]
-    assert np.nonzero(allowed)[0].tolist() == [HOVER]
-
-
-def test_a_uav_that_can_reach_two_zones_leaves_the_pad_to_one_that_can_reach_one() -> None:
+def test_a_uav_that_can_reach_two_zones_leaves_the_pad_to_one_that_can_reach_one():
     """The batteries are equal, so the first UAV would choose first."""
     team: list[dict[str, Any]] = [{"x": x, "y": 1, "battery": 15} for x in (12, 15)]
     sea: dict[str, Any] = {"grid": 24, "rows": 3, "zone": [0, 0, 1, 3], "pads": 1}

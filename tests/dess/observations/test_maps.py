@@ -4,17 +4,8 @@ import numpy as np
 from hypothesis import event, given
 from hypothesis import strategies as st
 
-from dess.observations.maps import (
-    BATTERY_SCALE,
-    CROP,
-    DATA,
-    DATA_SCALE,
-    FLYING_TIME,
-    POOL,
-    STATUS,
-    ZONE,
-    Maps,
-)
+from dess.observations import maps as module
+from dess.observations.maps import CROP, POOL, Maps
 from dess.observations.states import ACTIVE, BATTERY, CompactStates, Layout, X, Y, empty_states
 
 
@@ -43,19 +34,19 @@ def _layers(layout: Layout, team: np.ndarray, residual: np.ndarray) -> np.ndarra
     """The map (4, M, M) of a mission, before any centring."""
     layers = np.zeros((4, layout.grid, layout.grid))
     x, y, width, height = layout.zone
-    layers[ZONE, y : y + height, x : x + width] = 1
-    np.add.at(layers[DATA], (layout.nodes[:, 1], layout.nodes[:, 0]), residual / DATA_SCALE)
+    layers[module.ZONE, y : y + height, x : x + width] = 1
+    np.add.at(
+        layers[module.DATA], (layout.nodes[:, 1], layout.nodes[:, 0]), residual / module.DATA_SCALE
+    )
     active = team[team[:, ACTIVE] != 0]
     cells = active[:, Y], active[:, X]
-    np.add.at(layers[FLYING_TIME], cells, active[:, BATTERY] / BATTERY_SCALE)
-    np.add.at(layers[STATUS], cells, 1)
+    np.add.at(layers[module.FLYING_TIME], cells, active[:, BATTERY] / module.BATTERY_SCALE)
+    np.add.at(layers[module.STATUS], cells, 1)
     return layers
 
 
 @given(_worlds())
-def test_the_maps_are_those_cut_from_the_whole_centred_map(
-    world: tuple[Maps, CompactStates, np.ndarray, np.ndarray],
-) -> None:
+def test_the_maps_are_those_cut_from_the_whole_centred_map(world):
     maps, states, missions, uavs = world
     grid, width = maps.layout.grid, maps.shapes[1][-1]
     encoded = maps.encode(states, missions, uavs)
@@ -77,4 +68,4 @@ def test_the_maps_are_those_cut_from_the_whole_centred_map(
         pooled = blocks.reshape(4, width, POOL, width, POOL).mean((2, 4))
         np.testing.assert_allclose(near, cut, rtol=1e-6)
         np.testing.assert_allclose(far, pooled, rtol=1e-5)
-        np.testing.assert_allclose(own, team[uav, BATTERY] / BATTERY_SCALE, rtol=1e-6)
+        np.testing.assert_allclose(own, team[uav, BATTERY] / module.BATTERY_SCALE, rtol=1e-6)

@@ -9,19 +9,17 @@ from hypothesis import strategies as st
 
 from dess.channel import world_of
 from dess.observations import states as column
-from dess.observations.sets import ACTION, MATE, MOVES, NODE, OWN, ZONE, Sets, sea_kinds, sea_of
+from dess.observations.sets import Sets, sea_kinds, sea_of
 from dess.observations.states import CompactStates, empty_states
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import NO_FLY
-from dess.state import constants_of, starts_of, state_of
+from dess.state import HOVER, constants_of, starts_of, state_of
 from tests.dess.observations.any_teams import any_teams
 from tests.dess.observations.plain_sets import arrays_of
-from tests.drawn import PLAIN_SEA, seas, spaces
+from tests.dess.turns import Turn
+from tests.drawn import seas, spaces
 
-OWN_PART, ACTIONS, NODES, NODE_MOVES, MATES, MATE_MOVES, ZONES, ZONE_MOVES = range(8)
-NORTH, EAST, SOUTH, WEST, HOVER = range(5)
-# What becomes of the four moves on a sea that is mirrored along x, and on one that is transposed.
-MIRRORED, TRANSPOSED = [NORTH, WEST, SOUTH, EAST], [WEST, SOUTH, EAST, NORTH]
+_OWN, ACTIONS, NODES, NODE_MOVES, MATES, MATE_MOVES, _ZONES, ZONE_MOVES = range(8)
 # Walls with a gap in the north or south, so that some ways are longer than the longest that counts.
 MAZE: dict[str, Any] = {
     **{"grid": 81, "rows": 12, "nodes": ((0, 11), (40, 5), (78, 3), (80, 0)), "zone": (0, 4, 1, 2)},
@@ -39,10 +37,10 @@ def _encode(space: ScenarioSpace, states: CompactStates, uav: int) -> tuple[np.n
 
 
 @st.composite
-def _cases(draw: st.DrawFn, **fixed: Any) -> tuple[dict[str, Any], CompactStates, int]:
-    """The geometry of a sea, a team in any state on it, and a UAV that is active."""
-    sea = draw(seas(**fixed))
-    return sea, *draw(_teams(_space(sea)))
+def _cases(draw: st.DrawFn) -> tuple[ScenarioSpace, CompactStates, int]:
+    """A sea, a team in any state on it, and a UAV that is active."""
+    space = ScenarioSpace.of(uavs=1, edge_snr=-14.0, **draw(seas()))
+    return space, *draw(_teams(space))
 
 
 @st.composite
@@ -58,40 +56,18 @@ def _teams(space: ScenarioSpace, count: int = 1) -> st.SearchStrategy[tuple[Comp
     return any_teams(open_cells, len(space.nodes), count)
 
 
-def _space(sea: dict[str, Any]) -> ScenarioSpace:
-    return ScenarioSpace.of(uavs=1, edge_snr=-14.0, **sea)
-
-
-def _turned(sea: dict[str, Any], transposes: bool) -> dict[str, Any]:
-    """A sea that is transposed, or mirrored along x."""
-    grid, rows = sea["grid"], sea["rows"] or sea["grid"]
-
-    def cells(x: int, y: int, width: int = 1, height: int = 1) -> tuple[int, ...]:
-        return (y, x, height, width) if transposes else (grid - x - width, y, width, height)
-
-    return {
-        "grid": rows if transposes else grid,
-        "rows": grid if transposes else rows,
-        "zone": cells(*sea["zone"]),
-        "nodes": [cells(*cell)[:2] for cell in sea["nodes"]],
-        "zones": [zone | {"cells": cells(*zone["cells"])} for zone in sea.get("zones", ())],
-        "no_fly": [cells(*cell)[:2] for cell in sea.get("no_fly", ())],
-    }
-
-
-def _turned_states(states: CompactStates, grid: int, transposes: bool) -> CompactStates:
-    """The states on such a sea."""
-    moves, team = (TRANSPOSED if transposes else MIRRORED), states.uavs.copy()
+def _turned(states: CompactStates, turn: Turn) -> CompactStates:
+    """The states on a sea that is turned."""
+    team, mask = states.uavs.copy(), states.uavs[..., column.MASK, None]
     x, y = states.uavs[..., column.X], states.uavs[..., column.Y]
-    team[..., column.X], team[..., column.Y] = (y, x) if transposes else (grid - 1 - x, y)
-    bits = states.uavs[..., column.MASK, None] >> np.array([*moves, HOVER]) & 1
-    team[..., column.MASK] = (bits << np.arange(5)).sum(-1)
+    team[..., column.X], team[..., column.Y] = turn.cell(x, y)
+    team[..., column.MASK] = ((mask >> np.arange(5) & 1) << turn.actions).sum(-1)
     return states._replace(uavs=team)
 
 
 @pytest.mark.parametrize("sea", [{}, MAZE], ids=["drawn", "maze"])
 @given(st.data())
-def test_its_numbers_are_the_plain_ones(sea: dict[str, Any], data: st.DataObject) -> None:
+def test_its_numbers_are_the_plain_ones(sea, data):
     """Without a tolerance: both round at the same places."""
     space, states, uav = data.draw(_worlds(**sea))
     missions = np.arange(len(states.missions))
@@ -101,47 +77,36 @@ def test_its_numbers_are_the_plain_ones(sea: dict[str, Any], data: st.DataObject
             np.testing.assert_array_equal(part[b], plain)
 
 
-@given(_cases(), st.booleans())
-def test_a_mirrored_or_rotated_sea_has_its_moves_in_another_order(
-    case: tuple[dict[str, Any], CompactStates, int], transposes: bool
-) -> None:
-    sea, states, uav = case
-    plain = _encode(_space(sea), states, uav)
-    turned_states = _turned_states(states, sea["grid"], transposes)
-    turned = _encode(_space(_turned(sea, transposes)), turned_states, uav)
-    moves = TRANSPOSED if transposes else MIRRORED
-    for part in (OWN_PART, NODES, MATES, ZONES):
-        np.testing.assert_allclose(turned[part], plain[part], atol=1e-6)
-    np.testing.assert_allclose(turned[ACTIONS], plain[ACTIONS][[*moves, HOVER]], atol=1e-6)
-    order = [*moves, *(4 + move for move in moves), 8]
-    for part in (NODE_MOVES, MATE_MOVES, ZONE_MOVES):
-        np.testing.assert_allclose(turned[part], plain[part][order], atol=1e-6)
+@given(_cases(), st.integers(1, 7))
+def test_a_mirrored_or_rotated_sea_has_its_moves_in_another_order(case, which):
+    space, states, uav = case
+    turn = Turn.all_of(space)[which]
+    plain = _encode(space, states, uav)
+    turned = _encode(turn.sea(space), _turned(states, turn), uav)
+    moves = [*turn.actions[:HOVER], *(4 + turn.actions[:HOVER]), 8]
+    orders = {ACTIONS: turn.actions, NODE_MOVES: moves, MATE_MOVES: moves, ZONE_MOVES: moves}
+    for part, values in enumerate(plain):
+        order = orders.get(part, slice(None))
+        np.testing.assert_allclose(turned[part][order], values, atol=1e-6)
 
 
 @given(_cases(), st.randoms(use_true_random=False))
-def test_renamed_nodes_and_uavs_are_the_same_sets(
-    case: tuple[dict[str, Any], CompactStates, int], random: Any
-) -> None:
-    sea, states, uav = case
-    nodes, team = [*range(len(sea["nodes"]))], [*range(states.uavs.shape[1])]
+def test_renamed_nodes_and_uavs_are_the_same_sets(case, random):
+    space, states, uav = case
+    nodes, team = [*range(len(space.nodes))], [*range(states.uavs.shape[1])]
     random.shuffle(nodes)
     random.shuffle(team)
-    renamed = states._replace(
-        uavs=states.uavs[:, team], residual=np.ascontiguousarray(states.residual[:, nodes])
-    )
-    plain = _encode(_space(sea), states, uav)
-    others = sea | {"nodes": [sea["nodes"][k] for k in nodes]}
-    other = _encode(_space(others), renamed, team.index(uav))
-    mates = [j - (j > uav) for j in team if j != uav]
-    expected = [
-        *(plain[OWN_PART], plain[ACTIONS], plain[NODES][nodes], plain[NODE_MOVES][:, nodes]),
-        *(plain[MATES][mates], plain[MATE_MOVES][:, mates], plain[ZONES], plain[ZONE_MOVES]),
-    ]
-    for part, values in zip(other, expected, strict=True):
+    residual = np.ascontiguousarray(states.residual[:, nodes])
+    renamed = states._replace(uavs=states.uavs[:, team], residual=residual)
+    others = ScenarioSpace.of(space, nodes=[space.nodes[k] for k in nodes])
+    expected, mates = [*_encode(space, states, uav)], [j - (j > uav) for j in team if j != uav]
+    for part, order in ((NODES, nodes), (MATES, mates)):
+        expected[part], expected[part + 1] = expected[part][order], expected[part + 1][:, order]
+    for part, values in zip(_encode(others, renamed, team.index(uav)), expected, strict=True):
         np.testing.assert_allclose(part, values, atol=1e-5)
 
 
-def test_a_small_sea_by_hand() -> None:
+def test_a_small_sea_by_hand():
     """Two nodes, a teammate and two zones, with an island between the UAV and a node.
 
     . . . . . . .    Z zones, U the UAV, T the teammate
@@ -186,35 +151,7 @@ def test_a_small_sea_by_hand() -> None:
     assert actions[:, 6] == pytest.approx(near, rel=1e-5)
 
 
-@given(_cases(), st.integers(1, 3))
-def test_uavs_that_are_not_there_are_zeros_behind_the_others(
-    case: tuple[dict[str, Any], CompactStates, int], more: int
-) -> None:
-    sea, states, uav = case
-    longer = states._replace(uavs=np.pad(states.uavs, ((0, 0), (0, more), (0, 0))))
-    plain, padded = (_encode(_space(sea), each, uav) for each in (states, longer))
-    mates = states.uavs.shape[1] - 1
-    for part, (short, long) in enumerate(zip(plain, padded, strict=True)):
-        if part == MATES:
-            assert not long[mates:].any()
-            long = long[:mates]
-        elif part == MATE_MOVES:
-            assert not long[:, mates:].any()
-            long = long[:, :mates]
-        np.testing.assert_array_equal(short, long)
-
-
-@given(spaces(**PLAIN_SEA))
-def test_its_shapes_are_those_of_what_it_encodes(space: ScenarioSpace) -> None:
-    states = empty_states(1, space.uavs[1], len(space.nodes))
-    sets = _sets(space)
-    parts = sets.encode(states, np.array([0]), np.array([0]))
-    assert tuple(part.shape[1:] for part in parts) == sets.shapes
-    empty = ((OWN,), (5, ACTION), (0, NODE), (MOVES, 0), (0, MATE), (MOVES, 0), (0, ZONE))
-    assert Sets.shapes == (*empty, (MOVES, 0))
-
-
-def test_missions_of_a_batch_may_have_different_seas() -> None:
+def test_missions_of_a_batch_may_have_different_seas():
     """The pads and the data may differ from mission to mission, the geometry may not."""
     same = [ScenarioSpace.of(uavs=1, charge_start=n) for n in (20, 30)]
     other = [ScenarioSpace.of(uavs=1, **field) for field in ({"pads": 3}, {"arrival_rate": 0.1})]

@@ -12,7 +12,6 @@ from dess.guard import guard
 from dess.mission import simulate
 from dess.observations import states as column
 from dess.observations.states import compact_states, masks
-from dess.scenario import ScenarioSpace
 from dess.state import HOVER
 from dess.view import View
 from tests.dess.env.episodes import placed
@@ -30,8 +29,10 @@ class _Compared:
     def act(self, view: View) -> np.ndarray:
         state = view.state
         present = np.arange(state.uavs.shape[1]) < state.missions["uavs"][:, None]
-        # Who charges, and who is done, can only hover.
-        idle = np.nonzero(present & (state.uavs["charging"] | ~state.uavs["active"]))
+        # Who charges, is done, or is on its way to a cell, can only hover.
+        idle = state.uavs["charging"] | ~state.uavs["active"] | (state.uavs["slots_left"] > 0)
+        assert not idle[view.mission, view.uav].any()
+        idle = np.nonzero(present & idle)
         for guarded, mask in ((True, guard(view)), (False, view.legal)):
             states = compact_states(state, view.world.chart, guarded)
             assert (masks(states, view.mission, view.uav) == mask).all()
@@ -47,21 +48,19 @@ class _Compared:
         return self.policy.act(view)
 
 
-@given(spaces(), teams, seeds, replications)
-def test_compact_states_tell_what_the_view_tells(
-    space: ScenarioSpace, team: list[Any], seed: int, replication: int
-) -> None:
+@given(spaces() | spaces(fleet=[{"slots_per_cell": 3}, {}]), teams, seeds, replications)
+def test_compact_states_tell_what_the_view_tells(space, team, seed, replication):
     simulate(space, [*map(_Compared, team[: space.uavs[1]])], seed, replication)
 
 
-def test_each_has_its_own_parking_cell() -> None:
+def test_each_has_its_own_parking_cell():
     # Both are nearest to (26, 5); the one with less battery chooses first.
     first, second = {"x": 23, "y": 5, "battery": 20}, {"x": 26, "y": 8, "battery": 19}
     states = compact_states(*placed([first, second]), True)
     assert states.uavs[0, :, column.HOME].tolist() == [3 + 1, 3]
 
 
-def test_a_quota_beyond_all_bounds_is_just_far_away() -> None:
+def test_a_quota_beyond_all_bounds_is_just_far_away():
     states = compact_states(*placed([{}], quota=1_000_000, communication_slots=1), True)
     assert states.uavs[0, 0, column.NEEDED] == np.iinfo(np.int16).max
 
@@ -75,7 +74,7 @@ SEEN = {
 
 
 @pytest.mark.parametrize("kind", SEEN)
-def test_observations_of_a_fleet_stay_the_same_to_the_bit(kind: str) -> None:
+def test_observations_of_a_fleet_stay_the_same_to_the_bit(kind):
     scenario = dess.load_scenario("paper", flying_time=[12, 40])
     env = dess.vector_env(scenario, 20, 2, kind, guarded=True)
     generator, digest = np.random.default_rng(0), sha256()

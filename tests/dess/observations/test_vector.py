@@ -26,7 +26,7 @@ def _line(vector: Vector, states: CompactStates, uav: int) -> np.ndarray:
 
 
 @given(_worlds())
-def test_it_is_the_plain_one_bit_for_bit(world: tuple[Vector, CompactStates, int]) -> None:
+def test_it_is_the_plain_one_bit_for_bit(world):
     vector, states, uav = world
     plain = line_of(states, vector.layout, 0, uav)
     assert _line(vector, states, uav).tobytes() == plain.tobytes()

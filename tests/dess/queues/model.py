@@ -2,8 +2,7 @@
 
 Zone (``dess.mission``), buffers (``dess.sections.packets``) and arrivals are those of the
 SimPy model. Only the UAVs are other ones: they come to the zone, charge for a given time and leave.
-A UAV collects data at fixed times, so a SimPy process takes its place where theory asks for
-exponential service. With a UAV above a node, a whole mission of the model is the queue.
+With a UAV above a node, a whole mission of the model is the queue.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -78,57 +77,6 @@ class Station:
     def _leaver(self, uav: int) -> Callable[[simpy.Event], None]:
         """What happens when a UAV is charged."""
         return lambda _: self._serve(self._zone.leave, uav)
-
-
-class Server:
-    """A server that takes one packet after the other from the buffer of a node.
-
-    A packet stays in the buffer, and takes one of its places, until its service is done.
-
-    Attributes:
-        buffers: The buffer.
-        numbers: (N,) for each packet, the integral of the number in the buffer over the time from
-            the arrival before to its own.
-    """
-
-    def __init__(self, times: np.ndarray, work: np.ndarray, limit: int = 0):
-        """Let all packets arrive, and serve them.
-
-        Args:
-            times: (N,) times of the arrivals.
-            work: (N,) service times, in the order of service.
-            limit: Packets that the buffer can hold; 0 for no limit.
-        """
-        self.buffers, self.numbers = Buffers(1, limit), np.zeros(len(times))
-        self._env = simpy.Environment()
-        self._work, self._number, self._changed = iter(work.tolist()), 0, 0.0
-        self._env.process(self._arrivals(times.tolist()))
-        self._env.run()
-
-    def _arrivals(self, times: list[float]) -> Process:
-        for self._number, time in enumerate(times):
-            yield self._env.timeout(time - self._env.now)
-            self._count()
-            was_empty = self._held == 0
-            self.buffers.store(0, self._env.now, 1.0)
-            if was_empty:
-                self._env.process(self._service())
-
-    def _service(self) -> Process:
-        """Serve packets until the buffer is empty."""
-        while self._held > 0:
-            yield self._env.timeout(next(self._work))
-            self._count()
-            self.buffers.serve(0, self._env.now, 1.0)
-
-    @property
-    def _held(self) -> int:
-        return len(self.buffers.queues[0])
-
-    def _count(self) -> None:
-        """Add the number in the buffer over the time since it has changed."""
-        self.numbers[self._number] += self._held * (self._env.now - self._changed)
-        self._changed = self._env.now
 
 
 def ages_of(buffers: Buffers, end: float) -> tuple[float, float, float]:

@@ -18,7 +18,6 @@ from dess.analysis.verification.closed_forms import Moments
 from dess.scenario import ScenarioSpace, load_scenario
 from tests.dess.queues import theory
 from tests.dess.queues.model import (
-    Server,
     Station,
     ages_of,
     arrivals_of,
@@ -58,36 +57,6 @@ def _zone(pads: int, is_fixed: bool = False) -> tuple[Means, Means]:
     )
     known = {"waiting time": waiting, "queue length": arrivals * waiting}
     return known, {"waiting time": waits, "queue length": queues / lasted}
-
-
-def _buffer(places: int) -> tuple[Means, Means]:
-    """A buffer whose packets arrive as in the model, with exponential service times of mean 1."""
-    loss, number = theory.loss_of_mm1k(LOAD, PLACES), theory.number_in_mm1k(LOAD, PLACES)
-    known = {
-        "share of packets lost": loss,
-        "packets in the buffer": number,
-        "time in the buffer": number / (LOAD * (1 - loss)),
-    }
-    if not places:
-        waiting, age = theory.waiting_of_mmc(LOAD, 1.0, 1), theory.age_of_mm1(LOAD, 1.0)
-        known = {"time in the buffer": waiting + 1.0, "age": age}
-    found = [_served(replication, places) for replication in range(BATCHES)]
-    return known, {what: np.array([means[what] for means in found]) for what in known}
-
-
-def _served(replication: int, places: int) -> Means:
-    world = _continuous(arrival_rate=LOAD, max_slots=round(CUSTOMERS / LOAD))
-    times = arrivals_of(world, 0, SEED, replication)
-    work = np.random.default_rng([SEED, replication]).exponential(1.0, len(times))
-    server = Server(times, work, places)
-    buffers = server.buffers
-    done = buffers.packets[buffers.delivered]
-    return {
-        "share of packets lost": buffers.lost / len(buffers.all),
-        "packets in the buffer": server.numbers.sum() / times[-1],
-        "time in the buffer": (done["left"] - done["generated"]).mean(),
-        "age": ages_of(buffers, done["left"].max())[0],
-    }
 
 
 def _mission(places: int) -> tuple[Means, Means]:
@@ -131,8 +100,6 @@ def p_value(values: np.ndarray, known: float) -> float:
 SYSTEMS: dict[str, Callable[[], tuple[Means, Means]]] = {
     **{f"zone, M/M/{pads}": partial(_zone, pads) for pads in (1, 2, 3)},
     "zone, M/D/1": partial(_zone, 1, is_fixed=True),
-    "buffer, M/M/1": partial(_buffer, 0),
-    f"buffer, M/M/1/{PLACES}": partial(_buffer, PLACES),
     "mission, M/D/1": partial(_mission, 0),
     f"mission, M/D/1/{PLACES}": partial(_mission, PLACES),
     "visits at exponential gaps": _visits,
@@ -140,19 +107,19 @@ SYSTEMS: dict[str, Callable[[], tuple[Means, Means]]] = {
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
-def test_a_queue_has_the_means_that_theory_knows(system: str) -> None:
+def test_a_queue_has_the_means_that_theory_knows(system):
     known, measured = SYSTEMS[system]()
     for what, mean in known.items():
         assert p_value(measured[what], mean) > LEAST
         assert p_value(2 * measured[what], mean) < LEAST
 
 
-def test_the_age_of_a_node_visited_at_fixed_gaps_is_uniform() -> None:
+def test_the_age_of_a_node_visited_at_fixed_gaps_is_uniform():
     times = np.arange(1, CUSTOMERS + 1) * GAP
     assert ages_of(visited(times), times[-1]) == pytest.approx((GAP / 2, GAP, 0.99 * GAP))
 
 
-def test_thinned_arrivals_are_a_poisson_process_in_the_integrated_rate() -> None:
+def test_thinned_arrivals_are_a_poisson_process_in_the_integrated_rate():
     schedule = {"process": "continuous", "schedule": SCHEDULE}
     world = _continuous(arrival_rate=RATE, max_slots=int(END), arrivals=schedule)
     times = arrivals_of(world, 0, SEED)
@@ -161,7 +128,7 @@ def test_thinned_arrivals_are_a_poisson_process_in_the_integrated_rate() -> None
     assert stats.poisson(total[0]).sf(len(times)) > LEAST < stats.poisson(total[0]).cdf(len(times))
 
 
-def test_a_node_has_its_own_rate() -> None:
+def test_a_node_has_its_own_rate():
     rates = {"process": "continuous", "rates": [0.0, 5.0, *[0.1] * 23]}
     world = _continuous(max_slots=1000, arrivals=rates)
     assert len(arrivals_of(world, 0)) == 0

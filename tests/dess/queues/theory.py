@@ -39,41 +39,6 @@ def waiting_of_mg1(arrivals: float, service: Moments) -> float:
     return arrivals * second / (2 * (1 - arrivals * service.mean))
 
 
-def loss_of_mm1k(load: float, places: int) -> float:
-    """The share of the customers of an M/M/1/K queue that find all K places taken.
-
-    Args:
-        load: Arrival rate times mean service time.
-        places: K, the one in service included.
-    """
-    weights = load ** np.arange(places + 1)
-    return float(weights[-1] / weights.sum())
-
-
-def number_in_mm1k(load: float, places: int) -> float:
-    """The mean number of customers in an M/M/1/K queue.
-
-    Args:
-        load: Arrival rate times mean service time.
-        places: K, the one in service included.
-    """
-    weights = load ** np.arange(places + 1)
-    return float(weights @ np.arange(places + 1) / weights.sum())
-
-
-def age_of_mm1(arrivals: float, service: float) -> float:
-    """The mean age of information where an M/M/1 queue delivers the updates, the oldest first.
-
-    S. Kaul, R. Yates, M. Gruteser: Real-time status: how often should one update?, INFOCOM 2012.
-
-    Args:
-        arrivals: Arrival rate.
-        service: Mean service time.
-    """
-    load = arrivals * service
-    return service * (1 + 1 / load + load**2 / (1 - load))
-
-
 def latency_of_slotted_md1(arrivals: float, gap: float) -> float:
     """The mean time until a server takes a customer, if it takes one at a time at fixed gaps.
 

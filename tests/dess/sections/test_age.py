@@ -15,7 +15,7 @@ def _of_teeth(teeth: list[Tooth]) -> tuple[float, float]:
     return age_of_teeth(lows, highs, np.ones(len(teeth)))
 
 
-def test_two_teeth_by_hand() -> None:
+def test_two_teeth_by_hand():
     """Areas 8 and 2 over 6 slots; the longer tooth alone passes the highest 0.06 slots."""
     mean, percentile = _of_teeth([(0.0, 4.0), (0.0, 2.0)])
     assert mean == pytest.approx(10 / 6)
@@ -26,7 +26,7 @@ ages = st.integers(0, 400).map(lambda quarters: quarters / 4)
 
 
 @given(st.lists(st.tuples(ages, ages).map(lambda ends: (min(ends), max(ends))), min_size=1))
-def test_the_mean_and_the_percentile_are_those_of_a_fine_sample(teeth: list[Tooth]) -> None:
+def test_the_mean_and_the_percentile_are_those_of_a_fine_sample(teeth):
     if all(low == high for low, high in teeth):
         return
     mean, percentile = _of_teeth(teeth)

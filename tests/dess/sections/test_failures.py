@@ -60,7 +60,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
-def test_failures_worked_by_hand(case: Case) -> None:
+def test_failures_worked_by_hand(case):
     check(case)
 
 
@@ -79,14 +79,14 @@ class Informed(Commuter):
 
 
 @given(st.data(), seeds, replications)
-def test_policies_see_what_has_failed(data: st.DataObject, seed: int, replication: int) -> None:
+def test_policies_see_what_has_failed(data, seed, replication):
     space = data.draw(extended_spaces(failures=data.draw(failures())))
     record = simulate(space, Informed(), seed, replication)
     kept = record.collected + record.residual + record.measured.get("lost", 0.0)
     assert kept == pytest.approx(record.initial + record.arrived, abs=1e-6)
 
 
-def test_the_times_to_failure_and_to_repair_are_geometric() -> None:
+def test_the_times_to_failure_and_to_repair_are_geometric():
     """Of 1000 nodes: chi-square of the first failure and of the first repair; fixed seed."""
     nodes = [[x, y] for x in range(40) for y in range(25)]
     space = ScenarioSpace.of(grid=40, nodes=nodes, failures={"node_rate": 0.1, "node_repair": 5.0})

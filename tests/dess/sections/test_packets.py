@@ -31,7 +31,7 @@ def _above(policy: Any = HOVER, **values: Any) -> tuple[Buffers, Any]:
     return model.packets.buffers, record
 
 
-def test_policies_see_the_age_of_the_newest_data() -> None:
+def test_policies_see_the_age_of_the_newest_data():
     seen = []
 
     class Reader(Script):
@@ -49,7 +49,7 @@ def test_policies_see_the_age_of_the_newest_data() -> None:
     assert record.reward - plain.reward == pytest.approx(-2.0 * (sum(seen[1:]) + last))
 
 
-def test_only_the_simpy_engine_has_continuous_arrivals() -> None:
+def test_only_the_simpy_engine_has_continuous_arrivals():
     space = load_scenario("paper", **{"arrivals.process": "continuous"})
     for refused in (lambda: simulate_batch(space, HOVER), lambda: parallel_env(space)):
         with pytest.raises(InputError, match="arrivals.process: continuous needs the SimPy"):

@@ -31,7 +31,7 @@ def _table(wind: Wind, grid: int, rows: int | None = None) -> np.ndarray:
     return surcharges((grid, rows or grid), *wind.push(), wind.gusts, wind.seed)
 
 
-def test_a_move_against_the_wind_costs_its_strength_more_and_no_other_does() -> None:
+def test_a_move_against_the_wind_costs_its_strength_more_and_no_other_does():
     for direction, against in ((0, "N"), (90, "E"), (180, "S"), (270, "W"), (360, "N")):
         wind = {"wind.strength": 3, "wind.direction": direction}
         space = ScenarioSpace.of(**(OPEN | {"max_slots": 5} | wind))
@@ -41,7 +41,7 @@ def test_a_move_against_the_wind_costs_its_strength_more_and_no_other_does() -> 
             assert batteries(log) == (60 - np.cumsum(costs)).tolist()
 
 
-def test_a_slanting_wind_costs_its_component_on_average() -> None:
+def test_a_slanting_wind_costs_its_component_on_average():
     # From the north-east with 2 %: sqrt(2) % for a move to the north or to the east. Each cell
     # rounds it up or down, so the mean of 64 x 64 cells has a deviation below 0.01.
     north, east, south, west = _table(Wind(strength=2, direction=45), 64)
@@ -51,7 +51,7 @@ def test_a_slanting_wind_costs_its_component_on_average() -> None:
     assert not south.any() and not west.any()
 
 
-def test_gusts_are_normal_and_a_tail_wind_saves_nothing() -> None:
+def test_gusts_are_normal_and_a_tail_wind_saves_nothing():
     # The mean of max(0, g) is the deviation / sqrt(2 pi).
     table = _table(Wind(gusts=3), 128)
     assert table.min() == 0
@@ -62,9 +62,7 @@ def test_gusts_are_normal_and_a_tail_wind_saves_nothing() -> None:
 
 
 @given(spaces(), winds)
-def test_the_way_home_costs_as_much_as_the_best_neighbour_and_the_move_there(
-    space: ScenarioSpace, wind: Wind
-) -> None:
+def test_the_way_home_costs_as_much_as_the_best_neighbour_and_the_move_there(space, wind):
     """The table satisfies the equation of the shortest way, to every parking cell."""
     fleet = [{"slots_per_cell": 2}]
     space = ScenarioSpace.of(space, wind=wind.model_dump(), fleet=fleet)
@@ -83,8 +81,8 @@ def test_the_way_home_costs_as_much_as_the_best_neighbour_and_the_move_there(
 
 @given(spaces(uavs=1, initial_data=1e6), winds, GUARDED, st.integers(1, 3), seeds, replications)
 def test_a_guarded_lone_uav_never_depletes_its_battery_in_wind(
-    space: ScenarioSpace, wind: Wind, name: str, slots_per_cell: int, seed: int, replication: int
-) -> None:
+    space, wind, name, slots_per_cell, seed, replication
+):
     fleet = [{"slots_per_cell": slots_per_cell}]
     windy = ScenarioSpace.of(space, wind=wind.model_dump(), fleet=fleet)
     record = simulate(windy, policies.load(name), seed, replication)

@@ -7,17 +7,9 @@ from hypothesis import strategies as st
 
 from tests.fuzz import steps
 from tests.fuzz.case import Step
+from tests.fuzz.strategies import values
 from tests.fuzz.strategies.sections import odd_settings
-from tests.fuzz.strategies.values import (
-    byte_edits,
-    json_edits,
-    json_values,
-    long_texts,
-    numbers,
-    positions,
-    texts,
-    toml_values,
-)
+from tests.fuzz.strategies.values import byte_edits, json_edits, positions, texts
 
 Changes = Callable[[str], st.SearchStrategy[Step]]  # of a file or folder of a case
 
@@ -56,7 +48,7 @@ def _edits(draw: st.DrawFn, path: str) -> Step:
     edits = []
     for _ in range(draw(st.integers(1, 3))):
         action = draw(st.sampled_from(["value", "value", "value", "line", "remove", "repeat"]))
-        new = draw(toml_values if action == "value" else _line | odd_settings)
+        new = draw(values.toml_values if action == "value" else _line | odd_settings)
         edits.append((draw(positions), action, new))
     return steps.change_lines(path, tuple(edits))
 
@@ -68,15 +60,15 @@ def document_changes(path: str) -> st.SearchStrategy[Step]:
         _names.map(lambda named: steps.change_lines(path, ((named[0], "value", named[1]),))),
         byte_edits().map(lambda edits: steps.change_bytes(path, edits)),
         st.binary(max_size=50).map(lambda content: steps.write(path, content)),
-        long_texts.map(lambda text: steps.write(path, text.encode())),
+        values.long_texts.map(lambda text: steps.write(path, text.encode())),
         st.builds(steps.node, st.just(path), _nodes),
     )
 
 
 def table_changes(path: str) -> st.SearchStrategy[Step]:
     """Changes of a CSV table: its bytes, one of its lines, or all of it."""
-    rows = st.tuples(numbers, numbers).map(",".join)
-    lines = st.tuples(positions, st.just("line"), texts | numbers | rows)
+    rows = st.tuples(values.numbers, values.numbers).map(",".join)
+    lines = st.tuples(positions, st.just("line"), texts | values.numbers | rows)
     return st.one_of(
         byte_edits().map(lambda edits: steps.change_bytes(path, edits)),
         lines.map(lambda edit: steps.change_lines(path, (edit,))),
@@ -94,13 +86,13 @@ def results_changes(folder: str) -> st.SearchStrategy[Step]:
     parts = st.tuples(texts, st.integers(-5, 10), st.integers(-5, 2**40)).map(list)
     names = texts.map(lambda text: text.replace("/", "_"))
     documents = st.builds(steps.change_json, manifest, json_edits())
-    of_parts = json_values | st.lists(parts, max_size=3).map(json.dumps)
+    of_parts = values.json_values | st.lists(parts, max_size=3).map(json.dumps)
     records = st.builds(steps.forge, here, positions, kinds, of_parts)
     scripts = st.sampled_from(["<b>x</b>", "../../ran", "~/x"])
     return st.one_of(
         *(documents, documents, documents, records, records),
         st.builds(steps.change_bytes, manifest, byte_edits()),
-        st.builds(steps.write, manifest, json_values.map(_encoded)),
+        st.builds(steps.write, manifest, values.json_values.map(_encoded)),
         st.builds(steps.rename, here, positions, names),
         odd(folder),
         st.builds(steps.hostile, here, scripts),
@@ -122,16 +114,16 @@ def training_changes(folder: str, tensors: str) -> st.SearchStrategy[Step]:
     config, main = st.just(f"{folder}/config.json"), st.just(f"{folder}/{tensors}")
     files = (tensors, "config.json", "training.parquet")
     paths = st.sampled_from([f"{folder}/{name}" for name in files])
-    values = st.tuples(st.tuples(st.integers(10**4, 10**7), st.sampled_from(_BAD)))
+    bad = st.tuples(st.tuples(st.integers(10**4, 10**7), st.sampled_from(_BAD)))
     headers = st.builds(
         steps.change_header, main, json_edits(), st.sampled_from([True, True, False])
     )
     return st.one_of(
         *(headers, headers),
         st.builds(steps.change_json, config, json_edits()),
-        st.builds(steps.change_bytes, main, values),
+        st.builds(steps.change_bytes, main, bad),
         st.builds(steps.change_bytes, paths, byte_edits()),
-        st.builds(steps.write, paths, json_values.map(_encoded)),
+        st.builds(steps.write, paths, values.json_values.map(_encoded)),
         odd(folder),
     )
 

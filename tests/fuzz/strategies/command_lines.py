@@ -5,9 +5,9 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from tests.fuzz import ready
 from tests.fuzz.case import Case
 from tests.fuzz.strategies import commands
-from tests.fuzz.strategies.forged import INPUTS
 from tests.fuzz.strategies.sections import FIELDS, odd_settings
 from tests.fuzz.strategies.values import long_texts, numbers, texts, toml_values
 
@@ -21,7 +21,7 @@ def command_lines(draw: st.DrawFn, words: commands.Words, parameters: list[Any])
     arguments = [*commands.line(words, *drawn)]
     if draw(st.integers(0, 9)) == 0:
         arguments.insert(draw(st.integers(0, len(arguments))), draw(texts | long_texts))
-    return Case("command line", tuple(arguments), INPUTS, lasting=2)
+    return Case("command line", tuple(arguments), ready.INPUTS, lasting=2)
 
 
 def _value(

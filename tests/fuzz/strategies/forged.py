@@ -8,24 +8,8 @@ from hypothesis import strategies as st
 from tests.fuzz import ready
 from tests.fuzz.case import IN, OUT, Case, Step
 from tests.fuzz.steps import copy, seal
-from tests.fuzz.strategies import commands
-from tests.fuzz.strategies.changes import (
-    Changes,
-    document_changes,
-    json_changes,
-    page_changes,
-    results_changes,
-    table_changes,
-    training_changes,
-)
+from tests.fuzz.strategies import changes, commands
 
-# What scenarios name beside them: nodes, polygons and a map of no-fly cells.
-SEAS = ("bay.csv", "oresund.csv", "oresund.geojson", "galway-bay.csv", "galway-bay.txt")
-_NAMES = (ready.SCENARIO, ready.SECTIONS, *SEAS, ready.STUDY, ready.SELECTION)
-_NAMES += (ready.STUDIED, ready.TRAINING, ready.RESULTS, ready.SELECTED, ready.EXTENDED)
-INPUTS: tuple[Step, ...] = tuple(
-    copy(name, f"in/{name}") for name in (*_NAMES, ready.POLICY, ready.PAGE)
-)
 _STUDY_OF = {  # of results
     ready.RESULTS: ready.STUDY,
     ready.SELECTED: ready.SELECTION,
@@ -47,7 +31,7 @@ _READY = {
 
 @st.composite
 def forged(
-    draw: st.DrawFn, words: commands.Words, parameter: Any, special: Changes | None = None
+    draw: st.DrawFn, words: commands.Words, parameter: Any, special: changes.Changes | None = None
 ) -> Case:
     """A command with an input that is changed, in a special way or any."""
     name = commands.name_of(words, parameter)
@@ -65,23 +49,25 @@ def forged(
     if flag is not None:
         values.setdefault(commands.name_of(words, flag), None)
     changed = special(path) if special else _changes(kind, path, place)
-    changes = draw(st.lists(changed, min_size=1, max_size=1 if special else 2))
+    made = draw(st.lists(changed, min_size=1, max_size=1 if special else 2))
     seals = draw(st.sampled_from([(), (seal(path),)])) if kind == "policy" else ()
     arguments = commands.line(words, values)
     is_long = kind in ("scenario", "study", "config", "policy")
-    steps = (*INPUTS, copy(source, path), *changes, *seals)
+    steps = (*ready.INPUTS, copy(source, path), *made, *seals)
     return Case(f"forged {kind}", arguments, steps, lasting=4 if is_long else 0)
 
 
 def _changes(kind: str, path: str, place: str) -> st.SearchStrategy[Step]:
     if kind in ("scenario", "study", "config"):
-        tables = [table_changes(f"in/{name}") for name in SEAS if not name.endswith("json")]
-        polygons = json_changes("in/oresund.geojson")
-        return st.one_of(*[document_changes(path)] * 5, st.one_of(*tables, polygons))
+        tables = [
+            changes.table_changes(f"in/{name}") for name in ready.SEAS if not name.endswith("json")
+        ]
+        polygons = changes.json_changes("in/oresund.geojson")
+        return st.one_of(*[changes.document_changes(path)] * 5, st.one_of(*tables, polygons))
     if kind == "policy":
-        return training_changes(
+        return changes.training_changes(
             path, "model.safetensors" if place == IN else "checkpoint.safetensors"
         )
     if kind == "page":
-        return page_changes(path)
-    return results_changes(path) if kind == "results" else json_changes(path)
+        return changes.page_changes(path)
+    return changes.results_changes(path) if kind == "results" else changes.json_changes(path)

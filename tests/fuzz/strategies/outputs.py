@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from tests.fuzz import ready
 from tests.fuzz.case import Case, Step
-from tests.fuzz.steps import copy, node, write
+from tests.fuzz.steps import node, write
 from tests.fuzz.strategies import commands
 from tests.fuzz.strategies.changes import NODES
 
@@ -32,8 +32,7 @@ _INSIDE += ("checkpoint.safetensors", "sweeps/kept.toml", "sweeps/kept")
 @st.composite
 def outputs(draw: st.DrawFn) -> Case:
     """A command whose output meets something in its place."""
-    inputs = (ready.SCENARIO, ready.STUDY, ready.TRAINING, ready.RESULTS, ready.PAGE)
-    steps: list[Step] = [copy(name, f"in/{name}") for name in inputs]
+    steps: list[Step] = [*ready.INPUTS]
     if draw(st.integers(0, 4)) == 0:
         stdout = draw(st.sampled_from(["full", "closed"]))
         return Case("output", draw(st.sampled_from(_PRINTING)), tuple(steps), stdout=stdout)

@@ -5,13 +5,11 @@ from hypothesis import strategies as st
 from dess.analysis.metrics import MEASURES
 from tests.fuzz import ready
 from tests.fuzz.case import Case
-from tests.fuzz.steps import copy, write
+from tests.fuzz.steps import write
 from tests.fuzz.strategies.commands import line
 from tests.fuzz.strategies.sections import PLAIN, odd_numbers
 from tests.fuzz.strategies.values import numbers, toml_values
 
-_INPUTS = tuple(copy(name, f"in/{name}") for name in (ready.SCENARIO, ready.SECTIONS))
-_INPUTS += (copy(ready.RESULTS, f"in/{ready.RESULTS}"),)
 _COMMANDS = (("simulate",), ("evaluate",), ("scenarios", "show"), ("sweep",))
 # Values of a field that are equal, or of no field at all.
 _DUPLICATES = (
@@ -46,7 +44,7 @@ def odd_fields(draw: st.DrawFn) -> Case:
     settings = [draw(odd_numbers), *draw(st.lists(st.sampled_from(PLAIN), max_size=1))]
     arguments = line(words, {name: f"../in/{file}"})
     options = tuple(f"--set={setting}" for setting in settings[::-1])
-    return Case("odd field", (*arguments, *options), _INPUTS, lasting=3)
+    return Case("odd field", (*arguments, *options), ready.INPUTS, lasting=3)
 
 
 @st.composite
@@ -54,21 +52,23 @@ def duplicates(draw: st.DrawFn) -> Case:
     """A design that has a point twice; it has to be refused."""
     if draw(st.booleans()):
         values = {"--set": draw(st.sampled_from(_SWEPT))}
-        return Case("duplicate", line(("sweep",), values), _INPUTS, code=2)
+        return Case("duplicate", line(("sweep",), values), ready.INPUTS, code=2)
     field, values = draw(st.sampled_from(_DUPLICATES))
     kind = draw(st.sampled_from(["grid", "one-at-a-time"]))
     text = f'scenario = "{ready.SECTIONS}"\npolicies = ["greedy"]\nmissions = 1\n'
     text += f'[design]\nkind = "{kind}"\nvalues.{field} = [{values}]\n'
     arguments = ("study", "run", "../in/twice.toml", "--dry-run")
-    return Case("duplicate", arguments, (*_INPUTS, write("in/twice.toml", text.encode())), code=2)
+    return Case(
+        "duplicate", arguments, (*ready.INPUTS, write("in/twice.toml", text.encode())), code=2
+    )
 
 
 @st.composite
 def unfit(draw: st.DrawFn) -> Case:
     """A sweep that is asked for what it cannot have; it is refused before its first mission."""
     if draw(st.booleans()):
-        return Case("unfit", line(("sweep",), draw(st.sampled_from(_UNFIT))), _INPUTS, code=2)
+        return Case("unfit", line(("sweep",), draw(st.sampled_from(_UNFIT))), ready.INPUTS, code=2)
     option = draw(st.sampled_from(["--price", "--require"]))
     key = draw(st.sampled_from(["uav", "pad", "hour", "missions", "slot_seconds", "success"]))
     values = {option: f"{key}={draw(numbers | toml_values)}"}
-    return Case("unfit", line(("sweep",), values), _INPUTS, lasting=5)
+    return Case("unfit", line(("sweep",), values), ready.INPUTS, lasting=5)

@@ -1,5 +1,3 @@
-from collections.abc import Iterator
-
 import pytest
 
 from dess.policies.learner.dqn import DQNTraining
@@ -7,13 +5,13 @@ from tests.policies.learner.tiny import CPU, PHASES, one_thread, tiny
 
 
 @pytest.fixture(autouse=True, scope="module")
-def _one_thread() -> Iterator[None]:
+def _one_thread():
     with one_thread():
         yield
 
 
 @pytest.fixture(scope="module")
-def training() -> DQNTraining:
+def training():
     """A training that has just begun."""
     training = DQNTraining(tiny(learning_starts=5, phases=[PHASES[1] | {"ticks": 3}]), CPU)
     training.run(2)

@@ -13,20 +13,18 @@ from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 from dess import InputError
-from dess.errors import printable
 from dess.policies.learner import trained
 from dess.policies.learner.checkpoint import load_training, save_training
 from dess.policies.learner.config import CHECKPOINT, MODEL
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.trained import load_policy, save_policy
-from dess.policies.learner.training import Training
 from dess.state import MISSION, SENSOR, UAV
 from tests.analysis.small import files_of, write_scenario
 from tests.policies.learner.tiny import CPU, assert_same, refusal_of, tiny
 
 
 @pytest.fixture
-def file(training: Training, tmp_path: Path) -> Path:
+def file(training, tmp_path):
     """The file of its checkpoint."""
     path = tmp_path / CHECKPOINT
     save_training(path, training)
@@ -43,7 +41,7 @@ class _Bomb:
         return Path.touch, (self.path,)
 
 
-def test_a_pickle_is_refused_and_not_run(training: Training, file: Path, tmp_path: Path) -> None:
+def test_a_pickle_is_refused_and_not_run(training, file, tmp_path):
     trace, policy = tmp_path / "trace", tmp_path / "policy"
     save_policy(policy, training.best, training.config, training.space)
     for path in (policy / MODEL, file):
@@ -55,22 +53,17 @@ def test_a_pickle_is_refused_and_not_run(training: Training, file: Path, tmp_pat
     assert trace.exists()  # it would have
 
 
-def test_a_training_comes_back_as_it_was(training: Training, file: Path) -> None:
+def test_a_training_comes_back_as_it_was(training, file):
     assert_same(load_training(file, training.config, CPU), training)
     assert files_of(file.parent).keys() == {CHECKPOINT}
 
 
-def test_the_checkpoint_of_another_config_is_refused(training: Training, file: Path) -> None:
+def test_the_checkpoint_of_another_config_is_refused(training, file):
     other = training.config.model_copy(update={"seed": 2, "discount": 0.5})
     line = refusal_of(load_training, file, other, CPU)
     assert line == (
         f"{file}: of another config (seed, discount differ); allowed: the one it began with"
     )
-
-
-def _header_of(file: Path) -> dict[str, Any]:
-    with safe_open(file, "pt") as opened:
-        return json.loads(opened.metadata()["dess"])
 
 
 def _forged(
@@ -82,12 +75,14 @@ def _forged(
     """
     values = load_file(file) | (tensors or {})
     kept = {name: value for name, value in values.items() if value is not None}
-    new = {k: v for k, v in (_header_of(file) | header).items() if k != "sha256"}
+    with safe_open(file, "pt") as opened:
+        new = json.loads(opened.metadata()["dess"]) | header
+    del new["sha256"]
     new["sha256"] = trained.digest(new, kept)
     save_file(kept, file, {"dess": json.dumps(new)})
 
 
-def test_the_checkpoint_of_another_version_is_refused(training: Training, file: Path) -> None:
+def test_the_checkpoint_of_another_version_is_refused(training, file):
     _forged(file)
     assert_same(load_training(file, training.config, CPU), training)  # nothing changed
     _forged(file, format=3, config="another form")
@@ -95,53 +90,50 @@ def test_the_checkpoint_of_another_version_is_refused(training: Training, file: 
     assert line == f"{file}: has format 3, not 2; allowed: 2"
 
 
-TENSORS: list[dict[str, torch.Tensor | None]] = [
-    {"online.value.bias": None},
-    {"average.value.bias": torch.zeros(3)},
-    {"stepper.uavs": torch.zeros(7, dtype=torch.uint8)},
-    {"optimizer.99999999.exp_avg": torch.zeros(1)},
-    {"losses.loss": torch.zeros(9)},
-    {"\U0001f4a3\n": torch.zeros(1)},
-]
+# What stands in the place of a tensor; None: it is left out.
+TENSORS: dict[str, torch.Tensor | None] = {
+    "online.value.bias": None,
+    "average.value.bias": torch.zeros(3),
+    "stepper.uavs": torch.zeros(7, dtype=torch.uint8),
+    "optimizer.99999999.exp_avg": torch.zeros(1),
+    "losses.loss": torch.zeros(9),
+    "\U0001f4a3\n": torch.zeros(1),
+}
 # A tensor, where in it, and the index that stands there then.
-CELLS: list[tuple[str, Any, int]] = [
-    ("replay.uavs", (0, 0, 0), 30_000),
-    ("replay.uavs", (0, 0, 1), -1),
-    ("replay.action", (0, 0), 9),
-]
-# A field of the first record of a tensor that holds records.
+CELLS = [("replay.uavs", (0, 0, 0), 30_000), ("replay.uavs", (0, 0, 1), -1)]
+CELLS += [("replay.action", (0, 0), 9)]
+# Bytes that stand for truths, but are neither 0 nor 1 then.
+TRUTHS = {"replay.acted": 0, "early": 0, "stepper.uavs": UAV.fields["latch"][1]}  # type: ignore[index]
+# Fields of the first record of a tensor that holds records; an age is an index, too.
 UAVS = {"x": 10**6, "y": -1, "from_x": 32, "executed": 77, "end": 5, "served": 25, "slots_left": 1}
 UAVS |= {"pad": 10**6, "zone": 9, "slots_per_cell": 100}
-MISSIONS = {"grid": 10**9, "nodes": 10**6, "uavs": 64, "slot": -1}
-SENSORS = {"newest": -1e9}  # an age is an index, too
-TRUTHS = {"replay.acted": 0, "early": 0, "stepper.uavs": UAV.fields["latch"][1]}  # type: ignore[index]
+RECORDS: dict[str, tuple[np.dtype, dict[str, Any]]] = {
+    "stepper.uavs": (UAV, UAVS),
+    "stepper.missions": (MISSION, {"grid": 10**9, "nodes": 10**6, "uavs": 64, "slot": -1}),
+    "stepper.sensors": (SENSOR, {"newest": -1e9}),
+}
 
 
-def _forgeries(file: Path) -> Iterator[tuple[str, dict[str, Any]]]:
-    """What is forged of a checkpoint: its name and the tensors."""
+def _forgeries(file: Path) -> Iterator[tuple[str, torch.Tensor | None]]:
+    """What is forged of a checkpoint: the name of a tensor, and what stands in its place."""
     whole = load_file(file)
-    for tensors in TENSORS:
-        yield str(tensors), tensors
+    yield from TENSORS.items()
     for name, place, value in CELLS:
         tensor = whole[name].clone()
         tensor[place] = value
-        yield f"{name} {place}", {name: tensor}
-    for name, fields, dtype in (
-        ("stepper.uavs", UAVS, UAV),
-        ("stepper.missions", MISSIONS, MISSION),
-        ("stepper.sensors", SENSORS, SENSOR),
-    ):
+        yield name, tensor
+    for name, place in TRUTHS.items():
+        tensor = whole[name].clone()
+        tensor.view(torch.uint8).flatten()[place] = 7
+        yield name, tensor
+    for name, (dtype, fields) in RECORDS.items():
         for field, value in fields.items():
             records = whole[name].numpy().copy().view(dtype)
             records[:1][field] = value
-            yield f"{name} {field}", {name: trained.bytes_of(records)}
-    for name, place in TRUTHS.items():  # neither 0 nor 1
-        tensor = whole[name].clone()
-        tensor.view(torch.uint8).flatten()[place] = 7
-        yield f"{name} {place}", {name: tensor}
+            yield name, trained.bytes_of(records)
 
 
-def test_a_checkpoint_has_no_bytes_of_undefined_memory(training: Training) -> None:
+def test_a_checkpoint_has_no_bytes_of_undefined_memory(training):
     uavs = np.frombuffer(b"\xff" * UAV.itemsize * 2, UAV).copy()
     for name in uavs.dtype.names:
         uavs[name] = 0
@@ -149,30 +141,22 @@ def test_a_checkpoint_has_no_bytes_of_undefined_memory(training: Training) -> No
     assert not trained.bytes_of(uavs).any()
 
 
-def test_an_index_that_the_scenario_has_not_is_refused(training: Training, file: Path) -> None:
-    content, accepted = file.read_bytes(), []
-    for name, tensors in list(_forgeries(file)):
+def test_an_index_that_the_scenario_has_not_is_refused(training, file):
+    content = file.read_bytes()
+    for name, tensor in list(_forgeries(file)):
         file.write_bytes(content)
-        _forged(file, tensors)
-        try:
-            load_training(file, training.config, CPU)
-            accepted.append(name)
-        except InputError as error:
-            line = str(error)
-            assert line.startswith(f"{file}: ") and printable(line) == line
-            assert "checksum" not in line  # somebody who wants to be believed has a right one
-    assert accepted == []
+        _forged(file, {name: tensor})
+        line = refusal_of(load_training, file, training.config, CPU)
+        assert line.startswith(f"{file}: ")
+        assert "checksum" not in line  # somebody who wants to be believed has a right one
 
 
-def test_damage_changes_nothing_that_is_used(training: Training, file: Path) -> None:
+def test_damage_changes_nothing_that_is_used(training, file):
     content = file.read_bytes()
     header = 8 + int.from_bytes(content[:8], "little")
     generator = random.Random(2)
-    positions = [
-        *range(8),
-        *generator.sample(range(8, header), 60),
-        *generator.sample(range(header, len(content)), 60),
-    ]
+    parts = range(8, header), range(header, len(content))
+    positions = [*range(8), *(place for part in parts for place in generator.sample(part, 60))]
     refused = 0
     for position in positions:
         changed = bytearray(content)
@@ -193,7 +177,7 @@ def test_damage_changes_nothing_that_is_used(training: Training, file: Path) -> 
         assert line.startswith(f"{file}: damaged: ")
 
 
-def test_the_checkpoint_of_a_scenario_that_has_changed_is_refused(tmp_path: Path) -> None:
+def test_the_checkpoint_of_a_scenario_that_has_changed_is_refused(tmp_path):
     scenario = write_scenario(tmp_path)
     training = DQNTraining(tiny(scenario=str(scenario), learning_starts=5), CPU)
     training.run(1)
@@ -203,9 +187,7 @@ def test_the_checkpoint_of_a_scenario_that_has_changed_is_refused(tmp_path: Path
 
 
 @pytest.mark.parametrize("error", [OSError("disk full"), KeyboardInterrupt()])
-def test_a_failed_write_leaves_the_old_file(
-    error: BaseException, training: Training, file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failed_write_leaves_the_old_file(error, training, file, monkeypatch):
     def fail_to_save(tensors: Any, path: Path, *_: Any) -> None:
         path.write_bytes(b"half")
         raise error

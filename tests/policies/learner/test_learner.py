@@ -29,7 +29,7 @@ def _values(network: nn.Module) -> list[torch.Tensor]:
 
 
 @pytest.mark.parametrize("loss", ["huber", "mse"])
-def test_the_loss_is_that_of_the_differences_to_the_target(loss: str) -> None:
+def test_the_loss_is_that_of_the_differences_to_the_target(loss):
     learner, batch = _learner(loss=loss, reward_scale=0.5)
     assert 0 < (batch.discount == 0).mean() < 0.5
     learner.target.load_state_dict(DQNTraining(tiny(seed=9), CPU).learner.online.state_dict())
@@ -51,7 +51,7 @@ def test_the_loss_is_that_of_the_differences_to_the_target(loss: str) -> None:
     assert float(update["value"]) == pytest.approx(chosen / len(batch.action), rel=1e-4)
 
 
-def test_after_a_step_the_copies_have_moved_by_their_rates() -> None:
+def test_after_a_step_the_copies_have_moved_by_their_rates():
     learner, batch = _learner(target_rate=0.25, average_rate=0.5)
     assert learner.average is not None
     assert learner.evaluated is learner.average
@@ -66,13 +66,13 @@ def test_after_a_step_the_copies_have_moved_by_their_rates() -> None:
             torch.testing.assert_close(parameter, old + rate * (new - old))
 
 
-def test_without_a_slow_copy_the_online_network_is_evaluated() -> None:
+def test_without_a_slow_copy_the_online_network_is_evaluated():
     learner, _ = _learner(average_rate=1.0)
     assert learner.average is None
     assert learner.evaluated is learner.online
 
 
-def test_gradients_are_clipped() -> None:
+def test_gradients_are_clipped():
     learner, batch = _learner(gradient_norm=0.01, reward_scale=1.0)
     norm = float(learner.update(batch, 1e-3)["gradient_norm"])
     gradients = [p.grad for p in learner.online.parameters() if p.grad is not None]

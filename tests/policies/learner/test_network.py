@@ -21,7 +21,7 @@ def _convolve(image: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
     return (summed + bias[:, None, None]).clamp(min=0)
 
 
-def test_the_values_are_those_of_the_layers_in_turn() -> None:
+def test_the_values_are_those_of_the_layers_in_turn():
     torch.manual_seed(2)
     network = PaperNetwork(SHAPES)
     local, far, own = _maps(3)
@@ -34,7 +34,7 @@ def test_the_values_are_those_of_the_layers_in_turn() -> None:
     torch.testing.assert_close(network(local, far, own), hidden @ w[14].T + w[15])
 
 
-def test_advantages_have_mean_zero() -> None:
+def test_advantages_have_mean_zero():
     torch.manual_seed(3)
     network = DuelingNetwork(30, [64, 32])
     vector = torch.rand(7, 30)
@@ -48,7 +48,7 @@ def test_advantages_have_mean_zero() -> None:
 
 
 @pytest.mark.parametrize("paper", [True, False])
-def test_bfloat16_is_near_float32(paper: bool) -> None:
+def test_bfloat16_is_near_float32(paper):
     torch.manual_seed(4)
 
     def make(precision: torch.dtype) -> nn.Module:

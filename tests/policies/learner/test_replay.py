@@ -47,33 +47,15 @@ class Log(NamedTuple):
         return total, factor, slot + n_step
 
 
-def _lone(rewards: list[float], terminated: int = -1, truncated: int = -1) -> Log:
-    """The log of one UAV in one environment, whose mission ends in the given slot."""
-    shape = (len(rewards), 1, 1)
-    slots = np.arange(len(rewards)).reshape(shape)
-    end = max(terminated, truncated)
-    return Log(
-        slots % 5,
-        np.array(rewards).reshape(shape),
-        slots != end + 1 if end >= 0 else np.full(shape, True),
-        slots == terminated,
-        slots == truncated,
-    )
+def _lone(slots: int, **changed: bool) -> Log:
+    """The log of one UAV in one environment, whose mission does not end."""
+    shape = (slots, 1, 1)
+    flags = {"acted": True, "terminated": False, "truncated": False} | changed
+    return Log(np.zeros(shape, int), np.ones(shape), *(np.full(shape, f) for f in flags.values()))
 
 
 def _drawn(memory: ReplayMemory, size: int, n_step: int, discount: float = 0.5) -> Batch:
     return memory.sample(size, n_step, discount, np.random.default_rng(1))
-
-
-# --- by hand, with a discount factor of 1/2 ---
-
-
-def test_a_memory_of_nothing_but_cut_slots_is_refused() -> None:
-    cut = np.full((6, 1, 1), True)
-    zero = np.zeros((6, 1, 1))
-    log = Log(zero.astype(int), zero, cut, ~cut, cut)
-    with pytest.raises(ValueError, match="has a transition"):
-        _drawn(log.memory(6), 4, 2)
 
 
 # --- against plain Python ---
@@ -82,11 +64,7 @@ def test_a_memory_of_nothing_but_cut_slots_is_refused() -> None:
 @st.composite
 def _logs(draw: st.DrawFn) -> tuple[Log, int, int]:
     """Missions one after another in every environment; n, and a capacity that fits."""
-    n_step, num_envs, uavs = (
-        draw(st.integers(1, 5)),
-        draw(st.integers(1, 3)),
-        draw(st.integers(1, 3)),
-    )
+    n_step, num_envs, uavs = (draw(st.integers(1, most)) for most in (5, 3, 3))
     slots = draw(st.integers(n_step + 2, 30))
     capacity = draw(st.integers(n_step + 2, 35))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
@@ -107,9 +85,7 @@ def _logs(draw: st.DrawFn) -> tuple[Log, int, int]:
 
 
 @given(_logs(), st.floats(0.1, 1.0))
-def test_all_that_can_be_drawn_is_drawn_and_right(
-    world: tuple[Log, int, int], discount: float
-) -> None:
+def test_all_that_can_be_drawn_is_drawn_and_right(world, discount):
     log, n_step, capacity = world
     slots, num_envs, uavs = log.action.shape
     oldest = max(0, slots - capacity)
@@ -131,20 +107,19 @@ def test_all_that_can_be_drawn_is_drawn_and_right(
         assert batch.action[row] == log.action[slot, environment, uav]
 
 
-def test_too_few_slots_are_refused() -> None:
+def test_too_few_slots_are_refused():
     for slots in range(4):
-        memory = _lone([1.0] * slots).memory(10)
         with pytest.raises(ValueError, match=f"{slots} slots in memory"):
-            _drawn(memory, 8, 3)
-    assert len(_drawn(_lone([1.0] * 4).memory(10), 8, 3).reward) == 8
+            _drawn(_lone(slots).memory(10), 8, 3)
+    assert len(_drawn(_lone(4).memory(10), 8, 3).reward) == 8
     with pytest.raises(ValueError, match="9 slots in memory"):  # of which three are left
-        _drawn(_lone([1.0] * 9).memory(3), 8, 3)
+        _drawn(_lone(9).memory(3), 8, 3)
+    with pytest.raises(ValueError, match="has a transition"):
+        _drawn(_lone(6, truncated=True).memory(6), 4, 2)
 
 
 @pytest.mark.parametrize(("capacity", "num_envs", "uavs", "nodes"), [(1, 1, 1, 1), (50, 8, 3, 25)])
-def test_its_size_is_known_before_it_is_made(
-    capacity: int, num_envs: int, uavs: int, nodes: int
-) -> None:
+def test_its_size_is_known_before_it_is_made(capacity, num_envs, uavs, nodes):
     memory = ReplayMemory(capacity, num_envs, uavs, nodes)
     taken = sum(array.nbytes for array in memory.arrays.values())
     assert ReplayMemory.bytes_for(capacity, num_envs, uavs, nodes) == taken

@@ -39,13 +39,13 @@ Progress = Callable[[Training, int], None]
 
 
 @pytest.fixture(autouse=True)
-def _no_tensorboard(monkeypatch: pytest.MonkeyPatch) -> None:
+def _no_tensorboard(monkeypatch):
     """It takes its time; all works without."""
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
 
 
 @pytest.fixture(scope="module")
-def whole() -> Training:
+def whole():
     """The short training in one go."""
     training = DQNTraining(SHORT, CPU)
     training.run(1000)
@@ -62,7 +62,7 @@ def _at(tick: int, act: Callable[[], Any]) -> Progress:
     return progress
 
 
-def test_the_folder_of_a_training(whole: Training, tmp_path: Path) -> None:
+def test_the_folder_of_a_training(whole, tmp_path):
     seen: list[tuple[int, int]] = []
     out = tmp_path / "runs" / "tiny"
     training = train(SHORT, out, progress=lambda t, done: seen.append((t.tick, done)))
@@ -70,10 +70,9 @@ def test_the_folder_of_a_training(whole: Training, tmp_path: Path) -> None:
     assert_same(training, whole)
     assert seen == [(tick, 1) for tick in range(1, 41)]
     assert set(files_of(out)) == {CHECKPOINT, CONFIG, CURVE, MODEL}
-    assert pq.read_table(out / CURVE).to_pylist() == [
-        {name: row.get(name) for name in pq.read_schema(out / CURVE).names}
-        for row in training.curve
-    ]
+    names = pq.read_schema(out / CURVE).names
+    rows = [{name: row.get(name) for name in names} for row in training.curve]
+    assert pq.read_table(out / CURVE).to_pylist() == rows
     policy = policies.load(out)
     best = training.policy(training.best)
     weights = zip(policy.network.parameters(), best.network.parameters(), strict=True)  # type: ignore[attr-defined]
@@ -81,12 +80,11 @@ def test_the_folder_of_a_training(whole: Training, tmp_path: Path) -> None:
     assert json.loads((out / CONFIG).read_text("utf-8"))["name"] == "tiny"
 
 
-@pytest.mark.parametrize(
-    ("number", "tick"), [(signal.SIGINT, 5), (signal.SIGTERM, 20), (signal.SIGHUP, 33)]
-)
-def test_a_signal_ends_it_after_the_tick_and_it_can_go_on(
-    number: signal.Signals, tick: int, whole: Training, tmp_path: Path
-) -> None:
+STOPS = [(signal.SIGINT, 5), (signal.SIGTERM, 20), (signal.SIGHUP, 33)]
+
+
+@pytest.mark.parametrize(("number", "tick"), STOPS)
+def test_a_signal_ends_it_after_the_tick_and_it_can_go_on(number, tick, whole, tmp_path):
     handlers = [signal.getsignal(kind) for kind in SIGNALS]
     stop = _at(tick, lambda: signal.raise_signal(number))
     training = train(SHORT, tmp_path, progress=stop)
@@ -95,14 +93,11 @@ def test_a_signal_ends_it_after_the_tick_and_it_can_go_on(
     assert not [name for name in os.listdir(tmp_path) if name.endswith(".tmp")]
     resumed = train(SHORT, tmp_path, resume=True)
     assert_same(resumed, whole)
-    assert pq.read_table(tmp_path / CURVE)["tick"].to_pylist() == [
-        row["tick"] for row in whole.curve
-    ]
+    ticks = pq.read_table(tmp_path / CURVE)["tick"].to_pylist()
+    assert ticks == [row["tick"] for row in whole.curve]
 
 
-def test_a_training_that_was_interrupted_is_a_policy_that_says_so(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_training_that_was_interrupted_is_a_policy_that_says_so(tmp_path, caplog):
     stop = _at(1, lambda: signal.raise_signal(signal.SIGINT))
     training = train(SHORT, tmp_path, progress=stop)
     assert not training.curve
@@ -119,37 +114,31 @@ def test_a_training_that_was_interrupted_is_a_policy_that_says_so(
     assert not caplog.records
 
 
-def test_the_second_signal_ends_it_at_once(whole: Training, tmp_path: Path) -> None:
-    def stop() -> None:
-        signal.raise_signal(signal.SIGINT)
-        signal.raise_signal(signal.SIGINT)
+def _twice() -> None:
+    signal.raise_signal(signal.SIGINT)
+    signal.raise_signal(signal.SIGINT)
 
+
+def _in_a_long_tick() -> None:
+    signal.raise_signal(signal.SIGTERM)
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        pass
+
+
+@pytest.mark.parametrize(("stop", "tick_end"), [(_twice, session.TICK_END), (_in_a_long_tick, 0.1)])
+def test_a_second_signal_or_a_long_tick_ends_it_at_once(
+    stop, tick_end, whole, tmp_path, monkeypatch
+):
     before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt):
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(session, "TICK_END", tick_end)
         train(SHORT, tmp_path, progress=_at(7, stop))
     assert signal.getsignal(signal.SIGINT) == before
     assert_same(train(SHORT, tmp_path, resume=True), whole)  # from the last checkpoint
 
 
-def test_a_signal_ends_a_tick_that_takes_long(
-    whole: Training, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def stop() -> None:
-        signal.raise_signal(signal.SIGTERM)
-        end = time.monotonic() + 60
-        while time.monotonic() < end:
-            pass
-
-    monkeypatch.setattr(session, "TICK_END", 0.1)
-    with pytest.raises(KeyboardInterrupt):
-        train(SHORT, tmp_path, progress=_at(7, stop))
-    monkeypatch.undo()
-    assert_same(train(SHORT, tmp_path, resume=True), whole)  # from the last checkpoint
-
-
-def test_it_is_saved_every_now_and_then(
-    whole: Training, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_is_saved_every_now_and_then(whole, tmp_path, monkeypatch):
     def fail() -> None:
         raise RuntimeError("the power failed")
 
@@ -163,13 +152,13 @@ def test_it_is_saved_every_now_and_then(
 
 def _refusal(out: Path, **arguments: Any) -> str:
     """The line with which a folder is refused; it stays as it is."""
-    before = files_of(out.parent)
+    before = files_of(out)
     line = refusal_of(train, SHORT, out, **arguments)
-    assert files_of(out.parent) == before
+    assert files_of(out) == before
     return line
 
 
-def test_folders_are_not_overwritten(tmp_path: Path) -> None:
+def test_folders_are_not_overwritten(tmp_path):
     out = tmp_path / "out"
     train(SHORT, out)
     assert _refusal(out) == f"{out}: holds a training; allowed: --resume, or another folder"
@@ -185,16 +174,12 @@ def test_folders_are_not_overwritten(tmp_path: Path) -> None:
         assert _refusal(other) == line
 
 
-def test_one_folder_has_one_training_at_a_time(tmp_path: Path) -> None:
+def test_one_folder_has_one_training_at_a_time(tmp_path):
     lines = []
     line = f"{tmp_path}: in use by another training; allowed: another --out, or wait for its end"
 
-    def intrude() -> None:
-        before = files_of(tmp_path)
-        lines.append(refusal_of(train, SHORT, tmp_path, resume=True))
-        assert files_of(tmp_path) == before
-
-    train(SHORT, tmp_path, progress=_at(9, intrude))
+    intrude = _at(9, lambda: lines.append(_refusal(tmp_path, resume=True)))
+    train(SHORT, tmp_path, progress=intrude)
     assert lines == [line]
     train(SHORT, tmp_path, resume=True)  # the first one has released the folder
 
@@ -212,9 +197,7 @@ def _recorded(out: Path) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 9])
-def test_a_kill_before_any_file_is_written_loses_nothing(
-    every: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_kill_before_any_file_is_written_loses_nothing(every, tmp_path, monkeypatch):
     """The process is killed before the first file, the second, and so on, or some of them."""
     config = tiny(
         phases=[phase | {"ticks": 3} for phase in PHASES], learning_starts=10, evaluate_every=4
@@ -238,7 +221,7 @@ def test_a_kill_before_any_file_is_written_loses_nothing(
     assert steps > 20
 
 
-def test_a_training_that_diverges_ends_and_keeps_the_best_policy(tmp_path: Path) -> None:
+def test_a_training_that_diverges_ends_and_keeps_the_best_policy(tmp_path):
     before = {}
 
     def spoil(training: Training, _: int) -> None:
@@ -255,7 +238,7 @@ def test_a_training_that_diverges_ends_and_keeps_the_best_policy(tmp_path: Path)
     train(SHORT, tmp_path, resume=True)
 
 
-def test_without_cuda_there_is_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_cuda_there_is_the_cpu(monkeypatch):
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     assert device_of("auto") == CPU
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)

@@ -10,6 +10,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dess.policies.planner import search
 from dess.policies.planner.fluid import (
     CHARGE,
     CRAFT,
@@ -25,36 +26,24 @@ from dess.policies.planner.fluid import (
     insert,
 )
 from dess.policies.planner.rates import rates_of
-from dess.policies.planner.search import (
-    _CHARGE,
-    _CROSS,
-    _INSERT,
-    _KINDS,
-    _MOVE,
-    _NO_EDIT,
-    _NUDGE,
-    _REMOVE,
-    _REPLACE,
-    _STAY,
-    _SWAP,
-    _TURN,
-    BEST,
-    _edit,
-    _first_unplanned,
-    empty_workspace,
-    improve,
-)
+from dess.policies.planner.search import empty_workspace, improve
 from dess.scenario import Scenario
+from tests.dess.flights import first_view
 from tests.drawn import reached, scenarios, seeds
-from tests.policies.flown import first_view
 
 Waypoint = tuple[int, int, int, int]
 X, Y, STAY, TURNED = range(4)
 # By how many waypoints an edit makes the plan of the team longer, if not by 0.
-GROWTH = {_INSERT: {1}, _REMOVE: {-1}, _CHARGE: {0, 1}}
+GROWTH = {search._INSERT: {1}, search._REMOVE: {-1}, search._CHARGE: {0, 1}}
 # What an edit may change in one waypoint, and the kinds that change it by 1.
-CHANGED = {_TURN: {TURNED}, _STAY: {STAY}, _NUDGE: {X, Y}, _REPLACE: {X, Y}, _CHARGE: {X, Y}}
-BY_ONE = _TURN, _STAY, _NUDGE
+CHANGED = {
+    search._TURN: {TURNED},
+    search._STAY: {STAY},
+    search._NUDGE: {X, Y},
+    search._REPLACE: {X, Y},
+    search._CHARGE: {X, Y},
+}
+BY_ONE = search._TURN, search._STAY, search._NUDGE
 # What the model knows of a UAV, but for what it takes from the plan.
 STATE = [name for name in CRAFT.names or () if name not in ("waypoints", "last_charge")]
 
@@ -89,11 +78,13 @@ class Sea:
 
     def edits(self) -> Iterator[tuple[int, int, Plan]]:
         """Edits of the plan: the kind, the first slot that it may change, and the edited plan."""
-        for kind in [*range(_KINDS.max() + 1)] * 8:
+        for kind in [*range(search._KINDS.max() + 1)] * 8:
             plan, words = _copy(self.plan), self.rng.integers(0, 2**32, 4, np.uint64)
-            place, chart = int(np.argmax(kind == _KINDS)), self.rates.chart
-            words[0] = (place * 2**16 // len(_KINDS) + 1) << 16 | int(words[0]) % 2**16
-            slot = _edit(self.mission, self.uavs, self.nodes, chart, self.flight, plan, words)
+            place, chart = int(np.argmax(kind == search._KINDS)), self.rates.chart
+            words[0] = (place * 2**16 // len(search._KINDS) + 1) << 16 | int(words[0]) % 2**16
+            slot = search._edit(
+                self.mission, self.uavs, self.nodes, chart, self.flight, plan, words
+            )
             yield kind, slot, plan
 
 
@@ -123,15 +114,15 @@ def _is_void(kind: int, slot: int) -> bool:
 
     The latter are moves to where the waypoints have been: they are taken out only.
     """
-    return slot == _NO_EDIT or (kind == _MOVE and slot == NEVER)
+    return slot == search._NO_EDIT or (kind == search._MOVE and slot == NEVER)
 
 
 def _check_new(kind: int, sea: Sea, gone: list[Waypoint], new: Waypoint) -> None:
     """Check a waypoint that an edit has made, of one that is gone if there is one."""
     nodes = [*map(tuple, sea.nodes.tolist())]
-    cells = {_INSERT: nodes, _REPLACE: nodes, _CHARGE: []}.get(kind, sea.open)
+    cells = {search._INSERT: nodes, search._REPLACE: nodes, search._CHARGE: []}.get(kind, sea.open)
     assert new[:2] in (sea.parking if new[STAY] == CHARGE else cells)
-    assert new[STAY] in range(CHARGE, 3 if kind == _INSERT else 5) and new[TURNED] in (0, 1)
+    assert new[STAY] in range(CHARGE, 3 if kind == search._INSERT else 5) and new[TURNED] in (0, 1)
     for old in gone:
         steps = np.abs(np.subtract(new, old))
         assert {*np.flatnonzero(steps)} <= CHANGED[kind]
@@ -139,7 +130,7 @@ def _check_new(kind: int, sea: Sea, gone: list[Waypoint], new: Waypoint) -> None
 
 
 @drawn
-def test_an_edit_keeps_all_other_waypoints(sea: Sea) -> None:
+def test_an_edit_keeps_all_other_waypoints(sea):
     """Moves, swaps, reversals and crossings keep all; UAVs charge as often but for two kinds."""
     before = _routes(sea.plan)
     for kind, slot, plan in sea.edits():
@@ -151,37 +142,37 @@ def test_an_edit_keeps_all_other_waypoints(sea: Sea) -> None:
         assert max(len(gone), len(come)) <= (kind in CHANGED or kind in GROWTH)
         assert (grown := len(come) - len(gone)) in GROWTH.get(kind, {0})
         assert come or kind not in BY_ONE
-        assert kind != _CHARGE or not grown or sea.mission["flight_cost"] > 0
+        assert kind != search._CHARGE or not grown or sea.mission["flight_cost"] > 0
         for new in come:
             _check_new(kind, sea, gone, new)
         more = [len(b) - len(a) for a, b in zip(_charges(sea.plan), _charges(plan), strict=True)]
-        assert kind == _REMOVE or sum(more) == (grown if kind == _CHARGE else 0)
-        assert kind in (_REMOVE, _CHARGE) or not any(more)
+        assert kind == search._REMOVE or sum(more) == (grown if kind == search._CHARGE else 0)
+        assert kind in (search._REMOVE, search._CHARGE) or not any(more)
         changed = [i for i in range(len(after)) if after[i] != before[i]]
         assert sea.uavs["active"][changed].all()
-        assert len(changed) <= 1 + (kind in (_MOVE, _SWAP, _CROSS))
+        assert len(changed) <= 1 + (kind in (search._MOVE, search._SWAP, search._CROSS))
         for i in changed if grown else ():  # the others are in their order
             short, long = sorted((before[i], after[i]), key=len)
             assert any(long[:p] + long[p + 1 :] == short for p in range(len(long)))
 
 
 @drawn
-def test_an_edit_writes_only_the_plan(sea: Sea) -> None:
+def test_an_edit_writes_only_the_plan(sea):
     """When legs begin belongs to their places, so that stays; if no edit was possible, all does."""
     for _, slot, plan in sea.edits():
         assert plan.lengths.min() >= 0 and plan.lengths.max() <= MOST_WAYPOINTS
         assert (plan.waypoints["begun"] == sea.plan.waypoints["begun"]).all()
         for now, before in zip(plan, sea.plan, strict=True):
-            rows = slice(None) if slot == _NO_EDIT else [0, -1]
+            rows = slice(None) if slot == search._NO_EDIT else [0, -1]
             assert now.base[rows].tobytes() == before.base[rows].tobytes()
 
 
 @drawn
-def test_a_flight_is_the_same_until_the_slot_that_an_edit_returns(sea: Sea) -> None:
+def test_a_flight_is_the_same_until_the_slot_that_an_edit_returns(sea):
     for kind, slot, plan in sea.edits():
         if _is_void(kind, slot):
             continue
-        slot = min(slot, _first_unplanned(sea.mission, sea.plan, plan))
+        slot = min(slot, search._first_unplanned(sea.mission, sea.plan, plan))
         plans, slots = (sea.plan, plan), min(slot, sea.slots)
         (before, value), (after, edited) = (sea.simulate(_copy(p), slots) for p in plans)
         assert after.last.tolist() == before.last.tolist()
@@ -190,26 +181,26 @@ def test_a_flight_is_the_same_until_the_slot_that_an_edit_returns(sea: Sea) -> N
 
 
 @drawn
-def test_the_value_of_a_search_is_that_of_its_plan(sea: Sea) -> None:
+def test_the_value_of_a_search_is_that_of_its_plan(sea):
     """From any plan on, with charges that are moved, taken out or not reached; never worse."""
     plan, workspace = _copy(sea.plan), empty_workspace(sea.slots, len(sea.uavs), len(sea.nodes))
     arguments = sea.mission, sea.uavs, sea.residual, sea.nodes, sea.rates, plan, workspace
     improve(*arguments, 200, 2.0, 200)
     slots = min(sea.slots, MOST_SLOTS)
     before, after = (sea.simulate(p, slots)[1] for p in (sea.plan, plan))
-    assert workspace.course[BEST] == after >= before
+    assert workspace.course[search.BEST] == after >= before
 
 
-def test_every_kind_of_edit_is_tried() -> None:
+def test_every_kind_of_edit_is_tried():
     """Each changes what is reached in the flight, and each is refused."""
     done, refused = Counter[int](), Counter[int]()
 
     @drawn
     def count(sea: Sea) -> None:
         for kind, slot, _ in sea.edits():
-            done[kind] += _NO_EDIT < slot < sea.flight.last[1]
-            refused[kind] += slot == _NO_EDIT
+            done[kind] += search._NO_EDIT < slot < sea.flight.last[1]
+            refused[kind] += slot == search._NO_EDIT
 
     count()
-    for kind in {*_KINDS.tolist()}:
+    for kind in {*search._KINDS.tolist()}:
         assert done[kind] >= 10 and refused[kind] >= 10

@@ -18,7 +18,7 @@ from dess.policies.planner.fluid import (
 from dess.policies.planner.rates import rates_of
 from dess.policies.planner.search import BEST, TRIED, empty_workspace, improve
 from dess.view import View
-from tests.policies.flown import first_view
+from tests.dess.flights import first_view
 
 CALM = {"shadowing_variance": 0.0, "arrival_rate": 0.0}
 
@@ -74,7 +74,7 @@ def _improved(view: View, plan: Plan, steps: int, most: int = 10_000) -> float:
 
 
 @pytest.mark.parametrize(("uavs", "quota"), [(1, 400), (2, 400), (3, 380), (6, 340)])
-def test_a_flight_is_the_engines_where_nothing_is_random(uavs: int, quota: int) -> None:
+def test_a_flight_is_the_engines_where_nothing_is_random(uavs, quota):
     """Cells, batteries, the quota, charging; data within 2 %, as rates are means of a slot."""
     scenario = ScenarioSpace.of(load_scenario("fig4"), uavs=uavs, quota=quota, **CALM)
     view, plan = first_view(scenario, 5), empty_plan(uavs)
@@ -97,7 +97,7 @@ def test_a_flight_is_the_engines_where_nothing_is_random(uavs: int, quota: int) 
 
 
 @pytest.mark.parametrize("replication", range(4))
-def test_more_search_is_never_worse(replication: int) -> None:
+def test_more_search_is_never_worse(replication):
     """The value that is returned is that of the plan, and each search keeps the best it finds."""
     view = first_view(load_scenario("paper"), 777001, replication)
     plan, values = empty_plan(view.state.uavs.shape[1]), []
@@ -109,7 +109,7 @@ def test_more_search_is_never_worse(replication: int) -> None:
     assert values == sorted(values) and values[-1] > values[0] + 100
 
 
-def test_a_search_in_pieces_is_the_whole_search() -> None:
+def test_a_search_in_pieces_is_the_whole_search():
     view, found = first_view(load_scenario("paper"), 777001, 1), []
     for most in (10_000, 700, 333):
         plan = empty_plan(view.state.uavs.shape[1])
@@ -126,7 +126,7 @@ ALONE = {
 }
 
 
-def test_an_emptied_node_has_data_again_when_half_a_packet_has_gathered() -> None:
+def test_an_emptied_node_has_data_again_when_half_a_packet_has_gathered():
     scenario = Scenario.of(**ALONE, shadowing_variance=0.0, arrival_rate=0.1)
     view = first_view(scenario)
     empty = empty_plan(1)
@@ -138,7 +138,7 @@ def test_an_emptied_node_has_data_again_when_half_a_packet_has_gathered() -> Non
 
 
 @pytest.mark.parametrize("rate", [0.0, 5e-324, 1e-300])
-def test_where_next_to_nothing_arrives_an_empty_node_stays_empty(rate: float) -> None:
+def test_where_next_to_nothing_arrives_an_empty_node_stays_empty(rate):
     view = first_view(Scenario.of(**ALONE, arrival_rate=rate))
     (mission,), uavs = view.state.missions, view.state.uavs[0]
     flight = empty_flight(MOST_SLOTS, 1, 1)
@@ -146,7 +146,7 @@ def test_where_next_to_nothing_arrives_an_empty_node_stays_empty(rate: float) ->
     assert flight.sea["since"][0].tolist() == [NEVER]
 
 
-def test_a_uav_charges_at_its_waypoint_once_its_latch_is_set() -> None:
+def test_a_uav_charges_at_its_waypoint_once_its_latch_is_set():
     scenario = Scenario.of(**ALONE, **CALM)
     plan = _plan(1, [(2, 2, CHARGE), (4, 2, 0)])
     crafts, _, _ = _flown(first_view(scenario), plan, 28)

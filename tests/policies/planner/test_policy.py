@@ -4,7 +4,6 @@ import gc
 from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,8 +14,8 @@ from dess.policies.planner import policy as module
 from dess.policies.planner.policy import _MEMORIES, Budget, memory_of
 from dess.scenario import ScenarioSpace
 from dess.view import View
+from tests.dess.flights import assert_same_alone, cells_of, first_view
 from tests.drawn import Checked, extended_spaces, replications, seeds, spaces
-from tests.policies.flown import assert_same_alone, cells_of, first_view
 
 
 class Quick(Planner):
@@ -37,20 +36,18 @@ QUICK = Quick()
     st.integers(1, 4),
 )
 @settings(max_examples=12)
-def test_the_planner_does_the_same_in_any_engine_and_batch(
-    space: ScenarioSpace, team: list[Any], seed: int, numbers: list[int], batch_size: int
-) -> None:
+def test_the_planner_does_the_same_in_any_engine_and_batch(space, team, seed, numbers, batch_size):
     team = team[: space.uavs[1]]
     assert_same_alone(space, team, seed, numbers, batch_size=batch_size)
 
 
-def test_the_planner_does_the_same_in_two_processes() -> None:
+def test_the_planner_does_the_same_in_two_processes():
     space = load_scenario("paper", quota=80)
     alone, together = (simulate_batch(space, QUICK, 5, 4, workers=n) for n in (1, 2))
     assert together.missions.tobytes() == alone.missions.tobytes()
 
 
-def test_a_call_of_compiled_code_takes_a_moment_on_any_sea(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_call_of_compiled_code_takes_a_moment_on_any_sea(monkeypatch):
     """The larger a mission is, the fewer edits are tried in one call; it changes no decision."""
     tried: list[int] = []
     original = module._decide
@@ -71,13 +68,11 @@ def test_a_call_of_compiled_code_takes_a_moment_on_any_sea(monkeypatch: pytest.M
 
 @given(spaces(), seeds, replications)
 @settings(max_examples=20)
-def test_its_actions_are_safe_and_do_not_depend_on_the_rows_asked_for(
-    space: ScenarioSpace, seed: int, replication: int
-) -> None:
+def test_its_actions_are_safe_and_do_not_depend_on_the_rows_asked_for(space, seed, replication):
     simulate(space, Checked(QUICK, guard), seed, replication)
 
 
-def test_missions_of_the_same_coordinates_do_not_meet() -> None:
+def test_missions_of_the_same_coordinates_do_not_meet():
     """Two missions in turns, of the same seed and replication but with other seas."""
     one = load_scenario("paper", uavs=2, quota=60)
     other = ScenarioSpace.of(one, arrival_rate=0.5)
@@ -97,7 +92,7 @@ def test_missions_of_the_same_coordinates_do_not_meet() -> None:
     assert [simulate(space, QUICK, 3, 1).metrics for space in (one, other)] == alone
 
 
-def test_plans_go_with_the_missions_that_they_belong_to() -> None:
+def test_plans_go_with_the_missions_that_they_belong_to():
     gc.collect()
     before = len(_MEMORIES)
     simulate_batch(load_scenario("paper", uavs=1, quota=20), QUICK, 1, 3, batch_size=2)
@@ -105,7 +100,7 @@ def test_plans_go_with_the_missions_that_they_belong_to() -> None:
     assert len(_MEMORIES) == before
 
 
-def test_a_mission_departs_from_its_plan_by_a_node_or_by_a_uav() -> None:
+def test_a_mission_departs_from_its_plan_by_a_node_or_by_a_uav():
     """Small surprises add up, and cancel out; those of nodes count over several slots."""
     view = first_view(load_scenario("paper", uavs=2))
     QUICK.act(view)
@@ -131,17 +126,14 @@ def test_a_mission_departs_from_its_plan_by_a_node_or_by_a_uav() -> None:
 # --- how good it is ---
 
 
-def test_a_longer_search_pays_and_beats_the_best_heuristic() -> None:
+def test_a_longer_search_pays_and_beats_the_best_heuristic():
     paper, products = load_scenario("paper"), {}
 
     class Better(Planner):
         budget = Budget(6_000, 600)
 
-    for name, policy in (
-        ("quick", QUICK),
-        ("better", Better()),
-        ("greedy", policies.load("greedy")),
-    ):
+    team = {"quick": QUICK, "better": Better(), "greedy": policies.load("greedy")}
+    for name, policy in team.items():
         missions = simulate_batch(paper, policy, 777001, 20).missions
         products[name] = missions["collection_ratio_and_communication"]
         assert missions["success"].all()
@@ -152,7 +144,7 @@ def test_a_longer_search_pays_and_beats_the_best_heuristic() -> None:
 # --- drawing ---
 
 
-def test_a_plan_is_drawn_as_it_is_flown() -> None:
+def test_a_plan_is_drawn_as_it_is_flown():
     """A lone UAV's first step of every plan is where it flies, but for what the guard forbids."""
     space = load_scenario("paper", uavs=1)
     plans = plan_of(space, 777001, 3, QUICK)
@@ -172,10 +164,10 @@ def test_a_plan_is_drawn_as_it_is_flown() -> None:
     assert len(start.path) > 100  # some 110 flying slots, and those to charge
 
 
-def test_a_search_is_the_same_after_one_for_another_mission() -> None:
+def test_a_search_is_the_same_after_one_for_another_mission():
     """Teams fly these missions for a number of slots that ends between two snapshots."""
-    space, numbers = load_scenario("paper", uavs=3), [4, 11, 24]
-    together = simulate_batch(space, policies.load("planner-short"), 0, numbers).missions
-    for record, number in zip(together, numbers, strict=True):
-        alone = simulate_batch(space, policies.load("planner-short"), 0, [number]).missions[0]
+    space, policy = load_scenario("paper", uavs=3), policies.load("planner-short")
+    together = simulate_batch(space, policy, 0, [4, 11, 24]).missions
+    for record in together:
+        (alone,) = simulate_batch(space, policy, 0, [record["replication"]]).missions
         assert record.tobytes() == alone.tobytes()
