@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import asdict
-from functools import cached_property
+from functools import cached_property, lru_cache
 from hashlib import sha256
 from pathlib import Path, PurePath
 from typing import Annotated, Any, NamedTuple, Self
@@ -258,7 +258,7 @@ class Manifest(Origin):
 
     @cached_property
     def _scenario_texts(self) -> list[str]:
-        return [_canonical(space.model_dump(mode="json")) for space in self.scenarios]
+        return [*map(_text_of, self.scenarios)]
 
     @property
     def text(self) -> str:
@@ -268,6 +268,12 @@ class Manifest(Origin):
 
 
 _ALLOWED = "another --out or name, or remove the folder"
+
+
+@lru_cache(maxsize=2**15)
+def _text_of(space: ScenarioSpace) -> str:
+    """A scenario as text; the manifests of a run have the same ones."""
+    return _canonical(space.model_dump(mode="json"))
 
 
 def _canonical(data: Any) -> str:
