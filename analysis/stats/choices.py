@@ -1,7 +1,7 @@
 """Which of several alternatives may be the best, and which are on the front of two metrics."""
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from dess.analysis.metrics import metric_of
 from dess.analysis.stats.intervals import LEVEL, check_share, rare_differences
@@ -154,7 +154,7 @@ def _unbeaten(
         t = lead / np.sqrt(n * deviations / (n - 1))
         ahead = lead > np.sqrt(_ROUNDING * squares * n)
     counts, places = np.unique(n, return_inverse=True)
-    critical = stats.t.isf(alpha, np.maximum(counts - 1, 1))[places].reshape(n.shape)
+    critical = -stdtrit(np.maximum(counts - 1, 1), alpha)[places].reshape(n.shape)
     # Use the sign test where all differences are equal.
     beaten = np.where(constant, ahead & (0.5**n <= alpha), t > critical)
     return ~(beaten & (n > 1)).any(axis=1)

@@ -18,14 +18,12 @@ from html import escape
 from numbers import Number
 from pathlib import Path
 from string import Formatter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import pandas as pd
 from IPython.display import HTML, Markdown, display
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup
-from matplotlib.figure import Figure
 
 import dess
 from dess.analysis import numbers
@@ -40,10 +38,13 @@ from dess.reports.pages.page import FILES, STUDY, Learned, Page, hidden
 SHORT = 12  # characters of a hash that are shown
 PART = "application/vnd.dess.part+json"  # type of the output of a cell that contains a ``Part``
 
-# A figure, its alternative text, its caption and, if the page links to them, its data.
-Drawing = (
-    tuple[Figure, str] | tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame | None]
-)
+if TYPE_CHECKING:  # an index is made without figures
+    from matplotlib.figure import Figure
+
+    # A figure, its alternative text, its caption and, if the page links to them, its data.
+    Drawing = (
+        tuple[Figure, str] | tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame | None]
+    )
 
 LEAD = (10.2, 4.4)  # the size of the figure that shows the answer [inches]
 LEAD_ON_PHONE = (4.3, 4.4)  # at least so high
@@ -277,7 +278,7 @@ def answer(sentence: str, number: str = "") -> Part:
     return Part(sentence=printable(re.sub(r"[*`]", "", sentence)), number=number)
 
 
-def figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = None) -> Part:
+def figure(drawing: "Figure", alt: str, caption: str, data: pd.DataFrame | None = None) -> Part:
     """A figure with its alternative text and its caption.
 
     Args:
@@ -290,11 +291,11 @@ def figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = 
 
 
 def lead(
-    drawing: Figure,
+    drawing: "Figure",
     alt: str,
     caption: str,
     data: pd.DataFrame | None = None,
-    narrow: Figure | None = None,
+    narrow: "Figure | None" = None,
 ) -> Part:
     """The figure that shows the answer, as wide as the page; with the arguments of ``figure``.
 
@@ -307,7 +308,7 @@ def lead(
     return figures([_figure(drawing, alt, caption, data) | {"narrow": source}], "lead")
 
 
-def gallery(drawings: Iterable[Drawing], note: str = "") -> Part:
+def gallery(drawings: "Iterable[Drawing]", note: str = "") -> Part:
     """Several figures side by side where there is room.
 
     Args:
@@ -330,7 +331,7 @@ def figures(values: Sequence[Mapping[str, str]], look: str = "", note: str = "")
     return Part(figures=[{**_BARE, **value} for value in values], look=look, note=note)
 
 
-def show(*parts: Table | HTML | Markdown | Iterable[Drawing]) -> None:
+def show(*parts: "Table | HTML | Markdown | Iterable[Drawing]") -> None:
     """Show tables, galleries of figures, and what else there is, one below the other."""
     for part in parts:
         if isinstance(part, HTML | Markdown):
@@ -339,8 +340,10 @@ def show(*parts: Table | HTML | Markdown | Iterable[Drawing]) -> None:
             display(table(*part) if isinstance(part, Table) else gallery(part))
 
 
-def svg(drawing: Figure) -> bytes:
+def svg(drawing: "Figure") -> bytes:
     """A figure as SVG; the same figure gives the same bytes."""
+    import matplotlib as mpl
+
     buffer = io.BytesIO()
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -355,13 +358,13 @@ def _shorter(coordinates: re.Match[bytes]) -> bytes:
 
 
 def _figure(
-    drawing: Figure, alt: str, caption: str = "", data: pd.DataFrame | None = None
+    drawing: "Figure", alt: str, caption: str = "", data: pd.DataFrame | None = None
 ) -> dict[str, str]:
     links = "" if data is None else _downloads(alt, data, data)
     return {"alt": alt, "source": _source(drawing), "caption": caption, "links": links}
 
 
-def _source(drawing: Figure) -> str:
+def _source(drawing: "Figure") -> str:
     """The address of a figure, which contains it."""
     return f"data:image/svg+xml;base64,{b64encode(svg(drawing)).decode()}"
 

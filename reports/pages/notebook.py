@@ -10,13 +10,13 @@ its page has scripts. One of its cells is tagged ``parameters``:
 
 import ast
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jupytext
 import nbformat
 from nbformat import NotebookNode
 
@@ -35,6 +35,14 @@ GROUPS = {
 }
 NAMES = tuple(name for names in GROUPS.values() for name in names)
 PARAMETERS = "parameters"  # the tag of the cell with the parameters
+
+# jupytext has a plugin for Jupyter's server, which takes longer to import than the rest of it.
+_UNUSED = {"jupyter_client", "jupyter_server"} - sys.modules.keys()
+sys.modules |= dict.fromkeys(_UNUSED)  # type: ignore[arg-type]
+import jupytext  # noqa: E402
+
+for _name in _UNUSED:
+    del sys.modules[_name]
 
 _KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}
 

@@ -22,7 +22,6 @@ from dess.files.reading import paths_in, read_bytes
 from dess.files.writing import delete, locked, write_files
 from dess.reports.folders import INDEX, LOCK, check_pages
 from dess.reports.pages import kernels
-from dess.reports.pages.body import page_of
 from dess.reports.pages.index import index_of, pages_in, with_bars
 from dess.reports.pages.kernels import Progress
 from dess.reports.pages.notebook import (
@@ -188,7 +187,11 @@ def _write(
     kernels.make([report.name for report in changed], results, values, progress)
     read_by = Counter(f for report in changed for f in _folders(report, results).values())
     kernels.run(changed, progress, [folder for folder, count in read_by.items() if count > 1])
-    made = {report.page: page_of(report) for report in changed}
+    made = {}
+    if changed:
+        from dess.reports.pages.body import page_of  # imports nbconvert
+
+        made = {report.page: page_of(report) for report in changed}
     complete = [report for report in reports if not report.failure]
     files = {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
     with locked(out / LOCK, _BUSY, PATIENCE):
