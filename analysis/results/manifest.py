@@ -1,6 +1,7 @@
 """The manifest of a results folder: the study, what it was run with, and the keys of its cells."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cached_property, lru_cache
 from hashlib import sha256
@@ -29,6 +30,7 @@ from dess.analysis.study.study import CHECK, Study, StudyData
 from dess.scenario import SEA, ScenarioSpace, load_scenario
 
 SCHEMA_VERSION = 3
+PROGRESS = {"missions", "selected", "complete"}  # what a run changes in its manifest
 NO_TEAM = -1  # the team of the cells of bounds, which hold for every policy
 
 # What is selected for a team: a design point, or one for each question; None without a selection.
@@ -89,6 +91,14 @@ class Manifest(Origin):
             raise ValueError("points: are not those of the design")
         self.scenarios  # noqa: B018 - they are checked when they are made
         return self
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with other values; its cells are made again only if they may be others."""
+        copy = super().model_copy(update=update)
+        if {*(update or ())} <= PROGRESS:
+            known = self.__dict__.keys() - type(self).model_fields.keys()
+            copy.__dict__.update({name: self.__dict__[name] for name in known})
+        return copy
 
     def selected_points(self, team: int) -> list[int]:
         """The design points that were selected for a team; none, if the study selects nothing."""
@@ -162,8 +172,7 @@ class Manifest(Origin):
             "accepted": self.accepted + accepted,
         }
         if self.study == new.study and self.points == new.points:
-            progress = ("missions", "selected", "complete")
-            update |= {name: getattr(self, name) for name in progress}
+            update |= {name: getattr(self, name) for name in PROGRESS}
         return new.model_copy(update=update)
 
     def _check_extended_by(self, new: "Manifest", path: Path) -> None:

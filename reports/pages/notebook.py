@@ -61,6 +61,7 @@ class Report:
         original: The complete notebook, as in its file.
         notebook: The cells of the page, with values for the parameters.
         key: What its page depends on; empty if it has other parameters than by default.
+        is_current: Whether its page is there, and has this key.
         done: Number of cells that have been run.
         failure: The cell that failed and its error, if one did.
         traceback: The traceback of the error.
@@ -75,6 +76,7 @@ class Report:
     original: NotebookNode
     notebook: NotebookNode
     key: str = ""
+    is_current: bool = False
     done: int = 0
     failure: str = ""
     traceback: str = ""

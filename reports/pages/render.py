@@ -5,6 +5,7 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from hashlib import sha256
 from importlib import metadata
@@ -127,7 +128,9 @@ def render(
     asked = [*dict.fromkeys(names)]
     reports = [read(name, notebooks) for name in asked or names_in(notebooks)]
     check_parameters(reports, values)
-    lacking = {report.name: _lacking(report, results) for report in reports}
+    for report in reports:
+        _look_up(report, results, out, values)
+    lacking = {r.name: {} if r.is_current else _lacking(r, results) for r in reports}
     for name, errors in lacking.items():
         for error in errors.values():
             if asked:
@@ -167,6 +170,7 @@ def render_study(
     report = report_of(folder, values)
     check_parameters([report], values)
     report.set({"results": str(folder.absolute()), **values})
+    _look_up(report, folder, out, values)
     _write([report], folder, out, progress, values)
     return out / report.page
 
@@ -181,9 +185,7 @@ def _write(
 ) -> None:
     """Run reports in the folder of their results, and write the pages and the index."""
     check_pages(out, *(report.name for report in reports))
-    for report in reports:
-        report.key = "" if values else key_of(report, _folders(report, results))
-    changed = [report for report in reports if not has_key(out / report.page, report.key)]
+    changed = [report for report in reports if not report.is_current]
     kernels.make([report.name for report in changed], results, values, progress)
     read_by = Counter(f for report in changed for f in _folders(report, results).values())
     kernels.run(changed, progress, [folder for folder, count in read_by.items() if count > 1])
@@ -205,6 +207,15 @@ def _write(
     if failed := [report for report in reports if report.failure]:
         lines = [f"{r.failure}; partial page: {out / r.page}" for r in failed]
         raise ReportError("; ".join(lines))
+
+
+def _look_up(report: Report, results: Path, out: Path, values: Mapping[str, Any]) -> None:
+    """Find out whether the page of a report is there and of these results, which are sound then."""
+    if values:
+        return
+    with suppress(InputError):  # there are none, or ``_lacking`` finds out what is wrong with them
+        report.key = key_of(report, _folders(report, results))
+        report.is_current = has_key(out / report.page, report.key)
 
 
 def _folders(report: Report, results: Path) -> dict[str, Path]:
