@@ -14,16 +14,25 @@ nox.options.sessions = ["tests"]
 
 # The studies that the reports read, and the options of those whose default budget takes long. The
 # pages say what their studies were made with.
+FEWER = "--policy ddqn --policy greedy --policy random --policy random-unguarded"
 STUDIES = {
-    "table4 fig1 fig4 sensitivity pads failures verification": "",
-    "fig5": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
-    "fig5-paper sweet-spot-paper": "",
-    "sweet-spot": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
+    "table4 fig1 fig4 sensitivity pads failures verification fig5-paper sweet-spot-paper": "",
+    "fig5 sweet-spot": FEWER,
     "comparison": "--missions 1000",
     "explorer age": "--missions 50",
     "gap": "--missions 12",
     "seas": "--missions 1 --policy any --policy greedy --policy planner",
 }
+# Runs commands in one process, since each would start workers and import libraries for seconds.
+ONE_AFTER_THE_OTHER = """
+import sys
+from dess.reports.cli import main
+
+for command in sys.argv[1:]:
+    print("dess", command, flush=True)
+    if code := main(command.split()):
+        sys.exit(code)
+"""
 # What says which libraries are installed.
 REQUIREMENTS = ("pyproject.toml", "constraints.txt")
 # Two test files at a time, in the order of their collection.
@@ -102,18 +111,18 @@ def reports(session: nox.Session) -> None:
         session.error(f"reports: {unknown} is unknown; allowed: --full, --dry-run")
     install(session, "[learning,reports]")
     results, reports = (folder / "full" if full else folder for folder in (RESULTS, REPORTS))
+    commands = []
     for studies, less in STUDIES.items():
         out = results if " " in studies else results / studies
-        options = [
-            *([] if full else less.split()),
-            "--workers",
-            "2",
-            *(["--dry-run"] if dry else []),
-        ]
-        session.run("dess", "study", "run", *studies.split(), "--out", str(out), *options)
+        budget = "" if full else f" {less}"
+        commands.append(f"study run {studies} --out {out} --workers 2{budget}")
+    if dry:
+        commands = [f"{command} --dry-run" for command in commands]
+    else:
+        commands.append(f"report --results {results} --out {reports}")
+    session.run("python", "-P", "-c", ONE_AFTER_THE_OTHER, *commands)
     if dry:
         return
-    session.run("dess", "report", "--results", str(results), "--out", str(reports))
     session.log(f"The reports are at {(reports / 'index.html').resolve().as_uri()}")
 
 

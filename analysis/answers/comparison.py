@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+import scipy
 from matplotlib.figure import Figure
-from scipy import stats
 from threadpoolctl import threadpool_limits
 
 from dess import InputError, simulate, simulate_batch
@@ -411,7 +411,7 @@ def spread(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFrame:
 def _equal_means(groups: Any) -> float:
     """The p-value of equal means; 1 if fewer than two groups have different values."""
     samples = [group.to_numpy() for _, group in groups if np.ptp(group) > 0]
-    return float(stats.alexandergovern(*samples).pvalue) if len(samples) > 1 else 1.0
+    return float(scipy.stats.alexandergovern(*samples).pvalue) if len(samples) > 1 else 1.0
 
 
 def _range_text(values: np.ndarray) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-from scipy import stats
+import scipy
 
 from dess import InputError
 from dess.analysis import numbers
@@ -201,7 +201,7 @@ def difference(
         return Interval(gap, np.nan, np.nan), 1.0
     if np.ptp(a) == np.ptp(b) == 0:
         return Interval(gap, gap, gap), 1.0
-    test = stats.ttest_ind(a, b, equal_var=min(a.size, b.size) == 1)
+    test = scipy.stats.ttest_ind(a, b, equal_var=min(a.size, b.size) == 1)
     ends = test.confidence_interval(level)
     return Interval(gap, float(ends.low), float(ends.high)), float(test.pvalue)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+from scipy.special import ndtri
 
 from dess import InputError
 from dess.analysis import numbers
@@ -135,7 +135,7 @@ def _indices(design: Saltelli, values: np.ndarray) -> pd.DataFrame:
     varies = np.ptp([a, b]) > np.finfo(float).eps * np.ptp(values)
     variance[variance <= 0] = np.inf  # of a resample in which nothing varies: its indices are 0
     table = pd.DataFrame({"parameter": design.problem["names"]})
-    half = stats.norm.ppf(0.5 + LEVEL / 2)
+    half = ndtri(0.5 + LEVEL / 2)
     for name, share in (("first", b * (mixed - a)), ("total", (a - mixed) ** 2 / 2)):
         indices = weights @ share / variance if varies else np.full((3, len(table)), np.nan)
         table[name], error = indices[0], half * indices[1:].std(axis=0, ddof=1)

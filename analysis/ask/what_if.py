@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import tomli_w
-from scipy import stats
+from scipy.special import ndtri
 
 from dess import InputError
 from dess.analysis import numbers
@@ -131,9 +131,9 @@ def missions_needed(answer: Any) -> float:
     """
     if not answer.difference or not answer.low < answer.high:
         return np.inf
-    quantile = stats.norm.isf((1 - LEVEL) / 2)
+    quantile = -ndtri((1 - LEVEL) / 2)
     half = (answer.high - answer.low) / 2 / abs(answer.difference)
-    return float(np.ceil(answer.n * (half * (1 + stats.norm.ppf(POWER) / quantile)) ** 2))
+    return float(np.ceil(answer.n * (half * (1 + ndtri(POWER) / quantile)) ** 2))
 
 
 def differences(results: Results, policy: str) -> pd.Series:

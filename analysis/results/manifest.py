@@ -1,8 +1,9 @@
 """The manifest of a results folder: the study, what it was run with, and the keys of its cells."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
-from functools import cached_property
+from functools import cached_property, lru_cache
 from hashlib import sha256
 from pathlib import Path, PurePath
 from typing import Annotated, Any, NamedTuple, Self
@@ -19,6 +20,7 @@ from dess.files.documents import Sha256
 from dess.scenario import SEA, ScenarioSpace, load_scenario
 
 SCHEMA_VERSION = 3
+PROGRESS = {"missions", "selected", "complete"}  # what a run changes in its manifest
 NO_TEAM = -1  # the team of the cells of bounds, which hold for every policy
 
 # What is selected for a team: a design point, or one for each question; None without a selection.
@@ -79,6 +81,14 @@ class Manifest(provenance.Origin):
             raise ValueError("points: are not those of the design")
         self.scenarios  # noqa: B018 - they are checked when they are made
         return self
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with other values; its cells are made again only if they may be others."""
+        copy = super().model_copy(update=update)
+        if {*(update or ())} <= PROGRESS:
+            known = self.__dict__.keys() - type(self).model_fields.keys()
+            copy.__dict__.update({name: self.__dict__[name] for name in known})
+        return copy
 
     def selected_points(self, team: int) -> list[int]:
         """The design points that were selected for a team; none, if the study selects nothing."""
@@ -154,8 +164,7 @@ class Manifest(provenance.Origin):
             "accepted": self.accepted + accepted,
         }
         if self.study == new.study and self.points == new.points:
-            progress = ("missions", "selected", "complete")
-            update |= {name: getattr(self, name) for name in progress}
+            update |= {name: getattr(self, name) for name in PROGRESS}
         return new.model_copy(update=update)
 
     def _check_extended_by(self, new: "Manifest", path: Path) -> None:
@@ -250,7 +259,7 @@ class Manifest(provenance.Origin):
 
     @cached_property
     def _scenario_texts(self) -> list[str]:
-        return [_canonical(space.model_dump(mode="json")) for space in self.scenarios]
+        return [*map(_text_of, self.scenarios)]
 
     @property
     def text(self) -> str:
@@ -260,6 +269,12 @@ class Manifest(provenance.Origin):
 
 
 _ALLOWED = "another --out or name, or remove the folder"
+
+
+@lru_cache(maxsize=2**15)
+def _text_of(space: ScenarioSpace) -> str:
+    """A scenario as text; the manifests of a run have the same ones."""
+    return _canonical(space.model_dump(mode="json"))
 
 
 def _canonical(data: Any) -> str:

@@ -196,6 +196,25 @@ def parts_in(table: pa.Table) -> list[Row]:
     return rows
 
 
+def is_log(path: Path) -> bool:
+    """Whether a file is an event log without damage."""
+    return _is_log(*_state(path))
+
+
+@lru_cache(2**16)
+def _is_log(path: Path, *_: int) -> bool:
+    return read(path) is not None
+
+
+File = tuple[Path, int, int, int]
+
+
+def _state(path: Path) -> File:
+    """A file with its number, size and time; if they stay the same, it is not read again."""
+    found = path.stat()
+    return path, found.st_ino, found.st_size, found.st_mtime_ns
+
+
 def content_hash(path: Path) -> str:
     """The part of a file's name that identifies the content of the file."""
     return path.stem.rpartition("-")[0]
@@ -303,13 +322,11 @@ def tables_in(folder: Path, kind: str) -> Found:
     A file is damaged if its content is not what its name says. Two files with different records of
     the same missions both count as damaged, since it is unknown which one is right.
     """
-    files = [(path, path.stat()) for path in files_in(folder)]
-    return _tables_of(tuple((p, s.st_ino, s.st_size, s.st_mtime_ns) for p, s in files), kind)
+    return _tables_of(tuple(map(_state, files_in(folder))), kind)
 
 
 @lru_cache(64)
-def _tables_of(files: tuple[tuple[Path, int, int, int], ...], kind: str) -> Found:
-    """The tables in files, which are read again if one has another number, size or time."""
+def _tables_of(files: tuple[File, ...], kind: str) -> Found:
     damaged = []
     sound: dict[str, dict[Path, pa.Table]] = defaultdict(dict)
     for path, *_ in files:

@@ -9,7 +9,7 @@ import inspect
 import json
 import subprocess
 from collections.abc import Collection, Iterable, Mapping
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
@@ -27,12 +27,12 @@ from pydantic import (
 import dess
 from dess import InputError
 from dess.analysis.study.stopping import Text
-from dess.analysis.study.study import StudyData
+from dess.analysis.study.study import StudyData, changed
 from dess.code.sources import OURS, code_of, combined
 from dess.errors import validation_line
 from dess.files.documents import Document, Sha256
 from dess.policies.registry import Policy, TypedByUser, confirmed, load_team
-from dess.scenario import SEA, ScenarioSpace, merged, scenario_at
+from dess.scenario import SEA, ScenarioSpace, scenario_at
 
 ENGINES = ("dess.batch", "dess.mission")
 BOUND = ("dess.analysis.bound",)
@@ -144,7 +144,11 @@ class Origin(Document):
         """
         if SEA in values:
             return scenario_at(self.study.scenario, values, **self.study.set)
-        return _scenario_of(json.dumps(merged(self.scenario, values)))
+        return changed(self._fields, json.dumps(values))
+
+    @cached_property
+    def _fields(self) -> str:
+        return json.dumps(self.scenario)
 
     def changes_here(self, named: Collection[str] = ()) -> list[str]:
         """How the code and libraries of this process differ from those that made the results.
@@ -177,19 +181,6 @@ class Origin(Document):
         if others := [n for n in versions if n in made and made[n] != versions[n]]:
             changes.append(f"made with other versions of {', '.join(others)}")
         return changes
-
-
-@lru_cache(maxsize=2**15)
-def _scenario_of(fields: str) -> ScenarioSpace:
-    """The scenario with these fields, as JSON; manifests have the same ones many times.
-
-    Raises:
-        InputError: If they are not valid.
-    """
-    try:
-        return ScenarioSpace.model_validate(json.loads(fields))
-    except ValidationError as error:
-        raise InputError(validation_line(error, "scenario", ScenarioSpace)) from None
 
 
 def team_of(policy: str) -> Team:

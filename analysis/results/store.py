@@ -167,7 +167,7 @@ class Store:
         for place, _ in (place for team in teams for place in self._places("events", team)):
             for path in parquet.files_in(place):
                 key, _, number = parquet.content_hash(path).partition("-")
-                if parquet.read(path) is None:
+                if not parquet.is_log(path):
                     self.damaged.append(path)
                 elif number:
                     self._enter_log(key, int(number), path)

@@ -6,7 +6,8 @@ from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+import scipy
+from scipy.special import stdtr, stdtrit
 
 from dess import InputError
 from dess.analysis.metrics import ALWAYS, MEASURES, REWARD, metric_of
@@ -121,7 +122,7 @@ def adjust(p: np.ndarray, correction: Correction | None) -> np.ndarray:
     if correction is None:
         return p
     if correction == "fdr":
-        return np.asarray(stats.false_discovery_control(p))
+        return np.asarray(scipy.stats.false_discovery_control(p))
     order = np.argsort(p)
     adjusted = np.empty_like(p)
     steps = p[order] * np.arange(len(p), 0, -1)
@@ -166,8 +167,8 @@ def t_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
     mean = mean_interval(differences, level)
     if np.ptp(differences) == 0:
         return mean, sign_test(differences)
-    t = abs(mean.mean) / stats.sem(differences)
-    return mean, float(2 * stats.t.sf(t, differences.size - 1))
+    t = abs(mean.mean) / scipy.stats.sem(differences)
+    return mean, float(2 * stdtr(differences.size - 1, -t))
 
 
 def difference_test(
@@ -196,7 +197,7 @@ def difference_test(
 @cache
 def mcnemar(gains: int, losses: int) -> float:
     """The p-value of McNemar's exact test."""
-    return float(stats.binomtest(gains, gains + losses).pvalue) if gains + losses else 1.0
+    return float(scipy.stats.binomtest(gains, gains + losses).pvalue) if gains + losses else 1.0
 
 
 def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") -> pd.DataFrame:
@@ -221,7 +222,7 @@ def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") ->
     rare = rare_differences(metric, own, own - mean)
     if rare is None:
         t = (mean / differences.sem()).abs()
-        table["p"] = 2 * stats.t.sf(t, np.maximum(n - 1, 1))
+        table["p"] = 2 * stdtr(np.maximum(n - 1, 1), -t)
         for column in differences.columns[constant & (n > 0)]:
             table.loc[column, "p"] = sign_test(differences[column].dropna().to_numpy())
             if n[column] > 1:
@@ -232,9 +233,9 @@ def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") ->
     squares = n * (differences.var(ddof=0) + (mean - centre) ** 2)
     squares += (rare[0] - centre) ** 2 + (rare[1] - centre) ** 2
     error = np.sqrt(squares / (size - 1) / size)
-    half = stats.t.isf((1 - LEVEL) / 2, size - 1) * error
+    half = -stdtrit(size - 1, (1 - LEVEL) / 2) * error
     table["low"], table["high"] = centre - half, centre + half
-    table["p"] = 2 * stats.t.sf((centre / error).abs(), size - 1)
+    table["p"] = 2 * stdtr(size - 1, -(centre / error).abs())
     if metric == REWARD:
         table.loc[n == 1, ["low", "high", "p"]] = np.nan, np.nan, 1.0
     else:
@@ -322,7 +323,7 @@ def relative_change(values: np.ndarray, reference: np.ndarray) -> Interval:
     if n == 1:
         return Interval(ratio - 1, np.nan, np.nan)
     error = np.std(values - ratio * reference, ddof=1) / np.sqrt(n) / abs(reference.mean())
-    half = float(stats.t.isf((1 - LEVEL) / 2, n - 1) * error)
+    half = -float(stdtrit(n - 1, (1 - LEVEL) / 2) * error)
     return Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
 
 

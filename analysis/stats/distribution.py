@@ -5,7 +5,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+import scipy
 
 from dess import InputError
 from dess.analysis.metrics import metric_of
@@ -108,7 +108,7 @@ def quantile_interval(
     sample = np.asarray(values, float)
     if not sample.size:
         raise ValueError("quantile_interval: no values")
-    low, high = stats.quantile_test(sample, p=share).confidence_interval(level)
+    low, high = scipy.stats.quantile_test(sample, p=share).confidence_interval(level)
     ends = (-np.inf if np.isnan(low) else float(low), np.inf if np.isnan(high) else float(high))
     return Interval(float(np.quantile(sample, share)), *ends)
 

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 import pandas as pd
-from scipy import stats
-from scipy.special import ndtri, stdtrit
+import scipy
+from scipy.special import ndtr, ndtri, stdtrit
 
 from dess import InputError
 from dess.analysis.metrics import REWARD, metric_of, metrics_in
@@ -181,8 +181,8 @@ class Moments(NamedTuple):
             half = 0.0 if self.n > 1 else np.nan
             return Interval(self.mean, self.mean - half, self.mean + half)
         error = np.sqrt(self.squares / (self.n - 1)) / np.sqrt(self.n)
-        low, high = stats.t.interval(level, self.n - 1, self.mean, error)
-        return Interval(self.mean, float(low), float(high))
+        ends = stdtrit(self.n - 1, [(1 - level) / 2, (1 + level) / 2]) * error + self.mean
+        return Interval(self.mean, *map(float, ends))
 
 
 def wilson(successes: int, n: int, level: float = LEVEL) -> Interval:
@@ -193,8 +193,12 @@ def wilson(successes: int, n: int, level: float = LEVEL) -> Interval:
     """
     if n < 1:
         raise ValueError("wilson: no trials")
-    ends = stats.binomtest(int(successes), int(n)).proportion_ci(level, method="wilson")
-    return Interval(successes / n, float(ends.low), float(ends.high))
+    share, z = successes / n, ndtri(0.5 + 0.5 * level)
+    width = 2 * (n + z**2)
+    centre = (2 * n * share + z**2) / width
+    half = z / width * np.sqrt(4 * n * share * (1 - share) + z**2)
+    low = float(centre - half) if successes else 0.0
+    return Interval(share, low, float(centre + half) if successes < n else 1.0)
 
 
 def bounded_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) -> Interval:
@@ -268,7 +272,7 @@ def stratified(values: np.ndarray, metric: str, level: float = LEVEL) -> Interva
     replications = int(present.any(axis=1).sum())
     freedom = max(replications - 1, 1)
     error = np.sqrt(common * replications / freedom)
-    half = float(stats.t.isf((1 - level) / 2, freedom) * error) if replications > 1 else np.nan
+    half = -float(stdtrit(freedom, (1 - level) / 2) * error) if replications > 1 else np.nan
     return Interval(mean, mean - half, mean + half)
 
 
@@ -314,7 +318,7 @@ def column_intervals(values: pd.DataFrame, metric: str = "") -> pd.DataFrame:
         (K, 4): ``mean``, ``low``, ``high``, ``n``, with the columns as index; nan without values.
     """
     n, mean = values.count(), values.mean()
-    half = values.sem() * stats.t.isf((1 - LEVEL) / 2, np.maximum(n - 1, 1))
+    half = -values.sem() * stdtrit(np.maximum(n - 1, 1), (1 - LEVEL) / 2)
     table = pd.DataFrame({"mean": mean, "low": mean - half, "high": mean + half, "n": n})
     if metric_of(metric).is_bounded:
         some = n > 0
@@ -474,8 +478,8 @@ def bootstrap_interval(
     if n == 1:
         return Interval(estimate, np.nan, np.nan)
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
-        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
-        result = stats.bootstrap(
+        warnings.simplefilter("ignore", scipy.stats.DegenerateDataWarning)
+        result = scipy.stats.bootstrap(
             arrays,
             statistic,
             n_resamples=resamples,
@@ -502,5 +506,5 @@ def expanded_level(level: float, n: float) -> float:
         n: Number of values; fewer than 2 count as 2.
     """
     n = max(n, 2)
-    end = np.sqrt(n / (n - 1)) * stats.t.ppf((1 + level) / 2, n - 1)
-    return float(1 - 2 * stats.norm.sf(end))
+    end = np.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + level) / 2)
+    return float(1 - 2 * ndtr(-end))

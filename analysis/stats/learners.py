@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy import optimize, stats
+import scipy
 
 from dess import InputError
 from dess.analysis.metrics import ALWAYS, REWARD
@@ -98,7 +98,7 @@ def crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
     new_sems = np.sqrt([between / trainings + between, shared / missions])
 
     def half(sems: np.ndarray, alpha: float) -> float:
-        return float(np.hypot(*sems * stats.t.isf(alpha / 2, [trainings - 1, missions - 1])))
+        return float(np.hypot(*sems * scipy.stats.t.isf(alpha / 2, [trainings - 1, missions - 1])))
 
     ends = max(half(sems, 1 - level), of_missions.high - mean)
     new = max(half(new_sems, 1 - level), ends)
@@ -195,4 +195,4 @@ def _alpha_of(half: Callable[[float], float], distance: float) -> float:
     lowest = -100.0  # quantiles of Student's t are still exact here
     if excess(lowest) <= 0:
         return 0.0
-    return float(10 ** optimize.brentq(excess, lowest, 0.0)) if distance else 1.0
+    return float(10 ** scipy.optimize.brentq(excess, lowest, 0.0)) if distance else 1.0

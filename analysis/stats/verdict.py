@@ -12,7 +12,7 @@ several alternatives, some may be the best, and some are on the front of two met
 from typing import Protocol
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from dess.analysis.metrics import metric_of
 from dess.analysis.stats.intervals import LEVEL, rare_differences
@@ -218,7 +218,7 @@ def _unbeaten(
         t = lead / np.sqrt(n * deviations / (n - 1))
         ahead = lead > np.sqrt(_ROUNDING * squares * n)
     counts, places = np.unique(n, return_inverse=True)
-    critical = stats.t.isf(alpha, np.maximum(counts - 1, 1))[places].reshape(n.shape)
+    critical = -stdtrit(np.maximum(counts - 1, 1), alpha)[places].reshape(n.shape)
     # Use the sign test where all differences are equal.
     beaten = np.where(constant, ahead & (0.5**n <= alpha), t > critical)
     return ~(beaten & (n > 1)).any(axis=1)

@@ -1,8 +1,9 @@
 """A study: the missions that are to be simulated, and what is asked of them."""
 
+import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -36,7 +37,9 @@ from dess.scenario import (
     dotted,
     is_scenario_name,
     load_scenario,
+    merged,
     scenario_at,
+    validated,
 )
 from dess.sections.section import tuples
 from dess.streams import MAX_SEED
@@ -267,9 +270,9 @@ class Study(StudyData):
         return load_scenario(self.scenario, **self.set)
 
     @cached_property
-    def _fields(self) -> dict[str, Any]:
+    def _fields(self) -> str:
         """The fields of ``_base``: its file is read once, and not for every design point."""
-        return self._base.model_dump()
+        return json.dumps(self._base.model_dump(mode="json"))
 
     @property
     def points(self) -> tuple[DesignPoint, ...]:
@@ -305,8 +308,9 @@ class Study(StudyData):
 
     def _scenario_at(self, values: dict[str, Any]) -> ScenarioSpace:
         if not values.keys() & {SEA, "grid", "rows", "cell_size"}:  # these move nodes of a file
-            with suppress(InputError):  # raised below, in the words of the scenario's file
-                return ScenarioSpace.of(**self._fields | values)
+            # An error is raised below, in the words of the scenario's file.
+            with suppress(InputError, TypeError, ValueError):
+                return changed(self._fields, json.dumps(values))
         try:
             space = scenario_at(self.scenario, values, **self.set)
             for field, cells in product(("grid", "rows", "cell_size"), ("nodes", "no_fly")):
@@ -316,6 +320,16 @@ class Study(StudyData):
             return space
         except InputError as error:
             raise InputError(f"at {_shown(values)}: {error}" if values else str(error)) from None
+
+
+@lru_cache(maxsize=2**15)
+def changed(scenario: str, values: str) -> ScenarioSpace:
+    """A scenario with other values, both as JSON: a study and its manifests ask for it many times.
+
+    Raises:
+        InputError: If it is not valid.
+    """
+    return validated(ScenarioSpace, merged(json.loads(scenario), json.loads(values)), "scenario")
 
 
 def study_from(data: Mapping[str, Any], what: str) -> Study:

@@ -239,7 +239,6 @@ def load_policy(folder: Path) -> LearnedPolicy:
         InputError: If a file is missing, damaged, of another version or of another shape.
     """
     path, description = folder / MODEL, read_description(folder)
-    config, where = description.training, folder / CONFIG
     content = read_bytes(path, MODEL_LIMIT, "the folder of a trained policy")
     sums = description.model_sha256
     if sums is not None and _sha256(content) not in sums:
@@ -249,6 +248,15 @@ def load_policy(folder: Path) -> LearnedPolicy:
             f"{path}: damaged: it has not the checksum in {CONFIG}; allowed: the file it was made "
             "with"
         )
+    return copy.copy(_policy(folder, content, description.model_dump_json()))
+
+
+@lru_cache(maxsize=4)
+def _policy(folder: Path, content: bytes, text: str) -> LearnedPolicy:
+    """The policy of these weights and their description; every process loads one many times."""
+    path, where = folder / MODEL, folder / CONFIG
+    description = Description.model_validate_json(text)
+    config = description.training
     values = description.layout and description.layout.model_dump()
     try:
         with torch.device("meta"):  # the forms of the weights, without their memory

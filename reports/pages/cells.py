@@ -19,15 +19,13 @@ from multiprocessing import Pipe, Process, set_start_method
 from multiprocessing.connection import Connection, wait
 from threading import Thread
 from traceback import format_exception
-from typing import NoReturn
-
-from IPython.core.displayhook import CapturingDisplayHook
-from IPython.core.displaypub import CapturingDisplayPublisher
-from IPython.core.interactiveshell import InteractiveShell
-from traitlets.config import Config
+from typing import TYPE_CHECKING, NoReturn
 
 from dess.analysis.results.tables import keep
 from dess.errors import InputError
+
+if TYPE_CHECKING:  # the process that only starts this one needs no shell
+    from IPython.core.interactiveshell import InteractiveShell
 
 AT_ONCE = 2
 
@@ -39,6 +37,8 @@ def _serve() -> None:
     them read. An answer is a list of the number of the notebook, the outputs of its next cell, and
     its error. A notebook whose child dies has no more.
     """
+    import IPython.core.interactiveshell  # noqa: F401 - here and not in every child
+
     work = json.loads(sys.stdin.readline())
     codes = work["cells"]
     Thread(target=_end_with_parent, daemon=True).start()
@@ -88,6 +88,9 @@ def _import_all(cells: Iterator[str]) -> None:
 
 def _run_cells(number: int, cells: Sequence[str], parent: Connection) -> None:
     """Run the cells of a notebook up to the first that fails, and send the answers."""
+    from IPython.core.interactiveshell import InteractiveShell
+    from traitlets.config import Config
+
     os.dup2(2, 1)  # what a library prints is no answer
     shell = InteractiveShell.instance(config=Config(HistoryManager={"enabled": False}))
     for cell in cells:
@@ -97,8 +100,11 @@ def _run_cells(number: int, cells: Sequence[str], parent: Connection) -> None:
             return
 
 
-def _run_cell(shell: InteractiveShell, cell: str) -> tuple[list[dict], list[str] | None]:
+def _run_cell(shell: "InteractiveShell", cell: str) -> tuple[list[dict], list[str] | None]:
     """Run a cell: its outputs as Jupyter stores them, and the name, text and place of its error."""
+    from IPython.core.displayhook import CapturingDisplayHook
+    from IPython.core.displaypub import CapturingDisplayPublisher
+
     shell.display_pub = CapturingDisplayPublisher()
     shell.display_trap.hook = CapturingDisplayHook(shell, shell.display_pub.outputs)
     streams = {"stdout": StringIO(), "stderr": StringIO()}

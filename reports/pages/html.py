@@ -18,14 +18,12 @@ from html import escape
 from numbers import Number
 from pathlib import Path
 from string import Formatter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import pandas as pd
 from IPython.display import HTML, Markdown, display
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup
-from matplotlib.figure import Figure
 
 import dess
 from dess.analysis import numbers
@@ -39,6 +37,9 @@ from dess.reports.pages.page import FILES, STUDY, Learned, Page, hidden
 
 SHORT = 12  # characters of a hash that are shown
 PART = "application/vnd.dess.part+json"  # type of the output of a cell that contains a ``Part``
+
+if TYPE_CHECKING:  # an index is made without figures
+    from matplotlib.figure import Figure
 
 LEAD = (10.2, 4.4)  # the size of the figure that shows the answer [inches]
 LEAD_ON_PHONE = (4.3, 4.4)  # at least so high
@@ -277,7 +278,7 @@ def answer(sentence: str, number: str = "") -> Part:
     return Part(sentence=printable(re.sub(r"[*`]", "", sentence)), number=number)
 
 
-def figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = None) -> Part:
+def figure(drawing: "Figure", alt: str, caption: str, data: pd.DataFrame | None = None) -> Part:
     """A figure with its alternative text and its caption.
 
     Args:
@@ -290,11 +291,11 @@ def figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = 
 
 
 def lead(
-    drawing: Figure,
+    drawing: "Figure",
     alt: str,
     caption: str,
     data: pd.DataFrame | None = None,
-    narrow: Figure | None = None,
+    narrow: "Figure | None" = None,
 ) -> Part:
     """The figure that shows the answer, as wide as the page; with the arguments of ``figure``.
 
@@ -339,8 +340,10 @@ def show(*parts: Table | HTML | Markdown | Iterable[tuple[Any, ...]]) -> None:
             display(table(*part) if isinstance(part, Table) else gallery(part))
 
 
-def svg(drawing: Figure) -> bytes:
+def svg(drawing: "Figure") -> bytes:
     """A figure as SVG; the same figure gives the same bytes."""
+    import matplotlib as mpl
+
     buffer = io.BytesIO()
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -355,13 +358,13 @@ def _shorter(coordinates: re.Match[bytes]) -> bytes:
 
 
 def _figure(
-    drawing: Figure, alt: str, caption: str = "", data: pd.DataFrame | None = None
+    drawing: "Figure", alt: str, caption: str = "", data: pd.DataFrame | None = None
 ) -> dict[str, str]:
     links = "" if data is None else _downloads(alt, data, data)
     return {"alt": alt, "source": _source(drawing), "caption": caption, "links": links}
 
 
-def _source(drawing: Figure) -> str:
+def _source(drawing: "Figure") -> str:
     """The address of a figure, which contains it."""
     return f"data:image/svg+xml;base64,{b64encode(svg(drawing)).decode()}"
 

@@ -11,14 +11,10 @@ from pathlib import Path
 from tempfile import TemporaryFile, gettempdir
 from typing import IO, Any
 
-import matplotlib as mpl
 from nbformat import from_dict
 
 from dess import InputError
-from dess.analysis.answers import comparison
-from dess.analysis.answers.missions import keep_logs
 from dess.analysis.results.tables import load_results
-from dess.analysis.verification import measurements
 from dess.files.writing import temporary_folder
 from dess.reports.pages import cells
 from dess.reports.pages.cells import kill
@@ -120,6 +116,8 @@ def _environment(home: Path) -> dict[str, str]:
 
     An empty entry of the path means the working directory of this process, where anything may lie.
     """
+    from matplotlib import get_cachedir
+
     path = [*(os.path.abspath(entry) for entry in sys.path if entry), str(PACKAGES)]
     return {
         **os.environ,
@@ -129,7 +127,7 @@ def _environment(home: Path) -> dict[str, str]:
         "OMP_NUM_THREADS": "1",
         "TQDM_DISABLE": "1",  # a page shows no progress bar
         "MPLBACKEND": "agg",
-        "MPLCONFIGDIR": mpl.get_cachedir(),
+        "MPLCONFIGDIR": get_cachedir(),
     }
 
 
@@ -155,6 +153,11 @@ def make(
     Raises:
         InputError: If results are damaged, a parameter is refused or nothing can be written.
     """
+    if not {COMPARISON, VERIFICATION, *TIMED} & {*pages}:
+        return  # what follows takes its time to import
+    from dess.analysis.answers import comparison
+    from dess.analysis.answers.missions import keep_logs
+    from dess.analysis.verification import measurements
 
     def show(done: int, total: int) -> None:
         if progress:

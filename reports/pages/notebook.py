@@ -10,13 +10,13 @@ its page has scripts. One of its cells is tagged ``parameters``:
 
 import ast
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jupytext
 import nbformat
 from nbformat import NotebookNode
 
@@ -36,6 +36,14 @@ GROUPS = {
 NAMES = tuple(name for names in GROUPS.values() for name in names)
 PARAMETERS = "parameters"  # the tag of the cell with the parameters
 
+# jupytext has a plugin for Jupyter's server, which takes longer to import than the rest of it.
+_UNUSED = {"jupyter_client", "jupyter_server"} - sys.modules.keys()
+sys.modules |= dict.fromkeys(_UNUSED)  # type: ignore[arg-type]
+import jupytext  # noqa: E402
+
+for _name in _UNUSED:
+    del sys.modules[_name]
+
 _KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}
 
 
@@ -53,6 +61,7 @@ class Report:
         original: The complete notebook, as in its file.
         notebook: The cells of the page, with values for the parameters.
         key: What its page depends on; empty if it has other parameters than by default.
+        is_current: Whether its page is there, and has this key.
         done: Number of cells that have been run.
         failure: The cell that failed and its error, if one did.
         traceback: The traceback of the error.
@@ -67,6 +76,7 @@ class Report:
     original: NotebookNode
     notebook: NotebookNode
     key: str = ""
+    is_current: bool = False
     done: int = 0
     failure: str = ""
     traceback: str = ""

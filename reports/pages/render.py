@@ -10,6 +10,7 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from hashlib import sha256
 from importlib import metadata
@@ -27,7 +28,6 @@ from dess.files.documents import LIMIT
 from dess.files.reading import paths_in, read_bytes
 from dess.files.writing import delete, locked, write_files
 from dess.reports.pages import INDEX, LOCK, PREFIX, check_pages, html, kernels, notebook
-from dess.reports.pages.body import page_of
 from dess.reports.pages.html import fill, template
 from dess.reports.pages.kernels import Progress
 from dess.reports.pages.page import FILES, Page
@@ -203,7 +203,9 @@ def render(
     asked = [*dict.fromkeys(names)]
     reports = [notebook.read(name, notebooks) for name in asked or notebook.names_in(notebooks)]
     notebook.check_parameters(reports, values)
-    lacking = {report.name: _lacking(report, results) for report in reports}
+    for report in reports:
+        _look_up(report, results, out, values)
+    lacking = {r.name: {} if r.is_current else _lacking(r, results) for r in reports}
     for name, errors in lacking.items():
         for error in errors.values():
             if asked:
@@ -243,6 +245,7 @@ def render_study(
     report = report_of(folder, values)
     notebook.check_parameters([report], values)
     report.set({"results": str(folder.absolute()), **values})
+    _look_up(report, folder, out, values)
     _write([report], folder, out, progress, values)
     return out / report.page
 
@@ -257,13 +260,15 @@ def _write(
 ) -> None:
     """Run reports in the folder of their results, and write the pages and the index."""
     check_pages(out, *(report.name for report in reports))
-    for report in reports:
-        report.key = "" if values else key_of(report, _folders(report, results))
-    changed = [report for report in reports if not has_key(out / report.page, report.key)]
+    changed = [report for report in reports if not report.is_current]
     kernels.make([report.name for report in changed], results, values, progress)
     read_by = Counter(f for report in changed for f in _folders(report, results).values())
     kernels.run(changed, progress, [folder for folder, count in read_by.items() if count > 1])
-    made = {report.page: page_of(report) for report in changed}
+    made = {}
+    if changed:
+        from dess.reports.pages.body import page_of  # imports nbconvert
+
+        made = {report.page: page_of(report) for report in changed}
     complete = [report for report in reports if not report.failure]
     files = {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
     with locked(out / LOCK, _BUSY, PATIENCE):
@@ -277,6 +282,15 @@ def _write(
     if failed := [report for report in reports if report.failure]:
         lines = [f"{r.failure}; partial page: {out / r.page}" for r in failed]
         raise ReportError("; ".join(lines))
+
+
+def _look_up(report: notebook.Report, results: Path, out: Path, values: Mapping[str, Any]) -> None:
+    """Find out whether the page of a report is there and of these results, which are sound then."""
+    if values:
+        return
+    with suppress(InputError):  # there are none, or ``_lacking`` finds out what is wrong with them
+        report.key = key_of(report, _folders(report, results))
+        report.is_current = has_key(out / report.page, report.key)
 
 
 def _folders(report: notebook.Report, results: Path) -> dict[str, Path]:

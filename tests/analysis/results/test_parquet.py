@@ -172,7 +172,10 @@ def test_a_run_does_not_write_or_delete_where_a_link_leads(
     assert {**files_of(tmp_path), **before} == files_of(tmp_path)
 
 
-def test_a_file_that_is_too_large_is_not_read(sound: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_is_too_large_is_not_read(
+    sound: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copied = shutil.copytree(sound, tmp_path / "copied")  # files that nobody has read yet
     monkeypatch.setattr(parquet, "LIMIT", 10)
     with pytest.raises(InputError, match="is too large"):
-        load_results(sound)
+        load_results(copied)
