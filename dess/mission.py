@@ -39,7 +39,18 @@ from dess.scenario import Scenario, ScenarioSpace
 from dess.sections import fleet
 from dess.sections.failures import strike
 from dess.sections.packets import Packets
-from dess.state import BATTERY, LOST, QUOTA, UAV, State, check_seed, spaces_of, starts_of, state_of
+from dess.state import (
+    BATTERY,
+    LANDED,
+    LOST,
+    QUOTA,
+    UAV,
+    State,
+    check_seed,
+    spaces_of,
+    starts_of,
+    state_of,
+)
 from dess.view import decide, team_of
 
 
@@ -306,6 +317,8 @@ class MissionModel:
                 self.log.add(
                     slot + n / m, "communication", i, u.served, u.amount, x, y, u.battery, snr=u.snr
                 )
+                if self.mission["landing"] and u.communications == u.quota:
+                    self._log_uav("quota_filled", slot + n / m, i, u.communications)
 
     def _log_close(self, time: int, before: list[Any]) -> None:
         """Log new data, and the charging sessions and the UAVs that ended with a slot."""
@@ -322,6 +335,8 @@ class MissionModel:
                 self._log_uav("quota_filled", time, i, u.communications)
             if was.active and u.end == BATTERY:
                 self._log_uav("battery_empty", time, i)
+            if was.active and u.end == LANDED:
+                self._log_uav("landing", time, i)
 
     def _log_failures(self, time: float, before: State) -> None:
         """Log what has failed or was repaired since a copy of the state at the end of the slot."""

@@ -13,7 +13,7 @@ from dess.sections.age import write_age
 from dess.sections.charging import write_use
 from dess.sections.failures import write_failures
 from dess.sections.section import for_sections
-from dess.state import END_NAMES, QUOTA, fields
+from dess.state import END_NAMES, LANDED, QUOTA, fields
 
 # One mission. Data are in data units; rewards are summed over the slots and the UAVs (eq. 14).
 MISSION_RECORD = np.dtype(
@@ -102,7 +102,7 @@ PACKET_EVENTS = ("delivery", "loss")
 EVENT_NAMES = (
     *("mission_start", *PARAMETER_EVENTS, "move", "collision"),
     *("charge_request", "charge_start", "charge_end", "charge_withdrawal"),
-    *("communication", "arrival", "quota_filled", "battery_empty"),
+    *("communication", "arrival", "quota_filled", "battery_empty", "landing"),
     *(*FAILURE_EVENTS, *PACKET_EVENTS, "mission_end"),
 )
 
@@ -174,7 +174,7 @@ def write_record(mission, uavs, residual, sensors, teeth, records, row):
         out.reward = u.total_reward
         record.uav_slots += u.slots_flying + u.slots_charging
         record.reward += u.total_reward
-        if u.end != QUOTA:
+        if u.end != QUOTA and u.end != LANDED:
             record.success = 0
     total = record.initial + record.arrived
     # Rounding may put the ratio a little below 0 or above 1; without any data it is 1.
