@@ -16,7 +16,7 @@ from dess.policies import load
 from dess.record import EVENT_NAMES, FAILURE_EVENTS, PACKET_EVENTS, MissionRecord, Records
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.sea.families import FAMILIES
-from dess.state import BATTERY, HOVER, QUOTA, TRUNCATED, sample_scenario
+from dess.state import BATTERY, HOVER, LANDED, QUOTA, TRUNCATED, sample_scenario
 from dess.view import View
 from tests.drawn import (
     Commuter,
@@ -73,7 +73,7 @@ def test_both_engines_give_the_same_record(
         assert _is(records, job, simulate(space, team, seed, replication))
 
 
-@pytest.mark.parametrize("sections", [{}, FAILING])
+@pytest.mark.parametrize("sections", [{}, FAILING, FAILING | {"landing": True, "quota": 100}])
 def test_both_engines_agree_where_everything_happens(sections: dict[str, Any]) -> None:
     space = ScenarioSpace.of(BUSY, forbid_swaps=not sections, **sections)
     seen, ends, fleets, waited = set(), set(), set(), 0
@@ -86,9 +86,11 @@ def test_both_engines_agree_where_everything_happens(sections: dict[str, Any]) -
             ends.update(single.uavs["end"].tolist())
             fleets.add(len(single.uavs))
             waited += int(single.uavs["slots_waiting"].sum())
-    absent = {*PACKET_EVENTS} if sections else {*PACKET_EVENTS, *FAILURE_EVENTS}
-    assert seen == {*EVENT_NAMES} - absent
-    assert ends == {QUOTA, BATTERY, TRUNCATED} and fleets == {1, 2, 3, 4, 5, 6}
+    lands = space.landing
+    absent = {*PACKET_EVENTS, *(() if lands else ["landing"])}
+    assert seen == {*EVENT_NAMES} - absent - ({*()} if sections else {*FAILURE_EVENTS})
+    assert ends == {LANDED if lands else QUOTA, BATTERY, TRUNCATED}
+    assert fleets == {1, 2, 3, 4, 5, 6}
     assert waited > 100
 
 

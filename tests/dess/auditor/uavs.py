@@ -41,6 +41,10 @@ class Uav(SimpleNamespace):
     def flies(self) -> bool:
         return not (self.end or self.charging or self.grounded)
 
+    @property
+    def has_filled(self) -> bool:
+        return 0 < self.quota <= self.communications
+
 
 def cells_of_zones(constants: Mapping[str, Any]) -> list[list[Cell]]:
     """The cells of each charging zone, the start zone first."""
@@ -78,6 +82,11 @@ class Fleet:
     def zone_of(self, u: Uav) -> int:
         """The number of the charging zone that a UAV is in, or -1."""
         return next((zone for zone, cells in enumerate(self.zones) if u.cell in cells), -1)
+
+    def stands(self, u: Uav) -> bool:
+        """Whether a UAV stands on the ground, on no pad: there hovering costs nothing."""
+        hovers = u.cell == (u.from_x, u.from_y)
+        return bool(self.c.get("landing") and u.flies and hovers and self.zone_of(u) >= 0)
 
     def type_of(self, i: int) -> Mapping[str, Any]:
         plain = {"slots_per_cell": 1, "quota": None, "rate": 1.0, "flying_time": None}
@@ -156,9 +165,9 @@ class Fleet:
         """Let the UAVs that fly lose battery."""
         for _, u in self.active:
             u.slots_grounded += u.grounded
-            if u.flies:
+            u.slots_waiting += u.waits
+            if u.flies and not self.stands(u):
                 u.slots_flying += 1
-                u.slots_waiting += u.waits
                 u.battery -= self.c["flight_cost"]
                 step = u.x - u.from_x, u.y - u.from_y
                 if step != (0, 0) and u.slots_left == u.slots_per_cell - 1 and u.battery > 0:
