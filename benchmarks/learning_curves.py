@@ -25,11 +25,10 @@ from dess.analysis.answers.learning import SHIPPED, read_curves, trained_policie
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.files.reading import paths_in
 from dess.files.tables import read_table, write_table
-from dess.policies.base import Policy
 from dess.policies.learner.config import TrainingConfig, load_config
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.session import device_of
-from dess.policies.registry import TRAINED, load
+from dess.policies.registry import TRAINED, Policy, load
 
 EVALUATION_SEED, MISSIONS = 900_000_001, 1000  # of the final evaluation
 

@@ -21,10 +21,8 @@ from dess.analysis.stats.differences import paired
 from dess.analysis.stats.intervals import interval_of, post_stratified
 from dess.files.reading import read_text
 from dess.files.writing import write_file
-from dess.policies.about import CARD
-from dess.policies.learner.config import MISSION_SEED, load_config
-from dess.policies.learner.description import read_description
-from dess.policies.registry import HEURISTICS, load
+from dess.policies.learner.config import MISSION_SEED, load_config, read_description
+from dess.policies.registry import CARD, HEURISTICS, load
 
 # The seed of the missions of model cards, which neither training nor selection of weights uses.
 EVALUATION_SEED = 20_261_121

@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess import streams
-from dess.code.kernels import inlined, kernel
-from dess.code.portable import log10
+from dess.code.kernels import inlined, kernel, log10
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import Chart
 from dess.sections import fleet

@@ -7,7 +7,7 @@ A UAV that cannot fill its quota with its present battery must be able to reach 
 charging zone, with a margin of some slots for detours around teammates. The rules are described in
 ``docs/concepts/return-guard.md``. The functions below are compiled and work on the arrays of one
 mission; ``chart`` is a ``dess.sea.chart.Chart``, ``reach`` the table of
-``dess.observations.reach``.
+``dess.sections.wind``.
 """
 
 import math
@@ -16,14 +16,13 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
-from dess.observations.reach import reach_of
 from dess.rules import data_left
 from dess.scenario import MOST_ZONES
 from dess.sea.chart import distance, in_zone, is_open, length_around
 from dess.sections.failures import working_pads
 from dess.sections.landing import flies, lands
 from dess.sections.section import for_sections
-from dess.sections.wind import move_surcharge
+from dess.sections.wind import move_surcharge, reach_of
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 

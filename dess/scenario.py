@@ -27,7 +27,7 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 
 from dess.errors import InputError, one_of, shown, validation_line
-from dess.files.shipped import Shipped
+from dess.files.reading import Shipped
 from dess.sea.chart import FAR, Cell, Chart, Rectangle, chart_at, parking_of, spread, zones_of
 from dess.sea.families import FAMILIES, is_generated, sea_of
 from dess.sea.files import no_fly_in, nodes_in, projection_in

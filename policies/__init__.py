@@ -8,8 +8,7 @@ actions = policy.act(view)
 from pathlib import Path
 
 from dess.policies import registry
-from dess.policies.base import Policy
-from dess.policies.registry import TypedByUser, names
+from dess.policies.registry import Policy, TypedByUser, names
 
 __all__ = ["load", "load_team", "names"]
 

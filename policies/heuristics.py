@@ -11,10 +11,10 @@ import numpy as np
 
 from dess import guard, streams
 from dess.code.kernels import inlined, kernel
-from dess.observations.reach import reach_of
 from dess.rules import data_left
 from dess.sea.chart import distance, spread
 from dess.sections.landing import flies
+from dess.sections.wind import reach_of
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 

@@ -1,7 +1,15 @@
 """Policies by name, from the folder of a training, from a Python file, or of another package.
 
 load("greedy"), load("ddqn"), load("runs/my-training"), load("my_policies.py:Eager")
-load_team("greedy,tour")
+load_team("greedy,tour"), about("ddqn").card
+
+A policy has a name and ``act``, which chooses actions for many UAVs at once::
+
+    class Hover:
+        name = "hover"
+
+        def act(self, view: View) -> np.ndarray:
+            return np.full(len(view), 4)
 
 Other packages register theirs under the entry point ``dess.policies``.
 """
@@ -15,13 +23,44 @@ from importlib import import_module, invalidate_caches
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
+import numpy as np
+
+import dess
 from dess.code.libraries import needs
 from dess.code.sources import path_of
 from dess.errors import InputError, one_of, shown
-from dess.files.reading import paths_in
-from dess.policies.base import Policy
+from dess.files.reading import Missing, paths_in, read_text
+from dess.policies.learner.config import CHECKPOINT, CONFIG, read_description
+from dess.scenario import SAMPLED, load_scenario, scenario_names
+from dess.view import View
+
+
+@runtime_checkable
+class Policy(Protocol):
+    """A policy chooses actions for many UAVs at once, and keeps no state between calls.
+
+    A slow policy may have the attribute ``chunk``: how many missions a study computes and stores
+    together at most, so that an interruption loses little.
+
+    Attributes:
+        name: The name under which results are stored.
+    """
+
+    name: str
+
+    def act(self, view: View) -> np.ndarray:
+        """Choose an action for every row of the view.
+
+        Args:
+            view: The state of the R UAVs that must act, over any number of missions.
+
+        Returns:
+            (R,) integers: 0 north, 1 east, 2 south, 3 west, 4 hover.
+        """
+        ...
+
 
 GROUP = "dess.policies"
 
@@ -47,8 +86,7 @@ PLANNERS = {
 }
 SHIPPED = HEURISTICS | PLANNERS
 
-# One folder per trained policy, and the file that describes it.
-TRAINED, CONFIG = Path(__file__).with_name("trained"), "config.json"
+TRAINED = Path(__file__).with_name("trained")  # one folder per trained policy
 
 # A class of a Python file.
 FILE = re.compile(r"(?P<path>.+\.py):(?P<kind>\w+)")
@@ -139,8 +177,6 @@ def folder_of(name: str) -> Path | None:
 
 def _check_untrained(folder: Path) -> None:
     """Raise an error if a folder has a training that has not written any weights yet."""
-    from dess.policies.learner.config import CHECKPOINT  # imports pydantic
-
     if os.path.exists(folder / CHECKPOINT):  # False for a name that no folder can have
         raise InputError(
             f"policy: {folder} is a training that has no weights yet; allowed: after "
@@ -263,9 +299,76 @@ def _outside() -> dict[str, EntryPoint]:
 
 def _description(folder: Path) -> str:
     """The description in the config of a trained policy, or the policy that it repeats."""
-    from dess.policies.learner.description import read_description  # imports pydantic
-
     training = read_description(folder).training
     if training.name == folder.name:
         return training.description
     return f"{training.name} trained once more, with seed {training.seed}"
+
+
+CARD = "README.md"  # beside the weights of a trained policy
+CARD_LIMIT = 2**20  # bytes
+
+
+class About(NamedTuple):
+    """A policy in words.
+
+    Attributes:
+        name: As commands take it.
+        origin: Where it comes from: dess, a package, a folder or a file.
+        code: Its module and class.
+        requires: The fields of a scenario that must have these values; empty if any will do.
+        scenarios: The shipped scenarios that it can simulate.
+        trained_on: The ranges of the sampled parameters in its training; empty if it has none.
+        card: Its model card in Markdown, or what its class says.
+    """
+
+    name: str
+    origin: str
+    code: str
+    requires: dict[str, Any]
+    scenarios: list[str]
+    trained_on: dict[str, Any]
+    card: str
+
+
+def about(name: str) -> About:
+    """What there is to know about a policy that a user asks for.
+
+    Raises:
+        InputError: If it does not exist or cannot be loaded.
+    """
+    policy, folder = load(TypedByUser(name)), folder_of(name)
+    described = read_description(folder) if folder else None
+    requires = described.layout.model_dump() if described and described.layout else {}
+    scenarios = {name: load_scenario(name).model_dump(mode="json") for name in scenario_names()}
+    trained_on = described.training.scenario if described and described.layout else ""
+    return About(
+        name=name,
+        origin=_origin(name),
+        code=f"{type(policy).__module__}:{type(policy).__qualname__}",
+        requires=requires,
+        scenarios=[n for n, fields in scenarios.items() if requires.items() <= fields.items()],
+        trained_on={field: scenarios[trained_on][field] for field in SAMPLED}
+        if trained_on in scenarios
+        else {},
+        card=_card(folder) or inspect.getdoc(type(policy)) or "",
+    )
+
+
+def _card(folder: Path | None) -> str:
+    """The model card in the folder of a trained policy; empty without one."""
+    try:
+        return read_text(folder / CARD, CARD_LIMIT) if folder else ""
+    except Missing:
+        return ""
+
+
+def _origin(name: str) -> str:
+    """Where a policy comes from, in words."""
+    if name in (*SHIPPED, *trained_names()):
+        return f"shipped with dess {dess.__version__}"
+    if folder := folder_of(name):
+        return f"the folder {folder}"
+    if file := FILE.fullmatch(name):
+        return f"the file {file['path']}"
+    return f"the package {package_of(name)}"

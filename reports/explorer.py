@@ -22,7 +22,7 @@ from dess.analysis.answers import summary
 from dess.analysis.answers.settings import points, varied
 from dess.analysis.figures import style
 from dess.analysis.results.tables import Results
-from dess.reports.pages.html import template
+from dess.reports.pages.html import rendered
 
 
 class Slider(NamedTuple):
@@ -149,7 +149,7 @@ def explorer(results: Results) -> HTML:
         ],
     }
     shown = {"sliders": grid.sliders, "policies": looks, "metrics": metrics.METRICS, "texts": texts}
-    return HTML(template("explorer.html").render(data=data, **shown))
+    return rendered("explorer.html", data=data, **shown)
 
 
 def _tenths(share: float) -> int:

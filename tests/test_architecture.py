@@ -24,7 +24,7 @@ ROOMS = {
         *("answers.main_effects", "figures.settings", "answers", "paper", "verification", "ask"),
     ),
     "reports": (
-        *("folders", "tools", "pages", "player", "explorer", "crate"),
+        *("pages", "player", "explorer", "crate"),
         *("interrupts", "cli"),
     ),
 }
@@ -52,7 +52,7 @@ LIGHT = (
 # These are the types and functions of the registry, and the functions to which users give names.
 MAY_RUN_FILES = {
     "dess.policies.registry.TypedByUser": {
-        *("dess.policies", "dess.policies.about", "dess.analysis.execution.evaluation"),
+        *("dess.policies", "dess.analysis.execution.evaluation"),
         *("dess.analysis.results.provenance", "dess.reports.cli.simulate"),
     },
     "dess.policies.registry.typed": {
@@ -64,18 +64,16 @@ MAY_RUN_FILES = {
     },
     "dess.policies.load": set(),
     "dess.policies.load_team": set(),
-    "dess.policies.about.about": {"dess.reports.cli.lists"},
+    "dess.policies.registry.about": {"dess.reports.cli.lists"},
     "dess.analysis.execution.evaluation.evaluate": {"dess.analysis"},
-    "dess.analysis.ask.question.sweep_question": {
-        "dess.analysis.ask.answer",
-        "dess.reports.cli.ask",
+    **{
+        f"dess.analysis.ask.question.{name}_question": {
+            *(f"dess.analysis.ask.{name}", "dess.reports.cli.ask"),
+        }
+        for name in ("sweep", "what_if")
     },
-    "dess.analysis.ask.question.what_if_question": {
-        "dess.analysis.ask.answer",
-        "dess.reports.cli.ask",
-    },
-    "dess.analysis.ask.answer.sweep": {"dess.analysis"},
-    "dess.analysis.ask.answer.what_if": {"dess.analysis"},
+    "dess.analysis.ask.sweep.sweep": {"dess.analysis"},
+    "dess.analysis.ask.what_if.what_if": {"dess.analysis"},
     **{f"dess.analysis.{name}": set() for name in ("evaluate", "sweep", "what_if")},
 }
 

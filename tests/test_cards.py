@@ -5,8 +5,7 @@ import re
 import pytest
 
 from benchmarks import model_cards
-from dess.policies.about import CARD
-from dess.policies.registry import TRAINED, trained_names
+from dess.policies.registry import CARD, TRAINED, trained_names
 
 
 @pytest.mark.slow

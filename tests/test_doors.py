@@ -39,10 +39,10 @@ ALLOWED = {
     "dess.code.kernels": {"read_bytes"},
     "dess.code.sources": {"read_bytes", "walk"},
     # A library that opens a file which the door has checked, or a temporary one of the door.
-    "dess.policies.learner.tensors": {"safe_open", "save_file"},
+    "dess.policies.learner.trained": {"safe_open", "save_file"},
     "dess.policies.learner.session": {"SummaryWriter"},
     "dess.reports.cli.simulate": {"savefig"},
-    "dess.reports.player.animation": {"saving"},
+    "dess.reports.player": {"saving"},
     # The null device in the place of a closed stream; the licence of the package.
     "dess.reports.cli.console": {"open"},
     "dess.reports.crate": {"read_text"},

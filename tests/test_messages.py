@@ -21,8 +21,7 @@ from dess.analysis.study.study import Study
 from dess.analysis.verification.measurements import CrossCheck
 from dess.files.documents import Document
 from dess.policies.learner.checkpoint import Header
-from dess.policies.learner.config import TrainingConfig, load_config
-from dess.policies.learner.description import Description
+from dess.policies.learner.config import Description, TrainingConfig, load_config
 from dess.policies.registry import TRAINED
 from dess.record import MISSION_RECORD
 from dess.reports.pages.page import Card, Learned

@@ -22,17 +22,15 @@ from dess.analysis.figures.comparison import middle
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from dess.analysis.names import PARAMETERS, parameter, value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.choices import on_front
 from dess.analysis.stats.differences import compare, for_choice, paired, with_adjusted
 from dess.analysis.stats.intervals import LEVEL, by_replication, values_within, wilson
-from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
+from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, on_front, position_by_test
 from dess.analysis.study.stopping import Text
 from dess.errors import one_of
 from dess.files.documents import Document
 from dess.files.reading import read_text
 from dess.files.writing import check_target, write_file
-from dess.policies.base import Policy
-from dess.policies.registry import load_team
+from dess.policies.registry import Policy, load_team
 from dess.view import View
 
 OF_BASELINE = "_baseline"  # suffix of the names of the baseline's metrics

@@ -24,7 +24,7 @@ from dess.analysis.answers.settings import edge, ends, points, ranked
 from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of
 from dess.analysis.names import DECISIONS, parameter
 from dess.analysis.results.tables import Results, once
-from dess.analysis.stats.choices import membership, on_front
+from dess.analysis.stats.verdict import membership, on_front
 from dess.analysis.study.cheapest import PARTS, Answer, Cheapest, CheapestChoice, Costs
 from dess.analysis.tables import CHECKED, INTERVALS, MOST_ROWS, Table, counts
 from dess.errors import one_of

@@ -24,8 +24,7 @@ from dess.analysis.stats.verdict import INCONCLUSIVE, MARKS, above, judged, posi
 from dess.errors import one_of
 from dess.files.reading import paths_in
 from dess.files.tables import read_table
-from dess.policies.learner.config import TrainingConfig, learner_of
-from dess.policies.learner.description import read_description
+from dess.policies.learner.config import TrainingConfig, learner_of, read_description
 
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.axes import Axes

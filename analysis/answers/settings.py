@@ -20,9 +20,9 @@ from dess.analysis import numbers
 from dess.analysis.metrics import COST, METRICS, PRODUCT, metric_of, metrics_in
 from dess.analysis.names import parameter, value_text
 from dess.analysis.results.tables import Results, once
-from dess.analysis.stats.choices import may_be_best
 from dess.analysis.stats.differences import column_tests, with_adjusted
 from dess.analysis.stats.intervals import by_replication, column_intervals, stratified
+from dess.analysis.stats.verdict import may_be_best
 from dess.analysis.tables import INTERVALS, MOST_ROWS, YES, Table, counts
 from dess.errors import one_of
 

@@ -16,12 +16,11 @@ from dess.analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS, metr
 from dess.analysis.names import parameter, value_text
 from dess.analysis.results.chunks import parts_of
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.choices import may_be_best
 from dess.analysis.stats.differences import compare, for_choice
 from dess.analysis.stats.distribution import distribution
 from dess.analysis.stats.intervals import LEVEL, by_replication, summary, values_within
 from dess.analysis.stats.learners import compare_learners
-from dess.analysis.stats.verdict import MARKS, position
+from dess.analysis.stats.verdict import MARKS, may_be_best, position
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.design import NOISE, Saltelli
 from dess.analysis.tables import INTERVALS, MOST_ROWS, YES, Table, compared, counts

@@ -38,14 +38,7 @@ from dess.errors import one_of, validation_line
 from dess.files.reading import paths_in
 from dess.files.writing import write_file
 from dess.policies.registry import typed
-from dess.scenario import (
-    SAMPLED,
-    ScenarioSpace,
-    dotted,
-    fields_of,
-    is_scenario_name,
-    load_scenario,
-)
+from dess.scenario import SAMPLED, ScenarioSpace, dotted, fields_of, is_scenario_name, load_scenario
 
 WHAT_IF = "what-if"
 RANGES = (*SAMPLED, "initial_data")  # fields that hold [low, high]
@@ -412,3 +405,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def plain(text: str) -> str:
+    """A sentence of Markdown as plain text."""
+    return text.replace("**", "").replace("`", "")

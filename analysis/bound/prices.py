@@ -4,6 +4,11 @@ Data that the team takes from a node up to a cut are at most what the node has h
 these constraints has a price. Every choice of prices gives an upper bound; subgradient steps look
 for low ones, and the lowest bound found is kept.
 
+The next prices to try are those of a proximal bundle method for convex functions. The bounds and
+slopes found so far give a model of the bound, the largest of their tangents. The next prices
+minimise the model plus the squared distance from the best prices so far (C. Lemarechal,
+*Nondifferentiable optimization*, 1989). Whatever it returns, the bound at the prices is valid.
+
     bound = upper_bound(load_scenario("paper"), seed=1, replication=0)
     bound.ratio  # no policy has a higher expected collection ratio in this mission
 """
@@ -15,9 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess import InputError, rules
-from dess.analysis.bound.bundle import next_prices
-from dess.analysis.bound.energy import Phases, early_charges, most_flying, phases_of
-from dess.analysis.bound.paths import blocks_of, bound_paths
+from dess.analysis.bound import paths
 from dess.analysis.bound.service import POINTS, rates_of, spread, step_values
 from dess.analysis.bound.slopes import add_slopes
 from dess.channel import empty_scratch, world_of
@@ -25,6 +28,53 @@ from dess.code.kernels import kernel
 from dess.scenario import ScenarioSpace
 from dess.sea import chart
 from dess.state import sample_scenario, starts_of, state_of
+
+_STEPS = 300
+
+
+@kernel
+def next_prices(centre, most, lowest, points, bounds, slopes, width):
+    """The prices that minimise the model plus the squared distance from ``centre``.
+
+    Args:
+        centre: (V,) the best prices so far.
+        most: (V,) the largest prices allowed; the smallest are 0.
+        lowest: The bound at ``centre``.
+        points: (N, V) prices tried.
+        bounds: (N,) the bounds there.
+        slopes: (N, V) the derivatives there.
+        width: Twice the weight of the model against the squared distance.
+
+    Returns:
+        (V,) prices, and the bound that the model has there.
+    """
+    count = len(bounds)
+    offsets, model = np.empty(count), np.empty(count)
+    for i in range(count):  # rounding, and the finite number of local prices, can lift a tangent
+        offsets[i] = min(bounds[i] + (slopes[i] * (centre - points[i])).sum(), lowest)
+    weights = np.zeros(count)
+    weights[np.argmax(offsets)] = 1.0
+    for _ in range(_STEPS):  # of the dual problem, between two tangents at a time
+        slope = np.zeros(len(centre))
+        for i in range(count):
+            slope += weights[i] * slopes[i]
+        prices = np.minimum(np.maximum(centre - width * slope, 0.0), most)
+        above, under = 0, -1
+        for i in range(count):
+            model[i] = offsets[i] + (slopes[i] * (prices - centre)).sum()
+            if model[i] > model[above]:
+                above = i
+            if weights[i] > 0.0 and (under < 0 or model[i] < model[under]):
+                under = i
+        gap = model[above] - model[under]
+        if gap < 1e-7:
+            break
+        between = ((slopes[above] - slopes[under]) ** 2).sum()
+        share = min(gap / (width * between), weights[under])
+        weights[above] += share
+        weights[under] -= share
+    return prices, model.max()
+
 
 ITERATIONS = 20
 MOST_MEMORY = 4 * 2**30  # of the table of a mission [bytes]
@@ -78,7 +128,7 @@ class Known(NamedTuple):
     nodes: np.ndarray
     rates: np.ndarray
     below: np.ndarray
-    phases: Phases
+    phases: paths.Phases
     zones: np.ndarray
     to_zone: np.ndarray
 
@@ -123,9 +173,9 @@ def check_scenario(scenario: ScenarioSpace) -> None:
 
 def ceilings_memory(scenario: ScenarioSpace, detail: Detail) -> int:
     """The memory [bytes] of ``Bounds.ceilings`` in the mission that takes the most."""
-    slots, near = most_flying(scenario), min(detail.near, max(len(scenario.nodes) - 1, 1))
+    slots, near = paths.most_flying(scenario), min(detail.near, max(len(scenario.nodes) - 1, 1))
     battery = scenario.flying_time[0], scenario.charge_start[1], scenario.charge_complete[0]
-    phases = 2 + len(early_charges(slots, *battery)) if scenario.flight_cost else 1
+    phases = 2 + len(paths.early_charges(slots, *battery)) if scenario.flight_cost else 1
     return math.prod(_shape(slots, phases, scenario.size, near, detail)) * np.dtype(float).itemsize
 
 
@@ -140,7 +190,7 @@ def _shape(
 def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
     """What seed and replication tell of a mission."""
     sampled = sample_scenario(scenario, seed, replication)
-    phases = phases_of(sampled)
+    phases = paths.phases_of(sampled)
     state = state_of([scenario], 1)
     rules.launch(state, 0, starts_of([scenario], seed), 0, replication)
     record = state.missions[0]
@@ -177,7 +227,7 @@ class Bounds:
     def __init__(self, known: Known, detail: Detail):
         self.known = known
         size, (phases, slots) = known.to_zone.shape, known.phases.clock.shape
-        self.blocks = blocks_of(known.nodes, size, detail.near, np.array(detail.levels))
+        self.blocks = paths.blocks_of(known.nodes, size, detail.near, np.array(detail.levels))
         self.parts = np.array(detail.local)
         last = int(known.phases.clock.max())
         inner = np.array([int(part * last) for part in detail.cuts], np.int64)
@@ -197,7 +247,7 @@ class Bounds:
         service = (known.nodes, known.rates, known.below)
         step_values(worth, local, known.nodes, self.blocks.home, *service[1:], self.values)
         before = (known.to_zone, known.phases, data, self.period, self.blocks, local)
-        bound_paths(*before, self.values, waiting, self.ceilings)
+        paths.bound_paths(*before, self.values, waiting, self.ceilings)
         bound = total + (prices[:-1] * data[cuts]).sum()
         slope, takings = np.zeros(prices.shape), np.zeros(prices.shape)
         slope[:-1] = data[cuts]

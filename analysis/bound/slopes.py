@@ -5,17 +5,7 @@ No bound depends on what is computed here.
 
 import numpy as np
 
-from dess.analysis.bound.paths import (
-    CHARGE,
-    STOP,
-    beginning,
-    data_had,
-    is_reached,
-    last_slot,
-    may_charge,
-    memory_of,
-    remembered,
-)
+from dess.analysis.bound import paths
 from dess.analysis.bound.service import step_takings
 from dess.code.kernels import inlined, kernel
 from dess.state import STEP_X, STEP_Y
@@ -38,7 +28,7 @@ def _leave(blocks, local, now, ahead, had, then_had, home, there, level, q):
     """The same by a step into another block, and the level at which ``home`` is remembered."""
     least, best, chosen = np.inf, 0, 0
     for later in range(len(blocks.levels)):
-        value, line = beginning(
+        value, line = paths.beginning(
             blocks, local, now, ahead, had, then_had, home, there, level, later, local[home, q]
         )
         if value < least:
@@ -53,23 +43,24 @@ def _choose(
 ):  # fmt: skip
     """What determines the ceiling of a state: the choice, its local price, the level kept."""
     home = blocks.home[x, y]
-    node, level = remembered(blocks, home, memory)
-    had, then_had = data_had(data, phases, phase, f), data_had(data, phases, phase, f + 1)
-    most = -waiting[last_slot(phases, phase, f, len(waiting) - 1)]
-    choice, line, later = STOP, q, 0
-    if may_charge(to_zone, phases, phase, f, x, y):
-        new = data_had(data, phases, phases.after[f], f) - had
+    node, level = paths.remembered(blocks, home, memory)
+    had = paths.data_had(data, phases, phase, f)
+    then_had = paths.data_had(data, phases, phase, f + 1)
+    most = -waiting[paths.last_slot(phases, phase, f, len(waiting) - 1)]
+    choice, line, later = paths.STOP, q, 0
+    if paths.may_charge(to_zone, phases, phase, f, x, y):
+        new = paths.data_had(data, phases, phases.after[f], f) - had
         value = ceilings[f, phases.after[f], x, y, memory, q] + local[home, q] * new[home]
         if memory > 0:
             value += local[node, blocks.levels[level]] * new[node]
         if value > most:
-            most, choice = value, CHARGE
+            most, choice = value, paths.CHARGE
     if f >= phases.deadline[phase]:
         return choice, line, later
     s = period[phases.clock[phase, f]]
     for action in range(5):
         x2, y2 = x + STEP_X[action], y + STEP_Y[action]
-        if not is_reached(to_zone, phases, phase, f + 1, x2, y2):
+        if not paths.is_reached(to_zone, phases, phase, f + 1, x2, y2):
             continue
         there, now, ahead = blocks.home[x2, y2], values[s, action, x2, y2], ceilings[f + 1, phase]
         if there == home:
@@ -106,7 +97,7 @@ def add_slopes(
         The bound of the UAV, and the earliest mission slot of its last flying slot.
     """
     phase, f, memory, home, last = 0, 0, 0, blocks.home[x, y], slopes[-1]
-    had = data_had(data, phases, phase, 0)
+    had = paths.data_had(data, phases, phase, 0)
     start = ceilings[0, 0, x, y, 0] + local[home] * had[home]
     q = np.argmin(start)
     least = start[q]
@@ -117,13 +108,14 @@ def add_slopes(
             to_zone, phases, data, period, blocks, local, values, waiting, ceilings,
             f, phase, x, y, memory, q,
         )  # fmt: skip
-        if choice == STOP:
+        if choice == paths.STOP:
             break
-        node, level = remembered(blocks, home, memory)
+        node, level = paths.remembered(blocks, home, memory)
         price = parts[blocks.levels[level]]
-        had, then_had = data_had(data, phases, phase, f), data_had(data, phases, phase, f + 1)
-        if choice == CHARGE:
-            then_had = data_had(data, phases, phases.after[f], f)
+        had = paths.data_had(data, phases, phase, f)
+        then_had = paths.data_had(data, phases, phase, f + 1)
+        if choice == paths.CHARGE:
+            then_had = paths.data_had(data, phases, phases.after[f], f)
             phase = phases.after[f]
         new = then_had - had
         s = period[phases.clock[phase, f]]
@@ -135,14 +127,14 @@ def add_slopes(
                 last[node] += price * new[node]
         else:
             known = level if node == there else 0
-            memory = memory_of(blocks, there, home, later)
+            memory = paths.memory_of(blocks, there, home, later)
             left = parts[blocks.levels[later]] if memory > 0 else 0.0
             last[home] += left * new[home] + max(left - parts[q], 0.0) * had[home]
             last[there] += parts[line] * new[there]
             known_price = parts[blocks.levels[known]]
             last[there] += max(parts[line] - known_price, 0.0) * had[there]
         home, q = there, line
-        if choice == CHARGE:
+        if choice == paths.CHARGE:
             continue
         priced = worth[s].copy()
         priced[home] = max(priced[home] - local[home, q], 0.0)
@@ -151,4 +143,4 @@ def add_slopes(
         slopes[s] += takings
         last[home] -= parts[q] * takings[home]
         f += 1
-    return least, last_slot(phases, phase, f, len(waiting) - 1)
+    return least, paths.last_slot(phases, phase, f, len(waiting) - 1)

@@ -8,13 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess import InputError, simulate_batch
-from dess.analysis.execution.effort import (
-    Range,
-    check_time,
-    check_workers,
-    check_workers_memory,
-    seconds_of,
-)
+from dess.analysis.execution import effort
 from dess.analysis.execution.jobs import (
     CHUNK,
     Job,
@@ -61,7 +55,7 @@ class Asked(NamedTuple):
 
     def check(self) -> None:
         """Refuse numbers that are out of range, and teams that are unknown or too large."""
-        check_workers(self.workers)
+        effort.check_workers(self.workers)
         if not 1 <= self.missions <= MAX_REPLICATION + 1:
             allowed = f"allowed: 1..{MAX_REPLICATION + 1:,}"
             raise InputError(f"missions: {self.missions} is out of range; {allowed}")
@@ -183,12 +177,12 @@ def check_evaluation(asked: Sequence[Asked], yes: bool = False) -> None:
     missions = sum(one.missions for one in asked)
     what = f"evaluate: {missions:,} missions (policies: {len(asked)}, workers: {workers:,})"
     if not yes:
-        check_workers_memory(what, workers, [scenario], 4 * MEMORY, engine == "events")
+        effort.check_workers_memory(what, workers, [scenario], 4 * MEMORY, engine == "events")
         times = [
-            seconds_of([scenario], one.team, (one.missions, one.missions), engine, workers)
+            effort.seconds_of([scenario], one.team, (one.missions, one.missions), engine, workers)
             for one in asked
         ]
-        check_time(what, reduce(Range.plus, times))
+        effort.check_time(what, reduce(effort.Range.plus, times))
     for one in asked[1:]:  # the first one is refused at its first mission
         simulate_missions(engine, [scenario], load_team(one.team), one.seed, [0])
 

@@ -15,7 +15,6 @@ from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
-from dess.analysis.execution.cluster import Cluster
 from dess.analysis.execution.effort import check_workers
 from dess.analysis.execution.jobs import (
     CHUNK,
@@ -26,7 +25,7 @@ from dess.analysis.execution.jobs import (
     Problem,
     Progress,
 )
-from dess.analysis.execution.workers import Here, Pool
+from dess.analysis.execution.workers import Cluster, Here, Pool
 from dess.analysis.results import tables
 from dess.analysis.results.chunks import (
     Chunk,

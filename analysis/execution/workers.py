@@ -1,19 +1,28 @@
-"""Pools that run jobs: the base class, and pools on this machine.
+"""Pools that run jobs: the base class, pools on this machine, and one on a dask cluster.
 
 A job that raises an error has a ``Problem`` as its result. A worker that is killed is replaced, and
-its job is run again; a job that kills its worker every time also has a ``Problem``.
+its job is run again; a job that kills its worker every time also has a ``Problem``. What the
+libraries of a cluster log or warn of is not shown: what matters to a user is an error or a note of
+this module.
 """
 
+import asyncio
+import logging
 import os
 import signal
 import warnings
 from abc import abstractmethod
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from queue import Empty, SimpleQueue
 from typing import Any
 
+from dess import InputError
+from dess.analysis.execution import live_and_die_with
 from dess.analysis.execution.jobs import Job, Problem, Progress, attempt, first_failing
-from dess.analysis.execution.orphans import live_and_die_with
+from dess.analysis.results.provenance import Member, engine_code
+from dess.code.libraries import needs
 
 Finished = Generator[tuple[int, Any], None, None]  # numbers and results of jobs
 
@@ -180,3 +189,177 @@ def reported(job: Job, result: Any, progress: Progress | None) -> Any:
 
 def _numbered(number: int, job: Job) -> tuple[int, Any]:
     return number, attempt(job)
+
+
+log = logging.getLogger(__name__)
+
+ANSWER = 10.0  # seconds in which a scheduler must answer
+LOOK = 5.0  # seconds without a result after which to look whether there are workers
+GOODBYE = 3.0  # seconds to take leave of a scheduler
+GONE = (OSError, asyncio.CancelledError, CancelledError)  # raised where a scheduler is gone
+NOISY = ("distributed", "tornado", "asyncio")  # libraries that log what goes wrong
+
+
+class SchedulerError(Exception):
+    """The scheduler of a cluster is gone; what had been computed before is complete."""
+
+
+class Cluster(Pool):
+    """A dask.distributed cluster, whose workers must have this code.
+
+    It runs a job several times by itself before it reports that the workers of the job have died.
+    """
+
+    attempts = 1
+
+    def __init__(self, address: str):
+        """Name the cluster.
+
+        Args:
+            address: The address of its scheduler.
+
+        Raises:
+            InputError: If ``distributed`` is not installed.
+        """
+        needs("distributed", "a scheduler")
+        self.address = address
+
+    def __enter__(self) -> "Cluster":
+        """Connect to the scheduler.
+
+        Raises:
+            InputError: If there is no scheduler at the address.
+        """
+        from distributed import Client
+
+        with ExitStack() as stack:
+            stack.enter_context(_silence())
+            try:
+                self._greet()
+                self.client = Client(self.address, timeout=ANSWER, set_as_default=False)
+            except InputError:
+                raise
+            except Exception as error:  # of many types, by what is at the address
+                reason = str(error) or f"no scheduler answers within {ANSWER:.0f} s"
+                raise InputError(self._refusal(f"cannot be reached: {reason}")) from None
+            stack.callback(self._leave)
+            self._exits = stack.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._exits.close()
+
+    def _finished(self, jobs: Mapping[int, Job], suspects: set[int]) -> Iterator[tuple[int, Any]]:
+        """Results by job number as they come in; ``suspects`` gets the jobs whose workers died.
+
+        Raises:
+            InputError: If a worker cannot run the jobs.
+            SchedulerError: If the connection to the scheduler is lost.
+        """
+        done: SimpleQueue[Any] = SimpleQueue()
+        code = engine_code()
+        codes = {policy: job.code for policy, job in {j.policy: j for j in jobs.values()}.items()}
+        futures = []
+        try:
+            for job in jobs.values():
+                own = codes[job.policy]
+                futures.append(self.client.submit(_checked, job, code, own, pure=False))
+                futures[-1].add_done_callback(done.put)
+            numbers = {future.key: number for future, number in zip(futures, jobs, strict=True)}
+            for _ in futures:
+                future = self._next(done)
+                if (result := self._result(future)) is None:
+                    suspects.add(numbers[future.key])
+                else:
+                    yield numbers[future.key], result
+                future.release()
+        except InputError:
+            raise
+        except (Exception, asyncio.CancelledError) as error:
+            if isinstance(error, GONE) or self.client.status != "running":
+                line = f"scheduler: the connection to {self.address} is lost"
+                raise SchedulerError(line) from None
+            raise
+        finally:
+            with suppress(Exception):  # the scheduler may be gone
+                self.client.cancel(futures)
+
+    def _next(self, done: "SimpleQueue[Any]") -> Any:
+        """The next future that is done; a line says so once if there are no workers to wait for."""
+        is_told = False
+        while True:
+            try:
+                return done.get(timeout=LOOK)
+            except Empty:
+                if not is_told and not self.client.nthreads():
+                    log.warning("note: %s has no workers; waiting for them", self.address)
+                    is_told = True
+
+    def _result(self, future: Any) -> Any:
+        """The result of a future that is done; None if the workers of its job have died."""
+        from distributed import KilledWorker
+
+        if future.status == "error":
+            error = future.exception()
+            if isinstance(error, KilledWorker):
+                return None
+            if isinstance(error, InputError):
+                raise error
+            reason = f"a worker cannot run jobs: {type(error).__name__}: {error}"
+            raise InputError(self._refusal(reason, "workers with the same libraries"))
+        return future.result()
+
+    def _refusal(self, reason: str, allowed: str = "tcp://HOST:PORT of a scheduler") -> str:
+        return f"scheduler: {self.address}: {reason}; allowed: {allowed}"
+
+    def _greet(self) -> None:
+        """Ask the scheduler who it is: a client would wait for an answer for ever.
+
+        Raises:
+            InputError: If it is something else.
+        """
+        with ThreadPoolExecutor(1) as thread:  # this one may have an event loop, as in a notebook
+            kind = thread.submit(asyncio.run, _kind(self.address)).result()
+        if kind != "Scheduler":
+            raise InputError(self._refusal(f"is a {kind}"))
+
+    def _leave(self) -> None:
+        with suppress(Exception):  # the scheduler may be gone
+            self.client.close(timeout=GOODBYE)
+
+
+async def _kind(address: str) -> str:
+    """What kind of server of dask answers at an address."""
+    from distributed import rpc
+    from distributed.security import Security
+
+    arguments = Security().get_connection_args("client")
+    async with rpc(address, timeout=ANSWER, connection_args=arguments) as server:
+        identity = await asyncio.wait_for(server.identity(), ANSWER)
+    return str(identity["type"])
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Let the libraries of the cluster log and warn of nothing."""
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in NOISY]
+    loggers = [logging.getLogger(name) for name in {*names, *NOISY}]
+    levels = [logger.level for logger in loggers]
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module="distributed")
+        for logger in loggers:
+            logger.setLevel(logging.CRITICAL + 1)
+        try:
+            yield
+        finally:
+            for logger, level in zip(loggers, levels, strict=True):
+                logger.setLevel(level)
+
+
+def _checked(job: Job, code: str, own: list[Member] | str) -> Any:
+    other = "code of dess" if engine_code() != code else ""
+    if job.code != own:
+        other = f"code or weights of {job.policy}"
+    if other:
+        raise InputError(f"scheduler: a worker has other {other}; allowed: the same as here")
+    return attempt(job)

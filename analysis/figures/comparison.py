@@ -42,7 +42,7 @@ def means(table: pd.DataFrame, metric: str, sides: Sequence[str]) -> Figure:
     """A metric of every policy in the baseline and in the variation, with intervals.
 
     Args:
-        table: Rows of ``ask.answer.means``.
+        table: Rows of ``ask.what_if.means``.
         metric: One of their metrics.
         sides: The texts below the baseline and the variation.
     """
@@ -61,7 +61,7 @@ def gains(answers: pd.DataFrame) -> Figure:
     """The paired differences of the metrics of every policy, with intervals.
 
     Args:
-        answers: Rows of ``ask.answer.answers``.
+        answers: Rows of ``ask.what_if.answers``.
     """
     names = {metric: name.replace(" and ", "\nand ") for metric, name in METRICS.items()}
     rows = answers[answers["metric"].isin([*names])]
@@ -72,7 +72,7 @@ def spread(differences: Mapping[str, pd.Series]) -> Figure:
     """The distribution of the paired differences of every policy: all, and the central part.
 
     Args:
-        differences: For each policy the result of ``ask.answer.differences``.
+        differences: For each policy the result of ``ask.what_if.differences``.
     """
     with style.panels(5.6, 2, sharey=True) as (figure, axes):
         titles = ("Share of missions with that difference or less", "The central part of it")

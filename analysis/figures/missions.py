@@ -18,14 +18,7 @@ from matplotlib.ticker import MaxNLocator
 
 from dess.analysis.figures import style
 from dess.analysis.names import value_text
-from dess.analysis.results.event_log import (
-    Events,
-    battery_levels,
-    duration,
-    mean_age,
-    residual_data,
-    uav_slots,
-)
+from dess.analysis.results import event_log
 from dess.scenario import Scenario, ScenarioSpace
 
 # Width [cells] over which UAVs on the same path are drawn side by side.
@@ -36,7 +29,7 @@ _ARROW: dict = {
 }
 
 
-def trajectories(events: Events, scenario: Scenario, ax: Axes) -> None:
+def trajectories(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     """The map of a mission, with the legend of the paper's Table I.
 
     An arrow is a move and a cross a slot in which the UAV hovers; both have the colour of the node
@@ -48,7 +41,7 @@ def trajectories(events: Events, scenario: Scenario, ax: Axes) -> None:
     colours = np.array([*style.node_colours(len(scenario.nodes)), style.MUTED])
     offsets = style.shifts(scenario.uavs, SPREAD / 2)
     _grid(scenario, ax)
-    for uav, slots in uav_slots(events).groupby("uav"):
+    for uav, slots in event_log.uav_slots(events).groupby("uav"):
         colour = style.uav_colours(scenario.uavs)[uav]
         ways = slots[["from_x", "from_y", "x", "y"]] + offsets[uav]
         start, end = ways.iloc[0, :2], ways.iloc[-1, 2:]
@@ -91,9 +84,9 @@ def chart(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
         axis.set_major_locator(MaxNLocator(integer=True, nbins=8))
 
 
-def battery(events: Events, scenario: Scenario, ax: Axes) -> None:
+def battery(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     """Battery [%] of every UAV over time, with the thresholds C_S and C_C of charging."""
-    levels = battery_levels(events)
+    levels = event_log.battery_levels(events)
     for uav, curve in levels.groupby("uav"):
         name = f"UAV {uav + 1}" if scenario.uavs <= 3 else f"{uav + 1}"
         ax.plot(curve["time"], curve["battery"], label=name, linewidth=1.6,
@@ -109,9 +102,9 @@ def battery(events: Events, scenario: Scenario, ax: Axes) -> None:
     _time_axis(events, ax)
 
 
-def residual(events: Events, scenario: Scenario, ax: Axes) -> None:
+def residual(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     """Residual data [data units] over time: one band per node, in its colour, and their sum."""
-    data = residual_data(events)
+    data = event_log.residual_data(events)
     colours = style.node_colours(len(scenario.nodes))
     ax.stackplot(data.index, data.to_numpy().T, colors=colours, alpha=0.75, linewidth=0)
     total = data.sum(axis=1)
@@ -121,17 +114,17 @@ def residual(events: Events, scenario: Scenario, ax: Axes) -> None:
     _time_axis(events, ax)
 
 
-def age(events: Events, scenario: Scenario, ax: Axes) -> None:
+def age(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     """The mean age of information of all nodes [slots] over time."""
-    curve = mean_age(events)
+    curve = event_log.mean_age(events)
     ax.plot(curve["time"], curve["age"], color=style.INK, linewidth=1.2, gid="age")
     ax.set(title="Mean age of the nodes", ylabel="slots", ylim=(0, None))
     _time_axis(events, ax)
 
 
-def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
+def occupancy(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     """The UAVs that charge (stacked, in their colours) and that wait for a pad, over time."""
-    slots, edges = uav_slots(events), np.arange(duration(events) + 1)
+    slots, edges = event_log.uav_slots(events), np.arange(event_log.duration(events) + 1)
     base, colours = np.zeros(len(edges)), style.uav_colours(scenario.uavs)
     for state, hatch in (("charging", None), ("waiting", "/////")):
         for uav, busy in slots[slots[state]].groupby("uav"):
@@ -151,13 +144,13 @@ def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
     _time_axis(events, ax)
 
 
-def curves(scenario: Scenario) -> dict[Callable[[Events, Scenario, Axes], None], float]:
+def curves(scenario: Scenario) -> dict[Callable[[event_log.Events, Scenario, Axes], None], float]:
     """The figures over the time of a mission, from top to bottom, and their heights [inches]."""
     ages = {age: 1.6} if scenario.age.measured else {}
     return {battery: 1.6, residual: 1.6, **ages, occupancy: 1.1}
 
 
-def mission_figure(events: Events, scenario: Scenario) -> Figure:
+def mission_figure(events: event_log.Events, scenario: Scenario) -> Figure:
     """A mission: its map, and below it its curves over time."""
     panels = curves(scenario)
     with style.look():
@@ -210,7 +203,7 @@ def courses(
     return figure
 
 
-def _outcome(events: Events, scenario: Scenario) -> str:
+def _outcome(events: event_log.Events, scenario: Scenario) -> str:
     log = pd.DataFrame(events)
     data = log[log["node"] >= 0].groupby("event")["value"].sum()
     total = data["mission_start"] + data.get("arrival", 0.0)
@@ -257,7 +250,7 @@ def _margin_note(text: str, level: float, ax: Axes) -> None:
     note.set_in_layout(False)  # so that all maps of a gallery have the same size
 
 
-def _time_axis(events: Events, ax: Axes) -> None:
-    ax.set(xlim=(0, duration(events)), xlabel="time [mission slots]")
+def _time_axis(events: event_log.Events, ax: Axes) -> None:
+    ax.set(xlim=(0, event_log.duration(events)), xlabel="time [mission slots]")
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=8))
     style.grid_of("y", ax)

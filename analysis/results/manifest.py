@@ -11,18 +11,7 @@ from pydantic import Field, model_validator
 
 import dess
 from dess import InputError
-from dess.analysis.results.provenance import (
-    Acceptance,
-    Hash,
-    Origin,
-    bound_code,
-    code_behind,
-    commit_of_source,
-    differing,
-    engine_code,
-    library_versions,
-    team_of,
-)
+from dess.analysis.results import provenance
 from dess.analysis.study.cheapest import AnySelection, Costs, Setting
 from dess.analysis.study.design import DesignPoint
 from dess.analysis.study.study import CHECK, Study, StudyData
@@ -48,7 +37,7 @@ class Cell(NamedTuple):
     first: int
 
 
-class Manifest(Origin):
+class Manifest(provenance.Origin):
     """The manifest of a results folder.
 
     It contains neither a time nor a path, so equal runs have equal manifests.
@@ -68,7 +57,7 @@ class Manifest(Origin):
     missions: list[list[Annotated[int, Field(ge=1, le=CHECK)]]]
     selected: list[Selected]
     complete: bool
-    bound_code: Hash | None = None
+    bound_code: provenance.Hash | None = None
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -105,20 +94,20 @@ class Manifest(Origin):
         return cls(
             schema_version=SCHEMA_VERSION,
             version=dess.__version__,
-            code=code_behind(study.policies, study.bounds),
-            engine_code=engine_code(),
+            code=provenance.code_behind(study.policies, study.bounds),
+            engine_code=provenance.engine_code(),
             accepted=[],
-            commit=commit_of_source(),
-            libraries=library_versions(),
+            commit=provenance.commit_of_source(),
+            libraries=provenance.library_versions(),
             seed=study.seed,
             study=StudyData.model_validate(data),
             scenario=base.model_dump(mode="json"),
-            policies=[team_of(policy) for policy in study.policies],
+            policies=[provenance.team_of(policy) for policy in study.policies],
             points=points,
             missions=[[study.first] * len(points)] * len(study.policies),
             selected=[None] * len(study.policies),
             complete=False,
-            bound_code=bound_code() if study.bounds else None,
+            bound_code=provenance.bound_code() if study.bounds else None,
         )
 
     @classmethod
@@ -147,13 +136,15 @@ class Manifest(Origin):
             InputError: If the results would not belong together.
         """
         self._check_extended_by(new, path)
-        changes = differing(self.code, new.code)
+        changes = provenance.differing(self.code, new.code)
         if changes and accepting is None:
             modules = ", ".join(changes)
             raise InputError(
                 f"{path}: made by other code of {modules}; allowed: {_ALLOWED}, or --accept-code"
             )
-        accepted = [Acceptance(modules=changes, missions=accepting or 0)] if changes else []
+        accepted = (
+            [provenance.Acceptance(modules=changes, missions=accepting or 0)] if changes else []
+        )
         held = {team.policy: team for team in self.policies}
         update: dict[str, Any] = {
             "engine_code": self.engine_code,

@@ -31,8 +31,7 @@ from dess.analysis.study.study import StudyData
 from dess.code.sources import OURS, code_of, combined
 from dess.errors import validation_line
 from dess.files.documents import Document
-from dess.policies.base import Policy
-from dess.policies.registry import TypedByUser, confirmed, load_team
+from dess.policies.registry import Policy, TypedByUser, confirmed, load_team
 from dess.scenario import SEA, ScenarioSpace, merged, scenario_at
 
 ENGINES = ("dess.batch", "dess.mission")

@@ -21,8 +21,7 @@ from dess.analysis.study.stopping import Text
 from dess.files.documents import Document
 from dess.files.reading import paths_in, read_bytes
 from dess.files.tables import LIMIT
-from dess.policies.base import Policy
-from dess.policies.registry import TRAINED, load_team
+from dess.policies.registry import TRAINED, Policy, load_team
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 from dess.state import END_NAMES, sample_scenario

@@ -1,16 +1,21 @@
-"""Verdicts that follow from intervals and tests, and the words and marks for them.
+"""Verdicts that follow from intervals and tests, with the words and marks for them.
 
 An estimate is ``ABOVE`` or ``BELOW`` a reference if its whole interval is, else ``INCONCLUSIVE``:
 
     >>> position(Interval(0.2, 0.1, 0.3))
     'above'
 
-A part of a claim is shown (True), refuted (False) or open (None), by a complete interval.
+A part of a claim is shown (True), refuted (False) or open (None), by a complete interval. Of
+several alternatives, some may be the best, and some are on the front of two metrics.
 """
 
 from typing import Protocol
 
-from dess.analysis.stats.intervals import LEVEL
+import numpy as np
+from scipy import stats
+
+from dess.analysis.metrics import metric_of
+from dess.analysis.stats.intervals import LEVEL, check_share, rare_differences
 
 ABOVE, INCONCLUSIVE, BELOW = POSITIONS = ("above", "inconclusive", "below")
 MARKS = {ABOVE: "▲", INCONCLUSIVE: "≈", BELOW: "▼"}  # in tables
@@ -68,3 +73,157 @@ def judged(*parts: Part) -> str:
     if any(parts):
         return HOLDS if all(parts) else IN_PART
     return REFUTED if False in parts else INCONCLUSIVE
+
+
+_BATCH = 2**21  # weights at a time, which take some megabytes for every n
+
+
+def on_front(costs: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Which settings are on the front.
+
+    Args:
+        costs: (..., k) costs of the settings; lower is better.
+        values: (..., k) values of the metric; higher is better.
+
+    Returns:
+        (..., k) booleans. Settings that are equal in both are either all on the front, or none is.
+    """
+    order = np.lexsort((-values, costs), axis=-1)
+    cost, value = (np.take_along_axis(of, order, -1) for of in (costs, values))
+    best_before = np.full_like(value, -np.inf)
+    best_before[..., 1:] = np.maximum.accumulate(value, axis=-1)[..., :-1]
+    # Equal settings are neighbours now; the first of them decides for all.
+    alike = np.zeros(value.shape, bool)
+    alike[..., 1:] = (np.diff(cost) == 0) & (np.diff(value) == 0)
+    first = np.maximum.accumulate(np.where(alike, 0, np.arange(value.shape[-1])), axis=-1)
+    members = np.zeros(value.shape, bool)
+    is_member = np.take_along_axis(value > best_before, first, -1)
+    np.put_along_axis(members, order, is_member, -1)
+    return members
+
+
+def membership(
+    costs: np.ndarray,
+    values: np.ndarray,
+    share: bool,
+    generator: np.random.Generator,
+    draws: int = 1000,
+) -> np.ndarray:
+    """The probability that each setting is on the front, given the missions.
+
+    The method is the Bayesian bootstrap (D. B. Rubin, Annals of Statistics 9 (1981) 130-134). The
+    missions get weights from a Dirichlet distribution. The weights are the same for all settings,
+    which keeps the correlation by common random numbers. Failures may be so rare that a sample has
+    none. Therefore half a success and half a failure with their own weights are added to each
+    setting, so that the share of a single setting has its posterior distribution under the prior of
+    Jeffreys.
+
+    In 3,000 simulated problems of each of three kinds, whose true means were drawn independently,
+    stated and true shares of membership differed by 0.005 on average, and by at most 0.06 in any
+    bin of probabilities. The method assumes nothing about how a metric depends on the fleet. If
+    every more expensive setting is truly better, but by less than the missions can show, the
+    probabilities are too low.
+
+    Args:
+        costs: (k, n) costs; entry r of every setting belongs to the same replication, and is nan if
+            the setting does not have this replication.
+        values: (k, n) values of the metric, nan at the same places.
+        share: Whether the metric is an outcome 0 or 1.
+        generator: The random generator of the weights.
+        draws: Number of fronts that are drawn.
+
+    Returns:
+        (k,) the share of the drawn fronts that contain the setting.
+    """
+    present = ~np.isnan(values)
+    count = np.zeros(len(values))
+    # Less the first one, equal costs stay equal, without rounding errors.
+    base = np.array([row[there][0] for row, there in zip(costs, present, strict=True)])
+    excess = np.where(present, costs - base[:, None], 0.0)
+    known, mask = np.where(present, values, 0.0), present.astype(float)
+    batch = max(1, _BATCH // values.shape[1])
+    for begin in range(0, draws, batch):
+        size = min(batch, draws - begin)
+        weights = generator.standard_exponential((size, values.shape[1]))
+        # Not matrix products: their last bits would depend on the number of threads.
+        total, cost, value = (np.einsum("bn,kn->bk", weights, of) for of in (mask, excess, known))
+        more = (
+            generator.standard_gamma(0.5, (2, size, len(values))) if share else np.zeros((2, 1, 1))
+        )
+        count += on_front(base + cost / total, (value + more[0]) / (total + more.sum(axis=0))).sum(
+            axis=0
+        )
+    return count / draws
+
+
+_BLOCK = 512  # settings that are compared with all others at once, which limits the memory
+_ROUNDING = 1e-12  # variances and differences below this, relative to the values, count as 0
+
+
+def may_be_best(values: np.ndarray, metric: str = "", level: float = LEVEL) -> np.ndarray:
+    """The settings that no other setting is significantly better than.
+
+    With probability ``level``, the setting with the highest true mean is among them, for all
+    variances and correlations. A setting is ruled out if any other one is better by a one-sided
+    paired t test at the level (1 - level) / (K - 1). This is the subset selection of Gupta (1965,
+    Technometrics; see also Hsu 1984, Annals of Statistics) with Bonferroni's bound for settings
+    that share their random numbers (Nelson, Swann, Goldsman and Song 2001, Operations Research). It
+    assumes that the number of missions does not depend on their results.
+
+    Args:
+        values: (R, K) values of K settings in R replications; nan means that a setting lacks a
+            replication. Two settings are compared on the replications of both.
+        metric: The metric, by default one of which more is better. Its rare differences are
+            added, as in ``dess.analysis.compare``.
+        level: The probability.
+
+    Returns:
+        (K,) of bool. A setting that has fewer than two replications in common with every other one
+        is not ruled out.
+
+    Raises:
+        InputError: If the level is not between 0 and 1.
+    """
+    check_share("level", level)
+    present = np.isfinite(values)
+    values = -values if metric_of(metric).less_is_better else values
+    means = np.nansum(values, axis=0) / np.maximum(present.sum(axis=0), 1)
+    # What a replication adds to all settings cancels in their differences.
+    centre = np.nanmean(np.where(present.any(1, keepdims=True), values, 0.0), axis=1, keepdims=True)
+    centred, mask = np.where(present, values - centre, 0.0), present.astype(float)
+    alpha = (1 - level) / max(values.shape[1] - 1, 1)
+    blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
+    rare = [rare_differences(metric, means, means[block, None]) for block in blocks]
+    parts = [_unbeaten(*of, centred, mask, alpha) for of in zip(blocks, rare, strict=True)]
+    return np.concatenate(parts) if parts else np.zeros(0, bool)
+
+
+def _unbeaten(
+    block: slice,
+    rare: tuple[np.ndarray, np.ndarray] | None,
+    values: np.ndarray,
+    mask: np.ndarray,
+    alpha: float,
+) -> np.ndarray:
+    """Which settings of a block are not ruled out by any other setting.
+
+    ``rare`` has the differences that are added, of the other settings minus those of the block.
+    """
+    own, here = values[:, block], mask[:, block]
+    n = here.T @ mask
+    lead = here.T @ values - own.T @ mask  # of the other settings, summed over common replications
+    squares = here.T @ values**2 + (own**2).T @ mask
+    spread = np.maximum(squares - 2 * own.T @ values, 0.0)
+    if rare is not None:
+        n, lead, more = n + 2 * (n > 1), lead + rare[0] + rare[1], rare[0] ** 2 + rare[1] ** 2
+        spread, squares = spread + more, squares + more
+    with np.errstate(divide="ignore", invalid="ignore"):
+        deviations = spread - lead**2 / n
+        constant = deviations <= _ROUNDING * squares
+        t = lead / np.sqrt(n * deviations / (n - 1))
+        ahead = lead > np.sqrt(_ROUNDING * squares * n)
+    counts, places = np.unique(n, return_inverse=True)
+    critical = stats.t.isf(alpha, np.maximum(counts - 1, 1))[places].reshape(n.shape)
+    # Use the sign test where all differences are equal.
+    beaten = np.where(constant, ahead & (0.5**n <= alpha), t > critical)
+    return ~(beaten & (n > 1)).any(axis=1)

@@ -26,7 +26,7 @@ from dess.analysis.study.selection import Selection
 from dess.analysis.study.stopping import MOST, Precision, StrictTable, Text
 from dess.batch import check_slotted
 from dess.errors import cut, listed, one_of, validation_line
-from dess.files.shipped import Shipped
+from dess.files.reading import Shipped
 from dess.policies.registry import load_team, typed
 from dess.record import measures_of
 from dess.scenario import (
@@ -201,7 +201,7 @@ class Study(StudyData):
         """Take the SimPy engine if the study does not say which and a design point needs it."""
         asked = self.engine if "engine" in self.model_fields_set else None
         # The model is frozen, and this is a part of its making.
-        self.__dict__["engine"] = engine_of(self.scenarios, asked)
+        object.__setattr__(self, "engine", engine_of(self.scenarios, asked))
 
     def _check_rule(self) -> None:
         if self.precision and self.selection:

@@ -14,8 +14,7 @@ from typing import Any, Self
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dess.errors import InputError, shown, validation_line
-from dess.files.parsing import parse_json
-from dess.files.reading import read_bytes
+from dess.files.reading import parse_json, read_bytes
 
 LIMIT = 256 * 2**20  # bytes of the largest document; a design point of a manifest takes about 150
 

@@ -3,6 +3,6 @@
 states = compact_states(state, space.chart, guarded=True)
 Vector(layout_of(space)).encode(states, missions, uavs)
 
-``guard`` has the return guard, ``states`` the compact states, from which ``vector`` and ``maps``
-encode the observations.
+``states`` has the compact states, from which ``vector``, ``maps`` and ``sets`` encode observations;
+``observer`` observes in environments, whose kind ``state`` is that of ``components``.
 """

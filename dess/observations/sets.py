@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dess.channel import World
-from dess.code.kernels import inlined, kernel
-from dess.code.portable import exp, log10
+from dess.code.kernels import exp, inlined, kernel, log10
 from dess.observations import states as column
 from dess.observations.states import CompactStates
 from dess.sea.chart import NO_FLY, Chart, spread

@@ -15,10 +15,10 @@ import numpy as np
 from dess import guard
 from dess.code.kernels import kernel
 from dess.errors import InputError
-from dess.observations.reach import reach_of
 from dess.rules import data_left, legal_moves, may_act
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import Chart, zones_of
+from dess.sections.wind import reach_of
 from dess.state import HOVER, State
 
 # Columns of ``CompactStates.missions``.

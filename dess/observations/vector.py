@@ -8,8 +8,7 @@ are described one by one, and all of them affect the data that is left for this 
 
 import numpy as np
 
-from dess.code.kernels import inlined, kernel
-from dess.code.portable import exp
+from dess.code.kernels import exp, inlined, kernel
 from dess.observations import states as column
 from dess.observations.states import CompactStates, Layout
 from dess.state import HOVER, STEP_X, STEP_Y

@@ -16,15 +16,13 @@ from pydantic import Field, create_model
 
 from dess.errors import InputError
 from dess.files.documents import Document
-from dess.files.parsing import parse_json
+from dess.files.reading import parse_json
 from dess.observations import states as column
-from dess.policies.learner import tensors
-from dess.policies.learner.config import CHECKPOINT, TrainingConfig
-from dess.policies.learner.description import Name, Number, Sha256
+from dess.policies.learner import trained
+from dess.policies.learner.config import CHECKPOINT, Name, Number, Sha256, TrainingConfig
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.ppo import ProximalTraining
-from dess.policies.learner.tensors import Tensors, array_of, bytes_of, part
-from dess.policies.learner.trained import require_version
+from dess.policies.learner.trained import Tensors, array_of, bytes_of, part, require_version
 from dess.policies.learner.training import METRICS, Training
 from dess.record import MISSION_RECORD
 from dess.scenario import SAMPLED, ScenarioSpace
@@ -118,8 +116,8 @@ def save_training(path: Path, training: Training) -> None:
     if isinstance(training, DQNTraining):
         header["stepper"] = [training.stepper.seed, training.stepper.replication]
         header["replay"] = training.replay.count if training.config.checkpoint_replay else None
-    header["sha256"] = tensors.digest(header, values)
-    tensors.write(path, values, {"dess": json.dumps(header)})
+    header["sha256"] = trained.digest(header, values)
+    trained.write_tensors(path, values, {"dess": json.dumps(header)})
 
 
 def load_training(
@@ -138,7 +136,9 @@ def load_training(
     Raises:
         InputError: If the file is missing, damaged, of another version or of another config.
     """
-    values, metadata = tensors.read(path, HEADER_LIMIT + (2**36 if limit is None else limit))
+    values, metadata = trained.read_tensors(
+        path, HEADER_LIMIT + (2**36 if limit is None else limit)
+    )
     if "dess" not in metadata:
         raise InputError(f"{path}: no checkpoint of a training; allowed: {CHECKPOINT} of one")
     header = Header.parse(metadata["dess"], str(path), fixed={"format": FORMAT})
@@ -152,7 +152,7 @@ def load_training(
             "allowed: the one it began with"
         )
     require_version(header.observation_version, training.observation, path)
-    if tensors.digest({k: v for k, v in raw.items() if k != "sha256"}, values) != header.sha256:
+    if trained.digest({k: v for k, v in raw.items() if k != "sha256"}, values) != header.sha256:
         raise InputError(
             f"{path}: damaged: its content has not the checksum of its header; allowed: {_WHOLE}"
         )
@@ -161,7 +161,7 @@ def load_training(
         for name, value in raw["progress"].items():
             setattr(training, name, value)
         finished = len(values.get("finished", ())) // MISSION_RECORD.itemsize
-        tensors.require_forms(values, _forms(training, finished), str(path))
+        trained.require_forms(values, _forms(training, finished), str(path))
         _restore(training, values, raw)
     except (LookupError, ValueError, TypeError, RuntimeError, OverflowError) as error:
         problem = str(error).removeprefix(f"{path}: ").partition("; allowed:")[0]

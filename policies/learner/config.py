@@ -1,7 +1,9 @@
-"""The settings of a training, documented where they are declared.
+"""The settings of a training, and ``config.json``, which has them beside the weights of a policy.
 
 config = load_config("quick", seed=2)      # shipped, or the path of a TOML file
 config.num_envs, config.n_step, config.phases[0].ticks
+description = read_description(Path("runs/quick"))
+description.training.seed, description.layout.nodes, description.model_sha256
 """
 
 import hashlib
@@ -23,7 +25,8 @@ from pydantic import (
 )
 
 from dess.errors import InputError, shown, validation_line
-from dess.files.shipped import Shipped
+from dess.files.documents import Document
+from dess.files.reading import Shipped
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.sea.families import SETS, seas_of
 
@@ -361,3 +364,65 @@ def resume_command(config: TrainingConfig, name: str, out: Path, device: str = "
         words += ["--set", f"{key}={json.dumps(value)}"] if original.set.get(key) != value else []
     words += [] if device == "auto" else ["--device", device]
     return shlex.join([*words, "--resume"])
+
+
+FORMAT: Literal[1] = 1
+MODEL, CONFIG = "model.safetensors", "config.json"
+LIMIT = 2**20  # bytes of the file
+
+Number = Annotated[int, Field(ge=0, lt=2**63)]
+Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
+class LayoutTable(Document):
+    """The grid, zone and nodes of the training, as in a scenario."""
+
+    grid: Number
+    zone: Annotated[list[Number], Field(min_length=4, max_length=4)]
+    nodes: Annotated[
+        list[Annotated[list[Number], Field(min_length=2, max_length=2)]],
+        Field(min_length=1, max_length=1024),
+    ]
+
+
+class Run(Document):
+    """The training so far, for readers; a policy that was only saved has none of it."""
+
+    dess: str = Field("", max_length=100)
+    torch: str = Field("", max_length=100)
+    device: str = Field("", max_length=200)
+    threads: Number = 0
+    ticks: Number | None = None
+    updates: Number = 0
+    uav_slots: Number = 0
+    seconds: Number = 0
+    selection_score: float | None = None
+
+
+class Description(Document):
+    """The content of ``config.json``."""
+
+    format: Literal[1] = Field(description="version of the file")
+    name: Name = Field(description="name of the policy")
+    observation_version: Number = Field(description="version of the encoding of observations")
+    layout: LayoutTable | None = Field(
+        default=None, description="grid, zone and nodes of the training; none for any sea"
+    )
+    training: TrainingConfig = Field(description="settings of the training")
+    run: Run = Field(description="the training so far")
+    model_sha256: list[Sha256] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=2,
+        description="checksum of model.safetensors; two while it is replaced, none before dess 0.3",
+    )
+
+
+def read_description(folder: Path) -> Description:
+    """The description of the trained policy in a folder.
+
+    Raises:
+        InputError: If there is none, or it is damaged or of another version.
+    """
+    absent, fixed = "the folder of a trained policy", {"format": FORMAT}
+    return Description.load(folder / CONFIG, "", absent, fixed, LIMIT)

@@ -26,8 +26,7 @@ from dess.files.tables import write_table
 from dess.files.writing import check_folder, locked, writable
 from dess.observations.observer import encoder_of
 from dess.policies.learner.checkpoint import load_training, new_training, save_training
-from dess.policies.learner.config import CHECKPOINT, TrainingConfig
-from dess.policies.learner.description import MODEL
+from dess.policies.learner.config import CHECKPOINT, MODEL, TrainingConfig
 from dess.policies.learner.dqn import ReplayMemory
 from dess.policies.learner.network import units_of
 from dess.policies.learner.trained import build, load_policy, save_policy

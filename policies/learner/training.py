@@ -20,8 +20,7 @@ from dess.observations import states as column
 from dess.observations.states import CompactStates, compact_states
 from dess.policies.learner.config import Phase, TrainingConfig
 from dess.policies.learner.policy import LearnedPolicy
-from dess.policies.learner.tensors import require_forms
-from dess.policies.learner.trained import build
+from dess.policies.learner.trained import build, require_forms
 from dess.scenario import ScenarioSpace
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.mission import MissionModel, simulate
-from dess.policies.planner.fluid import MOST_SLOTS, begin, empty_flight, fly
-from dess.policies.planner.plan import Plan
+from dess.policies.planner.fluid import MOST_SLOTS, Plan, begin, empty_flight, fly
 from dess.policies.planner.policy import Planner, memory_of
 from dess.policies.planner.rates import rates_of
 from dess.scenario import Scenario, ScenarioSpace

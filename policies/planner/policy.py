@@ -18,8 +18,7 @@ import numpy as np
 from dess.code.kernels import inlined, kernel
 from dess.guard import guard, must_charge
 from dess.policies.heuristics import step_towards
-from dess.policies.planner.fluid import CRAFT, MOST_SLOTS, begin, fly
-from dess.policies.planner.plan import CHARGE, MOST_WAYPOINTS, WAYPOINT, Plan, insert, remove
+from dess.policies.planner import fluid
 from dess.policies.planner.rates import rates_of
 from dess.policies.planner.search import TRIED, empty_workspace, improve
 from dess.sections.landing import lands
@@ -95,7 +94,7 @@ class Planner:
         rates, safe = rates_of(view), guard(view)
         memory = memory_of(state, self.budget)
         fleet, m = state.uavs.shape[1], int(state.missions["communication_slots"][0])
-        edits = max(_WORK // (min(slots, MOST_SLOTS) * fleet * (fleet + m)), 1)
+        edits = max(_WORK // (min(slots, fluid.MOST_SLOTS) * fleet * (fleet + m)), 1)
         workspace = empty_workspace(slots, fleet, state.residual.shape[1])
         actions, decided = np.empty(len(view), np.int64), 0
         while decided < len(view):
@@ -128,9 +127,9 @@ def memory_of(state: State, budget: Budget) -> Memory:
     if key not in _MEMORIES:
         memory = Memory(
             np.zeros((len(missions), 3), np.uint64),
-            np.zeros((*shape, MOST_WAYPOINTS + 1), WAYPOINT),
+            np.zeros((*shape, fluid.MOST_WAYPOINTS + 1), fluid.WAYPOINT),
             np.zeros(shape, np.int64),
-            np.zeros(shape, CRAFT),
+            np.zeros(shape, fluid.CRAFT),
             np.zeros_like(state.residual),
             np.zeros_like(state.residual),
         )
@@ -150,7 +149,7 @@ def _decide(
             return row
         b, i = rows_mission[row], rows_uav[row]
         mission, team, made = missions[b], uavs[b], memory.made[b]
-        plan = Plan(memory.waypoints[b], memory.lengths[b])
+        plan = fluid.Plan(memory.waypoints[b], memory.lengths[b])
         slot = np.uint64(mission.slot + 1)
         is_same = made[0] == mission.seed and made[1] == np.uint64(mission.replication)
         if not is_same or made[2] != slot:
@@ -174,9 +173,9 @@ def _decide(
                 if workspace.course[TRIED] > 0:
                     return row
             else:
-                begin(mission, team, residual[b], workspace.flight)
+                fluid.begin(mission, team, residual[b], workspace.flight)
             ahead = workspace.ahead
-            fly(mission, rates, plan, workspace.flight, 0, ahead, 1)
+            fluid.fly(mission, rates, plan, workspace.flight, 0, ahead, 1)
             for k in range(mission.nodes):
                 memory.sea[b, k] = ahead.sea[ahead.last[0], k].base
             for j in range(mission.uavs):
@@ -225,7 +224,7 @@ def _must_charge_here(mission, u, data, waypoints, length):
         return False
     is_planned = False
     for number in range(length):
-        is_planned = is_planned or waypoints[number].stay == CHARGE
+        is_planned = is_planned or waypoints[number].stay == fluid.CHARGE
     return not is_planned
 
 
@@ -236,7 +235,7 @@ def _start(mission, uavs, data, chart, plan):
         plan.lengths[i] = 0
         if not lands(mission) and uavs[i].active and must_charge(mission, uavs[i], data):
             cell = chart.parking[i % len(chart.parking)]
-            insert(plan, i, 0, cell[0], cell[1], CHARGE, 0)
+            fluid.insert(plan, i, 0, cell[0], cell[1], fluid.CHARGE, 0)
 
 
 @kernel
@@ -251,16 +250,16 @@ def _take_up(mission, uavs, plan, planned):
             plan.lengths[i] = 0
             continue
         for _ in range(v.next):
-            remove(plan, i, 0)
-        if plan.lengths[i] > 0 and plan.waypoints[i, 0].stay != CHARGE:
+            fluid.remove(plan, i, 0)
+        if plan.lengths[i] > 0 and plan.waypoints[i, 0].stay != fluid.CHARGE:
             plan.waypoints[i, 0].stay -= v.stayed
         charge = 0
-        while charge < plan.lengths[i] and plan.waypoints[i, charge].stay != CHARGE:
+        while charge < plan.lengths[i] and plan.waypoints[i, charge].stay != fluid.CHARGE:
             charge += 1
         if charge == plan.lengths[i]:
             continue
         if u.charging and charge > 0:
-            remove(plan, i, charge)
-            insert(plan, i, 0, u.x, u.y, CHARGE, 0)
+            fluid.remove(plan, i, charge)
+            fluid.insert(plan, i, 0, u.x, u.y, fluid.CHARGE, 0)
         elif v.charging != 0 and charge == 0 and not u.charging and not u.latch:
-            remove(plan, i, 0)
+            fluid.remove(plan, i, 0)

@@ -16,9 +16,7 @@ import numpy as np
 from dess import streams
 from dess.code.kernels import inlined, kernel
 from dess.policies.planner import fluid
-from dess.policies.planner import plan as plans
-from dess.policies.planner.fluid import Flight
-from dess.policies.planner.plan import Plan
+from dess.policies.planner.fluid import Flight, Plan
 from dess.sea.chart import distance, in_zone, is_open
 from dess.state import STEP_X, STEP_Y
 
@@ -64,7 +62,7 @@ def empty_workspace(slots: int, uavs: int, nodes: int) -> Workspace:
     """Working memory for missions of at most that many slots, UAVs and nodes."""
     slots = min(slots, fluid.MOST_SLOTS)
     flight, ahead = (fluid.empty_flight(slots, uavs, nodes) for _ in range(2))
-    return Workspace(plans.empty_plan(uavs), plans.empty_plan(uavs), flight, ahead, np.zeros(4))
+    return Workspace(fluid.empty_plan(uavs), fluid.empty_plan(uavs), flight, ahead, np.zeros(4))
 
 
 @kernel
@@ -95,8 +93,8 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         fluid.begin(mission, uavs, residual, flight)
         course[VALUE] = course[BEST] = fluid.fly(mission, rates, plan, flight, 0, flight, slots)
         course[HEAT] = hottest
-        plans.copy_plan(mission, plan, present)
-        plans.copy_plan(mission, plan, trial)
+        fluid.copy_plan(mission, plan, present)
+        fluid.copy_plan(mission, plan, trial)
     value, best, heat = course[VALUE], course[BEST], course[HEAT]
     lag = _LAG if mission.uavs > 1 else math.inf
     words = np.empty(4, np.uint64)
@@ -109,10 +107,10 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         slot = _edit(mission, uavs, nodes, rates.chart, flight, trial, words)
         if slot == _NO_EDIT:
             continue
-        if slot != plans.NEVER:
+        if slot != fluid.NEVER:
             slot = min(slot, _first_unplanned(mission, present, trial))
         if slot >= flight.last[1]:
-            plans.copy_plan(mission, present, trial)
+            fluid.copy_plan(mission, present, trial)
             continue
         luck = streams.uniform(words[0] >> _HIGH << _HIGH | words[3] & _LOW)
         least = heat * math.log(luck)
@@ -124,12 +122,12 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
             for i in range(mission.uavs):  # waypoints that are not reached are of no use
                 v = flight.team[flight.last[0], i]  # but for charges, which count as planned
                 trial.lengths[i] = min(trial.lengths[i], max(v.next, v.last_charge) + 1)
-            plans.copy_plan(mission, trial, present)
+            fluid.copy_plan(mission, trial, present)
             if value > best:
                 best = value
-                plans.copy_plan(mission, present, plan)
+                fluid.copy_plan(mission, present, plan)
         else:
-            plans.copy_plan(mission, present, trial)
+            fluid.copy_plan(mission, present, trial)
     course[TRIED] = last if last < steps else 0
     course[VALUE], course[BEST], course[HEAT] = value, best, heat
     return last - first
@@ -138,9 +136,9 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
 @kernel
 def _first_unplanned(mission, present, trial):
     """The first slot after the last charge of a UAV in one plan, if it is another in the other."""
-    slot = plans.NEVER
+    slot = fluid.NEVER
     for i in range(mission.uavs):
-        one, other = plans.last_charge(present, i), plans.last_charge(trial, i)
+        one, other = fluid.last_charge(present, i), fluid.last_charge(trial, i)
         if one != other:
             slot = min(slot, present.waypoints[i, min(one, other) + 1].begun)
     return slot
@@ -184,21 +182,21 @@ def _edit(mission, uavs, nodes, chart, flight, plan, words):
     w = plan.waypoints[i, p]
     slot = w.begun
     if kind == _REMOVE:
-        plans.remove(plan, i, p)
+        fluid.remove(plan, i, p)
     elif kind == _TURN:
         w.turned = 1 - w.turned
     elif kind == _STAY:
-        if w.stay == plans.CHARGE:
+        if w.stay == fluid.CHARGE:
             return _NO_EDIT
         w.stay += 1 if w.stay == 0 or _pick(words[2], 2) == 0 else -1
     elif kind == _NUDGE:
         action = _pick(words[2], 4)
         x, y = w.x + STEP_X[action], w.y + STEP_Y[action]
-        if not is_open(chart, x, y) or (w.stay == plans.CHARGE and not in_zone(chart, x, y)):
+        if not is_open(chart, x, y) or (w.stay == fluid.CHARGE and not in_zone(chart, x, y)):
             return _NO_EDIT
         w.x, w.y = x, y
     elif kind == _REPLACE:
-        if w.stay == plans.CHARGE:
+        if w.stay == fluid.CHARGE:
             return _NO_EDIT
         k, other = _pick(words[2], mission.nodes), _pick_low(words[2], mission.nodes)
         w.x, w.y = _nearer(w, nodes[k], nodes[other])
@@ -231,7 +229,7 @@ def _nearer(w, one, other):
 def _move(chart, flight, plan, i, p, j, words):
     """Move some waypoints of UAV ``i``, from ``p`` on, to UAV ``j``, in this order or reversed."""
     count = min(1 + _pick_low(words[3], _MOST_MOVED), plan.lengths[i] - p)
-    if plan.lengths[j] + count > plans.MOST_WAYPOINTS:
+    if plan.lengths[j] + count > fluid.MOST_WAYPOINTS:
         return _NO_EDIT
     moved, has_charge = np.empty((_MOST_MOVED, 4), np.int64), False
     slot = plan.waypoints[i, p].begun
@@ -239,21 +237,21 @@ def _move(chart, flight, plan, i, p, j, words):
         w = plan.waypoints[i, p + number]
         moved[number, 0], moved[number, 1] = w.x, w.y
         moved[number, 2], moved[number, 3] = w.stay, w.turned
-        has_charge = has_charge or w.stay == plans.CHARGE
+        has_charge = has_charge or w.stay == fluid.CHARGE
     if has_charge and j != i:
         return _NO_EDIT
     for _ in range(count):
-        plans.remove(plan, i, p)
+        fluid.remove(plan, i, p)
     q = _pick(words[3], plan.lengths[j] + 1)
     if not has_charge and _pick_low(words[2], 1 << 16) < _SHORTEST:
         q = _shortest_detour(chart, flight, plan, j, moved[0, 0], moved[0, 1])
     if j == i and q == p:
-        return plans.NEVER
+        return fluid.NEVER
     slot = min(slot, plan.waypoints[j, q].begun)
     is_reversed = words[0] & np.uint64(1) == np.uint64(1)
     for number in range(count):
         x, y, stay, turned = moved[number]
-        plans.insert(plan, j, q if is_reversed else q + number, x, y, stay, turned)
+        fluid.insert(plan, j, q if is_reversed else q + number, x, y, stay, turned)
     return slot
 
 
@@ -263,7 +261,7 @@ def _swap_with(plan, i, p, j, q):
     if q == plan.lengths[j] or (i == j and p == q):
         return _NO_EDIT
     w, other = plan.waypoints[i, p], plan.waypoints[j, q]
-    if j != i and (w.stay == plans.CHARGE or other.stay == plans.CHARGE):
+    if j != i and (w.stay == fluid.CHARGE or other.stay == fluid.CHARGE):
         return _NO_EDIT
     slot = min(w.begun, other.begun)
     _swap(w, other)
@@ -276,12 +274,12 @@ def _cross(plan, i, p, j, q):
     slot = min(plan.waypoints[i, p].begun, plan.waypoints[j, q].begun)
     own, other = plan.lengths[i] - p, plan.lengths[j] - q
     count, charges = max(own, other), 0
-    if j == i or max(p, q) + count > plans.MOST_WAYPOINTS:
+    if j == i or max(p, q) + count > fluid.MOST_WAYPOINTS:
         return _NO_EDIT
     for number in range(own):
-        charges += plan.waypoints[i, p + number].stay == plans.CHARGE
+        charges += plan.waypoints[i, p + number].stay == fluid.CHARGE
     for number in range(other):
-        charges -= plan.waypoints[j, q + number].stay == plans.CHARGE
+        charges -= plan.waypoints[j, q + number].stay == fluid.CHARGE
     if charges != 0:
         return _NO_EDIT
     for number in range(count):
@@ -293,7 +291,7 @@ def _cross(plan, i, p, j, q):
 @kernel
 def _insert_node(mission, nodes, chart, flight, plan, i, p, words):
     """Insert a node into the plan of UAV ``i``: of two random ones, that which keeps more data."""
-    if plan.lengths[i] == plans.MOST_WAYPOINTS:
+    if plan.lengths[i] == fluid.MOST_WAYPOINTS:
         return _NO_EDIT
     k, other = _pick(words[2], mission.nodes), _pick_low(words[2], mission.nodes)
     end = flight.last[0]
@@ -303,7 +301,7 @@ def _insert_node(mission, nodes, chart, flight, plan, i, p, words):
     if _pick_low(words[0], 1 << 16) < _SHORTEST:
         p = _shortest_detour(chart, flight, plan, i, x, y)
     slot = plan.waypoints[i, p].begun
-    plans.insert(plan, i, p, x, y, _pick(words[3], 3), np.int64(words[3] & np.uint64(1)))
+    fluid.insert(plan, i, p, x, y, _pick(words[3], 3), np.int64(words[3] & np.uint64(1)))
     return slot
 
 
@@ -314,19 +312,19 @@ def _edit_charge(mission, chart, plan, i, p, words):
     x, y = chart.parking[cell, 0], chart.parking[cell, 1]
     w = plan.waypoints[i, p]
     slot = w.begun
-    if p < plan.lengths[i] and w.stay == plans.CHARGE:
+    if p < plan.lengths[i] and w.stay == fluid.CHARGE:
         w.x, w.y = x, y
-    elif plan.lengths[i] == plans.MOST_WAYPOINTS or mission.flight_cost == 0:
+    elif plan.lengths[i] == fluid.MOST_WAYPOINTS or mission.flight_cost == 0:
         slot = _NO_EDIT
     else:
-        plans.insert(plan, i, p, x, y, plans.CHARGE, np.int64(words[3] & np.uint64(1)))
+        fluid.insert(plan, i, p, x, y, fluid.CHARGE, np.int64(words[3] & np.uint64(1)))
     return slot
 
 
 @kernel
 def _shortest_detour(chart, flight, plan, i, x, y):
     """Where in the plan of UAV ``i`` a cell is the shortest detour."""
-    least, place = plans.NEVER, 0
+    least, place = fluid.NEVER, 0
     from_x, from_y = flight.team[0, i].x, flight.team[0, i].y
     for p in range(plan.lengths[i] + 1):
         detour = distance(chart, from_x, from_y, x, y)
@@ -343,5 +341,5 @@ def _shortest_detour(chart, flight, plan, i, x, y):
 def _swap(one, other):
     """Swap two waypoints, but for when their legs begin."""
     x, y, stay, turned = one.x, one.y, one.stay, one.turned
-    plans.set_waypoint(one, other.x, other.y, other.stay, other.turned)
-    plans.set_waypoint(other, x, y, stay, turned)
+    fluid.set_waypoint(one, other.x, other.y, other.stay, other.turned)
+    fluid.set_waypoint(other, x, y, stay, turned)

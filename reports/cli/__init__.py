@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _check_text(words: Sequence[str]) -> None:
     """Refuse arguments that are not UTF-8, which not every library could write or print."""
     from dess.errors import InputError, shown
-    from dess.files.parsing import is_text
+    from dess.files.reading import is_text
 
     for word in words:
         if not is_text(word):

@@ -27,13 +27,14 @@ from dess.reports.cli.options import (
 )
 from dess.reports.cli.report import WHAT_IF, rendering
 from dess.reports.cli.studies import print_plan
-from dess.reports.folders import PREFIX, check_pages
+from dess.reports.pages import PREFIX, check_pages
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dess.analysis.ask.answer import Sweep, WhatIf
     from dess.analysis.ask.question import Question
+    from dess.analysis.ask.sweep import Sweep
+    from dess.analysis.ask.what_if import WhatIf
     from dess.analysis.results.tables import Results
     from dess.reports.pages.kernels import Progress
 
@@ -88,8 +89,8 @@ def sweep(
         out: Folder of the page.
         dry_run: Only print the plan and the range of its time.
     """
-    from dess.analysis.ask.answer import Sweep
     from dess.analysis.ask.question import sweep_question
+    from dess.analysis.ask.sweep import Sweep
     from dess.analysis.metrics import ALIASES, PRODUCT
 
     question = sweep_question(
@@ -156,8 +157,8 @@ def what_if(
         out: Folder of the page.
         dry_run: Only print the plan and the range of its time.
     """
-    from dess.analysis.ask.answer import VARIATION, WhatIf, best_policy, check_shown
     from dess.analysis.ask.question import what_if_question
+    from dess.analysis.ask.what_if import VARIATION, WhatIf, best_policy, check_shown
 
     changes, fixed = all_settings(settings, SET), all_settings(baseline or [], "--baseline")
     question = what_if_question(changes, fixed, scenario, policy, missions, seed, results)

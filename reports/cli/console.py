@@ -268,8 +268,8 @@ def complete(
         Interruption: If it was.
         typer.Exit: If some of it could not be computed.
     """
-    from dess.analysis.execution.cluster import SchedulerError
     from dess.analysis.execution.runner import ChunkError
+    from dess.analysis.execution.workers import SchedulerError
 
     try:
         with compile_notice(), _bar() as (progress, announce):

@@ -35,7 +35,7 @@ def show_policy(
     Args:
         name: A policy, by name, folder of a training or file.
     """
-    from dess.policies.about import about
+    from dess.policies.registry import about
 
     found = about(name)
     if as_json:

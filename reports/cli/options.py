@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from dess.errors import InputError, one_of, shown
-from dess.files.parsing import parse_toml
+from dess.files.reading import parse_toml
 
 
 def policies(start: str) -> list[str]:

@@ -16,7 +16,7 @@ from dess.reports.cli.console import YesOption
 if TYPE_CHECKING:
     import numpy as np
 
-    from dess.policies.base import Policy
+    from dess.policies.registry import Policy
     from dess.record import MissionRecord
     from dess.scenario import Scenario, ScenarioSpace
 
@@ -85,7 +85,7 @@ def simulate(
     _check_suffix("--figure", figure, FIGURES, "a picture")
     _check_suffix("--animation", animation, ANIMATIONS, "an animation")
     if animation and animation.suffix == ".mp4":
-        from dess.reports.player.animation import check_ffmpeg
+        from dess.reports.player import check_ffmpeg
 
         check_ffmpeg()
     writers = {events: _write_log, figure: _draw, animation: _animate}
@@ -232,7 +232,7 @@ def _draw(mission: _Mission, path: Path, kind: str) -> None:
 
 
 def _animate(mission: _Mission, path: Path, kind: str) -> None:
-    from dess.reports.player.animation import write_animation
+    from dess.reports.player import write_animation
 
     if kind == "html":
         _write_page(mission, path)

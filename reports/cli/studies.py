@@ -22,7 +22,7 @@ from dess.reports.cli.options import (
     command,
 )
 from dess.reports.cli.report import rendering
-from dess.reports.folders import PREFIX, check_pages
+from dess.reports.pages import PREFIX, check_pages
 
 if TYPE_CHECKING:
     import pandas as pd

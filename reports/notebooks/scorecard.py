@@ -30,9 +30,8 @@ from dess.analysis.figures.comparison import claims
 from dess.analysis.paper import scorecard
 from dess.analysis.results.chunks import MANIFEST
 from dess.files.reading import paths_in
-from dess.policies.learner.description import read_description
+from dess.policies.learner.config import read_description
 from dess.reports.pages import html
-from dess.reports.pages.scorecard import as_html
 
 # %%
 folder = Path(str(trained or files("dess.policies") / "trained"))
@@ -64,7 +63,8 @@ html.lead(
 # *matched* if our interval reaches it, *exceeded* if the whole interval is above it.
 
 # %%
-as_html(telling, "The diagnostic claims")
+caption, columns = "The diagnostic claims", scorecard.names(telling)
+html.rendered("scorecard.html", rows=telling, columns=columns, caption=caption)
 
 # %% [markdown]
 # ## How far to trust it
@@ -81,7 +81,8 @@ html.table(scorecard.counts(rows), "Verdicts by policy")
 
 # %%
 others = [row for row in rows if not row.is_diagnostic]
-as_html(others, "Claims that a policy passes that has learned nothing")
+caption, columns = "Claims that a policy passes that has learned nothing", scorecard.names(others)
+html.rendered("scorecard.html", rows=others, columns=columns, caption=caption)
 
 # %% [markdown]
 # ## How this page was made

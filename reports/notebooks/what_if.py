@@ -29,7 +29,7 @@ shown = None  # the policy whose missions are drawn; None for the best in the va
 from IPython.display import display
 
 from dess.analysis import metrics, what_if
-from dess.analysis.ask.answer import measured
+from dess.analysis.ask.what_if import measured
 from dess.analysis.metrics import metric_of
 from dess.reports.pages import html
 

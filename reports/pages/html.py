@@ -40,11 +40,6 @@ from dess.reports.pages.page import FILES, STUDY, Learned, Page, hidden
 SHORT = 12  # characters of a hash that are shown
 PART = "application/vnd.dess.part+json"  # type of the output of a cell that contains a ``Part``
 
-# A figure, its alternative text, its caption and, if the page links to them, its data.
-Drawing = (
-    tuple[Figure, str] | tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame | None]
-)
-
 LEAD = (10.2, 4.4)  # the size of the figure that shows the answer [inches]
 LEAD_ON_PHONE = (4.3, 4.4)  # at least so high
 DIGITS = "%.6g"  # format of numbers in files with data
@@ -95,6 +90,11 @@ def template(name: str, **filters: Callable[..., str]) -> Template:
     environment = Environment(loader=loader, finalize=finalize, trim_blocks=True, **JINJA)
     environment.filters |= {"indexed": indexed, "explained": Markup.escape, **filters}
     return environment.get_template(name)
+
+
+def rendered(name: str, **values: Any) -> HTML:
+    """A part of a page that a template makes of values, which it escapes."""
+    return HTML(template(name).render(**values))
 
 
 def fill(name: str, scripts: bool = False, **values: Any) -> str:
@@ -307,11 +307,11 @@ def lead(
     return figures([_figure(drawing, alt, caption, data) | {"narrow": source}], "lead")
 
 
-def gallery(drawings: Iterable[Drawing], note: str = "") -> Part:
+def gallery(drawings: Iterable[tuple[Any, ...]], note: str = "") -> Part:
     """Several figures side by side where there is room.
 
     Args:
-        drawings: The arguments of ``figure`` of each; the caption may be left out.
+        drawings: Each a ``Drawing``, or the first two or more of its values.
         note: What holds for all of them, in a paragraph below.
     """
     return figures([_figure(*parts) for parts in drawings], "gallery", note)
@@ -330,7 +330,7 @@ def figures(values: Sequence[Mapping[str, str]], look: str = "", note: str = "")
     return Part(figures=[{**_BARE, **value} for value in values], look=look, note=note)
 
 
-def show(*parts: Table | HTML | Markdown | Iterable[Drawing]) -> None:
+def show(*parts: Table | HTML | Markdown | Iterable[tuple[Any, ...]]) -> None:
     """Show tables, galleries of figures, and what else there is, one below the other."""
     for part in parts:
         if isinstance(part, HTML | Markdown):

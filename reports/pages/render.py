@@ -1,10 +1,15 @@
-"""Render notebooks to pages, and leave those that are up to date as they are."""
+"""Render notebooks to pages, leave those that are up to date as they are, and write their index.
+
+The index has tiles, the figure of the scorecard, and a card per page. Anybody may have made a page
+in the folder. So of older pages, the index takes only what cannot run.
+"""
 
 import logging
 import os
+import re
 import sys
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from functools import lru_cache
 from hashlib import sha256
 from importlib import metadata
@@ -13,6 +18,7 @@ from types import MappingProxyType
 from typing import Any
 
 import nbformat
+from markupsafe import Markup
 
 from dess import InputError
 from dess.analysis.results.chunks import MANIFEST
@@ -20,26 +26,97 @@ from dess.analysis.results.manifest import Manifest
 from dess.files.documents import LIMIT
 from dess.files.reading import paths_in, read_bytes
 from dess.files.writing import delete, locked, write_files
-from dess.reports.folders import INDEX, LOCK, check_pages
-from dess.reports.pages import kernels
+from dess.reports.pages import INDEX, LOCK, PREFIX, check_pages, html, kernels, notebook
 from dess.reports.pages.body import page_of
-from dess.reports.pages.index import index_of, pages_in, with_bars
+from dess.reports.pages.html import fill, template
 from dess.reports.pages.kernels import Progress
-from dess.reports.pages.notebook import (
-    SHIPPED,
-    Report,
-    check_parameters,
-    names_in,
-    read,
-    with_paths,
-)
-from dess.reports.pages.page import Page
+from dess.reports.pages.page import FILES, Page
 from dess.reports.pages.study import report_of
+
+TILES = {  # pages whose number has a tile, and what it is
+    "performance.html": "Against the paper's policy",
+    "planner.html": "Planning against learning",
+    "own-sea.html": "The cheapest fleet of the example",
+}
+_OF_STUDY = re.compile(rf"{PREFIX}.+(?<!\.partial)\.html")
+
+
+def index_of(
+    pages: Mapping[str, Page], left_out: Mapping[str, Sequence[str]] = MappingProxyType({})
+) -> str:
+    """The index of pages.
+
+    Args:
+        pages: The pages, by file name.
+        left_out: Titles of reports whose results are missing, with the commands that make these.
+    """
+    cards = {name: pages[name].card for name in in_order(pages)}
+    scorecard = cards.get(f"{notebook.SCORECARD}.html")
+    shown = Page("".join(pages[name].text for name in cards))
+    return fill(
+        INDEX,
+        cards=cards,
+        tiles=[
+            (text, page) for page, text in TILES.items() if page in cards and cards[page].number
+        ],
+        picture=scorecard and scorecard.picture,
+        groups=[(head, names) for head in notebook.GROUPS if (names := in_order(pages, head))],
+        left_out=left_out,
+        origins=Markup(html.carrying(shown.evidence, shown.hidden(FILES)).data),
+    )
+
+
+def in_order(pages: Iterable[str], group: str | None = None) -> list[str]:
+    """File names of pages in the order of the index: those of a group, or all."""
+    known = {*pages}
+    studies = sorted(name for name in known if _OF_STUDY.fullmatch(name))
+    order = []
+    for heading, names in notebook.GROUPS.items():
+        if group in (None, heading):
+            if heading == next(iter(notebook.GROUPS)):
+                order += studies
+            order += [f"{name}.html" for name in names]
+    return [name for name in order if name in known]
+
+
+def with_bars(pages: Mapping[str, Page]) -> dict[str, Page]:
+    """The pages of a folder, with the links to all of them in their bars."""
+    links = {}
+    for name in in_order(pages):
+        links[name] = name.removesuffix(".html").replace("-", " ").capitalize()
+        if _OF_STUDY.fullmatch(name):
+            links[name] = pages[name].card.title
+    bar = template("bar.html")
+    return {n: page.with_bar(bar.render(links=links, page=n)) for n, page in pages.items()}
+
+
+def pages_in(out: Path, but: Container[str] = ()) -> dict[str, Page]:
+    """The pages in a folder, by file name; pages that were altered are left out, with a warning.
+
+    Args:
+        out: The folder.
+        but: File names that are left out without a warning.
+    """
+    pages = {}
+    names = in_order(path.name for path in paths_in(out, "*.html"))
+    for path in (out / name for name in names if name not in but):
+        try:
+            page = Page.read(path)
+            if not (page.is_sealed and page.card and page.evidence is not None):
+                raise InputError("altered")
+        except InputError:
+            log.warning("%s: altered, or of another version; the index leaves it out", path)
+        else:
+            pages[path.name] = page
+    return pages
+
+
+log = logging.getLogger(__name__)
 
 PACKAGE = Path(__file__).parents[2]  # dess
 
 
-def key_of(report: Report, studies: Mapping[str, Path]) -> str:
+def key_of(report: notebook.Report, studies: Mapping[str, Path]) -> str:
     """The key of a page whose notebook has its default parameters.
 
     Args:
@@ -81,8 +158,6 @@ def _hash(path: Path) -> str:
     return sha256(read_bytes(path, LIMIT)).hexdigest()
 
 
-log = logging.getLogger(__name__)
-
 PATIENCE = 60.0  # for which the page of another process is waited for [s]
 _BUSY = "another process writes there; allowed: wait"
 
@@ -97,7 +172,7 @@ def render(
     out: str | Path,
     progress: Progress | None = None,
     parameters: Mapping[str, Any] | None = None,
-    notebooks: Path = SHIPPED,
+    notebooks: Path = notebook.SHIPPED,
 ) -> Path:
     """Run reports on the results of studies and write their pages, their notebooks and an index.
 
@@ -124,10 +199,10 @@ def render(
             up to the cell that failed.
     """
     results, out, given = Path(results), Path(out), parameters or {}
-    values = {name: with_paths(value, os.path.abspath) for name, value in given.items()}
+    values = {name: notebook.with_paths(value, os.path.abspath) for name, value in given.items()}
     asked = [*dict.fromkeys(names)]
-    reports = [read(name, notebooks) for name in asked or names_in(notebooks)]
-    check_parameters(reports, values)
+    reports = [notebook.read(name, notebooks) for name in asked or notebook.names_in(notebooks)]
+    notebook.check_parameters(reports, values)
     lacking = {report.name: _lacking(report, results) for report in reports}
     for name, errors in lacking.items():
         for error in errors.values():
@@ -166,14 +241,14 @@ def render_study(
     """
     folder, out, values = Path(folder), Path(out), parameters or {}
     report = report_of(folder, values)
-    check_parameters([report], values)
+    notebook.check_parameters([report], values)
     report.set({"results": str(folder.absolute()), **values})
     _write([report], folder, out, progress, values)
     return out / report.page
 
 
 def _write(
-    reports: Sequence[Report],
+    reports: Sequence[notebook.Report],
     results: Path,
     out: Path,
     progress: Progress | None,
@@ -204,14 +279,14 @@ def _write(
         raise ReportError("; ".join(lines))
 
 
-def _folders(report: Report, results: Path) -> dict[str, Path]:
+def _folders(report: notebook.Report, results: Path) -> dict[str, Path]:
     """The results folders that a report reads, by name."""
     found = (paths_in(results, f"{name}/{MANIFEST}") for name in report.optional)
     others = [path.parent.name for paths in found for path in paths]
     return {name: results / name for name in (*report.studies, *others)}
 
 
-def _lacking(report: Report, results: Path) -> dict[str, InputError]:
+def _lacking(report: notebook.Report, results: Path) -> dict[str, InputError]:
     """The results that a report lacks: the command that makes them, and what is wrong."""
     errors = {}
     for study in report.studies:

@@ -14,8 +14,7 @@ from dess.analysis.names import parameter, value_text
 from dess.analysis.results.tables import Results, load_results
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.selection import Selection
-from dess.reports.folders import PREFIX
-from dess.reports.pages import html, notebook
+from dess.reports.pages import PREFIX, html, notebook
 from dess.reports.pages.notebook import SHIPPED, Report, tags_of
 
 _BEST = "Which setting is the best for {}?"

@@ -31,8 +31,7 @@ from dess.analysis.results.resimulate import (
 from dess.analysis.results.store import Store
 from dess.analysis.results.tables import Results, results_of
 from dess.files.reading import paths_in
-from dess.policies.base import Policy
-from dess.policies.registry import confirmed, load_team
+from dess.policies.registry import Policy, confirmed, load_team
 from dess.record import PARAMETER_EVENTS
 from dess.reports.pages.page import ALLOWED, LIMIT, Page
 from dess.scenario import ScenarioSpace

@@ -8,8 +8,8 @@ from typing import Any
 import tomli_w
 
 from dess.analysis import load_study
-from dess.analysis.ask.answer import WhatIf, best_policy
 from dess.analysis.ask.question import what_if_question
+from dess.analysis.ask.what_if import WhatIf, best_policy
 from dess.analysis.study.study import Study
 
 SCENARIO: dict[str, Any] = {

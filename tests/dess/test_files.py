@@ -12,8 +12,15 @@ import pytest
 from filelock import FileLock
 
 from dess.errors import InputError
-from dess.files.parsing import parse_json, parse_toml
-from dess.files.reading import Missing, checked, paths_in, read_bytes, read_text
+from dess.files.reading import (
+    Missing,
+    checked,
+    parse_json,
+    parse_toml,
+    paths_in,
+    read_bytes,
+    read_text,
+)
 from dess.files.writing import (
     check_folder,
     check_target,

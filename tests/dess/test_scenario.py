@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dess import InputError, streams
-from dess.files.parsing import parse_toml
+from dess.files.reading import parse_toml
 from dess.scenario import (
     SAMPLED,
     ScenarioSpace,

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from dess import policies
 from dess.channel import world_of
 from dess.guard import guard
-from dess.observations.reach import reach_of
 from dess.policies.heuristics import _AGE, _GREEDY, _NEAREST
 from dess.rules import launch
 from dess.scenario import ScenarioSpace
+from dess.sections.wind import reach_of
 from dess.state import HOVER, STEP_X, STEP_Y, State, starts_of, state_of
 from dess.view import View
 from tests import compiled

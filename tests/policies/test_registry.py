@@ -13,12 +13,10 @@ import dess
 from dess import InputError, policies
 from dess.mission import simulate
 from dess.policies import registry
-from dess.policies.about import about
-from dess.policies.base import Policy
 from dess.policies.heuristics import Greedy
 from dess.policies.learner.config import config_of
 from dess.policies.learner.trained import build, save_policy
-from dess.policies.registry import SHIPPED, TypedByUser
+from dess.policies.registry import SHIPPED, Policy, TypedByUser, about
 from dess.scenario import Scenario, load_scenario, scenario_names
 
 ROOT = Path(__file__).parents[2]

@@ -15,14 +15,7 @@ import dess
 from dess import policies
 from dess.analysis.figures import style
 from dess.analysis.results.event_log import residual_data, uav_slots
-from dess.reports.player.animation import (
-    GIF,
-    LAST_SECONDS,
-    MP4,
-    SLOTS_PER_SECOND,
-    Film,
-    write_animation,
-)
+from dess.reports.player import GIF, LAST_SECONDS, MP4, SLOTS_PER_SECOND, Film, write_animation
 from dess.scenario import Scenario
 from dess.state import sample_scenario
 

@@ -22,8 +22,7 @@ from dess.analysis.results.event_log import (
     residual_data,
     uav_slots,
 )
-from dess.reports.player import AGE_READING, library, player, reading
-from dess.reports.player.playback import TRAIL
+from dess.reports.player import AGE_READING, TRAIL, library, player, reading
 from dess.state import sample_scenario
 from tests.reports.browser import Visit
 

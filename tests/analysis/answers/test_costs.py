@@ -5,7 +5,7 @@ import pytest
 from dess import InputError
 from dess.analysis import run_study
 from dess.analysis.answers import costs, summary
-from dess.analysis.stats.choices import on_front
+from dess.analysis.stats.verdict import on_front
 from dess.analysis.study.study import CHECK
 from tests.analysis.small import small_study
 

@@ -13,8 +13,8 @@ from scipy import stats
 from dess import InputError
 from dess.analysis import load_study, sweep, what_if
 from dess.analysis.answers.settings import varied
-from dess.analysis.ask import answer as found
-from dess.analysis.ask.answer import BASELINE, VARIATION, Example, WhatIf
+from dess.analysis.ask import what_if as found
+from dess.analysis.ask.what_if import BASELINE, VARIATION, Example, WhatIf
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dess.analysis.bound.bundle import next_prices
+from dess.analysis.bound.prices import next_prices
 
 
 def minimise(function, slope, start: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, float]:

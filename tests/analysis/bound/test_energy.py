@@ -6,8 +6,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dess.analysis.bound.energy import most_charging, phases_of
-from dess.analysis.bound.paths import last_slot
+from dess.analysis.bound.paths import last_slot, most_charging, phases_of
 from dess.scenario import Scenario
 
 

@@ -14,10 +14,10 @@ import pytest
 
 from dess import InputError
 from dess.analysis import run_study
-from dess.analysis.execution import cluster as clusters
-from dess.analysis.execution.cluster import Cluster, _checked
+from dess.analysis.execution import workers
 from dess.analysis.execution.jobs import MissionsJob
 from dess.analysis.execution.runner import CHUNK
+from dess.analysis.execution.workers import Cluster, _checked
 from dess.analysis.results.chunks import Chunk, Part
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.results.provenance import engine_code, members_of
@@ -102,7 +102,7 @@ def test_a_study_goes_on_after_its_scheduler_was_killed(tmp_path, monkeypatch, c
 
 
 def test_dask_waits_for_workers_and_leaves_the_same_bytes(tmp_path, monkeypatch):
-    monkeypatch.setattr(clusters, "LOOK", 0.1)
+    monkeypatch.setattr(workers, "LOOK", 0.1)
     study = small_study(tmp_path, logged=1)
     with distributed.LocalCluster(n_workers=0, **OPTIONS) as cluster:
         notes = []
@@ -111,7 +111,7 @@ def test_dask_waits_for_workers_and_leaves_the_same_bytes(tmp_path, monkeypatch)
             notes.append(words)
             cluster.scale(2)
 
-        monkeypatch.setattr(clusters.log, "warning", note)
+        monkeypatch.setattr(workers.log, "warning", note)
         run_study(study, tmp_path / "out", scheduler=cluster.scheduler_address)
     assert notes == [("note: %s has no workers; waiting for them", cluster.scheduler_address)]
     run_study(study, tmp_path / "undisturbed")
@@ -122,7 +122,7 @@ def test_a_worker_that_cannot_run_a_job_is_one_line(tmp_path, monkeypatch):
     def unprepared(*_):
         raise ModuleNotFoundError("No module named 'analysis'")
 
-    monkeypatch.setattr(clusters, "_checked", unprepared)
+    monkeypatch.setattr(workers, "_checked", unprepared)
     with distributed.LocalCluster(n_workers=1, processes=False, **OPTIONS) as cluster:
         line = "a worker cannot run jobs: ModuleNotFoundError: No module named 'analysis'; allowed"
         with pytest.raises(InputError, match=line):
@@ -138,14 +138,14 @@ ADDRESSES = {
 
 @pytest.mark.parametrize("address", ADDRESSES)
 def test_what_is_no_scheduler_is_refused_at_once(address, monkeypatch, capfd):
-    monkeypatch.setattr(clusters, "ANSWER", 0.5)
+    monkeypatch.setattr(workers, "ANSWER", 0.5)
     named = address
     with ExitStack() as stack:
         if address == "silent":  # a server that accepts, and says nothing
             server = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
             named = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         if address == "worker":
-            monkeypatch.setattr(clusters, "ANSWER", 10)
+            monkeypatch.setattr(workers, "ANSWER", 10)
             options = {"n_workers": 1, "processes": False, **OPTIONS}
             cluster = stack.enter_context(distributed.LocalCluster(**options))
             named = cluster.workers[0].worker_address

@@ -147,9 +147,7 @@ def test_every_mission_ends_or_is_refused(fields):
 
 def test_a_worker_ends_with_a_killed_parent_before_it_has_loaded_anything():
     """The parent starts a process as joblib does, which is busy, and is killed."""
-    busy = (
-        "import os, time; from dess.analysis.execution.orphans import live_and_die_with as live; "
-    )
+    busy = "import os, time; from dess.analysis.execution import live_and_die_with as live; "
     busy += "live(int(os.sys.argv[1])); print(os.getpid(), flush=True); time.sleep(60)"
     script = "import os, subprocess, sys; subprocess.run([sys.executable, '-c', sys.argv[1], "
     script += "str(os.getpid())])"
@@ -165,7 +163,7 @@ def test_a_worker_ends_with_a_killed_parent_before_it_has_loaded_anything():
             os.kill(worker, 0)
             time.sleep(0.01)
     loaded = subprocess.run(
-        [sys.executable, "-c", "import dess.analysis.execution.orphans, sys; print(*sys.modules)"],
+        [sys.executable, "-c", "import dess.analysis.execution, sys; print(*sys.modules)"],
         capture_output=True, text=True, check=True, env=environment(),
     )  # fmt: skip
     assert not {"numpy", "numba", "pandas", "joblib"} & {*loaded.stdout.split()}

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess.analysis.ask import answer
+from dess.analysis.ask import what_if
 from dess.analysis.figures import comparison
 from dess.analysis.metrics import BOUND, METRICS, PRODUCT
 from tests.analysis.answers.test_comparison import drawn_interval
@@ -19,7 +19,7 @@ def results(tmp_path_factory):
 
 
 def test_figures_show_the_means_and_the_gains(results):
-    table, answers = answer.means(results), answer.answers(results)
+    table, answers = what_if.means(results), what_if.answers(results)
     sides = ["baseline\nuavs 2\npads 6", "variation\nuavs 6\npads 1"]
     for metric in METRICS:
         (ax,) = comparison.means(table, metric, sides).axes

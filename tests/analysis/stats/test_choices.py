@@ -9,8 +9,8 @@ from scipy import stats
 from scipy.special import ndtri
 
 from dess.analysis.metrics import SUCCESS
-from dess.analysis.stats.choices import may_be_best, membership, on_front
 from dess.analysis.stats.differences import difference_test
+from dess.analysis.stats.verdict import may_be_best, membership, on_front
 
 
 def slow_front(costs, values):
@@ -126,7 +126,7 @@ def test_it_is_the_paired_t_test_of_every_two_settings():
 def test_blocks_of_settings_are_judged_like_all_at_once(monkeypatch):
     values = np.random.default_rng(1).normal(size=(12, 40)) + np.linspace(0, 2, 40)
     whole = may_be_best(values)
-    monkeypatch.setattr("dess.analysis.stats.choices._BLOCK", 7)
+    monkeypatch.setattr("dess.analysis.stats.verdict._BLOCK", 7)
     assert may_be_best(values).tolist() == whole.tolist()
 
 

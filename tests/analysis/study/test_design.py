@@ -7,15 +7,9 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from scipy.stats import qmc
 
 from dess import InputError
-from dess.analysis.study.design import (
-    MAX_SIZE,
-    Design,
-    Grid,
-    LatinHypercube,
-    Saltelli,
-)
+from dess.analysis.study.design import MAX_SIZE, Design, Grid, LatinHypercube, Saltelli
 from dess.errors import validation_line
-from dess.files.parsing import parse_toml
+from dess.files.reading import parse_toml
 from dess.scenario import load_scenario
 from dess.sea.families import seas_of
 from dess.streams import MAX_REPLICATION, MAX_SEED

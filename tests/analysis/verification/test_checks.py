@@ -5,13 +5,7 @@ import pytest
 from scipy import stats
 
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
-from dess.analysis.verification.checks import (
-    ALPHA,
-    Check,
-    judge,
-    poisson_fit,
-    uniform_fit,
-)
+from dess.analysis.verification.checks import ALPHA, Check, judge, poisson_fit, uniform_fit
 
 
 def check(**values: float) -> Check:

@@ -8,11 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dess import policies, simulate
-from dess.observations.reach import reach_of
 from dess.policies.registry import HEURISTICS
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import parking_of
-from dess.sections.wind import Wind, surcharges
+from dess.sections.wind import Wind, reach_of, surcharges
 from dess.state import BATTERY, constants_of
 from tests.dess.flights import batteries, flown
 from tests.drawn import reached, replications, seeds, spaces

@@ -14,10 +14,9 @@ from safetensors.torch import load_file, save_file
 
 from dess import InputError
 from dess.errors import printable
-from dess.policies.learner import tensors as files
+from dess.policies.learner import trained
 from dess.policies.learner.checkpoint import load_training, save_training
-from dess.policies.learner.config import CHECKPOINT
-from dess.policies.learner.description import MODEL
+from dess.policies.learner.config import CHECKPOINT, MODEL
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.trained import load_policy, save_policy
 from dess.policies.learner.training import Training
@@ -84,7 +83,7 @@ def _forged(
     values = load_file(file) | (tensors or {})
     kept = {name: value for name, value in values.items() if value is not None}
     new = {k: v for k, v in (_header_of(file) | header).items() if k != "sha256"}
-    new["sha256"] = files.digest(new, kept)
+    new["sha256"] = trained.digest(new, kept)
     save_file(kept, file, {"dess": json.dumps(new)})
 
 
@@ -135,7 +134,7 @@ def _forgeries(file: Path) -> Iterator[tuple[str, dict[str, Any]]]:
         for field, value in fields.items():
             records = whole[name].numpy().copy().view(dtype)
             records[:1][field] = value
-            yield f"{name} {field}", {name: files.bytes_of(records)}
+            yield f"{name} {field}", {name: trained.bytes_of(records)}
     for name, place in TRUTHS.items():  # neither 0 nor 1
         tensor = whole[name].clone()
         tensor.view(torch.uint8).flatten()[place] = 7
@@ -147,7 +146,7 @@ def test_a_checkpoint_has_no_bytes_of_undefined_memory(training: Training) -> No
     for name in uavs.dtype.names:
         uavs[name] = 0
     assert uavs.tobytes().strip(b"\0")  # what lies between the fields
-    assert not files.bytes_of(uavs).any()
+    assert not trained.bytes_of(uavs).any()
 
 
 def test_an_index_that_the_scenario_has_not_is_refused(training: Training, file: Path) -> None:
@@ -212,7 +211,7 @@ def test_a_failed_write_leaves_the_old_file(
         raise error
 
     before = files_of(file.parent)
-    monkeypatch.setattr(files, "save_file", fail_to_save)
+    monkeypatch.setattr(trained, "save_file", fail_to_save)
     with pytest.raises(InputError if isinstance(error, OSError) else KeyboardInterrupt):
         save_training(file, training)
     assert files_of(file.parent) == before

@@ -8,14 +8,7 @@ import torch
 
 from dess.observations.states import layout_of, masks
 from dess.policies.learner.checkpoint import load_training, new_training, save_training
-from dess.policies.learner.ppo import (
-    CLIP,
-    TRACE,
-    WORTH,
-    ProximalTraining,
-    _advantages,
-    _with_range,
-)
+from dess.policies.learner.ppo import CLIP, TRACE, WORTH, ProximalTraining, _advantages, _with_range
 from dess.scenario import load_scenario
 from tests.policies.learner.tiny import CPU, assert_same, tiny_on_seas, weights_of
 

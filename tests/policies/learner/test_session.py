@@ -16,8 +16,7 @@ import torch
 from dess import policies
 from dess.policies.learner import session
 from dess.policies.learner.checkpoint import load_training
-from dess.policies.learner.config import CHECKPOINT
-from dess.policies.learner.description import CONFIG, MODEL
+from dess.policies.learner.config import CHECKPOINT, CONFIG, MODEL
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.session import CURVE, LOCK, SIGNALS, device_of, train
 from dess.policies.learner.training import DivergenceError, Training

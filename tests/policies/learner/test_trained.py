@@ -14,7 +14,7 @@ from safetensors.torch import load_file, save_file
 
 from dess.batch import simulate_batch
 from dess.policies.learner import trained
-from dess.policies.learner.description import CONFIG, MODEL
+from dess.policies.learner.config import CONFIG, MODEL
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.trained import load_policy, save_policy
 from dess.policies.learner.training import Training

@@ -16,13 +16,7 @@ from dess.policies.learner.dqn import Batch, DQNTraining
 from dess.policies.learner.training import SELECT_BY, Training
 from dess.record import empty_records
 from dess.scenario import ScenarioSpace
-from tests.policies.learner.tiny import (
-    CPU,
-    PHASES,
-    assert_same,
-    tiny,
-    weights_of,
-)
+from tests.policies.learner.tiny import CPU, PHASES, assert_same, tiny, weights_of
 
 # --- stopping and going on ---
 

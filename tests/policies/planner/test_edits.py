@@ -10,8 +10,20 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dess.policies.planner.fluid import CRAFT, MOST_SLOTS, Flight, begin, empty_flight, fly
-from dess.policies.planner.plan import CHARGE, MOST_WAYPOINTS, NEVER, Plan, empty_plan, insert
+from dess.policies.planner.fluid import (
+    CHARGE,
+    CRAFT,
+    MOST_SLOTS,
+    MOST_WAYPOINTS,
+    NEVER,
+    Flight,
+    Plan,
+    begin,
+    empty_flight,
+    empty_plan,
+    fly,
+    insert,
+)
 from dess.policies.planner.rates import rates_of
 from dess.policies.planner.search import (
     _CHARGE,

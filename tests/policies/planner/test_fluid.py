@@ -4,8 +4,17 @@ import numpy as np
 import pytest
 
 from dess import Scenario, ScenarioSpace, load_scenario, simulate
-from dess.policies.planner.fluid import MOST_SLOTS, begin, empty_flight, fly
-from dess.policies.planner.plan import CHARGE, NEVER, Plan, empty_plan, insert
+from dess.policies.planner.fluid import (
+    CHARGE,
+    MOST_SLOTS,
+    NEVER,
+    Plan,
+    begin,
+    empty_flight,
+    empty_plan,
+    fly,
+    insert,
+)
 from dess.policies.planner.rates import rates_of
 from dess.policies.planner.search import BEST, TRIED, empty_workspace, improve
 from dess.view import View

@@ -15,10 +15,9 @@ from nbconvert.filters import markdown2html
 from dess.analysis import numbers, run_study
 from dess.analysis.figures import style
 from dess.reports.pages import html
-from dess.reports.pages.index import index_of, pages_in, with_bars
 from dess.reports.pages.notebook import values_of, with_values
 from dess.reports.pages.page import CARD, Page
-from dess.reports.pages.render import render_study
+from dess.reports.pages.render import index_of, pages_in, render_study, with_bars
 from tests.analysis.hostile import hostile_folder
 from tests.analysis.small import small_study
 from tests.reports.browser import Visit

@@ -23,9 +23,9 @@ from dess.policies.registry import TRAINED
 from dess.reports.cli import main
 from dess.reports.pages import html, verify
 from dess.reports.pages.body import page_of
-from dess.reports.pages.index import index_of, pages_in
 from dess.reports.pages.notebook import read
 from dess.reports.pages.page import STUDY, Page
+from dess.reports.pages.render import index_of, pages_in
 from dess.reports.pages.verify import verify_page, verify_results
 from tests.analysis.small import small_study
 from tests.reports.small import made_up, quick

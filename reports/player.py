@@ -1,16 +1,25 @@
-"""A mission as an animation in a file: a GIF, or a video in MP4, which needs the program ffmpeg.
+"""A mission played slot by slot: in a page, with buttons, a slider or the keyboard, or in a file.
 
-write_animation(log, scenario, "mission.gif", GIF)
+A page contains ``library()`` once, before its first ``player``; then it needs no network. What is
+drawn is in ``templates/player.js``.
 
-Its frames show what the player shows, drawn by matplotlib.
+    display(library())
+    display(player(log, scenario, "player-1", "One UAV"))
+
+A file is a GIF, or a video in MP4, which needs the program ffmpeg. Its frames show what the player
+shows, drawn by matplotlib.
+
+    write_animation(log, scenario, "mission.gif", GIF)
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from subprocess import CalledProcessError
 from typing import Any
 
 import numpy as np
+import pandas as pd
+from IPython.display import HTML
 from matplotlib.animation import FFMpegWriter
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -19,9 +28,148 @@ from PIL import Image
 
 from dess import InputError
 from dess.analysis.figures import missions, style
-from dess.analysis.results.event_log import Events
-from dess.reports.player.playback import TRAIL, Playback
+from dess.analysis.figures.style import node_colours, uav_colours
+from dess.analysis.results import event_log
+from dess.reports.pages.html import Part, figures, template
 from dess.scenario import Scenario
+
+TRAIL = 12  # number of last moves that are drawn behind a UAV
+
+
+class Playback:
+    """A mission of T slots, I UAVs and K nodes, slot by slot.
+
+    Attributes:
+        end: T.
+        residual: (T + 1, K) residual data [data units] at the start of every slot and at the end.
+        fleet: (T + 1, I) arrays, the state of the UAVs after every slot: ``x``, ``y``, ``battery``,
+            ``node`` (served, -1 without), ``charging``, ``waiting``, and ``over`` if the UAV's
+            mission has ended.
+    """
+
+    def __init__(self, events: event_log.Events, scenario: Scenario):
+        """Compute the states.
+
+        Raises:
+            InputError: If the log is not that of a complete mission of this scenario.
+        """
+        self._log, self.scenario = pd.DataFrame(events), scenario
+        _check(self._log, scenario)
+        # Residual data may be -1e-16.
+        self.residual = event_log.residual_data(self._log).clip(lower=0).to_numpy()
+        self.end = len(self.residual) - 1
+        self.fleet = self._fleet()
+        self.uav_colours = uav_colours(scenario.uavs)
+        self.node_colours = node_colours(len(scenario.nodes))
+
+    def _fleet(self) -> dict[str, np.ndarray]:
+        slots, levels = event_log.uav_slots(self._log), event_log.battery_levels(self._log)
+        first = slots.groupby("uav", as_index=False).first()
+        full = levels.groupby("uav")["battery"].first().to_numpy()
+        absent = {"node": -1, "charging": False, "waiting": False}
+        start = first.assign(slot=-1, x=first["from_x"], y=first["from_y"], battery=full, **absent)
+        table = pd.concat([start, slots]).pivot(index="slot", columns="uav")
+        table = table.reindex(range(-1, self.end))
+        active = table["x"].notna()
+        fleet = {name: table[name].ffill().to_numpy(int) for name in ("x", "y", "battery")}
+        for name, value in absent.items():
+            fleet[name] = table[name].where(active, value).to_numpy(type(value))
+        return fleet | {"over": ~active.shift(-1, fill_value=False).to_numpy(bool)}
+
+    def status(self, slot: int) -> str:
+        """The residual data and the pads in use after a slot, in words."""
+        charging, waiting = (self.fleet[state][slot].sum() for state in ("charging", "waiting"))
+        pads = self.scenario.charging_pads
+        queue = f", {waiting} waiting" if waiting else ""
+        used = f"{charging} of {pads} pad{'s' * (pads != 1)} in use{queue}"
+        return (
+            f"slot {slot} of {self.end} · {self.residual[slot].sum():.1f} data units left · {used}"
+        )
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """All that a player in a page shows, as JSON; lists of states are in the order of slots."""
+        scenario, log = self.scenario, self._log
+        filled = log.loc[log["event"] == "quota_filled", "uav"]
+        aged = scenario.age.measured
+        return {
+            **{"size": scenario.size, "zones": scenario.rectangles},
+            **{"nodes": scenario.nodes, "noFly": scenario.no_fly},
+            "thresholds": {"C_S": scenario.charge_start, "C_C": scenario.charge_complete},
+            "colours": {"uavs": self.uav_colours, "nodes": self.node_colours},
+            "pads": scenario.charging_pads,
+            "trail": TRAIL,
+            "filled": np.isin(range(scenario.uavs), filled).tolist(),
+            "fleet": {name: (1 * values).tolist() for name, values in self.fleet.items()},
+            "residual": self.residual.round(2).tolist(),
+            "status": [self.status(slot) for slot in range(self.end + 1)],
+            "ages": event_log.ages(log).round(2).to_numpy().tolist() if aged else None,
+            "meanAge": event_log.mean_age(log).round(2).to_numpy().tolist() if aged else None,
+        }
+
+
+def _check(log: pd.DataFrame, scenario: Scenario) -> None:
+    for edge in ("mission_start", "mission_end"):
+        rows = log[log["event"] == edge]
+        for what, count in (("uav", scenario.uavs), ("node", len(scenario.nodes))):
+            numbers = sorted(rows.loc[rows[what] >= 0, what])
+            if numbers != list(range(count)):
+                raise InputError(
+                    f"events: {edge} has {len(numbers)} rows of a {what}; "
+                    f"allowed: one for each of the scenario's {count}"
+                )
+
+
+READING = (
+    "A disc shows the data left at a node, and its ring the most that it ever had. A numbered dot "
+    "is a UAV, with its last moves and a line to the node that it serves most; it turns pale when "
+    "its mission is over. A full square is a UAV that charges, an empty one a UAV that waits for a "
+    "pad. A tick means that the quota was filled. A click in the panels goes to another slot; "
+    "space plays and pauses, the arrows, Home and End change the slot."
+)
+
+AGE_READING = (
+    " The age of a node is the time since its newest collected data were generated; where data "
+    "have no time stamps, it is the time since the node was last emptied. The length of a stem is "
+    "the age of its node."
+)
+
+
+def reading(scenario: Scenario) -> str:
+    """How to read the player of a mission of this scenario."""
+    return READING + (AGE_READING if scenario.age.measured else "")
+
+
+def library() -> HTML:
+    """The script of all players, which a page needs once, before its players."""
+    return HTML(f"<script>{template('player.js').render(style=style)}</script>")
+
+
+def together(players: Iterable[Part]) -> Part:
+    """Several players side by side, which show the same slot."""
+    return figures([player.values["figures"][0] for player in players], "gallery together")
+
+
+def player(
+    events: event_log.Events, scenario: Scenario, name: str, title: str = "", caption: str = ""
+) -> Part:
+    """A player of a mission: it can be played, paused and shown slot by slot.
+
+    Args:
+        events: The event log (a data frame, or the columns, of ``dess.record.EventLog``).
+        scenario: The scenario of the mission.
+        name: The id of the player, unique in its page: letters, digits and hyphens.
+        title: The text above the map.
+        caption: The text below the figure; ``READING`` explains how to read it.
+
+    Raises:
+        InputError: If the log is not that of a complete mission of this scenario.
+    """
+    playback = Playback(events, scenario)
+    shown = {"name": name, "title": title, "end": playback.end}
+    drawn = template("player.html").render(data=playback.data, **shown)
+    return figures([{"name": name, "player": drawn, "caption": caption}])
+
 
 GIF, MP4 = "gif", "mp4"
 SLOTS_PER_SECOND = 10
@@ -32,7 +180,7 @@ NODE_SIZE, UAV_SIZE, PAD_SIZE = 20, 12, 17  # diameters, and the side of a squar
 
 
 def write_animation(
-    events: Events, scenario: Scenario, file: str | Path, kind: str, title: str = ""
+    events: event_log.Events, scenario: Scenario, file: str | Path, kind: str, title: str = ""
 ) -> None:
     """Write a mission as an animation; the same mission gives the same bytes of a GIF.
 
@@ -115,7 +263,7 @@ class Film:
         InputError: If the log is not that of a whole mission of this scenario.
     """
 
-    def __init__(self, events: Events, scenario: Scenario, title: str = ""):
+    def __init__(self, events: event_log.Events, scenario: Scenario, title: str = ""):
         self.playback = Playback(events, scenario)
         self.end, curves = self.playback.end, missions.curves(scenario)
         self.figure = Figure(figsize=(WIDTH / DPI, HEIGHT * len(curves) / DPI), dpi=DPI)
