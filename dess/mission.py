@@ -39,6 +39,7 @@ from dess.scenario import Scenario, ScenarioSpace
 from dess.sections import fleet
 from dess.sections.failures import strike
 from dess.sections.packets import Packets
+from dess.sections.wind import ways_home
 from dess.state import (
     BATTERY,
     LANDED,
@@ -188,7 +189,8 @@ class MissionModel:
         self.env.run(self.env.process(self._clock()))
         self._log_state("mission_end")
         records = empty_records(1, len(self.fleet), self.is_extended)
-        write_records(np.zeros(1, np.int64), self.state, records)
+        ways = ways_home(self.state.missions, self.world.chart)
+        write_records(np.zeros(1, np.int64), self.state, ways, records)
         if self.packets is not None:
             self.packets.write(records.operations[0])
         return records.mission(0, self.log)
@@ -274,7 +276,7 @@ class MissionModel:
         return [_Uav(*values) for values in self.uavs[: len(self.fleet)].tolist()]
 
     def _log_uav(
-        self, event: str, time: int, i: int, value: float | None = None, other: int = -1
+        self, event: str, time: float, i: int, value: float | None = None, other: int = -1
     ) -> None:
         """Log an event of a UAV; its value is by default the battery."""
         if self.log is not None:

@@ -120,13 +120,14 @@ class _Auditor:
         nodes, collected = self.nodes, self._sum("collected")
         total = nodes.initial + nodes.arrived
         success = int(all(u.end in FILLED for u in self.fleet.uavs))
+        home = int(all(map(self.fleet.is_home, self.fleet.uavs)))
         ratio = min(max(collected / total, 0.0), 1.0) if total > 0 else 1.0
         return self.parameters | {
             **{"uavs": len(self.fleet.uavs), "slots": self.log.slot, "success": success},
             "uav_slots": self._sum("slots_flying") + self._sum("slots_charging"),
             **{"initial": nodes.initial, "arrived": nodes.arrived, "collected": collected},
             **{"residual": sum(nodes.residual), "reward": self._sum("reward")},
-            "collection_ratio": ratio,
+            **{"collection_ratio": ratio, "home": home},
             "collection_ratio_and_communication": ratio * success,
         }
 

@@ -88,6 +88,21 @@ class Fleet:
         hovers = u.cell == (u.from_x, u.from_y)
         return bool(self.c.get("landing") and u.flies and hovers and self.zone_of(u) >= 0)
 
+    def way_home(self, u: Uav) -> int:
+        """The battery of the shortest way to a zone; the wind of cells not visited is not known."""
+        cells = {cell for zone in self.zones for cell in zone}
+        way, edge, seen = 0, {u.cell}, {u.cell}
+        while not edge & cells:
+            near = {(x + dx, y + dy) for x, y in edge for dx, dy in STEPS}
+            way, edge = way + 1, (near & self.open) - seen
+            seen |= edge
+        return self.c["flight_cost"] * (way * u.slots_per_cell + u.slots_left)
+
+    def is_home(self, u: Uav) -> bool:
+        """Whether a UAV has ended with the battery for its way home."""
+        is_down = u.end in ("battery", "lost") or (u.grounded and self.zone_of(u) < 0)
+        return not is_down and u.battery >= self.way_home(u)
+
     def type_of(self, i: int) -> Mapping[str, Any]:
         plain = {"slots_per_cell": 1, "quota": None, "rate": 1.0, "flying_time": None}
         types = self.c.get("fleet") or [plain]
