@@ -15,6 +15,7 @@ from dess.analysis.results import provenance
 from dess.analysis.study.cheapest import AnySelection, Costs, Setting
 from dess.analysis.study.design import DesignPoint
 from dess.analysis.study.study import CHECK, Study, StudyData
+from dess.files.documents import Sha256
 from dess.scenario import SEA, ScenarioSpace, load_scenario
 
 SCHEMA_VERSION = 3
@@ -57,7 +58,7 @@ class Manifest(provenance.Origin):
     missions: list[list[Annotated[int, Field(ge=1, le=CHECK)]]]
     selected: list[Selected]
     complete: bool
-    bound_code: provenance.Hash | None = None
+    bound_code: Sha256 | None = None
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:

@@ -30,7 +30,7 @@ from dess.analysis.study.stopping import Text
 from dess.analysis.study.study import StudyData
 from dess.code.sources import OURS, code_of, combined
 from dess.errors import validation_line
-from dess.files.documents import Document
+from dess.files.documents import Document, Sha256
 from dess.policies.registry import Policy, TypedByUser, confirmed, load_team
 from dess.scenario import SEA, ScenarioSpace, merged, scenario_at
 
@@ -38,8 +38,7 @@ ENGINES = ("dess.batch", "dess.mission")
 BOUND = ("dess.analysis.bound",)
 LIBRARIES = ("numpy", "numba", "simpy", "scipy", "torch", "pandas", "pyarrow")
 
-# Strings of a known form: a hash of code, a module, a class, a library, a version.
-Hash = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+# Strings of a known form: a module, a class, a library, a version.
 Module = Annotated[str, Field(pattern=r"^[\w.]+$", max_length=500)]
 Class = Annotated[str, Field(pattern=r"^[\w.]+:[\w.<>]+$", max_length=1000)]
 Library = Annotated[str, Field(pattern=r"^[\w.-]+$", max_length=100)]
@@ -55,7 +54,7 @@ class Member(Document):
 
     name: Text
     class_: Class = Field(alias="class")
-    code: Hash
+    code: Sha256
     weights: Text = ""
     learner: Text = ""
 
@@ -80,7 +79,7 @@ class Acceptance(Document):
         missions: The number of missions that were simulated before, with the old code.
     """
 
-    modules: dict[Module, tuple[Hash, Hash | Literal[""]]]
+    modules: dict[Module, tuple[Sha256, Sha256 | Literal[""]]]
     missions: int
 
     @property
@@ -107,8 +106,8 @@ class Origin(Document):
     """
 
     version: Version
-    code: dict[Module, Hash]
-    engine_code: Hash
+    code: dict[Module, Sha256]
+    engine_code: Sha256
     accepted: list[Acceptance]
     commit: Commit | None
     libraries: dict[Library, Version]

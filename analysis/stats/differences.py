@@ -308,7 +308,7 @@ def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str = "")
     return Paired(*mean, p, correlation, reduction, a.size)
 
 
-def relative_change(values: np.ndarray, reference: np.ndarray, level: float = LEVEL) -> Interval:
+def relative_change(values: np.ndarray, reference: np.ndarray) -> Interval:
     """The change of a mean as a share of a reference mean, with the interval of a ratio of means.
 
     Source: W. G. Cochran, Sampling Techniques, 3rd edition, 1977, Section 6.3: the variance of the
@@ -317,13 +317,12 @@ def relative_change(values: np.ndarray, reference: np.ndarray, level: float = LE
     Args:
         values: (n,) values.
         reference: (n,) reference values of the same replications, whose mean is not 0.
-        level: Confidence level.
     """
     ratio, n = float(values.mean() / reference.mean()), len(values)
     if n == 1:
         return Interval(ratio - 1, np.nan, np.nan)
     error = np.std(values - ratio * reference, ddof=1) / np.sqrt(n) / abs(reference.mean())
-    half = float(stats.t.isf((1 - level) / 2, n - 1) * error)
+    half = float(stats.t.isf((1 - LEVEL) / 2, n - 1) * error)
     return Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
 
 

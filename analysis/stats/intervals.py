@@ -302,29 +302,28 @@ def summary(
     return pd.DataFrame(rows, columns=[*by, "metric", "mean", "low", "high", "n"])
 
 
-def column_intervals(values: pd.DataFrame, metric: str = "", level: float = LEVEL) -> pd.DataFrame:
+def column_intervals(values: pd.DataFrame, metric: str = "") -> pd.DataFrame:
     """Means of columns with their intervals (``interval_of``), for many columns at once.
 
     Args:
         values: (R, K) a row per replication, a column per group; nan where a group lacks one.
         metric: The metric; Student's t, if not given. Values of ``success`` that are no outcomes 0
             or 1, but means of such, have the interval of bounded values.
-        level: Confidence level.
 
     Returns:
         (K, 4): ``mean``, ``low``, ``high``, ``n``, with the columns as index; nan without values.
     """
     n, mean = values.count(), values.mean()
-    half = values.sem() * stats.t.isf((1 - level) / 2, np.maximum(n - 1, 1))
+    half = values.sem() * stats.t.isf((1 - LEVEL) / 2, np.maximum(n - 1, 1))
     table = pd.DataFrame({"mean": mean, "low": mean - half, "high": mean + half, "n": n})
     if metric_of(metric).is_bounded:
         some = n > 0
-        ends = bounded_ends(mean[some], values.var(ddof=0)[some], n[some], level)
+        ends = bounded_ends(mean[some], values.var(ddof=0)[some], n[some])
         table.loc[some, ["low", "high"]] = np.transpose(ends)
     if metric_of(metric).is_outcome:
         rows = ((values.isin((0, 1)) | values.isna()).all() & (n > 0)).to_numpy()
         pairs = [*zip((mean * n)[rows].round().astype(int), n[rows], strict=True)]
-        known = {pair: wilson(*pair, level)[1:] for pair in {*pairs}}  # each takes its time
+        known = {pair: wilson(*pair)[1:] for pair in {*pairs}}  # each takes its time
         table.loc[rows, ["low", "high"]] = np.array([known[p] for p in pairs]).reshape(-1, 2)
     return table
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import stats
 
 from dess.analysis.metrics import metric_of
-from dess.analysis.stats.intervals import LEVEL, check_share, rare_differences
+from dess.analysis.stats.intervals import LEVEL, rare_differences
 
 ABOVE, INCONCLUSIVE, BELOW = POSITIONS = ("above", "inconclusive", "below")
 MARKS = {ABOVE: "▲", INCONCLUSIVE: "≈", BELOW: "▼"}  # in tables
@@ -160,12 +160,12 @@ _BLOCK = 512  # settings that are compared with all others at once, which limits
 _ROUNDING = 1e-12  # variances and differences below this, relative to the values, count as 0
 
 
-def may_be_best(values: np.ndarray, metric: str = "", level: float = LEVEL) -> np.ndarray:
+def may_be_best(values: np.ndarray, metric: str = "") -> np.ndarray:
     """The settings that no other setting is significantly better than.
 
-    With probability ``level``, the setting with the highest true mean is among them, for all
+    With probability ``LEVEL``, the setting with the highest true mean is among them, for all
     variances and correlations. A setting is ruled out if any other one is better by a one-sided
-    paired t test at the level (1 - level) / (K - 1). This is the subset selection of Gupta (1965,
+    paired t test at the level (1 - LEVEL) / (K - 1). This is the subset selection of Gupta (1965,
     Technometrics; see also Hsu 1984, Annals of Statistics) with Bonferroni's bound for settings
     that share their random numbers (Nelson, Swann, Goldsman and Song 2001, Operations Research). It
     assumes that the number of missions does not depend on their results.
@@ -175,23 +175,18 @@ def may_be_best(values: np.ndarray, metric: str = "", level: float = LEVEL) -> n
             replication. Two settings are compared on the replications of both.
         metric: The metric, by default one of which more is better. Its rare differences are
             added, as in ``dess.analysis.compare``.
-        level: The probability.
 
     Returns:
         (K,) of bool. A setting that has fewer than two replications in common with every other one
         is not ruled out.
-
-    Raises:
-        InputError: If the level is not between 0 and 1.
     """
-    check_share("level", level)
     present = np.isfinite(values)
     values = -values if metric_of(metric).less_is_better else values
     means = np.nansum(values, axis=0) / np.maximum(present.sum(axis=0), 1)
     # What a replication adds to all settings cancels in their differences.
     centre = np.nanmean(np.where(present.any(1, keepdims=True), values, 0.0), axis=1, keepdims=True)
     centred, mask = np.where(present, values - centre, 0.0), present.astype(float)
-    alpha = (1 - level) / max(values.shape[1] - 1, 1)
+    alpha = (1 - LEVEL) / max(values.shape[1] - 1, 1)
     blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
     rare = [rare_differences(metric, means, means[block, None]) for block in blocks]
     parts = [_unbeaten(*of, centred, mask, alpha) for of in zip(blocks, rare, strict=True)]

@@ -18,27 +18,14 @@ from dess.errors import InputError
 EXTRAS = {
     "learning": ("torch", "safetensors"),
     "reports": (
-        *("matplotlib", "PIL", "seaborn", "SALib", "IPython"),
-        *(
-            "jinja2",
-            "jupytext",
-            "markupsafe",
-            "nbconvert",
-            "nbformat",
-            "packaging",
-            "pygments",
-            "traitlets",
-        ),
+        *("matplotlib", "PIL", "seaborn", "SALib", "IPython", "jinja2", "jupytext"),
+        *("markupsafe", "nbconvert", "nbformat", "packaging", "pygments", "traitlets"),
     ),
     "distributed": ("distributed",),
     "tensorboard": ("tensorboard",),
     "examples": ("sb3_contrib", "stable_baselines3", "supersuit", "torchrl"),
 }
-_TITLES = {
-    "torch": "PyTorch",
-    "PIL": "Pillow",
-    "tensorboard": "TensorBoard",
-}
+_TITLES = {"torch": "PyTorch", "PIL": "Pillow", "tensorboard": "TensorBoard"}
 
 
 class MissingLibraryError(InputError):

@@ -9,14 +9,16 @@ notes = Notes.load(Path("notes.json"), "what dess notes has written")
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from dess.errors import InputError, shown, validation_line
 from dess.files.reading import parse_json, read_bytes
 
 LIMIT = 256 * 2**20  # bytes of the largest document; a design point of a manifest takes about 150
+
+Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]  # a checksum, or a hash of code
 
 _NONE: Mapping[str, object] = MappingProxyType({})
 

@@ -15,11 +15,11 @@ import torch
 from pydantic import Field, create_model
 
 from dess.errors import InputError
-from dess.files.documents import Document
+from dess.files.documents import Document, Sha256
 from dess.files.reading import parse_json
 from dess.observations import states as column
 from dess.policies.learner import trained
-from dess.policies.learner.config import CHECKPOINT, Name, Number, Sha256, TrainingConfig
+from dess.policies.learner.config import CHECKPOINT, Name, Number, TrainingConfig
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.ppo import ProximalTraining
 from dess.policies.learner.trained import Tensors, array_of, bytes_of, part, require_version

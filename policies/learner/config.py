@@ -25,7 +25,7 @@ from pydantic import (
 )
 
 from dess.errors import InputError, shown, validation_line
-from dess.files.documents import Document
+from dess.files.documents import Document, Sha256
 from dess.files.reading import Shipped
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.sea.families import SETS, seas_of
@@ -371,7 +371,6 @@ MODEL, CONFIG = "model.safetensors", "config.json"
 LIMIT = 2**20  # bytes of the file
 
 Number = Annotated[int, Field(ge=0, lt=2**63)]
-Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
 class LayoutTable(Document):

@@ -15,7 +15,7 @@ from dess.analysis.results.tables import Results, load_results
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.selection import Selection
 from dess.reports.pages import PREFIX, html, notebook
-from dess.reports.pages.notebook import SHIPPED, Report, tags_of
+from dess.reports.pages.notebook import Report, tags_of
 
 _BEST = "Which setting is the best for {}?"
 _MOST_VALUES = 12  # the largest number of values of a field in a list
@@ -115,15 +115,12 @@ def _set(value: Any) -> str:
 NOTEBOOK = "study"
 
 
-def report_of(
-    folder: Path, values: Mapping[str, Any] = MappingProxyType({}), notebooks: Path = SHIPPED
-) -> Report:
+def report_of(folder: Path, values: Mapping[str, Any] = MappingProxyType({})) -> Report:
     """The report of a results folder, with the sections and the title of its study.
 
     Args:
         folder: The results folder.
         values: Values for the parameters of the notebook, to be checked.
-        notebooks: The folder of the notebooks.
 
     Raises:
         InputError: If the folder holds no results, or they are incomplete or damaged; if the study
@@ -132,7 +129,7 @@ def report_of(
     results = load_results(folder)
     settings.ranking_metric(results, values.get("metric"))
     settings.baseline(results, values.get("baseline", 0))
-    study, original = results.manifest["study"], notebook.parsed(NOTEBOOK, notebooks)
+    study, original = results.manifest["study"], notebook.parsed(NOTEBOOK)
     kept = parts(results)
     original.cells = [
         cell for cell in original.cells if all(kept.get(tag, True) for tag in tags_of(cell))
