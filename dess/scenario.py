@@ -255,6 +255,11 @@ class Constants(Strict):
         return chart_at(*self.size, self.rectangles, self.no_fly)
 
     @property
+    def aim(self) -> str:
+        """What every UAV of a successful mission has done, in words."""
+        return "landed" if self.landing else "filled their quota"
+
+    @property
     def zone_cells(self) -> int:
         """Number of cells of the start and charging zone."""
         return self.zone[2] * self.zone[3]

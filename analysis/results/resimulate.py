@@ -93,7 +93,7 @@ class Mission:
         """What happened in the mission, as the caption of a figure."""
         return (
             f"{self.policy} in mission {self.replication}, a single one (n = 1): "
-            f"{self.causes or 'All UAVs filled their quota.'} "
+            f"{self.causes or f'All UAVs {self.scenario.aim}.'} "
             f"{self.collected} in {self.record.slots} mission slots."
         )
 
