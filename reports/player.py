@@ -125,8 +125,8 @@ READING = (
     "A disc shows the data left at a node, and its ring the most that it ever had. A numbered dot "
     "is a UAV, with its last moves and a line to the node that it serves most; it turns pale when "
     "its mission is over. A full square is a UAV that charges, an empty one a UAV that waits for a "
-    "pad. A tick means that the quota was filled, or that the UAV has landed. A click in the panels goes to another slot; "
-    "space plays and pauses, the arrows, Home and End change the slot."
+    "pad. A tick means that the quota was filled, or that the UAV has landed. A click in the "
+    "panels goes to another slot; space plays and pauses, the arrows, Home and End change the slot."
 )
 
 AGE_READING = (
