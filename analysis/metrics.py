@@ -80,7 +80,7 @@ class Metric:
         return numbers.points if self.in_percent else numbers.quantities
 
 
-SUCCESS, RATIO = "success", "collection_ratio"
+SUCCESS, RATIO, HOME = "success", "collection_ratio", "home"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
 AGE, COST = "age", "cost"  # a cost have the missions of a study with prices
 # Of a study with bounds: the bound, and the bound minus the product.
@@ -96,6 +96,7 @@ _PAPER = (
     Metric(PRODUCT, "Product", kind="share", in_percent=True),
 )
 _OTHERS = (
+    Metric(HOME, "Battery for the way home", kind="outcome", in_percent=True),
     Metric(REWARD, "Reward"),
     Metric(BOUND, "Upper bound"),
     Metric(GAP, "Optimality gap", less_is_better=True),
@@ -143,5 +144,5 @@ def measured_in(missions: Container[str]) -> list[str]:
 
 def metrics_in(missions: Container[str]) -> list[str]:
     """The metrics that a table of missions has: those of the paper, then all others."""
-    of_bounds = [name for name in (BOUND, GAP) if name in missions]
-    return [*ALWAYS, *of_bounds, *measured_in(missions)]
+    others = [name for name in (HOME, BOUND, GAP) if name in missions]
+    return [*ALWAYS, *others, *measured_in(missions)]

@@ -23,6 +23,7 @@ from dess.code.kernels import kernel
 from dess.errors import InputError
 from dess.record import Records, empty_records, write_record
 from dess.scenario import Scenario, ScenarioSpace
+from dess.sections.wind import ways_home
 from dess.state import check_seed, spaces_of, starts_of, state_of, teeth_lengths
 from dess.view import decide, team_of
 
@@ -163,11 +164,12 @@ def _run(spaces, team, source, batch_size, records, progress, stopped) -> None:
     queue = np.array([0, 0])  # next job, jobs done
     for b in range(size):
         _next_mission(b, job_of, queue, source, state)
+    ways = ways_home(state.missions, world.chart)
     # Reporting holds Python's global lock, so about a hundred reports are made in all.
     reported, step = 0, max(1, len(jobs) // 100)
     while queue[1] < len(jobs) and not stopped.is_set():
         decide(team, state, world)
-        _advance(job_of, queue, source, state, world, scratch, records)
+        _advance(job_of, queue, source, state, world, scratch, ways, records)
         if progress and (queue[1] >= reported + step or queue[1] == len(jobs)):
             progress(int(queue[1]) - reported)
             reported = int(queue[1])
@@ -188,7 +190,7 @@ def _next_mission(b, job_of, queue, source, state):
 
 
 @kernel
-def _advance(job_of, queue, source, state, world, scratch, records):
+def _advance(job_of, queue, source, state, world, scratch, ways, records):
     """Advance every mission by one slot; a mission that ends is recorded and replaced."""
     nodes, mean_snr, order, means, chart = world
     batches, search = scratch
@@ -204,6 +206,6 @@ def _advance(job_of, queue, source, state, world, scratch, records):
         )  # fmt: skip
         if mission.active == 0:
             job = job_of[b]
-            write_record(mission, team, data, sensors[b], teeth[b], records, job)
+            write_record(mission, team, data, sensors[b], teeth[b], ways, records, job)
             queue[1] += 1
             _next_mission(b, job_of, queue, source, state)

@@ -16,10 +16,11 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
-from dess.rules import data_left, flies
+from dess.rules import data_left
 from dess.scenario import MOST_ZONES
 from dess.sea.chart import distance, in_zone, is_open, length_around
 from dess.sections.failures import working_pads
+from dess.sections.landing import flies, lands
 from dess.sections.section import for_sections
 from dess.sections.wind import move_surcharge, reach_of
 from dess.state import HOVER, STEP_X, STEP_Y
@@ -72,19 +73,34 @@ def must_charge(mission, u, data):
 
     In wind, every move until then may cost the most. If little data is left, a communication slot
     may find no node to serve, so a margin is added. Where flying costs no battery, or no pad will
-    ever work again, no UAV must charge.
+    ever work again, no UAV must charge. In a mission that ends on the ground, every UAV must keep
+    a zone within reach.
 
     Args:
         mission: ``MISSION`` record.
         u: ``UAV`` record.
         data: Residual data of all nodes together [data units].
     """
+    if lands(mission):
+        return True
     needed = slots_expected(mission, u, data)
     if mission.pad_rate > 0.0 and mission.pad_repair == 0.0 and _all_pads(mission) == 0:
         return False
     # A UAV that lives until the mission is truncated is not lost.
     needed = min(needed, mission.max_slots - mission.slot + 1)
     return u.battery < mission.flight_cost * (needed + _most_wind(mission, u, needed))
+
+
+@inlined
+def slots_left(mission, u):
+    """The slots that UAV ``u`` may fly at most: as many as it has battery [%].
+
+    If missions end on the ground, no more than to the end of the mission.
+    """
+    if not lands(mission):
+        return u.battery
+    left = mission.max_slots - mission.slot
+    return min(u.battery, left) if mission.flight_cost > 0 else left
 
 
 @inlined
@@ -103,9 +119,12 @@ def _most_wind(mission, u, slots):
 
 
 @inlined
-def is_parked(u):
+def is_parked(mission, u):
     """Whether a UAV blocks its cell: it charges or is about to charge, or is grounded."""
-    return u.active and (u.grounded or (u.latch and u.zone >= 0))
+    charges = u.latch
+    if lands(mission):  # there the latch is set whenever a UAV may charge
+        charges = u.charging or u.pad_request >= 0 or u.battery <= mission.charge_start
+    return u.active and (u.grounded or (charges and u.zone >= 0))
 
 
 @inlined
@@ -122,7 +141,7 @@ def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     """
     length, between = distance(chart, x, y, to_x, to_y), 0
     for j in range(mission.uavs):
-        closed_x, closed_y = _closed(uavs, i, j, chart, planned)
+        closed_x, closed_y = _closed(mission, uavs, i, j, chart, planned)
         if closed_x >= 0:
             before = distance(chart, x, y, closed_x, closed_y)
             between += before + distance(chart, closed_x, closed_y, to_x, to_y) == length
@@ -135,10 +154,10 @@ def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
 
 
 @inlined
-def _closed(uavs, i, j, chart, planned):
+def _closed(mission, uavs, i, j, chart, planned):
     """The cell that UAV ``j`` closes to UAV ``i``, or -1."""
     o = uavs[j]
-    if j != i and is_parked(o):
+    if j != i and is_parked(mission, o):
         return o.x, o.y
     if planned is not None and planned[j] >= 0:
         return np.int64(chart.parking[planned[j], 0]), np.int64(chart.parking[planned[j], 1])
@@ -154,7 +173,7 @@ def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     width = chart.zones.shape[1]
     closed, count = np.empty(mission.uavs, np.int64), 0
     for j in range(mission.uavs):
-        closed_x, closed_y = _closed(uavs, i, j, chart, planned)
+        closed_x, closed_y = _closed(mission, uavs, i, j, chart, planned)
         if closed_x >= 0 and not (closed_x == to_x and closed_y == to_y):
             closed[count] = closed_y * width + closed_x
             count += 1
@@ -255,7 +274,7 @@ def _chooses_first(mission, uavs, i, chart, memory, reach):
     lacks = _plan(mission, uavs, i, -1, chart, memory, reach).lacks
     first = i if lacks > 0 else -1
     for j in range(mission.uavs):
-        if first < 0 and _will_charge(mission, uavs[j]) and not is_parked(uavs[j]):
+        if first < 0 and _will_charge(mission, uavs[j]) and not is_parked(mission, uavs[j]):
             first = j if _plan(mission, uavs, j, -1, chart, memory, reach).lacks > 0 else -1
     if first >= 0 and _plan(mission, uavs, i, first, chart, memory, reach).lacks > lacks:
         return -1
@@ -264,8 +283,9 @@ def _chooses_first(mission, uavs, i, chart, memory, reach):
 
 @inlined
 def _will_charge(mission, u):
-    """Whether a UAV in the air cannot fill its quota with its battery."""
-    return flies(u) and u.battery < mission.flight_cost * slots_needed(mission, u)
+    """Whether a UAV in the air cannot fill its quota with its battery, or has to land."""
+    needs = u.battery < mission.flight_cost * slots_needed(mission, u)
+    return flies(u) and (needs or lands(mission))
 
 
 @inlined
@@ -318,7 +338,7 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
     for j in range(mission.uavs):
         o = uavs[j]
         memory.planned[j] = -1
-        stays_there = j == i or is_parked(o) or not is_crowded(mission, chart, o.zone)
+        stays_there = j == i or is_parked(mission, o) or not is_crowded(mission, chart, o.zone)
         if o.active and o.zone >= 0 and stays_there:
             taken[chart.nearest[o.y, o.x]] = True
             if j != i and o.pad_request >= 0 and _plans_wait(mission, o.zone):
@@ -336,7 +356,7 @@ def _plan(mission, uavs, i, first, chart, memory, reach):
         will_charge = _will_charge(mission, o)
         if j != i and (o.grounded or o.pad_request >= 0 or (home_zone >= 0 and not will_charge)):
             continue
-        if j != i and is_parked(o):  # it asks for a pad in this slot
+        if j != i and is_parked(mission, o):  # it asks for a pad in this slot
             cell, slots, zone = np.int64(chart.nearest[o.y, o.x]), 0, np.int64(o.zone)
         elif home_zone < 0 or mission.zones > 1:
             cell, slots, lacks = _soonest_free(mission, uavs, j, chart, memory, reach)
@@ -431,7 +451,9 @@ def _is_given_up(mission, zone):
 
 @inlined
 def _plans_wait(mission, zone):
-    """Whether the guard allows for the wait for a pad of a zone."""
+    """Whether the guard allows for waits for a pad of a zone; on the ground, they cost nothing."""
+    if lands(mission):
+        return False
     few = mission.plans_waits and mission.uavs > mission.zone_pads[zone]
     return few or mission.pad_rate > 0.0
 
@@ -570,7 +592,7 @@ def contests(mission, uavs, i):
         east, south = o.x - u.x, o.y - u.y
         if j == i or not o.active or abs(east) + abs(south) > 2:
             continue
-        parked = is_parked(o)
+        parked = is_parked(mission, o)
         goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
         for action in range(5):
             slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
@@ -637,7 +659,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
         # Teammates fly around a parked UAV, so it need not leave its cell for any.
-        stays = action == HOVER and is_parked(u)
+        stays = action == HOVER and is_parked(mission, u)
         contested = 0 if stays else contest(levels, action)
         gives_way = charge and home.gives_way == 1 and action == HOVER
         if not is_open(chart, x, y) or contested == 3 or gives_way:
@@ -647,7 +669,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
             needed = battery_home(mission, uavs, i, chart, planned, x, y, home, reach)
             needed += 1 if reach is None else _cost(mission, u, chart, action, x, y)
             # One slot is the charging slot itself; the battery must not be depleted before it.
-            late = max(needed + 1 + reserve - u.battery, 0)
+            late = max(needed + 1 + reserve - slots_left(mission, u), 0)
         bit = 1 << action
         if contested < 2:
             clear |= bit
@@ -660,7 +682,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     if nearest & clear and (least > 0 or u.overruled):
         return nearest & clear
     elsewhere = nearest & clear & ~(1 << HOVER)
-    if elsewhere and not is_parked(u) and _is_in_the_way(mission, uavs, i):
+    if elsewhere and not is_parked(mission, u) and _is_in_the_way(mission, uavs, i):
         return elsewhere
     if least > 0 and clear & in_time:
         # these slots are there to wait or step aside until the teammate has passed

@@ -39,7 +39,19 @@ from dess.scenario import Scenario, ScenarioSpace
 from dess.sections import fleet
 from dess.sections.failures import strike
 from dess.sections.packets import Packets
-from dess.state import BATTERY, LOST, QUOTA, UAV, State, check_seed, spaces_of, starts_of, state_of
+from dess.sections.wind import ways_home
+from dess.state import (
+    BATTERY,
+    LANDED,
+    LOST,
+    QUOTA,
+    UAV,
+    State,
+    check_seed,
+    spaces_of,
+    starts_of,
+    state_of,
+)
 from dess.view import decide, team_of
 
 
@@ -177,7 +189,8 @@ class MissionModel:
         self.env.run(self.env.process(self._clock()))
         self._log_state("mission_end")
         records = empty_records(1, len(self.fleet), self.is_extended)
-        write_records(np.zeros(1, np.int64), self.state, records)
+        ways = ways_home(self.state.missions, self.world.chart)
+        write_records(np.zeros(1, np.int64), self.state, ways, records)
         if self.packets is not None:
             self.packets.write(records.operations[0])
         return records.mission(0, self.log)
@@ -263,7 +276,7 @@ class MissionModel:
         return [_Uav(*values) for values in self.uavs[: len(self.fleet)].tolist()]
 
     def _log_uav(
-        self, event: str, time: int, i: int, value: float | None = None, other: int = -1
+        self, event: str, time: float, i: int, value: float | None = None, other: int = -1
     ) -> None:
         """Log an event of a UAV; its value is by default the battery."""
         if self.log is not None:
@@ -306,6 +319,8 @@ class MissionModel:
                 self.log.add(
                     slot + n / m, "communication", i, u.served, u.amount, x, y, u.battery, snr=u.snr
                 )
+                if self.mission["landing"] and u.communications == u.quota:
+                    self._log_uav("quota_filled", slot + n / m, i, u.communications)
 
     def _log_close(self, time: int, before: list[Any]) -> None:
         """Log new data, and the charging sessions and the UAVs that ended with a slot."""
@@ -322,6 +337,8 @@ class MissionModel:
                 self._log_uav("quota_filled", time, i, u.communications)
             if was.active and u.end == BATTERY:
                 self._log_uav("battery_empty", time, i)
+            if was.active and u.end == LANDED:
+                self._log_uav("landing", time, i)
 
     def _log_failures(self, time: float, before: State) -> None:
         """Log what has failed or was repaired since a copy of the state at the end of the slot."""

@@ -13,7 +13,7 @@ from dess.sections.age import write_age
 from dess.sections.charging import write_use
 from dess.sections.failures import write_failures
 from dess.sections.section import for_sections
-from dess.state import END_NAMES, QUOTA, fields
+from dess.state import BATTERY, END_NAMES, LANDED, LOST, QUOTA, fields
 
 # One mission. Data are in data units; rewards are summed over the slots and the UAVs (eq. 14).
 MISSION_RECORD = np.dtype(
@@ -23,6 +23,7 @@ MISSION_RECORD = np.dtype(
         *fields(np.int64, "slots uav_slots success"),
         *fields(np.float64, "collection_ratio collection_ratio_and_communication"),
         *fields(np.float64, "initial arrived collected residual reward"),
+        ("home", np.int64),  # 1 if every UAV ended with the battery for its way home, else 0
     ]
 )
 
@@ -32,6 +33,7 @@ UAV_RECORD = np.dtype(
     [
         *fields(np.int64, "quota battery slots_flying slots_charging slots_waiting end"),
         *fields(np.float64, "collected reward"),
+        ("way_home", np.int64),  # the battery for its shortest way to a zone cell [%]
     ]
 )
 
@@ -102,7 +104,7 @@ PACKET_EVENTS = ("delivery", "loss")
 EVENT_NAMES = (
     *("mission_start", *PARAMETER_EVENTS, "move", "collision"),
     *("charge_request", "charge_start", "charge_end", "charge_withdrawal"),
-    *("communication", "arrival", "quota_filled", "battery_empty"),
+    *("communication", "arrival", "quota_filled", "battery_empty", "landing"),
     *(*FAILURE_EVENTS, *PACKET_EVENTS, "mission_end"),
 )
 
@@ -134,18 +136,21 @@ class Records(NamedTuple):
 
 
 @kernel
-def write_records(places, state, records):
-    """Write the records of the missions at these (N,) places of the state."""
+def write_records(places, state, ways, records):
+    """Write the records of the missions at these (N,) places of the state.
+
+    ``ways`` is the table of ``wind.ways_home``.
+    """
     for row in range(len(places)):
         b = places[row]
         write_record(
             state.missions[b], state.uavs[b], state.residual[b], state.sensors[b], state.teeth[b],
-            records, row,
+            ways, records, row,
         )  # fmt: skip
 
 
 @inlined
-def write_record(mission, uavs, residual, sensors, teeth, records, row):
+def write_record(mission, uavs, residual, sensors, teeth, ways, records, row):
     """Write the record of a mission into a row of ``Records``."""
     record, uav_records = records.missions[row], records.uavs[row]
     record.seed = mission.seed
@@ -160,7 +165,7 @@ def write_record(mission, uavs, residual, sensors, teeth, records, row):
     record.collected = mission.collected
     record.residual = data_left(mission, residual)
     record.uav_slots = 0
-    record.success = 1
+    record.success = record.home = 1
     record.reward = 0.0
     for i in range(mission.uavs):
         u, out = uavs[i], uav_records[i]
@@ -174,8 +179,13 @@ def write_record(mission, uavs, residual, sensors, teeth, records, row):
         out.reward = u.total_reward
         record.uav_slots += u.slots_flying + u.slots_charging
         record.reward += u.total_reward
-        if u.end != QUOTA:
+        if u.end != QUOTA and u.end != LANDED:
             record.success = 0
+        way = ways[u.slots_per_cell - 1, u.y, u.x] + u.slots_left
+        out.way_home = mission.flight_cost * way
+        is_down = u.end == BATTERY or u.end == LOST or (u.grounded and way > 0)
+        if is_down or u.battery < out.way_home:
+            record.home = 0
     total = record.initial + record.arrived
     # Rounding may put the ratio a little below 0 or above 1; without any data it is 1.
     record.collection_ratio = min(max(record.collected / total, 0.0), 1.0) if total > 0.0 else 1.0

@@ -22,11 +22,13 @@ from dess.sea.chart import is_open
 from dess.sections import age, fleet, wind
 from dess.sections.charging import is_before, share_power
 from dess.sections.failures import strike_if_on, take_pad, working_pads
+from dess.sections.landing import flies, has_filled, has_landed, lands, stands
 from dess.sections.section import for_sections
 from dess.state import (
     ACTIVE,
     BATTERY,
     HOVER,
+    LANDED,
     LOST,
     QUOTA,
     STEP_X,
@@ -108,7 +110,14 @@ def _start_place(mission, i):
 
 @inlined
 def _update_latch(mission, u):
-    """Set or clear the charging latch iota (eq. 3) by the battery at the start of a slot."""
+    """Set or clear the charging latch iota (eq. 3) by the battery at the start of a slot.
+
+    In missions that end on the ground, every UAV may charge that is not charged and has not filled
+    its quota.
+    """
+    if lands(mission):
+        u.latch = u.battery < mission.charge_complete and not has_filled(u)
+        return
     if u.battery <= mission.charge_start:
         u.latch = True
     if u.battery >= mission.charge_complete:
@@ -185,12 +194,6 @@ def _cancel(u):
     u.executed = HOVER
     u.slots_left = 0
     u.overruled = True
-
-
-@inlined
-def flies(u):
-    """Whether a UAV is in the air: it is active and neither charges nor is grounded."""
-    return u.active and not u.charging and not u.grounded
 
 
 @inlined
@@ -274,9 +277,10 @@ def spend(mission, uavs):
         elif u.grounded:
             mission.slots_grounded += 1
         else:
-            u.battery -= mission.flight_cost
-            _spend_against_wind(mission, u)
-            u.slots_flying += 1
+            if not stands(mission, u):
+                u.battery -= mission.flight_cost
+                _spend_against_wind(mission, u)
+                u.slots_flying += 1
             if u.pad_request >= 0:
                 u.slots_waiting += 1
     mission.slot_collected = 0.0
@@ -304,7 +308,7 @@ def communicate(
     for i in range(mission.uavs):
         u = uavs[i]
         u.served = -1
-        if not flies(u):
+        if not flies(u) or stands(mission, u):
             continue
         if (n - 1) % channel.GROUP == 0 or mission.continuous != 0:
             channel.open_group(i, search)
@@ -379,7 +383,7 @@ def reward_terms(mission, u, charged):
         mission.reward_step,
         mission.reward_overruled if u.overruled else 0.0,
         mission.reward_charging if charged else 0.0,
-        mission.reward_quota if u.end == QUOTA else 0.0,
+        mission.reward_quota if u.end == QUOTA or u.end == LANDED else 0.0,
         mission.reward_depleted if u.end == BATTERY else 0.0,
         mission.age_reward * age.mean_age(mission),
     )
@@ -395,7 +399,9 @@ def settle(mission, uavs):
         u.reward = 0.0
         if not u.active:
             continue
-        if u.communications >= u.quota:
+        if lands(mission) and has_landed(mission, u):
+            u.end = LANDED
+        elif not lands(mission) and u.communications >= u.quota:
             u.end = QUOTA
         elif u.battery <= 0:
             u.end = BATTERY

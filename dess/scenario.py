@@ -62,6 +62,7 @@ MOST_ENTRIES = 2**30
 SECTIONS = ("arrivals", "age", "charging", "failures", "wind", "fleet")
 # The fields of seas that the paper does not have; records are the same with and without them.
 GEOMETRY = ("rows", "zones", "no_fly")
+LANDING = "landing"
 ZONE_PADS = "zones.pads"  # sets the pads of the zones of ``zones``, and leaves their cells
 
 # The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
@@ -144,6 +145,11 @@ class Constants(Strict):
     max_slots: Integer = Field(
         500, ge=1, le=MOST_SLOTS, description="mission slots after which a mission is truncated"
     )
+    landing: bool = Field(
+        False,
+        description="whether missions end on the ground: UAVs stand in a zone for nothing, and "
+        "land when their quota is filled",
+    )
 
     # Energy
     charge_rate: Integer = Field(
@@ -176,7 +182,11 @@ class Constants(Strict):
         0.02, ge=0, le=100, description="new data per node and mission slot [data units] (lambda)"
     )
     quota: Integer = Field(
-        440, ge=1, le=1_000_000, description="communication slots that a UAV must fill (U_C)"
+        440,
+        ge=0,
+        le=1_000_000,
+        description="communication slots that a UAV must fill (U_C); 0, with landing, for none: "
+        "UAVs work until max_slots",
     )
 
     # Reward (Table III)
@@ -209,7 +219,8 @@ class Constants(Strict):
     def _without_what_is_off(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out the sections that are off: so scenarios without them are stored as before."""
         values = handler(self)
-        return {n: v for n, v in values.items() if n not in (*SECTIONS, *GEOMETRY) or self.has(n)}
+        off = [n for n in (*SECTIONS, *GEOMETRY, LANDING) if not self.has(n)]
+        return {name: value for name, value in values.items() if name not in off}
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
@@ -244,6 +255,11 @@ class Constants(Strict):
         return chart_at(*self.size, self.rectangles, self.no_fly)
 
     @property
+    def aim(self) -> str:
+        """What every UAV of a successful mission has done, in words."""
+        return "landed" if self.landing else "filled their quota"
+
+    @property
     def zone_cells(self) -> int:
         """Number of cells of the start and charging zone."""
         return self.zone[2] * self.zone[3]
@@ -263,7 +279,7 @@ class Constants(Strict):
     @property
     def is_extended(self) -> bool:
         """Whether the scenario goes beyond the paper, so that records have ``OPERATIONS``."""
-        return any(self.has(name) for name in SECTIONS)
+        return any(self.has(name) for name in (*SECTIONS, LANDING))
 
     def has(self, section: str) -> bool:
         """Whether a section is on."""
@@ -602,6 +618,8 @@ def _unreachable(c: Constants) -> Iterator[str]:
 def _unfit(c: Constants) -> Iterator[str]:
     """The rates, the pads and the initial data fit to the nodes and the zones."""
     rates, (low, high) = c.arrivals.rates, c.initial_data
+    if c.quota == 0 and not c.landing:
+        yield "quota: 0 needs landing; allowed: 1..1000000, or landing = true"
     if rates and len(rates) != len(c.nodes):
         yield f"arrivals.rates: there are {len(rates)}; allowed: {len(c.nodes)}, a rate per node"
     for number, ((*_, width, height), pads) in enumerate(

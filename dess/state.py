@@ -26,8 +26,8 @@ STEP_X = np.array([0, 1, 0, -1, 0])
 STEP_Y = np.array([-1, 0, 1, 0, 0])
 
 # How the mission of a UAV ended; ACTIVE while it has not ended.
-ACTIVE, QUOTA, BATTERY, TRUNCATED, LOST = range(5)
-END_NAMES = ("active", "quota", "battery", "truncated", "lost")
+ACTIVE, QUOTA, BATTERY, TRUNCATED, LOST, LANDED = range(6)
+END_NAMES = ("active", "quota", "battery", "truncated", "lost", "landed")
 
 
 def fields(kind: type, names: str) -> list[tuple[str, type]]:
@@ -49,6 +49,7 @@ MISSION = np.dtype(
         # Time, fleet and energy.
         *fields(np.int64, "communication_slots max_slots uavs flying_time charge_start"),
         *fields(np.int64, "charge_complete charge_rate flight_cost quota"),
+        ("landing", np.int64),  # whether missions end on the ground
         # Charging (dess.sections.charging); ``plans_waits`` tells whether the return guard allows
         # for the wait for a pad.
         *fields(np.int64, "has_charging plans_waits lowest_battery_first power"),

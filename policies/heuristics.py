@@ -11,8 +11,9 @@ import numpy as np
 
 from dess import guard, streams
 from dess.code.kernels import inlined, kernel
-from dess.rules import data_left, flies
+from dess.rules import data_left
 from dess.sea.chart import distance, spread
+from dess.sections.landing import flies
 from dess.sections.wind import reach_of
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
@@ -192,7 +193,7 @@ def _goal(
     u = team[i]
     spare = guard.slots_needed(mission, u)
     if charge:
-        spare = u.battery - 1 - guard.margin(mission, u) - home.wait
+        spare = guard.slots_left(mission, u) - 1 - guard.margin(mission, u) - home.wait
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best, node = 0.0, -1
     for k in range(mission.nodes):

@@ -90,7 +90,8 @@ class Playback:
     def data(self) -> dict[str, Any]:
         """All that a player in a page shows, as JSON; lists of states are in the order of slots."""
         scenario, log = self.scenario, self._log
-        filled = log.loc[log["event"] == "quota_filled", "uav"]
+        end = "landing" if scenario.landing else "quota_filled"
+        filled = log.loc[log["event"] == end, "uav"]
         aged = scenario.age.measured
         return {
             **{"size": scenario.size, "zones": scenario.rectangles},
@@ -124,8 +125,8 @@ READING = (
     "A disc shows the data left at a node, and its ring the most that it ever had. A numbered dot "
     "is a UAV, with its last moves and a line to the node that it serves most; it turns pale when "
     "its mission is over. A full square is a UAV that charges, an empty one a UAV that waits for a "
-    "pad. A tick means that the quota was filled. A click in the panels goes to another slot; "
-    "space plays and pauses, the arrows, Home and End change the slot."
+    "pad. A tick means that the quota was filled, or that the UAV has landed. A click in the "
+    "panels goes to another slot; space plays and pauses, the arrows, Home and End change the slot."
 )
 
 AGE_READING = (

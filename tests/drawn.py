@@ -176,7 +176,10 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
             "seed": draw(st.integers(0, 2**32 - 1)),
         },
         "fleet": draw(st.lists(_uav_types, max_size=3)),
+        "landing": draw(st.booleans()),
     }
+    if sections["landing"] and draw(st.booleans()):
+        sections["quota"] = 0
     return draw(spaces(**(sections | fixed)))
 
 

@@ -18,7 +18,7 @@ from PIL import Image
 import dess
 from benchmarks import learning_curves
 from dess import load_scenario, policies
-from dess.analysis import load_study
+from dess.analysis import load_study, numbers
 from dess.analysis.paper import values
 from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
 from dess.reports import cli
@@ -285,6 +285,17 @@ def test_the_readme_has_the_figures_of_the_table_of_policies() -> None:
     assert [a or b for a, b, _ in rows] == ["greedy", "ddqn", "planner", "paper"]
     for name, other, cells in rows:
         assert re.search(rf"^\| `?{name or other}`? \| {re.escape(cells)} \|$", POLICIES, re.M)
+
+
+@pytest.mark.slow
+def test_the_readme_says_how_often_uavs_have_the_battery_for_the_way_home(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    arguments = ["evaluate", "--policy", "greedy", "--policy", "ddqn", "--missions", "1000"]
+    rows = evaluated(arguments, capsys)
+    for row, policy in zip(rows, ("greedy", "ddqn"), strict=True):
+        text = numbers.interval(*row["home"].values())
+        assert re.search(rf"{re.escape(text)}\s+(of the missions )?with `{policy}`", README)
 
 
 @pytest.mark.slow

@@ -273,7 +273,8 @@ def outcome_table(missions: pd.DataFrame, results: Results, pair: Pair) -> pd.Da
 def _ends(results: Results, policy: str, replications: Iterable[int]) -> pd.DataFrame:
     """How the UAVs of missions end: a row per mission, and a column of counts per kind of end."""
     uavs = results.uavs[results.uavs["policy"] == policy]
-    ends = pd.crosstab(uavs["replication"], uavs["end"], margins=True, margins_name="all")
+    end = uavs["end"].replace("landed", "quota")  # who has landed has filled the quota
+    ends = pd.crosstab(uavs["replication"], end, margins=True, margins_name="all")
     return ends.reindex([*replications], columns=["quota", "battery", "all"], fill_value=0)
 
 

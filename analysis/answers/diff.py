@@ -199,7 +199,7 @@ def _uavs(results: Results, missions: pd.DataFrame, numbered: pd.DataFrame) -> p
     which = missions[["policy", "point", *_KEYS]].merge(numbered, on=_KEYS)
     which = which[["policy", "point", "replication", "mission"]]
     rows = pd.concat(tables, ignore_index=True).merge(which)
-    return rows[["mission", "uav", *_UAV_FIELDS]]
+    return rows.reindex(columns=["mission", "uav", *_UAV_FIELDS])
 
 
 def _differing_fields(missions: pd.DataFrame, uavs: pd.DataFrame) -> np.ndarray:

@@ -31,7 +31,7 @@ BAND = (0.1, 0.9)  # the quantiles between which most queues are
 # The events that begin and end the wait of a UAV for a pad.
 _WAITS = (
     *("charge_request", "charge_start", "charge_withdrawal", "uav_failure", "quota_filled"),
-    *("battery_empty", "mission_end"),
+    *("battery_empty", "landing", "mission_end"),
 )
 _ENDS = ["mean", "low", "high"]
 

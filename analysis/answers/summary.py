@@ -12,7 +12,7 @@ from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers import costs
 from dess.analysis.answers.settings import edge, ends, in_words
-from dess.analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS, metric_of
+from dess.analysis.metrics import ALWAYS, HOME, METRICS, PRODUCT, RATIO, SUCCESS, metric_of
 from dess.analysis.names import parameter, value_text
 from dess.analysis.results.chunks import parts_of
 from dess.analysis.results.tables import Results
@@ -222,9 +222,11 @@ def beside_paper(
 
     Returns:
         A row of the printed numbers and a row per policy, with a column of text per metric and
-        number of UAVs, see ``with_mark``.
+        number of UAVs, see ``with_mark``; of all missions, also the share with the battery for
+        the way home, which the paper does not have.
     """
-    columns = {("", "Policy"): ["paper", *estimates["policy"].unique()]}
+    policies, of_home = estimates["policy"].unique(), estimates[estimates["metric"] == HOME]
+    columns = {("", "Policy"): ["paper", *policies]}
     for metric in next(iter(printed.values())):
         of_metric = estimates[estimates["metric"] == metric]
         for uavs, figures in printed.items():
@@ -232,7 +234,26 @@ def beside_paper(
             texts = [with_mark(row, figures[metric]) for row in rows.itertuples()]
             head = "" if uavs is None else f"I = {uavs}"
             columns[METRICS[metric], head] = [numbers.percent(figures[metric]), *texts]
+    if None in printed and len(of_home):
+        texts = [numbers.estimate(row) for _, row in of_home.iterrows()]
+        columns[metric_of(HOME).name, ""] = ["", *texts]
     return pd.DataFrame(columns)
+
+
+def home_in_words(means: pd.DataFrame) -> str:
+    """What the paper's success is, and how often the UAVs of a success could fly home.
+
+    Args:
+        means: Rows of ``dess.analysis.summary`` by policy.
+    """
+    of_home = means[means["metric"] == HOME].itertuples()
+    shares = [f"{numbers.percent(row.mean)} with `{row.policy}`" for row in of_home]
+    return (
+        "Success is the paper's: the mission of a UAV ends where its quota is filled. The share of "
+        "missions in which every UAV ends with the battery for its way home is "
+        f"{numbers.words(shares) or 'not known'}. With `landing = true`, missions end on the "
+        "ground."
+    )
 
 
 def with_mark(estimate: Any, printed: float) -> str:

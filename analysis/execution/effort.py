@@ -53,7 +53,8 @@ def policies_for(spaces: Iterable[ScenarioSpace], missions: int) -> tuple[str, .
 
 def decisions(space: ScenarioSpace) -> float:
     """About the decisions of a mission: every UAV flies until its quota is filled."""
-    slots = min(ceil(space.quota / space.communication_slots), space.max_slots)
+    needed = ceil(space.quota / space.communication_slots) or space.max_slots
+    slots = min(needed, space.max_slots)
     return sum(space.uavs) / 2 * slots
 
 

@@ -18,7 +18,7 @@ from dess.analysis.execution.jobs import (
     simulate_missions,
 )
 from dess.analysis.execution.workers import Here, Pool
-from dess.analysis.metrics import ALWAYS
+from dess.analysis.metrics import ALWAYS, HOME, SUCCESS
 from dess.analysis.results.chunks import Part, split
 from dess.analysis.results.manifest import Cell
 from dess.analysis.stats.intervals import Moments
@@ -154,7 +154,7 @@ def _evaluated(asked: Asked, size: int, progress: Progress | None) -> Evaluation
 
 def _metrics(records: Records) -> dict[str, np.ndarray]:
     """The values of every metric that some of the missions have measured."""
-    values = {metric: records.missions[metric] for metric in ALWAYS}
+    values = {metric: records.missions[metric] for metric in (SUCCESS, HOME, *ALWAYS)}
     if len(records.operations):
         values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
     return {metric: of.astype(float) for metric, of in values.items()}

@@ -208,8 +208,9 @@ def _outcome(events: event_log.Events, scenario: Scenario) -> str:
     data = log[log["node"] >= 0].groupby("event")["value"].sum()
     total = data["mission_start"] + data.get("arrival", 0.0)
     share = data.get("communication", 0.0) / total if total else 1.0
-    filled = (log["event"] == "quota_filled").sum()
-    return f"I = {scenario.uavs}: {share:.1%} collected, {filled} of {scenario.uavs} quotas filled"
+    event, what = ("landing", "landed") if scenario.landing else ("quota_filled", "quotas filled")
+    count = (log["event"] == event).sum()
+    return f"I = {scenario.uavs}: {share:.1%} collected, {count} of {scenario.uavs} {what}"
 
 
 def _grid(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:

@@ -168,7 +168,7 @@ def _slots_of(log: pd.DataFrame, event: str) -> set[tuple[int, int]]:
 
 
 def causes(events: Events, scenario: Scenario, first: int = 1) -> list[str]:
-    """A sentence per UAV that did not fill its quota, without a full stop.
+    """A sentence per UAV that did not fill its quota, or did not land, without a full stop.
 
     Args:
         events: The event log (a data frame, or the columns, of ``dess.record.EventLog``).
@@ -176,21 +176,23 @@ def causes(events: Events, scenario: Scenario, first: int = 1) -> list[str]:
         first: The number of the first UAV, as in what stands beside the sentences.
     """
     log = pd.DataFrame(events)
-    filled = set(log.loc[log["event"] == "quota_filled", "uav"])
+    end = "landing" if scenario.landing else "quota_filled"
+    ended = set(log.loc[log["event"] == end, "uav"])
     slots, levels = uav_slots(log), battery_levels(log)
     # The battery before each slot: that at its start.
     starts = levels.rename(columns={"time": "slot", "battery": "before"})
     slots = slots.merge(starts, on=["uav", "slot"])
-    unfilled = (uav for uav in range(scenario.uavs) if uav not in filled)
-    return [_cause(log, slots, scenario, uav, first) for uav in unfilled]
+    failed = (uav for uav in range(scenario.uavs) if uav not in ended)
+    return [_cause(log, slots, scenario, uav, first) for uav in failed]
 
 
 def _cause(log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int, first: int) -> str:
     own, flown = log[log["uav"] == uav], slots[slots["uav"] == uav]
     kind, last = type_of(scenario.fleet, uav), flown.iloc[-1]
     quota, after = kind.quota or scenario.quota, int(last["slot"]) + 1
-    to_go = f"{quota - (own['event'] == 'communication').sum()} of {quota}"
-    to_go, name = f"with {to_go} communication slots to go", f"UAV {first + uav}"
+    to_go = f"{max(quota - (own['event'] == 'communication').sum(), 0)} of {quota}"
+    to_go = f"with {to_go} communication slots to go" if quota else "without having landed"
+    name = f"UAV {first + uav}"
     cell = f"after {after} slots at ({last['x']}, {last['y']})"
     if not (own["event"] == "battery_empty").any():
         if after == scenario.max_slots:

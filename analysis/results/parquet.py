@@ -70,10 +70,18 @@ EVENTS = pa.schema(
     (name, pa.string() if kind is object else pa.from_numpy_dtype(kind))
     for name, kind in EVENT_COLUMNS.items()
 )
-# The schemas that files may have; event logs of before had the first columns only.
+
+
+def _without(schema: pa.Schema, name: str) -> pa.Schema:
+    return schema.remove(schema.get_field_index(name))
+
+
+# The schemas that files may have; those of version 0.2 have no ways home, and fewer columns of the
+# event log.
 SCHEMAS = {
-    "missions": [MISSIONS, EXTENDED_MISSIONS],
-    "uavs": [UAVS],
+    "missions": [MISSIONS, EXTENDED_MISSIONS]
+    + [_without(schema, "home") for schema in (MISSIONS, EXTENDED_MISSIONS)],
+    "uavs": [UAVS, _without(UAVS, "way_home")],
     "bounds": [BOUNDS],
     "events": [EVENTS, pa.schema([EVENTS.field(name) for name in EVENTS.names[:7]])],
 }

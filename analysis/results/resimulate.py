@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from dess import InputError, simulate
 from dess.analysis import numbers
-from dess.analysis.metrics import measured_in
+from dess.analysis.metrics import HOME, measured_in
 from dess.analysis.results.event_log import causes
 from dess.analysis.results.provenance import Origin
 from dess.analysis.results.tables import Results
@@ -93,7 +93,7 @@ class Mission:
         """What happened in the mission, as the caption of a figure."""
         return (
             f"{self.policy} in mission {self.replication}, a single one (n = 1): "
-            f"{self.causes or 'All UAVs filled their quota.'} "
+            f"{self.causes or f'All UAVs {self.scenario.aim}.'} "
             f"{self.collected} in {self.record.slots} mission slots."
         )
 
@@ -153,7 +153,8 @@ def recorded(results: Results, policy: str, point: int, replication: int) -> dic
 def difference(record: MissionRecord, fields: Mapping[str, Any]) -> str:
     """The stored fields that differ, in any bit, from a record, in words; empty if none does."""
     uavs = _uavs_of(record).to_dict("records")
-    simulated = _by_field(record.metrics, uavs) | record.measured
+    metrics = {name: record.metrics[name] for name in MISSION_RECORD.names or ()}
+    simulated = _by_field(metrics, uavs) | record.measured
     names = [*fields, *(name for name in record.measured if name not in fields)]
     changed = [name for name in names if simulated.get(name) != fields.get(name)]
     if not changed:
@@ -162,11 +163,11 @@ def difference(record: MissionRecord, fields: Mapping[str, Any]) -> str:
     return f"{first} is {fields.get(first)} and {simulated.get(first)} when simulated again{more}"
 
 
-def _by_field(mission: Any, uavs: Sequence[Mapping[Any, Any]]) -> dict[str, Any]:
+def _by_field(mission: Mapping[Any, Any], uavs: Sequence[Mapping[Any, Any]]) -> dict[str, Any]:
     """A record by field, from the row of the mission and the rows of its UAVs."""
-    fields = {name: mission[name] for name in MISSION_RECORD.names or ()}
+    fields = {name: mission[name] for name in MISSION_RECORD.names or () if name in mission}
     for number, uav in enumerate(uavs, 1):
-        fields |= {f"uav {number} {name}": uav[name] for name in UAV_RECORD.names or ()}
+        fields |= {f"uav {number} {n}": uav[n] for n in UAV_RECORD.names or () if n in uav}
     return fields
 
 
@@ -215,7 +216,8 @@ class Evidence(Origin):
         for mission in self.sample:
             if mission.policy not in policies:
                 raise ValueError(f"sample: {mission.policy} is not a policy of the study")
-            if missing := [n for n in MISSION_RECORD.names or () if n not in mission.record]:
+            names = [name for name in MISSION_RECORD.names or () if name != HOME]  # before 0.3
+            if missing := [name for name in names if name not in mission.record]:
                 raise ValueError(f"sample: a record has no {missing[0]}")
         return self
 

@@ -20,7 +20,7 @@ from pydantic import (
 
 from dess import InputError
 from dess.analysis.bound import check_scenario
-from dess.analysis.metrics import BOUND, COST, GAP, metrics_in
+from dess.analysis.metrics import BOUND, COST, GAP, HOME, metrics_in
 from dess.analysis.study.cheapest import AnySelection, Cheapest, Costs
 from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
 from dess.analysis.study.selection import Selection
@@ -196,7 +196,7 @@ class Study(StudyData):
     @property
     def metrics(self) -> list[str]:
         """The metrics that missions of the study have, be it only at some design points."""
-        measured = {name for space in self.scenarios for name in measures_of(space)}
+        measured = {HOME, *(name for space in self.scenarios for name in measures_of(space))}
         of_bounds = {BOUND, GAP} if self.bounds else set()
         return [*metrics_in(measured | of_bounds), *([COST] if self.costs else [])]
 
@@ -230,7 +230,7 @@ class Study(StudyData):
         else:
             return
         for space in self.scenarios:
-            known = metrics_in(measures_of(space))
+            known = metrics_in([HOME, *measures_of(space)])
             if absent := sorted(asked - {*known}):
                 raise ValueError(
                     f"{key}: {absent[0]} is not measured at every design point; allowed: "

@@ -44,12 +44,13 @@ class Suite:
 
         Raises:
             InputError: If the study or its cross-check is missing or damaged, or if its scenario
-                has failures or arrivals in continuous time, which the checks of logs do not know.
+                has failures, landing or arrivals in continuous time, which the checks of logs do
+                not know.
         """
         self.study = load_results(Path(folder) / STUDY)
         self.space = self.study.scenario()
-        for section in ("failures", "arrivals"):
-            if getattr(self.space, section).is_on:
+        for section in ("failures", "arrivals", "landing"):
+            if self.space.has(section):
                 raise InputError(
                     f"{Path(folder) / STUDY}: its scenario has {section}, which this page cannot "
                     "check; allowed: a study without them"

@@ -16,6 +16,7 @@ from dess.code.kernels import kernel
 from dess.errors import InputError
 from dess.record import Records, empty_records, write_records
 from dess.scenario import Scenario, ScenarioSpace
+from dess.sections.wind import ways_home
 from dess.state import ACTION_NAMES, TRUNCATED, check_seed, fields, spaces_of, starts_of, state_of
 
 # The terms of a reward, in the order of ``rules.reward_terms``.
@@ -106,7 +107,8 @@ class MissionStepper:
         """The records of the missions in these environments, up to the present slot."""
         fleet = self.state.uavs.shape[1]
         records = empty_records(len(environments), fleet, self.space.is_extended)
-        write_records(environments, self.state, records)
+        ways = ways_home(self.state.missions, self.world.chart)
+        write_records(environments, self.state, ways, records)
         return records
 
 

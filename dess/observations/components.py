@@ -136,8 +136,8 @@ def _encode_uav(mission, chart, uavs, i, residual, out):
 
 @kernel
 def _quota_share(u):
-    """Communications as a share of the quota, at most 1; the last slot may exceed the quota."""
-    return min(u.communications / u.quota, 1.0)
+    """Communications as a share of the quota, at most 1; 0 without a quota."""
+    return min(u.communications / u.quota, 1.0) if u.quota > 0 else 0.0
 
 
 @kernel

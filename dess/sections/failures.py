@@ -6,6 +6,7 @@ from pydantic import Field
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
+from dess.sections.landing import stands
 from dess.sections.section import Probability, Section, Slots, for_sections
 
 MOST_PADS = 64  # charging pads that can fail: as many as the largest fleet has UAVs
@@ -97,7 +98,7 @@ def _happens(mission, stream, index, probability):
 
 @inlined
 def _strike_uav(mission, u, i, lost):
-    """A UAV fails in the air, neither on a pad nor grounded; then it is grounded or lost.
+    """A UAV fails in the air, not on the ground or a pad; then it is grounded or lost.
 
     In the middle of a move it comes down in the cell that it flies to.
     """
@@ -105,7 +106,9 @@ def _strike_uav(mission, u, i, lost):
         return
     if u.grounded:
         u.grounded = not _happens(mission, streams.UAV_FAILURE, i, mission.uav_repair)
-    elif not u.charging and _happens(mission, streams.UAV_FAILURE, i, mission.uav_rate):
+    elif stands(mission, u) or u.charging:
+        return
+    elif _happens(mission, streams.UAV_FAILURE, i, mission.uav_rate):
         mission.uav_failures += 1
         u.pad_request = -1
         u.slots_left = 0

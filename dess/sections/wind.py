@@ -159,6 +159,29 @@ def _table(shape: tuple[int, int], zones: bytes, parking: bytes, slowest: int, *
     return table
 
 
+def ways_home(missions: np.ndarray, chart: Chart) -> np.ndarray:
+    """(S, H, W) battery [%] from each cell to the nearest zone cell, for 1 to S slots per cell.
+
+    Args:
+        missions: (B,) ``MISSION`` records of one batch, which share wind and fleet.
+        chart: Their chart.
+    """
+    sea = (chart.zones.shape, chart.zones.tobytes(), chart.parking.tobytes())
+    return _ways_home(*sea, *(missions[0][field].item() for field in _FIELDS))
+
+
+@lru_cache(maxsize=16)
+def _ways_home(
+    shape: tuple[int, int], zones: bytes, parking: bytes, slowest: int, *wind
+) -> np.ndarray:
+    cells, homes = np.frombuffer(zones, np.int8).reshape(shape), np.frombuffer(parking, np.int64)
+    table = np.full((slowest, *shape), FAR, np.int16)
+    table[:, homes[1::2], homes[::2]] = 0
+    for s in range(slowest):
+        _relax(cells, surcharges(shape[::-1], *wind), s + 1, table[s])
+    return table
+
+
 @kernel
 def _relax(zones, extras, slots, costs):
     """Lower the costs of all cells to those of the cheapest ways to the cell that costs nothing."""

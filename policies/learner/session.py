@@ -85,7 +85,8 @@ def sizes_of(config: TrainingConfig) -> Sizes:
 
     def memory(space: ScenarioSpace) -> int:
         # Missions with charging last about twice as long as it takes to fill the quota.
-        flown = min(2 * ceil(space.quota / space.communication_slots), space.max_slots)
+        needed = ceil(space.quota / space.communication_slots) or space.max_slots
+        flown = min(2 * needed, space.max_slots)
         slots, missions = config.replay if has_replay else flown, config.num_envs
         missions *= config.seas_per_tick
         return ReplayMemory.bytes_for(slots, missions, space.uavs[1], len(space.nodes))

@@ -26,6 +26,8 @@ from dess.guard import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
 from dess.sea.chart import distance, in_zone, is_open
 from dess.sections.failures import working_pads
 from dess.sections.fleet import leg
+from dess.sections.landing import lands
+from dess.sections.section import for_sections
 from dess.state import HOVER, STEP_X, STEP_Y, fields
 
 WAYPOINT = np.dtype(
@@ -122,8 +124,9 @@ CRAFT = np.dtype(
 # A node: in slot t it holds ``base + arrival_rate * t`` data units, if t is not before ``since``.
 NODE = np.dtype([("base", np.float64), ("since", np.int64)])
 
-# The slots between two snapshots, and the most slots that are planned.
-STRIDE, MOST_SLOTS = 8, 2048
+# The slots between two snapshots, and the most slots that are planned; fewer if missions end on the
+# ground, as there is no quota or it is filled long before the last slot.
+STRIDE, MOST_SLOTS, MOST_SLOTS_LANDING = 8, 2048, 240
 
 # An emptied node has data again when so much is expected to have arrived [data units]. If it had
 # some at once, UAVs would serve crumbs instead of the data of other nodes.
@@ -181,6 +184,13 @@ def begin(mission, uavs, residual, flight):
         node = flight.sea[0, k]
         node.base, node.since = residual[k], 0 if residual[k] > 0.0 else wait
     flight.sums[0, 0] = flight.sums[0, 1] = 0.0
+
+
+@inlined
+def planned_slots(mission):
+    """The slots that are planned, counted from the present one."""
+    most = MOST_SLOTS_LANDING if lands(mission) else MOST_SLOTS
+    return min(mission.max_slots - mission.slot, most)
 
 
 @inlined
@@ -248,26 +258,30 @@ def fly(mission, rates, plan, source, first, flight, slots, lag=math.inf):
             if v.charging != 0:
                 v.battery = min(v.battery + mission.charge_rate, mission.charge_complete)
                 continue
-            if v.next > v.last_charge:
+            if v.next > v.last_charge and not lands(mission):
                 penalty += _unplanned(mission, v, active, data_left)
-            penalty += _act(mission, rates, waypoints, team, i, t)
+            penalty += _act(mission, rates, waypoints, team, i, t, active)
             if _may_charge(rates.chart, v) and _has_pad(mission, rates.chart, team, v):
                 penalty += _begin_to_charge(mission, v, active)
+            elif _stands(mission, rates.chart, v):
+                v.battery += mission.flight_cost
         active = 0
         for i in range(mission.uavs):
             v = team[i]
             if v.active == 0:
                 continue
-            if v.charging == 0:
+            if v.charging == 0 and not _stands(mission, rates.chart, v):
                 left = present + arriving * t - collected
                 collected += _collect(mission, rates, sea, v, t, wait, left)
-            penalty += _settle(mission, v)
+            penalty += _settle(mission, rates.chart, v)
             if v.charging != 0 and v.latch == 0:
                 v.charging = 0
                 if v.next < v.waypoints and waypoints[i, v.next].stay == CHARGE:
                     _go_on(waypoints, i, v, t + 1)
             active += v.active
         t += 1
+    if t == mission.max_slots - mission.slot:
+        penalty += _not_landed(mission, rates.chart, team)
     s = (t + STRIDE - 1) // STRIDE
     copy_snapshot(mission, flight, -1, flight, s)
     flight.last[0], flight.last[1] = s, t
@@ -296,29 +310,33 @@ def _go_on(waypoints, i, v, t):
 
 
 @inlined
-def _act(mission, rates, waypoints, team, i, t):
+def _act(mission, rates, waypoints, team, i, t, active):
     """Let UAV ``i`` fly or hover for a slot, and return the penalty for teammates in its way."""
     v = team[i]
     v.battery -= mission.flight_cost
     if v.slots_left > 0:
         v.slots_left -= 1
         return 0.0
-    v.action, flies_on, penalty = HOVER, False, 0.0
+    v.action, flies_on, penalty, turned = HOVER, False, 0.0, 0
+    x, y = v.x, v.y
     while v.next < v.waypoints:
         w = waypoints[i, v.next]
-        flies_on = v.x != w.x or v.y != w.y
+        x, y, turned = w.x, w.y, w.turned
+        flies_on = v.x != x or v.y != y
         if flies_on or w.stay == CHARGE:
             break
         v.stayed += 1
         if v.stayed <= w.stay:
             break
         _go_on(waypoints, i, v, t)
+    if lands(mission) and (v.next == v.waypoints or _must_return(mission, rates, v, t, active)):
+        x, y = _free_cell(mission, rates.chart, team, i)
+        flies_on = v.x != x or v.y != y
     # a teammate in the way costs something, and the UAV tries the other direction
     is_blocked = False
     for attempt in range(2):
         if flies_on:
-            w = waypoints[i, v.next]
-            v.action = _towards(rates.chart, v, w, w.turned != attempt)
+            v.action = _towards(rates.chart, v, x, y, turned != attempt)
         is_blocked = False
         for j in range(mission.uavs):
             is_blocked = is_blocked or (j != i and _blocks(rates.chart, v, team[j], j < i))
@@ -373,28 +391,28 @@ def _unplanned(mission, v, active, data_left):
 
 
 @inlined
-def _towards(chart, v, w, turned):
-    """The action of a shortest way to a waypoint, along y first if ``turned``; or Hover."""
-    along_x = 1 if w.x > v.x else 3 if w.x < v.x else HOVER
-    along_y = 2 if w.y > v.y else 0 if w.y < v.y else HOVER
+def _towards(chart, v, x, y, turned):
+    """The action of a shortest way to a cell, along y first if ``turned``; or Hover."""
+    along_x = 1 if x > v.x else 3 if x < v.x else HOVER
+    along_y = 2 if y > v.y else 0 if y < v.y else HOVER
     first, second = (along_y, along_x) if turned else (along_x, along_y)
     first = second if first == HOVER else first
-    if chart.ways is None or first == HOVER or _is_nearer(chart, v, w, first):
+    if chart.ways is None or first == HOVER or _is_nearer(chart, v, x, y, first):
         return first
-    if _is_nearer(chart, v, w, second):
+    if _is_nearer(chart, v, x, y, second):
         return second
     for action in range(HOVER):
-        if _is_nearer(chart, v, w, action):
+        if _is_nearer(chart, v, x, y, action):
             return action
     return HOVER
 
 
 @inlined
-def _is_nearer(chart, v, w, action):
-    """Whether an action leads to an open cell that is nearer to a waypoint."""
-    x, y = v.x + STEP_X[action], v.y + STEP_Y[action]
-    before = distance(chart, v.x, v.y, w.x, w.y)
-    return is_open(chart, x, y) and distance(chart, x, y, w.x, w.y) < before
+def _is_nearer(chart, v, x, y, action):
+    """Whether an action leads to an open cell that is nearer to a cell."""
+    after_x, after_y = v.x + STEP_X[action], v.y + STEP_Y[action]
+    before = distance(chart, v.x, v.y, x, y)
+    return is_open(chart, after_x, after_y) and distance(chart, after_x, after_y, x, y) < before
 
 
 @inlined
@@ -426,22 +444,86 @@ def _begin_to_charge(mission, v, active):
     before = v.battery + mission.flight_cost
     v.charging = 1
     v.battery = min(before + mission.charge_rate, mission.charge_complete)
-    reserve = (active - 1) * (MARGIN_PER_TEAMMATE * v.slots_per_cell + mission.wind_most)
-    return _LATE * max(1 + reserve - before, 0)
+    return _LATE * max(1 + _reserve(mission, v, active) - before, 0)
 
 
 @inlined
-def _settle(mission, v):
+def _settle(mission, chart, v):
     """End the slot of a UAV, and return the penalty if its battery is depleted."""
     penalty = 0.0
-    if v.counted >= v.quota:
+    if v.counted >= v.quota and (not lands(mission) or _has_landed(mission, chart, v)):
         v.active = v.charging = 0
     elif v.battery <= 0:
         lacking = (v.quota - v.counted) / mission.communication_slots
         penalty = _DEPLETED + _SLOT_MISSED * lacking
         v.active = v.charging = 0
+    if lands(mission):
+        v.latch = v.battery < mission.charge_complete and not _has_filled(v)
+        return penalty
     if v.battery <= mission.charge_start:
         v.latch = 1
     if v.battery >= mission.charge_complete:
         v.latch = 0
+    return penalty
+
+
+@inlined
+def _stands(mission, chart, v):
+    """Whether a UAV stands on the ground (``dess.sections.landing``)."""
+    return lands(mission) and v.charging == 0 and v.action == HOVER and in_zone(chart, v.x, v.y)
+
+
+@inlined
+def _has_filled(v):
+    return v.quota > 0 and v.counted >= v.quota
+
+
+@inlined
+def _has_landed(mission, chart, v):
+    return _has_filled(v) and _stands(mission, chart, v)
+
+
+@inlined
+def _must_return(mission, rates, v, t, active):
+    """Whether the return guard would send a UAV home, after its action of slot ``t``."""
+    home = rates.chart.parking[rates.chart.nearest[v.y, v.x]]
+    way = distance(rates.chart, v.x, v.y, home[0], home[1]) * v.slots_per_cell
+    left = mission.max_slots - mission.slot - t
+    if mission.flight_cost > 0:
+        left = min(left, v.battery + mission.flight_cost)
+    return way + v.slots_per_cell + 2 + _reserve(mission, v, active) > left
+
+
+@inlined
+def _reserve(mission, v, active):
+    """The margin of the return guard for the detours around teammates [%]."""
+    return (active - 1) * (MARGIN_PER_TEAMMATE * v.slots_per_cell + mission.wind_most)
+
+
+@inlined
+def _free_cell(mission, chart, team, i):
+    """The nearest zone cell that no teammate is on; its own cell if there is none."""
+    v, least = team[i], NEVER
+    best_x, best_y = v.x, v.y
+    for cell in range(len(chart.parking)):
+        x, y = np.int64(chart.parking[cell, 0]), np.int64(chart.parking[cell, 1])
+        way = distance(chart, v.x, v.y, x, y)
+        is_taken = way >= least
+        for j in range(mission.uavs):
+            o = team[j]
+            is_taken = is_taken or (j != i and o.active != 0 and o.x == x and o.y == y)
+        if not is_taken:
+            best_x, best_y, least = x, y, way
+    return best_x, best_y
+
+
+@for_sections
+def _not_landed(mission, chart, team):
+    """The penalty for UAVs in the air in the last slot, if missions end on the ground."""
+    penalty = 0.0
+    if mission.landing:
+        for i in range(mission.uavs):
+            v = team[i]
+            if v.active != 0 and v.charging == 0 and not _stands(mission, chart, v):
+                penalty += _DEPLETED
     return penalty

@@ -21,6 +21,7 @@ from dess.policies.heuristics import step_towards
 from dess.policies.planner import fluid
 from dess.policies.planner.rates import rates_of
 from dess.policies.planner.search import TRIED, empty_workspace, improve
+from dess.sections.landing import lands
 from dess.state import HOVER, STEP_X, State
 from dess.view import View
 
@@ -219,7 +220,7 @@ def _must_charge_here(mission, u, data, waypoints, length):
 
     The fluid model may expect that the battery suffices for the quota where the guard does not.
     """
-    if not (u.latch and u.zone >= 0 and must_charge(mission, u, data)):
+    if lands(mission) or not (u.latch and u.zone >= 0 and must_charge(mission, u, data)):
         return False
     is_planned = False
     for number in range(length):
@@ -232,7 +233,7 @@ def _start(mission, uavs, data, chart, plan):
     """A plan in which the UAVs that must charge do so, each in its own cell of the zone."""
     for i in range(mission.uavs):
         plan.lengths[i] = 0
-        if uavs[i].active and must_charge(mission, uavs[i], data):
+        if not lands(mission) and uavs[i].active and must_charge(mission, uavs[i], data):
             cell = chart.parking[i % len(chart.parking)]
             fluid.insert(plan, i, 0, cell[0], cell[1], fluid.CHARGE, 0)
 

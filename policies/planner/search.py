@@ -88,7 +88,7 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         search has ended.
     """
     present, trial, flight, ahead, course = workspace
-    slots, first = min(mission.max_slots - mission.slot, fluid.MOST_SLOTS), int(course[TRIED])
+    slots, first = fluid.planned_slots(mission), int(course[TRIED])
     if first == 0:
         fluid.begin(mission, uavs, residual, flight)
         course[VALUE] = course[BEST] = fluid.fly(mission, rates, plan, flight, 0, flight, slots)

@@ -208,10 +208,10 @@ class _Mission:
         from dess.analysis.results.event_log import causes
 
         ends = [uav["end"] for uav in self.record.uav_rows()]
+        ended = sum(end in ("quota", "landed") for end in ends)
         outcome = (
             f"{percent(self.record.collection_ratio)} of the data collected in "
-            f"{self.record.slots} mission slots; {ends.count('quota')} of {len(ends)} UAVs filled "
-            "their quota."
+            f"{self.record.slots} mission slots; {ended} of {len(ends)} UAVs {self.scenario.aim}."
         )
         return " ".join([outcome, *(f"{c}." for c in causes(self.log, self.scenario))])
 

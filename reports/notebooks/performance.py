@@ -130,6 +130,9 @@ html.table(
 )
 
 # %%
+html.say("{text}", text=html.composed(questions.home_in_words(overall)))
+
+# %%
 html.table(
     questions.beside_paper(fig4_fleets, values.FIG_4),
     f"Fig. 4: means with 95 % intervals, and the difference in points; {marks}",

@@ -15,7 +15,7 @@ from dess.policies import load
 from dess.record import EVENT_NAMES, FAILURE_EVENTS, PACKET_EVENTS, Records
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.sea.families import FAMILIES
-from dess.state import BATTERY, HOVER, QUOTA, TRUNCATED, sample_scenario
+from dess.state import BATTERY, HOVER, LANDED, QUOTA, TRUNCATED, sample_scenario
 from dess.view import View
 from tests.dess.flights import assert_same_alone, is_same
 from tests.drawn import (
@@ -58,7 +58,7 @@ def test_both_engines_give_the_same_record(space, team, seed, numbers):
     assert_same_alone(space, team[: space.uavs[1]], seed, numbers, batch_size=2)
 
 
-@pytest.mark.parametrize("sections", [{}, FAILING])
+@pytest.mark.parametrize("sections", [{}, FAILING, FAILING | {"landing": True, "quota": 100}])
 def test_both_engines_agree_where_everything_happens(sections):
     space = ScenarioSpace.of(BUSY, forbid_swaps=not sections, **sections)
     seen, ends, fleets, waited = set(), set(), set(), 0
@@ -71,9 +71,11 @@ def test_both_engines_agree_where_everything_happens(sections):
             ends.update(single.uavs["end"].tolist())
             fleets.add(len(single.uavs))
             waited += int(single.uavs["slots_waiting"].sum())
-    absent = {*PACKET_EVENTS} if sections else {*PACKET_EVENTS, *FAILURE_EVENTS}
-    assert seen == {*EVENT_NAMES} - absent
-    assert ends == {QUOTA, BATTERY, TRUNCATED} and fleets == {1, 2, 3, 4, 5, 6}
+    lands = space.landing
+    absent = {*PACKET_EVENTS, *(() if lands else ["landing"])}
+    assert seen == {*EVENT_NAMES} - absent - ({*()} if sections else {*FAILURE_EVENTS})
+    assert ends == {LANDED if lands else QUOTA, BATTERY, TRUNCATED}
+    assert fleets == {1, 2, 3, 4, 5, 6}
     assert waited > 100
 
 

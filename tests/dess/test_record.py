@@ -1,15 +1,28 @@
 """The record of a mission and its event log."""
 
 import pickle
+from heapq import heappop, heappush
 
 import numpy as np
 import pytest
 from hypothesis import given
 
+from dess import load_scenario
+from dess import policies as shipped
 from dess.mission import simulate
 from dess.record import MISSION_RECORD, measures_of
 from dess.scenario import ScenarioSpace
-from tests.drawn import Commuter, continuous_spaces, extended_spaces, policies, replications, seeds
+from dess.sections.wind import surcharges
+from dess.state import BATTERY
+from tests.drawn import (
+    Commuter,
+    Script,
+    continuous_spaces,
+    extended_spaces,
+    policies,
+    replications,
+    seeds,
+)
 
 # Nothing was delivered, no age has come to its end, or no UAV has asked for a pad.
 NOT_ALWAYS = {"latency", "latency_p99", "peak_age", "waiting"}
@@ -33,3 +46,36 @@ def test_metrics_and_the_columns_of_a_log_are_attributes():
 def test_a_record_has_what_the_scenario_measures(space, policy, seed, replication):
     measured, known = {*simulate(space, policy, seed, replication).measured}, {*measures_of(space)}
     assert known - NOT_ALWAYS <= measured <= known
+
+
+def test_the_way_home_is_the_cheapest_in_battery() -> None:
+    """Dijkstra's algorithm in plain Python, over the surcharges of the wind."""
+    wind = {"strength": 0.7, "direction": 70.0, "gusts": 0.5, "seed": 3}
+    space = load_scenario("archipelago:2", wind=wind, fleet=[{"slots_per_cell": 2}, {}])
+    columns, rows = space.size
+    extras = surcharges(space.size, *space.wind.push(), space.wind.gusts, space.wind.seed)
+    record = simulate(space, shipped.load("random-unguarded"), 3, events=True)
+    for i, uav in enumerate(record.uavs):
+        at = next((e.x, e.y) for e in reversed(record.events or []) if e.uav == i)
+        costs, queue = {at: 0}, [(0, at)]
+        while space.chart.zones[queue[0][1][::-1]] < 0:
+            cost, (x, y) = heappop(queue)
+            for action, (dx, dy) in enumerate([(0, -1), (1, 0), (0, 1), (-1, 0)]):
+                to = x + dx, y + dy
+                if not (0 <= to[0] < columns and 0 <= to[1] < rows) or to in space.no_fly:
+                    continue
+                further = cost + (2, 1)[i % 2] + extras[action, to[1], to[0]]
+                if further < costs.get(to, 10**6):
+                    costs[to] = further
+                    heappush(queue, (further, to))
+        assert uav["way_home"] - queue[0][0] in (0, 1)  # 1 in the middle of a move
+        assert uav["end"] == BATTERY and record.home == 0
+
+
+@pytest.mark.parametrize("battery, home", [(10, 1), (6, 1), (5, 0)])
+def test_a_mission_is_home_if_its_uav_has_the_battery_for_the_way(battery: int, home: int) -> None:
+    # Three cells south of its zone the quota of 12 is filled, and three percent are left or not.
+    sea = {"grid": 8, "zone": [2, 2, 1, 1], "nodes": [[2, 6]], "initial_data": 1e6, "uavs": 1}
+    space = ScenarioSpace.of(**sea, quota=12, flying_time=battery, charge_start=10)
+    record = simulate(space, Script("SSS"), 1)
+    assert record.success and record.home == home and record.uavs["way_home"].tolist() == [3]

@@ -3,7 +3,9 @@
 from hashlib import sha256
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.lib.recfunctions import repack_fields
 
 from dess import policies
 from dess.batch import simulate_batch
@@ -21,6 +23,12 @@ SEAS: dict[str, dict[str, Any]] = {"paper": {}, "archipelago:7": {}, "bay": EXTE
 TEAMS = ["greedy", "age", "planner-short", "ddqn", "any"]
 
 
+def _bytes(table: np.ndarray) -> bytes:
+    """The bytes of a table without the columns that are younger than the pins."""
+    names = [name for name in table.dtype.names or () if name not in ("home", "way_home")]
+    return repack_fields(table[names]).tobytes()
+
+
 @pytest.mark.parametrize("team", TEAMS)
 def test_the_records_of_a_policy_are_the_kept_ones(team: str) -> None:
     hashes = []
@@ -28,6 +36,6 @@ def test_the_records_of_a_policy_are_the_kept_ones(team: str) -> None:
         if team == "ddqn" and sea != "paper":
             continue  # it acts on the paper's sea only
         records = simulate_batch(load_scenario(sea, **changes), policies.load(team), 2030, 8)
-        content = sha256(b"".join(table.tobytes() for table in records)).hexdigest()
+        content = sha256(b"".join(map(_bytes, records))).hexdigest()
         hashes.append(f"{sea} {content}\n")
     pinned(f"records/{team}.txt", "".join(hashes))

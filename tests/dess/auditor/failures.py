@@ -46,7 +46,8 @@ class Failures:
 
     def _replay_uav(self, i: int) -> None:
         u, slot = self.fleet.uavs[i], self.log.slot
-        if u.charging or not self._happens("uav", u.grounded, uav=i):
+        on_ground = u.charging or self.fleet.stands(u)
+        if on_ground or not self._happens("uav", u.grounded, uav=i):
             return
         if u.grounded:
             u.grounded = False

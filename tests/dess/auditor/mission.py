@@ -10,6 +10,7 @@ from tests.dess.auditor.nodes import Nodes
 from tests.dess.auditor.pads import EVENTS, Pads
 from tests.dess.auditor.uavs import Fleet, Uav
 
+FILLED = ("quota", "landed")  # how the mission of a UAV ends well
 PARAMETERS = ("seed", "replication", "flying_time", "charge_start", "charge_complete")
 
 
@@ -86,15 +87,18 @@ class _Auditor:
 
     def _settle(self, i: int, u: Uav, data: float) -> None:
         c, charged, slot = self.c, u.charging, self.log.slot
-        if u.communications >= u.quota:
+        is_last = slot >= c["max_slots"]
+        if c.get("landing"):
+            on_ground = charged or self.fleet.stands(u)
+            if on_ground and (u.has_filled or (u.quota == 0 and is_last)):
+                u.end = "landed"
+        elif u.communications >= u.quota:
             u.end = "quota"
-        elif u.battery <= 0:
-            u.end = "battery"
-        elif slot >= c["max_slots"]:
-            u.end = "truncated"
+        if not u.end and (u.battery <= 0 or is_last):
+            u.end = "battery" if u.battery <= 0 else "truncated"
         u.reward += c["reward_data"] * data + c["reward_step"]
         u.reward += c["reward_overruled"] * (u.other is not None) + c["reward_charging"] * charged
-        u.reward += c["reward_quota"] * (u.end == "quota")
+        u.reward += c["reward_quota"] * (u.end in FILLED)
         u.reward += c["reward_depleted"] * (u.end == "battery")
         u.reward += c.get("age", {}).get("reward", 0.0) * self.nodes.ages.mean_at(slot)
         if charged and (u.battery >= self.pads.complete or u.end):
@@ -104,6 +108,8 @@ class _Auditor:
             self.fleet.take("quota_filled", slot, i, value=u.communications)
         if u.end == "battery":
             self.fleet.take("battery_empty", slot, i)
+        if u.end == "landed":
+            self.fleet.take("landing", slot, i)
         self.pads.update_latch(u)
 
     def _sum(self, name: str) -> Any:
@@ -113,14 +119,15 @@ class _Auditor:
         """The paper's metrics."""
         nodes, collected = self.nodes, self._sum("collected")
         total = nodes.initial + nodes.arrived
-        success = int(all(u.end == "quota" for u in self.fleet.uavs))
+        success = int(all(u.end in FILLED for u in self.fleet.uavs))
+        home = int(all(map(self.fleet.is_home, self.fleet.uavs)))
         ratio = min(max(collected / total, 0.0), 1.0) if total > 0 else 1.0
         return self.parameters | {
             **{"uavs": len(self.fleet.uavs), "slots": self.log.slot, "success": success},
             "uav_slots": self._sum("slots_flying") + self._sum("slots_charging"),
             **{"initial": nodes.initial, "arrived": nodes.arrived, "collected": collected},
             **{"residual": sum(nodes.residual), "reward": self._sum("reward")},
-            "collection_ratio": ratio,
+            **{"collection_ratio": ratio, "home": home},
             "collection_ratio_and_communication": ratio * success,
         }
 

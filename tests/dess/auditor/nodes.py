@@ -62,7 +62,8 @@ class Nodes:
         if self.packets is not None:
             self._packets_arrive(self.packets, time)
         for i, u in enumerate(self.fleet.uavs):
-            if u.flies and any(data > 0 for data in self.residual):
+            serves = u.flies and not self.fleet.stands(u)
+            if serves and any(data > 0 for data in self.residual):
                 served.append((i, self._serve(i, n, time)))
         if self.packets is not None:
             self._deliver(self.packets, served)
@@ -85,6 +86,8 @@ class Nodes:
             self.ages.fall(k, time, time)
         u.collected += value
         u.communications += 1
+        if self.c.get("landing") and u.communications == u.quota:
+            self.fleet.take("quota_filled", time, i, value=u.communications)
         return row
 
     def _check_snr(self, row: Any) -> None:

@@ -79,6 +79,9 @@ class Pads:
 
     def update_latch(self, u: Uav) -> None:
         """Judge the latch of a UAV at the start of a slot."""
+        if self.c.get("landing"):
+            u.latch = u.battery < self.complete and not u.has_filled
+            return
         if u.battery <= self.start:
             u.latch = True
         if u.battery >= self.complete:

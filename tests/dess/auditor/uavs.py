@@ -41,6 +41,10 @@ class Uav(SimpleNamespace):
     def flies(self) -> bool:
         return not (self.end or self.charging or self.grounded)
 
+    @property
+    def has_filled(self) -> bool:
+        return 0 < self.quota <= self.communications
+
 
 def cells_of_zones(constants: Mapping[str, Any]) -> list[list[Cell]]:
     """The cells of each charging zone, the start zone first."""
@@ -78,6 +82,26 @@ class Fleet:
     def zone_of(self, u: Uav) -> int:
         """The number of the charging zone that a UAV is in, or -1."""
         return next((zone for zone, cells in enumerate(self.zones) if u.cell in cells), -1)
+
+    def stands(self, u: Uav) -> bool:
+        """Whether a UAV stands on the ground, on no pad: there hovering costs nothing."""
+        hovers = u.cell == (u.from_x, u.from_y)
+        return bool(self.c.get("landing") and u.flies and hovers and self.zone_of(u) >= 0)
+
+    def way_home(self, u: Uav) -> int:
+        """The battery of the shortest way to a zone; the wind of cells not visited is not known."""
+        cells = {cell for zone in self.zones for cell in zone}
+        way, edge, seen = 0, {u.cell}, {u.cell}
+        while not edge & cells:
+            near = {(x + dx, y + dy) for x, y in edge for dx, dy in STEPS}
+            way, edge = way + 1, (near & self.open) - seen
+            seen |= edge
+        return self.c["flight_cost"] * (way * u.slots_per_cell + u.slots_left)
+
+    def is_home(self, u: Uav) -> bool:
+        """Whether a UAV has ended with the battery for its way home."""
+        is_down = u.end in ("battery", "lost") or (u.grounded and self.zone_of(u) < 0)
+        return not is_down and u.battery >= self.way_home(u)
 
     def type_of(self, i: int) -> Mapping[str, Any]:
         plain = {"slots_per_cell": 1, "quota": None, "rate": 1.0, "flying_time": None}
@@ -156,9 +180,9 @@ class Fleet:
         """Let the UAVs that fly lose battery."""
         for _, u in self.active:
             u.slots_grounded += u.grounded
-            if u.flies:
+            u.slots_waiting += u.waits
+            if u.flies and not self.stands(u):
                 u.slots_flying += 1
-                u.slots_waiting += u.waits
                 u.battery -= self.c["flight_cost"]
                 step = u.x - u.from_x, u.y - u.from_y
                 if step != (0, 0) and u.slots_left == u.slots_per_cell - 1 and u.battery > 0:
