@@ -14,6 +14,7 @@ import numpy as np
 from dess.code.kernels import kernel
 from dess.sea.chart import NO_FLY, Chart
 from dess.sections.wind import surcharges
+from dess.state import PLAIN_MISSION
 
 FAR = 2**15 - 1  # [%]: further than any cell
 _MOST_ENTRIES = 2**26  # 128 MB
@@ -32,6 +33,8 @@ def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
         missions: (B,) ``MISSION`` records of one batch, which share wind and fleet.
         chart: Their chart.
     """
+    if missions.dtype == PLAIN_MISSION:  # no section is on, so neither wind nor slow UAVs
+        return None
     mission = missions[0]
     if mission["wind_most"] == 0 and mission["slowest"] == 1:
         return None
