@@ -20,7 +20,7 @@ import numpy as np
 from dess import rules
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
-from dess.errors import InputError
+from dess.errors import InputError, shown
 from dess.record import Records, empty_records, write_record
 from dess.scenario import AnyScenario, ScenarioSpace
 from dess.state import check_seed, spaces_of, starts_of, state_of, teeth_lengths
@@ -133,11 +133,11 @@ def work_of(space: ScenarioSpace) -> int:
 
 def _numbers(replications: Sequence[int] | int) -> np.ndarray:
     """The replication numbers as an array of integers."""
-    if isinstance(replications, int | np.integer):
-        return np.arange(replications)
     numbers = np.asarray(replications)
-    if len(numbers) and numbers.dtype.kind not in "iu":
-        raise ValueError(f"replications must be integers, not {numbers.dtype}")
+    if numbers.ndim == 0 and numbers.dtype.kind in "iu" and numbers >= 0:
+        return np.arange(int(numbers))
+    if numbers.ndim != 1 or (len(numbers) and numbers.dtype.kind not in "iu"):
+        raise InputError(f"replications: {shown(replications)}; allowed: a number, or integers")
     return numbers.astype(np.int64)
 
 

@@ -60,9 +60,7 @@ class MissionStepper:
         self.world, self.state = world_of(self.space), state_of([self.space], num_envs)
         self._starts = starts_of([self.space])
         self._is_extended = self.space.is_extended
-        scratch = empty_scratch(self.space.uavs[1], len(self.space.nodes))
-        # For numba, the arrays one by one take less time than tuples of them.
-        self._arrays = (*self.state, *self.world, *scratch)
+        self._scratch = empty_scratch(self.space.uavs[1], len(self.space.nodes))
         self.is_started, self._is_seeded = False, seed is not None
         self.start_at(seed or 0, 0)
 
@@ -137,7 +135,8 @@ class MissionStepper:
             (N, I) ``OUTCOME`` records.
         """
         outcome = np.zeros(self.state.uavs.shape, OUTCOME)
-        _step(*self._arrays, actions, outcome)
+        # For numba, the arrays one by one take less time than tuples of them.
+        _step(*self.state, *self.world, *self._scratch, actions, outcome)
         return outcome
 
     def records(self, environments: np.ndarray) -> Records:

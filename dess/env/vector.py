@@ -118,7 +118,7 @@ class HarvestVectorEnv(VectorEnv):
             InputError: If a seed or the replication is out of range, there are not N seeds, or
                 there is another option.
         """
-        for name in {**(options or {})}.keys() - {"replication"}:
+        for name in {*(options or ())} - {"replication"}:
             raise InputError(f"options: {name!r} is unknown{one_of(name, ['replication'])}")
         self._stepper.start(seed, options)
         self._waiting = np.zeros(self.missions, np.bool_)  # over before the slot, with NextStep

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Annotated, Any, Self
 
-import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from dess.code.kernels import inlined
@@ -27,13 +26,14 @@ def _at_least_a_slot(mean: float) -> float:
 Slots = Annotated[Number, Field(ge=0, le=1_000_000), AfterValidator(_at_least_a_slot)]
 
 
-def tuples(value: Any) -> Any:
-    """Convert the lists that TOML gives to tuples, nested ones and those of tables included.
+def plain(value: Any) -> Any:
+    """What numpy or pandas holds as numbers and lists of Python: ``np.int64(3)`` as 3."""
+    return value.tolist() if hasattr(value, "tolist") else value
 
-    What numpy holds becomes plain: ``np.int64(3)`` is the integer 3.
-    """
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
+
+def tuples(value: Any) -> Any:
+    """Convert the lists that TOML gives to tuples, nested ones and those of tables included."""
+    value = plain(value)
     if isinstance(value, dict):
         return {key: tuples(item) for key, item in value.items()}
     return tuple(tuples(item) for item in value) if isinstance(value, list | tuple) else value

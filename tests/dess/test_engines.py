@@ -276,7 +276,7 @@ def test_bad_teams_and_seeds_are_refused(run: Any) -> None:
         run(BUSY, [], 0)
     with pytest.raises(InputError, match="seed: -1 is out of range"):
         run(BUSY, Wanderer(), -1)
-    with pytest.raises(TypeError):
+    with pytest.raises(InputError, match="^seed: 1.5 is of type float; allowed: an integer$"):
         run(BUSY, Wanderer(), 1.5)
 
 
