@@ -14,8 +14,6 @@ from importlib.util import find_spec
 from types import ModuleType
 from typing import Any
 
-NAME = "dess/Paper-v0"
-
 
 def register() -> None:
     """Register the environments: now, or as soon as Gymnasium, which takes time, is imported."""
@@ -28,13 +26,12 @@ def register() -> None:
 def _register() -> None:
     import gymnasium
 
-    if NAME not in gymnasium.registry:
-        gymnasium.register(
-            NAME,
-            entry_point="dess.env.single:single_env",
-            vector_entry_point="dess.env.vector:vector_env",
-            kwargs={"scenario": "paper"},
-        )
+    gymnasium.register(
+        "dess/Paper-v0",
+        entry_point="dess.env.single:single_env",
+        vector_entry_point="dess.env.vector:vector_env",
+        kwargs={"scenario": "paper"},
+    )
 
 
 class _WhenImported(MetaPathFinder):

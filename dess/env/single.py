@@ -11,8 +11,9 @@ import gymnasium
 import numpy as np
 
 from dess.env.parallel import HarvestEnv
-from dess.record import MissionRecord
 from dess.scenario import AnyScenario, ScenarioSpace
+
+_UAV = "uav_0"
 
 
 class HarvestSingleEnv(gymnasium.Env[Any, SupportsInt]):
@@ -20,64 +21,57 @@ class HarvestSingleEnv(gymnasium.Env[Any, SupportsInt]):
 
     The mask of the allowed actions is ``info["action_mask"]``, and that of the next step also
     ``action_masks()``, where sb3-contrib looks for it.
+
+    Attributes:
+        mission: The same mission as a PettingZoo environment, which has its ``record()``.
     """
 
     metadata = HarvestEnv.metadata
 
-    def __init__(
-        self,
-        scenario: AnyScenario = "paper",
-        seed: int | None = None,
-        render_mode: str | None = None,
-        observation: str = "vector",
-        guarded: bool = False,
-    ):
-        """Make an environment; the arguments are those of ``parallel_env``.
+    def __init__(self, scenario: AnyScenario = "paper", **options: Any):
+        """Make an environment.
+
+        Args:
+            scenario: The scenario, or what ``load_scenario`` takes.
+            **options: ``seed``, ``render_mode``, ``observation`` and ``guarded`` of
+                ``parallel_env``.
 
         Raises:
             InputError: If one of the arguments is not allowed.
         """
         space = ScenarioSpace.of(scenario, uavs=1)
-        self._mission = HarvestEnv(space, seed, render_mode, observation, "info", "stay", guarded)
-        (self._agent,) = self._mission.possible_agents
-        self.render_mode = render_mode
-        self.observation_space = self._mission.observation_space(self._agent)
-        self.action_space = self._mission.action_space(self._agent)
+        self.mission = HarvestEnv(space, **options, mask="info", ended="stay")
+        self.render_mode = self.mission.render_mode
+        self.observation_space = self.mission.observation_space(_UAV)
+        self.action_space = self.mission.action_space(_UAV)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start the next mission, as ``HarvestEnv.reset``."""
         super().reset(seed=seed)
-        observations, infos = self._mission.reset(seed, options)
-        return observations[self._agent], self._known(infos)
+        return self._own(self.mission.reset(seed, options))
 
     def step(self, action: SupportsInt) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Run one mission slot, as ``HarvestEnv.step``."""
-        *outcome, infos = self._mission.step({self._agent: int(action)})
-        observation, reward, terminated, truncated = (part[self._agent] for part in outcome)
-        return observation, reward, terminated, truncated, self._known(infos)
+        return self._own(self.mission.step({_UAV: int(action)}))
 
     def action_masks(self) -> np.ndarray:
         """The (5,) mask of the actions that are allowed in the next step."""
         return self._mask
 
-    def record(self) -> MissionRecord:
-        """The record of the mission up to the present slot."""
-        return self._mission.record()
-
     def render(self) -> Any:
         """A picture, as ``HarvestEnv.render``."""
-        return self._mission.render()
+        return self.mission.render()
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        self._mission.close()
+        self.mission.close()
 
-    def _known(self, infos: dict[str, dict[str, Any]]) -> dict[str, Any]:
-        info = infos[self._agent]
-        self._mask = info["action_mask"].astype(bool)
-        return info
+    def _own(self, parts: tuple[dict[str, Any], ...]) -> Any:
+        own = tuple(part[_UAV] for part in parts)
+        self._mask = own[-1]["action_mask"].astype(bool)
+        return own
 
 
 single_env = HarvestSingleEnv

@@ -65,7 +65,7 @@ def test_a_lone_uav_flies_the_mission_of_simulate() -> None:
             return np.full(len(view), 4)
 
     record = dess.simulate(dess.load_scenario("paper", uavs=1), Hover(), 4, 2)
-    assert env.record().metrics == record.metrics and reward == record.reward
+    assert env.mission.record().metrics == record.metrics and reward == record.reward
 
 
 def test_gymnasiums_vectors_and_wrappers_take_it() -> None:
@@ -88,7 +88,7 @@ def test_gymnasiums_vectors_and_wrappers_take_it() -> None:
 
 
 def seeds_of(env: Any) -> list[int]:
-    stepper = getattr(env, "_stepper", None) or env.unwrapped._mission._stepper
+    stepper = getattr(env, "_stepper", None) or env.unwrapped.mission._stepper
     return stepper.state.missions["seed"].tolist()
 
 
