@@ -52,7 +52,8 @@ def _mask(*uavs: dict[str, Any], **scenario: Any) -> np.ndarray:
     """The guard's masks for UAVs in given states, 400 communications short of the quota."""
     rows = np.zeros(len(uavs), int), np.arange(len(uavs))
     state, chart = placed([*uavs], **scenario)
-    return guard(View(state, SimpleNamespace(chart=chart), *rows))
+    world = SimpleNamespace(chart=chart)
+    return guard(View(state, SimpleNamespace(shown=lambda: world), *rows))
 
 
 def test_at_the_last_moment_only_the_way_home_is_left() -> None:
