@@ -3,19 +3,23 @@
     import dess
 
     scenario = dess.load_scenario("paper", uavs=3)
-    record = dess.simulate(scenario, dess.policies.load("greedy"), seed=1)
-    records = dess.simulate_batch(scenario, dess.policies.load("greedy"), seed=1, replications=1000)
+    record = dess.simulate(scenario, "greedy", seed=1)
+    records = dess.simulate_batch(scenario, "greedy", seed=1, replications=1000)
     records.missions["success"].mean()
 
-Names are imported on first use, so that ``import dess`` is fast.
+Names are imported on first use, so that ``import dess`` is fast. It lets Gymnasium know the names
+of the environments.
 """
 
 from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any
 
+from dess.env.registration import register
+
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
     from dess.batch import simulate_batch as simulate_batch
     from dess.env.parallel import parallel_env as parallel_env
+    from dess.env.single import single_env as single_env
     from dess.env.vector import vector_env as vector_env
     from dess.errors import InputError as InputError
     from dess.mission import simulate as simulate
@@ -33,12 +37,15 @@ _HOME = {
     "simulate": "mission",
     "simulate_batch": "batch",
     "parallel_env": "env.parallel",
+    "single_env": "env.single",
     "vector_env": "env.vector",
 }
 
 _FLOORS = ("policies", "analysis")  # above this one, imported by name alone
 
 __all__ = ["__version__", *_HOME, *_FLOORS]
+
+register()
 
 
 def __getattr__(name: str) -> Any:

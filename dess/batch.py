@@ -20,9 +20,9 @@ import numpy as np
 from dess import rules
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
-from dess.errors import InputError
+from dess.errors import InputError, shown
 from dess.record import Records, empty_records, write_record
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario import AnyScenario, ScenarioSpace
 from dess.sections.wind import ways_home
 from dess.state import check_seed, spaces_of, starts_of, state_of, teeth_lengths
 from dess.view import decide, team_of
@@ -35,7 +35,7 @@ MOST_WORK = 2**26
 
 
 def simulate_batch(
-    scenario: Scenario | ScenarioSpace | Sequence[Scenario | ScenarioSpace],
+    scenario: AnyScenario | Sequence[AnyScenario],
     policy: Any,
     seed: int = 0,
     replications: Sequence[int] | int = 1,
@@ -47,8 +47,10 @@ def simulate_batch(
     """Simulate many missions in lockstep.
 
     Args:
-        scenario: One scenario or space for all missions, or one per mission.
-        policy: A policy, or a sequence of policies; UAV i follows ``policy[i % len(policy)]``.
+        scenario: One scenario or space for all missions, or one per mission; or what
+            ``load_scenario`` takes.
+        policy: A policy, or a list of policies; UAV i follows ``policy[i % len(policy)]``. A name
+            stands for what ``dess.policies.load_team`` loads.
         seed: Seed of all missions.
         replications: The replication numbers, or a number n for the replications 0 to n - 1.
         workers: Number of threads; the compiled code does not hold Python's global lock.
@@ -61,7 +63,8 @@ def simulate_batch(
 
     Raises:
         InputError: If the seed or a replication is out of range, if the team has more policies
-            than the largest fleet has UAVs, or if a scenario needs the SimPy engine.
+            than the largest fleet has UAVs, or if a scenario needs the SimPy engine; if there is no
+            scenario or policy of a name.
         ValueError: If a policy does not return actions.
     """
     numbers = _numbers(replications)
@@ -69,7 +72,7 @@ def simulate_batch(
         check_seed(seed, int(number))
     if min(workers, batch_size) < 1:
         raise ValueError("workers and batch_size must be at least 1")
-    if isinstance(scenario, Scenario | ScenarioSpace):
+    if isinstance(scenario, str) or not isinstance(scenario, Sequence):
         scenario = [scenario] * len(numbers)
     if len(scenario) != len(numbers):
         raise ValueError(f"{len(scenario)} scenarios for {len(numbers)} replications")
@@ -131,11 +134,11 @@ def work_of(space: ScenarioSpace) -> int:
 
 def _numbers(replications: Sequence[int] | int) -> np.ndarray:
     """The replication numbers as an array of integers."""
-    if isinstance(replications, int | np.integer):
-        return np.arange(replications)
     numbers = np.asarray(replications)
-    if len(numbers) and numbers.dtype.kind not in "iu":
-        raise ValueError(f"replications must be integers, not {numbers.dtype}")
+    if numbers.ndim == 0 and numbers.dtype.kind in "iu" and numbers >= 0:
+        return np.arange(int(numbers))
+    if numbers.ndim != 1 or (len(numbers) and numbers.dtype.kind not in "iu"):
+        raise InputError(f"replications: {shown(replications)}; allowed: a number, or integers")
     return numbers.astype(np.int64)
 
 

@@ -9,14 +9,14 @@ shadowing, lies below the best SNR found.
 import math
 from functools import lru_cache
 from threading import get_ident
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from dess import streams
 from dess.code.kernels import inlined, kernel, log10
 from dess.scenario import ScenarioSpace
-from dess.sea.chart import Chart
+from dess.sea.chart import Chart, read_only
 from dess.sections import fleet
 from dess.state import STEP_X, STEP_Y
 
@@ -43,7 +43,8 @@ class World(NamedTuple):
     """The nodes and the tables of the channel, shared by all missions of a batch.
 
     A step is an action together with the cell that it leads to. The row of a step in ``order`` and
-    ``means`` is computed when it is first needed.
+    ``means`` is computed when it is first needed; all other arrays are read-only. A copy shares
+    them all.
 
     Attributes:
         nodes: (K, 2) cells of the sensor nodes.
@@ -65,6 +66,33 @@ class World(NamedTuple):
     order: np.ndarray
     means: np.ndarray
     chart: Chart
+
+    @classmethod
+    def of(
+        cls, nodes: np.ndarray, mean_snr: np.ndarray, chart: Chart, steps: int, m: int
+    ) -> "World":
+        """The world of these nodes, with empty rows for so many steps."""
+        # The operating system allocates memory page by page as the rows are filled.
+        order = np.zeros((steps, len(nodes) + 1), np.int16)
+        means = np.zeros((steps, len(nodes), m))
+        return cls(read_only(nodes), read_only(mean_snr), order, means, chart)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "World":
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return World.of, (
+            self.nodes,
+            self.mean_snr,
+            self.chart,
+            len(self.order),
+            self.means.shape[2],
+        )
+
+    def shown(self) -> "World":
+        """The same world, of which nothing can be written to."""
+        order, means = read_only(self.order.view()), read_only(self.means.view())
+        return World(self.nodes, self.mean_snr, order, means, self.chart)
 
 
 class Scratch(NamedTuple):
@@ -116,9 +144,7 @@ def _world_of(scenario: ScenarioSpace, thread: int) -> World:
         mean_snr[row] = scenario.edge_snr - loss
     nodes = np.array(scenario.nodes, np.int64)
     steps = 5 * columns * rows * fleet.legs(scenario.fleet)
-    # The operating system allocates memory page by page as the rows are filled.
-    order = np.zeros((steps, len(nodes) + 1), np.int16)
-    return World(nodes, mean_snr, order, np.zeros((steps, len(nodes), m)), scenario.chart)
+    return World.of(nodes, mean_snr, scenario.chart, steps, m)
 
 
 @kernel

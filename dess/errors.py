@@ -37,6 +37,17 @@ class InputError(ValueError):
     """Bad input: one line that says where, what, and what is allowed."""
 
 
+def check_type(name: str, value: object, kinds: Any, allowed: str) -> None:
+    """Refuse a value that is of none of some types.
+
+    Raises:
+        InputError: If it is of another one.
+    """
+    if not isinstance(value, kinds):
+        kind = type(value).__name__
+        raise InputError(f"{name}: {shown(value)} is of type {kind}; allowed: {allowed}")
+
+
 def shown(value: object) -> str:
     """A value of the input as a message quotes it: in Python's notation, printable and short."""
     try:

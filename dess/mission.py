@@ -35,7 +35,7 @@ from dess import channel, rules
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.record import PARAMETER_EVENTS, EventLog, MissionRecord, empty_records, write_records
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario import AnyScenario, ScenarioSpace
 from dess.sections import fleet
 from dess.sections.failures import strike
 from dess.sections.packets import Packets
@@ -123,7 +123,7 @@ _Uav: Any = namedtuple("_Uav", UAV.names or ())  # type: ignore[misc]
 
 
 def simulate(
-    scenario: Scenario | ScenarioSpace,
+    scenario: AnyScenario,
     policy: Any,
     seed: int = 0,
     replication: int = 0,
@@ -133,8 +133,10 @@ def simulate(
     """Simulate one mission with the SimPy model.
 
     Args:
-        scenario: The scenario, or the space from which the replication draws its parameters.
-        policy: A policy, or a sequence of policies; UAV i follows ``policy[i % len(policy)]``.
+        scenario: The scenario, or the space from which the replication draws its parameters; or
+            what ``load_scenario`` takes.
+        policy: A policy, or a list of policies; UAV i follows ``policy[i % len(policy)]``. A name
+            stands for what ``dess.policies.load_team`` loads.
         seed: Seed of the study.
         replication: Number of the replication.
         events: Whether to keep the event log.
@@ -144,7 +146,7 @@ def simulate(
 
     Raises:
         InputError: If the seed or the replication is out of range, or if the team has more policies
-            than the largest fleet has UAVs.
+            than the largest fleet has UAVs; if there is no scenario or policy of a name.
         ValueError: If a policy does not return actions.
     """
     check_seed(seed, replication)

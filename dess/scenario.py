@@ -26,7 +26,7 @@ from pydantic import (
 )
 from pydantic.fields import FieldInfo
 
-from dess.errors import InputError, one_of, shown, validation_line
+from dess.errors import InputError, check_type, one_of, shown, validation_line
 from dess.files.reading import Shipped
 from dess.sea.chart import FAR, Cell, Chart, Rectangle, chart_at, parking_of, spread, zones_of
 from dess.sea.families import FAMILIES, is_generated, sea_of
@@ -36,7 +36,7 @@ from dess.sections.arrivals import Arrivals
 from dess.sections.charging import Charging
 from dess.sections.failures import MOST_PADS, Failures
 from dess.sections.fleet import UavType, legs, places_per_slot
-from dess.sections.section import Integer, Number, Section, Strict
+from dess.sections.section import Integer, Number, Section, Strict, tuples
 from dess.sections.wind import Wind
 
 # Section VI-A: all combinations of five columns and five rows.
@@ -230,13 +230,13 @@ class Constants(Strict):
         return self
 
     @classmethod
-    def of(cls, scenario: "Constants | None" = None, **values: Any) -> Self:
+    def of(cls, scenario: "AnyScenario | None" = None, **values: Any) -> Self:
         """A scenario of the given values, on top of another one (default: the paper's).
 
         Raises:
-            InputError: For unknown keys, wrong types and values out of range.
+            InputError: For unknown names and keys, wrong types and values out of range.
         """
-        base = scenario.model_dump() if scenario is not None else {}
+        base = loaded(scenario).model_dump() if scenario is not None else {}
         return validated(cls, merged(base, values), "scenario")
 
     @property
@@ -365,7 +365,7 @@ def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
         else:
             result[name] = value
     if ZONE_PADS in result:
-        pads, zones = result.pop(ZONE_PADS), result.get("zones") or ()
+        pads, zones = tuples(result.pop(ZONE_PADS)), result.get("zones") or ()
         each = pads if isinstance(pads, list | tuple) else [pads] * len(zones)
         if not zones or len(each) != len(zones):
             allowed = f"a number, or a list of {len(zones)}" if zones else "with further zones"
@@ -476,6 +476,21 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     return validated(ScenarioSpace, values, where)
 
 
+# What a function takes for a scenario: one, or what ``load_scenario`` takes.
+AnyScenario = Constants | str | Path
+_NAMED = "a name such as paper, or the path of a TOML file"
+
+
+def loaded(scenario: AnyScenario) -> Constants:
+    """A scenario, or the one that has this name or path.
+
+    Raises:
+        InputError: If there is no such scenario, or this is neither a scenario nor a name.
+    """
+    check_type("scenario", scenario, AnyScenario, f"{_NAMED}, Scenario or ScenarioSpace")
+    return load_scenario(scenario) if isinstance(scenario, str | Path) else scenario
+
+
 def _from_files(
     name_or_path: str | Path, where: str, read: dict[str, Any], overrides: dict[str, Any]
 ) -> dict[str, Any]:
@@ -541,6 +556,7 @@ def scenario_description(name_or_path: str | Path) -> str:
 
 def _read(name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
     """The name or path of a scenario, for messages, and its fields."""
+    check_type("scenario", name_or_path, str | Path, _NAMED)
     name = str(name_or_path)
     if is_generated(name):
         return f"scenario {name}", sea_of(name)

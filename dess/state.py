@@ -7,15 +7,14 @@ state.uavs[0, 0]["battery"], state.residual[0]
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from operator import index
 from typing import NamedTuple
 
 import numpy as np
 
 from dess import streams
 from dess.code.kernels import kernel
-from dess.errors import InputError
-from dess.scenario import MOST_ZONES, SAMPLED, Scenario, ScenarioSpace
+from dess.errors import InputError, check_type
+from dess.scenario import MOST_ZONES, SAMPLED, AnyScenario, Scenario, ScenarioSpace, loaded
 from dess.sections import fleet, wind
 from dess.sections.failures import MOST_PADS
 
@@ -275,16 +274,22 @@ def check_seed(seed: int, replication: int) -> None:
     """Refuse a seed or a replication that the random streams cannot represent.
 
     Raises:
-        InputError: If one of them is out of range.
-        TypeError: If one of them is not an integer.
+        InputError: If one of them is no integer, or out of range.
     """
-    seed, replication = index(seed), index(replication)
+    for name, number in (("seed", seed), ("replication", replication)):
+        check_type(name, number, int | np.integer, "an integer")
+    seed, replication = int(seed), int(replication)
     if not 0 <= seed <= streams.MAX_SEED:
         raise InputError(f"seed: {seed} is out of range; allowed: 0..2**64-1")
     if not 0 <= replication <= streams.MAX_REPLICATION:
         raise InputError(f"replication: {replication} is out of range; allowed: 0..2**32-1")
 
 
-def spaces_of(scenarios: Sequence[Scenario | ScenarioSpace]) -> list[ScenarioSpace]:
-    """The scenarios as spaces; a single scenario becomes a space of one."""
-    return [s if isinstance(s, ScenarioSpace) else ScenarioSpace.of(s) for s in scenarios]
+def spaces_of(scenarios: Iterable[AnyScenario]) -> list[ScenarioSpace]:
+    """The scenarios as spaces; a single scenario becomes a space of one.
+
+    Raises:
+        InputError: If there is no scenario of a name, or something is neither one nor a name.
+    """
+    known = map(loaded, scenarios)
+    return [s if isinstance(s, ScenarioSpace) else ScenarioSpace.of(s) for s in known]

@@ -6,22 +6,27 @@ view.own["battery"], view.residual, view.legal
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from dess.channel import World
 from dess.code.kernels import kernel
-from dess.errors import InputError
+from dess.errors import InputError, shown
 from dess.rules import legal_moves, may_act
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER, State
+
+_POLICY = "a name such as greedy, an object with act(view), or a list of them"
 
 
 class View:
     """What a policy may use to decide: one row per UAV that must act, over any number of missions.
 
-    Policies must not write to it. In the shapes below, R is the number of rows, K the number of
+    What missions share (``world``) is read-only, and policies must not write to the rest either. In
+    the shapes below, R is the number of rows, K the number of
     nodes and I the number of UAVs in the largest mission.
 
     Attributes:
@@ -32,7 +37,7 @@ class View:
     """
 
     def __init__(self, state: State, world: World, mission: np.ndarray, uav: np.ndarray):
-        self.state, self.world, self.mission, self.uav = state, world, mission, uav
+        self.state, self.world, self.mission, self.uav = state, world.shown(), mission, uav
 
     def __len__(self) -> int:
         return len(self.mission)
@@ -128,19 +133,31 @@ def team_of(policy: Any, spaces: Sequence[ScenarioSpace]) -> list[Any]:
     """The team of one policy, or of a list or tuple of policies.
 
     Args:
-        policy: The policy or policies.
+        policy: The policy or policies; a name stands for what ``dess.policies.load_team`` loads.
         spaces: The scenarios that the team is to act in.
 
     Raises:
-        InputError: If there are more policies than UAVs in the largest fleet of all scenarios.
-        ValueError: If the sequence is empty.
+        InputError: If there are no policies, or more than UAVs in the largest fleet of all
+            scenarios; if something is neither a policy nor the name of one.
     """
-    team = list(policy) if isinstance(policy, list | tuple) else [policy]
+    given = policy if isinstance(policy, list | tuple) else [policy]
+    team = [member for part in given for member in _members(part)]
     if not team:
-        raise ValueError("a team needs at least one policy")
+        raise InputError(f"policy: the team is empty; allowed: at least one policy, {_POLICY}")
     if spaces:
         check_team(len(team), spaces)
     return team
+
+
+def _members(policy: Any) -> Sequence[Any]:
+    """A policy, or those that a name stands for."""
+    if isinstance(policy, str | Path):
+        # The package above this one, imported by name alone, and only here.
+        return import_module("dess.policies").load_team(str(policy))
+    if isinstance(policy, type) or not callable(getattr(policy, "act", None)):
+        kind = type(policy).__name__
+        raise InputError(f"policy: {shown(policy)} is of type {kind}; allowed: {_POLICY}")
+    return [policy]
 
 
 def check_team(policies: int, spaces: Iterable[ScenarioSpace]) -> None:

@@ -53,6 +53,7 @@ MAY_RUN_FILES = {
         "dess.reports.pages.verify",
     },
     "dess.policies.load": set(),
+    "dess.view.team_of": {"dess.batch", "dess.mission"},  # what a user gives them as a policy
     "dess.policies.load_team": set(),
     "dess.policies.registry.about": {"dess.reports.cli.lists"},
     "dess.analysis.execution.evaluation.evaluate": {"dess.analysis"},
@@ -136,6 +137,16 @@ def test_imports_only_go_downwards(floor):
         if place_of(imported)[0] in refused
     }
     assert not climbing
+
+
+def test_three_modules_of_the_ground_import_by_name_what_may_be_above() -> None:
+    """The attributes of the package, its command, and the policies that a user names."""
+    importing = {
+        name
+        for name in SOURCES
+        if place_of(name)[0] == "dess" and "import_module(" in ast.unparse(SOURCES[name])
+    }
+    assert importing == {"dess", "dess.__main__", "dess.view"}
 
 
 @pytest.mark.parametrize("floor", ROOMS)

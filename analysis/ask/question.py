@@ -383,7 +383,7 @@ def listed(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
 
 def _is_value(field: str, given: Any) -> bool:
     """Whether ``given`` is one value of the field, and not several values."""
-    if isinstance(given, np.ndarray):
+    if hasattr(given, "ndim"):  # an array of numpy or a column of pandas
         return given.ndim == 0
     if not isinstance(given, Sequence) or isinstance(given, str):
         return True

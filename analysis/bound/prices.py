@@ -25,9 +25,9 @@ from dess.analysis.bound.service import POINTS, rates_of, spread, step_values
 from dess.analysis.bound.slopes import add_slopes
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
-from dess.scenario import ScenarioSpace
+from dess.scenario import AnyScenario, ScenarioSpace
 from dess.sea import chart
-from dess.state import sample_scenario, starts_of, state_of
+from dess.state import sample_scenario, spaces_of, starts_of, state_of
 
 _STEPS = 300
 
@@ -134,7 +134,7 @@ class Known(NamedTuple):
 
 
 def upper_bound(
-    scenario: ScenarioSpace, seed: int, replication: int, *, iterations: int = ITERATIONS
+    scenario: AnyScenario, seed: int, replication: int, *, iterations: int = ITERATIONS
 ) -> Bound:
     """An upper bound on the expected collection ratio of any policy in one mission.
 
@@ -142,7 +142,7 @@ def upper_bound(
     over the shadowing.
 
     Args:
-        scenario: The scenario, without sections beyond the paper.
+        scenario: The scenario, without sections beyond the paper, or what ``load_scenario`` takes.
         seed: Seed of the mission.
         replication: Number of the replication.
         iterations: How many prices are tried.
@@ -150,8 +150,9 @@ def upper_bound(
     Raises:
         InputError: If the scenario has no bound, or the seed or the replication is out of range.
     """
-    check_scenario(scenario)
-    return improve(known_of(scenario, seed, replication), iterations, Detail())
+    (space,) = spaces_of([scenario])
+    check_scenario(space)
+    return improve(known_of(space, seed, replication), iterations, Detail())
 
 
 def check_scenario(scenario: ScenarioSpace) -> None:

@@ -22,10 +22,11 @@ from dess.analysis.metrics import ALWAYS, HOME, SUCCESS
 from dess.analysis.results.chunks import Part, split
 from dess.analysis.results.manifest import Cell
 from dess.analysis.stats.intervals import Moments
+from dess.errors import check_type
 from dess.policies.registry import TypedByUser, load_team
 from dess.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
-from dess.scenario import ScenarioSpace
-from dess.state import check_seed
+from dess.scenario import AnyScenario, ScenarioSpace
+from dess.state import check_seed, spaces_of
 from dess.streams import MAX_REPLICATION
 from dess.view import check_team
 
@@ -83,7 +84,7 @@ class Evaluation(NamedTuple):
 
 
 def evaluate(
-    scenario: ScenarioSpace,
+    scenario: AnyScenario,
     team: str,
     missions: int = 1000,
     seed: int = 0,
@@ -96,7 +97,8 @@ def evaluate(
     The records of all missions are kept, some 300 bytes for each of them; ``means`` need not.
 
     Args:
-        scenario: The scenario space from which the missions are drawn.
+        scenario: The scenario space from which the missions are drawn, or what ``load_scenario``
+            takes.
         team: ``"P"`` or ``"P,P,..."``.
         missions: Number of missions.
         seed: Seed of the missions.
@@ -108,7 +110,9 @@ def evaluate(
         InputError: If a policy is unknown, a number is out of range, or the team has more policies
             than the largest fleet has UAVs.
     """
-    asked = Asked(scenario, TypedByUser(team), missions, seed, engine, workers)
+    check_type("policy", team, str, "a name such as greedy, or names such as greedy,tour")
+    (space,) = spaces_of([scenario])
+    asked = Asked(space, TypedByUser(team), missions, seed, engine, workers)
     return _evaluated(asked, missions, progress)
 
 

@@ -154,7 +154,7 @@ def mission_figure(events: event_log.Events, scenario: Scenario) -> Figure:
     """A mission: its map, and below it its curves over time."""
     panels = curves(scenario)
     with style.look():
-        figure = Figure(figsize=(5.6, 6.7 + sum(panels.values())), dpi=style.DPI)
+        figure = style.Picture(figsize=(5.6, 6.7 + sum(panels.values())), dpi=style.DPI)
         figure.set_layout_engine("constrained", rect=(0, 0, 0.94, 1))
         axes = figure.subplots(1 + len(panels), height_ratios=(5.6, *panels.values()))
         trajectories(events, scenario, axes[0])
@@ -170,7 +170,7 @@ def mission_figure(events: event_log.Events, scenario: Scenario) -> Figure:
 def sea_figure(space: ScenarioSpace) -> Figure:
     """The map of a scenario: its sensor nodes, each in its colour, and its zone."""
     with style.look():
-        figure = Figure(figsize=(5.6, 5.6), dpi=style.DPI, layout="constrained")
+        figure = style.Picture(figsize=(5.6, 5.6), dpi=style.DPI, layout="constrained")
         _grid(space, figure.subplots())
     return figure
 

@@ -12,6 +12,7 @@ axis, and ``value``, the text at this place, see ``placed``.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from math import ceil
 from typing import Any, Literal, TypeAlias
 
@@ -65,6 +66,19 @@ _LOOK = {
 }
 
 
+class Picture(Figure):
+    """A figure that notebooks show as a picture, though nothing has imported pyplot.
+
+    Jupyter shows other figures so only once pyplot is imported, which it has a hook for.
+    """
+
+    def _repr_png_(self) -> bytes:
+        """The picture, as IPython asks for it."""
+        png = BytesIO()
+        self.savefig(png, format="png", bbox_inches="tight")
+        return png.getvalue()
+
+
 @contextmanager
 def look() -> Iterator[None]:
     """The look of all figures, for the figures and axes that are made inside."""
@@ -97,7 +111,7 @@ def panels(
         options: Further arguments of ``Figure.subplots``.
     """
     with look():
-        figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+        figure = Picture(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
         axes = figure.subplots(rows, **options)
         for ax in np.ravel(axes):
             grid_of(values, ax)

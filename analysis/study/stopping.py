@@ -21,6 +21,7 @@ from dess.analysis.metrics import ALWAYS, MEASURES, metric_of
 from dess.analysis.stats.intervals import LEVEL, bounded_ends
 from dess.errors import listed, one_of, shown, validation_line
 from dess.scenario import Integer, Number
+from dess.sections.section import plain
 
 _METRICS = [*ALWAYS, *MEASURES]
 
@@ -56,6 +57,12 @@ class StrictTable(BaseModel):
     """A table of a study's TOML file: frozen, without unknown keys, strictly typed."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _numbers_of_numpy(cls, values: Any) -> Any:
+        is_table = isinstance(values, dict)
+        return {key: plain(value) for key, value in values.items()} if is_table else values
 
 
 def of_its_kind(key: str, *models: type[BaseModel]) -> BeforeValidator:

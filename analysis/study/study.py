@@ -41,7 +41,7 @@ from dess.scenario import (
     scenario_at,
     validated,
 )
-from dess.sections.section import tuples
+from dess.sections.section import plain, tuples
 from dess.streams import MAX_SEED
 
 Engine = Literal["batch", "events"]
@@ -357,7 +357,7 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
         InputError: If there is no such study, or it is not valid; or if the file, not ``policies``
             among the overrides, names a policy of a Python file, which is code.
     """
-    text = str(name_or_path)
+    text, overrides = str(name_or_path), {name: plain(of) for name, of in overrides.items()}
     where, values = _STUDIES.load(name_or_path)
     values = {"name": text if text in study_names() else Path(text).stem} | values
     scenario = values.get("scenario")

@@ -1,12 +1,13 @@
 """Environments for reinforcement learning, with the same rules of the model as both engines.
 
-    env = dess.parallel_env(dess.load_scenario("paper"))   # PettingZoo: one mission
+    env = dess.parallel_env("paper")   # PettingZoo: one mission
     observations, infos = env.reset(seed=1)
     observations, rewards, terminated, truncated, infos = env.step(actions)
 
-    envs = dess.vector_env(dess.load_scenario("paper"), num_envs=64)   # Gymnasium: many missions
+    envs = dess.vector_env("paper", num_envs=64)   # Gymnasium: many missions
+    env = dess.single_env("paper")   # Gymnasium: one mission of one UAV
 
-Both environments number their missions: replication r of seed s is the mission that
+All environments number their missions: replication r of seed s is the mission that
 ``dess.simulate`` runs with this seed and replication, and the same actions give the same record,
 bit for bit.
 

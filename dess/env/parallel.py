@@ -22,7 +22,7 @@ from dess.errors import shown as quoted
 from dess.observations.components import Components, component_bounds
 from dess.observations.observer import Observer, rows_of
 from dess.record import MissionRecord
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario import AnyScenario
 from dess.state import ACTION_NAMES, HOVER, TRUNCATED
 
 _MODES = ("rgb_array", "human")
@@ -60,8 +60,8 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
 
     def __init__(
         self,
-        scenario: Scenario | ScenarioSpace,
-        seed: int = 0,
+        scenario: AnyScenario,
+        seed: int | None = None,
         render_mode: str | None = None,
         observation: str = "vector",
         mask: str = "observation",
@@ -71,8 +71,10 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         """Make an environment.
 
         Args:
-            scenario: The scenario, or the space from which each episode draws its parameters.
-            seed: Seed of the episodes, until ``reset`` is called with another seed.
+            scenario: The scenario, or the space from which each episode draws its parameters; or
+                what ``load_scenario`` takes.
+            seed: Seed of the episodes, until ``reset`` is called with another seed. Without one,
+                each ``reset`` draws one.
             render_mode: None, ``"rgb_array"``, or ``"human"`` for a window (needs matplotlib).
             observation: ``vector`` or ``maps``, the observations of the shipped learner,
                 or ``state``, the components of ``dess.observations.components.component_names``.
@@ -105,7 +107,7 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         self._gather()
         self.observation_spaces = {agent: deepcopy(space) for agent in self.possible_agents}
         self.action_spaces = {a: spaces.Discrete(len(ACTION_NAMES)) for a in self.possible_agents}
-        low, high = (np.tile(bound, fleet) for bound in component_bounds(scenario))
+        low, high = (np.tile(bound, fleet) for bound in component_bounds(self._stepper.space))
         self.state_space = spaces.Box(low, high, dtype=np.float32)
 
     def observation_space(self, agent: str) -> spaces.Space:

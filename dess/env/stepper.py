@@ -5,6 +5,8 @@ stepper.launch(stepper.indices)    # replications 0 to 3
 outcome = stepper.step(actions)    # (4, I) actions
 """
 
+from collections.abc import Sequence
+from secrets import randbits
 from typing import Any
 
 import numpy as np
@@ -15,13 +17,14 @@ from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.errors import InputError
 from dess.record import Records, empty_records, write_records
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario import AnyScenario
 from dess.sections.wind import ways_home
 from dess.state import ACTION_NAMES, TRUNCATED, check_seed, fields, spaces_of, starts_of, state_of
 
 # The terms of a reward, in the order of ``rules.reward_terms``.
 REWARD_TERMS = ("data", "step", "overruled", "charging", "quota", "depleted", "age")
 
+Seeds = int | Sequence[int] | np.ndarray  # one for all environments, or one for each
 
 # What a mission slot does to one UAV.
 OUTCOME = np.dtype(
@@ -41,54 +44,87 @@ OUTCOME = np.dtype(
 class MissionStepper:
     """N missions of one scenario in progress.
 
+    All environments take the next replication of one seed, or each that of a seed of its own.
+
     Attributes:
         space: The space from which each mission draws its parameters.
-        seed: Seed of the missions to be launched.
-        replication: The next replication to be launched.
+        is_started: Whether missions have been launched.
         state: The arrays of the missions.
         world: The nodes and the tables of the channel.
         indices: (N,) the indices 0 to N - 1 of the environments.
     """
 
-    def __init__(self, scenario: Scenario | ScenarioSpace, num_envs: int, seed: int):
+    def __init__(self, scenario: AnyScenario, num_envs: int, seed: int | None):
         self.space = spaces_of([scenario])[0]
         check_slotted([self.space])
         self.indices = np.arange(num_envs)
         self.world, self.state = world_of(self.space), state_of([self.space], num_envs)
         self._starts = starts_of([self.space])
+        self._is_extended = self.space.is_extended
         self._scratch = empty_scratch(self.space.uavs[1], len(self.space.nodes))
-        self.start_at(seed, 0)
+        self.is_started, self._is_seeded = False, seed is not None
+        self.start_at(seed or 0, 0)
 
-    def start_at(self, seed: int, replication: int) -> None:
+    @property
+    def seed(self) -> int:
+        """Seed of the missions to be launched; the first one if there are several."""
+        return int(self._seeds[0])
+
+    @property
+    def replication(self) -> int:
+        """The next replication of this seed to be launched."""
+        return int(self._next[0])
+
+    def start_at(self, seed: Seeds, replication: int) -> None:
         """Make this replication of this seed the next mission to be launched.
 
-        Raises:
-            InputError: If one of them is out of range.
-        """
-        check_seed(seed, replication)
-        self.seed, self.replication = seed, replication
+        Args:
+            seed: A seed, or one for each environment.
+            replication: The replication.
 
-    def start(self, seed: int | None, options: dict[str, Any] | None) -> None:
+        Raises:
+            InputError: If one of them is out of range, or there are not as many seeds.
+        """
+        seeds = [*seed] if isinstance(seed, Sequence | np.ndarray) else [seed]
+        if len(seeds) != 1 and len(seeds) != len(self.indices):
+            raise InputError(
+                f"seed: there are {len(seeds)}; allowed: an integer, or a list of "
+                f"{len(self.indices)}, one for each mission in progress"
+            )
+        for one in seeds:
+            check_seed(one, replication)
+        self._seeds = np.array(seeds, np.uint64)
+        self._next = np.full(len(seeds), replication, np.int64)
+
+    def start(self, seed: Seeds | None, options: dict[str, Any] | None) -> None:
         """Launch a mission in every environment, as ``reset`` of an environment is asked to.
 
         Args:
-            seed: Start at replication 0 of this seed. If None, the numbering continues.
+            seed: Start at replication 0 of this seed, or of one for each environment. If None, the
+                numbering continues; where no seed was ever given, one is drawn.
             options: ``{"replication": r}`` starts at replication r; other keys are ignored.
 
         Raises:
-            InputError: If the seed or the replication is out of range.
+            InputError: If a seed or the replication is out of range, or there are not as many
+                seeds.
         """
-        replication = (options or {}).get("replication")
-        if seed is not None or replication is not None:
-            self.start_at(self.seed if seed is None else seed, replication or 0)
+        replication, following = (options or {}).get("replication"), seed
+        if seed is None and not self._is_seeded:
+            # Drawn at each start, so that copies of an environment play missions of their own; a
+            # number that every reader of a record can represent.
+            following = randbits(53)
+        elif seed is None and replication is not None:
+            following = self._seeds
+        if following is not None:
+            self.start_at(following, 0 if replication is None else replication)
+        self._is_seeded |= seed is not None
         self.launch(self.indices)
 
     def launch(self, environments: np.ndarray) -> None:
         """Start the next replications in these environments, in this order."""
-        check_seed(self.seed, self.replication + len(environments) - 1)
-        self._starts.constants["seed"] = self.seed
-        _launch(self.state, environments, self._starts, self.replication)
-        self.replication += len(environments)
+        check_seed(0, int(self._next.max()) + len(environments) - 1)
+        _launch(self.state, environments, self._starts, self._seeds, self._next)
+        self.is_started = True
 
     def step(self, actions: np.ndarray) -> np.ndarray:
         """Run one slot of every environment.
@@ -100,46 +136,51 @@ class MissionStepper:
             (N, I) ``OUTCOME`` records.
         """
         outcome = np.zeros(self.state.uavs.shape, OUTCOME)
-        _step(self.state, self.world, self._scratch, actions, outcome)
+        # For numba, the arrays one by one take less time than tuples of them.
+        _step(*self.state, *self.world, *self._scratch, actions, outcome)
         return outcome
 
     def records(self, environments: np.ndarray) -> Records:
         """The records of the missions in these environments, up to the present slot."""
         fleet = self.state.uavs.shape[1]
-        records = empty_records(len(environments), fleet, self.space.is_extended)
+        records = empty_records(len(environments), fleet, self._is_extended)
         ways = ways_home(self.state.missions, self.world.chart)
         write_records(environments, self.state, ways, records)
         return records
 
 
 @kernel
-def _launch(state, environments, starts, first):
-    """Start the replications from ``first`` on in these environments."""
-    for n in range(len(environments)):
-        rules.launch(state, environments[n], starts, 0, first + n)
+def _launch(state, environments, starts, seeds, following):
+    """Start the next replications of the seeds, of which there is one, or one per environment."""
+    for b in environments:
+        own = b % len(seeds)
+        starts.constants[0].seed = seeds[own]
+        rules.launch(state, b, starts, 0, following[own])
+        following[own] += 1
 
 
 @kernel
-def _step(state, world, scratch, actions, out):
+def _step(
+    missions, uavs, residual, sensors, teeth,
+    nodes, mean_snr, order, means, chart, batches, search, actions, out,
+):  # fmt: skip
     """Run one slot of every mission and write the ``OUTCOME`` records."""
-    nodes, mean_snr, order, means, chart = world
-    batches, search = scratch
-    fleet = state.uavs.shape[1]
-    arrivals = np.empty(len(world.nodes), np.int64)
+    fleet = uavs.shape[1]
+    arrivals = np.empty(len(nodes), np.int64)
     charged, collected = np.empty(fleet, np.int64), np.empty(fleet)
-    for b in range(len(state.missions)):
-        mission, uavs = state.missions[b], state.uavs[b]
+    for b in range(len(missions)):
+        mission, team = missions[b], uavs[b]
         for i in range(fleet):
-            u = uavs[i]
+            u = team[i]
             u.action = actions[b, i]
             out[b, i].acted = u.active
             charged[i], collected[i] = u.slots_charging, u.collected
         rules.advance(
-            mission, uavs, state.residual[b], state.sensors[b], state.teeth[b], arrivals,
+            mission, team, residual[b], sensors[b], teeth[b], arrivals,
             nodes, mean_snr, order, means, chart, batches, search,
         )  # fmt: skip
         for i in range(fleet):
-            u, to = uavs[i], out[b, i]
+            u, to = team[i], out[b, i]
             ended = to.acted and not u.active
             to.reward = u.reward
             to.end = u.end
@@ -165,7 +206,7 @@ def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
         raise InputError(
             f"actions: {array.dtype} of shape {array.shape}; allowed: integers of shape {shape}"
         )
-    wrong = array[(array < 0) | (array >= len(ACTION_NAMES))]
+    wrong = array[array.astype(np.uint64) >= len(ACTION_NAMES)]  # negative ones become large
     if wrong.size:
         raise InputError(
             f"actions: {wrong[0]} is not an action; allowed: 0..{len(ACTION_NAMES) - 1}"

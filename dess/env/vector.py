@@ -7,21 +7,22 @@ observations, rewards, terminated, truncated, info = env.step(actions)   # (R,) 
 
 from typing import Any
 
-import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from dess.env.stepper import MissionStepper, checked_actions
-from dess.errors import InputError
+from dess.env.stepper import OUTCOME, MissionStepper, Seeds, checked_actions
+from dess.errors import InputError, one_of
 from dess.observations.observer import Observation, Observer, rows_of
 from dess.record import Records
-from dess.scenario import Scenario, ScenarioSpace, load_scenario
+from dess.scenario import AnyScenario
 from dess.state import ACTION_NAMES, TRUNCATED, State
 from dess.view import View, acting_rows
 
 _MODES = (AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP)
+# What ``info`` has of ``OUTCOME``; the rest is in the other results of a step.
+_INFOS = [n for n in OUTCOME.names or () if n not in ("reward", "terminated", "truncated")]
 
 
 class HarvestVectorEnv(VectorEnv):
@@ -59,9 +60,9 @@ class HarvestVectorEnv(VectorEnv):
 
     def __init__(
         self,
-        scenario: Scenario | ScenarioSpace,
+        scenario: AnyScenario,
         num_envs: int,
-        seed: int = 0,
+        seed: int | None = None,
         observation: str = "vector",
         guarded: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
@@ -69,9 +70,11 @@ class HarvestVectorEnv(VectorEnv):
         """Make an environment.
 
         Args:
-            scenario: The scenario, or the space from which each mission draws its parameters.
+            scenario: The scenario, or the space from which each mission draws its parameters; or
+                what ``load_scenario`` takes.
             num_envs: Number of missions in progress (N).
-            seed: Seed of the missions, until ``reset`` is called with another seed.
+            seed: Seed of the missions, until ``reset`` is called with another seed. Without one,
+                each ``reset`` draws one.
             observation: ``vector`` or ``maps``, the observations of the shipped learner,
                 or ``state``, the components of ``dess.observations.components.component_names``.
             guarded: Whether the masks leave out what the return guard does not allow, as for the
@@ -85,14 +88,14 @@ class HarvestVectorEnv(VectorEnv):
         if autoreset_mode not in [name for mode in _MODES for name in (mode, mode.value)]:
             allowed = " or ".join(mode.value for mode in _MODES)
             raise InputError(f"autoreset_mode: {autoreset_mode!r}; allowed: {allowed}")
-        if not isinstance(num_envs, int) or num_envs < 1:
+        if not isinstance(num_envs, int | np.integer) or num_envs < 1:
             raise InputError(f"num_envs: {num_envs!r} is not allowed; allowed: an integer >= 1")
         self.autoreset_mode = AutoresetMode(autoreset_mode)  # where TorchRL reads it
         self.metadata = {"autoreset_mode": self.autoreset_mode}
-        self.missions = num_envs
-        self._stepper = MissionStepper(scenario, num_envs, seed)
+        self.missions = int(num_envs)
+        self._stepper = MissionStepper(scenario, self.missions, seed)
         self._observer = Observer(self._stepper.space, observation, guarded)
-        self.state, self.world = self._stepper.state, self._stepper.world
+        self.state, self.world = self._stepper.state, self._stepper.world.shown()
         self.num_envs = self.state.uavs.size
         self.single_observation_space = self._observer.space
         self.single_action_space = spaces.Discrete(len(ACTION_NAMES))
@@ -101,18 +104,24 @@ class HarvestVectorEnv(VectorEnv):
         self._mask = np.zeros((self.num_envs, len(ACTION_NAMES)), np.bool_)
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        self, *, seed: Seeds | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Start a new mission in every environment.
 
         Args:
-            seed: Start at replication 0 of this seed. If None, the numbering continues.
-            options: ``{"replication": r}`` starts at replication r; other keys are ignored.
+            seed: Start at replication 0 of this seed. With a list of N seeds, mission n is
+                replication 0 of the n-th one, and followed by the next ones of this seed. If None,
+                the numbering continues.
+            options: ``{"replication": r}`` starts at replication r.
 
         Raises:
-            InputError: If the seed or the replication is out of range.
+            InputError: If a seed or the replication is out of range, there are not N seeds, or
+                there is another option.
         """
+        for name in {*(options or ())} - {"replication"}:
+            raise InputError(f"options: {name!r} is unknown{one_of(name, ['replication'])}")
         self._stepper.start(seed, options)
+        self._waiting = np.zeros(self.missions, np.bool_)  # over before the slot, with NextStep
         observations = self._observe(self.state.uavs["active"])
         return observations, self._present()
 
@@ -130,25 +139,18 @@ class HarvestVectorEnv(VectorEnv):
         Raises:
             InputError: If ``reset`` was not called first, or the actions are not allowed.
         """
-        state, fleet = self.state, self.state.uavs.shape[1]
-        if not self._stepper.replication:  # none has been launched
+        if not self._stepper.is_started:
             raise InputError("step: no mission is in progress; allowed: reset() first")
         checked = checked_actions(actions, (self.num_envs,))
-        starting = np.flatnonzero(state.missions["active"] == 0)  # only with NextStep
-        outcome = self._stepper.step(checked.reshape(state.uavs.shape))
-        ended = state.missions["active"] == 0
-        ended[starting] = False
-        over, shown, info = np.repeat(ended, fleet), outcome["acted"].copy(), self._outcome(outcome)
-        if ended.any():
-            info |= self._final(np.flatnonzero(ended), over, shown)
-        if self.autoreset_mode is AutoresetMode.SAME_STEP:
-            starting = np.flatnonzero(ended)
-        self._stepper.launch(starting)
-        shown[starting] = state.uavs["active"][starting]
-        truncated = over & (outcome["end"].ravel() == TRUNCATED)
+        outcome = self._stepper.step(checked.reshape(self.state.uavs.shape))
+        info = self._outcome(outcome)
+        terminated, truncated = np.zeros(self.num_envs, np.bool_), np.zeros(self.num_envs, np.bool_)
+        shown = outcome["acted"]
+        if np.count_nonzero(self.state.missions["active"]) < self.missions:
+            terminated, truncated, shown = self._turn(outcome, info)
         observations = self._observe(shown)
-        rewards = outcome["reward"].ravel()
-        return observations, rewards, over & ~truncated, truncated, info | self._present()
+        info |= self._present()
+        return observations, outcome["reward"].ravel(), terminated, truncated, info
 
     def action_masks(self) -> np.ndarray:
         """The (R, 5) mask of the actions that are allowed in the next step."""
@@ -166,8 +168,33 @@ class HarvestVectorEnv(VectorEnv):
 
     def _outcome(self, outcome: np.ndarray) -> dict[str, Any]:
         """The outcome of a slot, by row."""
-        names = {*(outcome.dtype.names or ())} - {"reward", "terminated", "truncated"}
-        return {name: np.ascontiguousarray(outcome.ravel()[name]) for name in names}
+        rows = outcome.ravel()
+        return {name: rows[name].copy() for name in _INFOS}
+
+    def _turn(
+        self, outcome: np.ndarray, info: dict[str, Any]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """After a slot, end the missions that are over, and start the next ones.
+
+        Args:
+            outcome: (N, I) ``OUTCOME`` records.
+            info: The info of the step; records and last observations are added.
+
+        Returns:
+            (R,) terminated and truncated, and (N, I) the UAVs that observe something next.
+        """
+        active, shown = self.state.uavs["active"], outcome["acted"].copy()
+        ended = (self.state.missions["active"] == 0) & ~self._waiting
+        over = np.repeat(ended, active.shape[1])
+        truncated = over & (outcome["end"].ravel() == TRUNCATED)
+        if ended.any():
+            info |= self._final(np.flatnonzero(ended), over, shown)
+        is_same = self.autoreset_mode is AutoresetMode.SAME_STEP
+        starting = np.flatnonzero(ended if is_same else self._waiting)
+        self._stepper.launch(starting)
+        self._waiting = self.state.missions["active"] == 0
+        shown[starting] = active[starting]
+        return over & ~truncated, truncated, shown
 
     def _final(self, ended: np.ndarray, over: np.ndarray, shown: np.ndarray) -> dict[str, Any]:
         """The records of the missions that have ended, and their last observations if needed."""
@@ -195,25 +222,8 @@ class HarvestVectorEnv(VectorEnv):
         return {
             "action_mask": self._mask,
             "active": self.state.uavs["active"].ravel(),
-            "replication": np.repeat(self.state.missions["replication"], fleet),
+            "replication": self.state.missions["replication"].repeat(fleet),
         }
 
 
 vector_env = HarvestVectorEnv
-
-
-def make_vec(num_envs: int, scenario: str | Scenario | ScenarioSpace, **options: Any) -> VectorEnv:
-    """``vector_env`` with the name of a scenario, for ``gymnasium.make_vec``.
-
-    envs = gymnasium.make_vec("dess.env.vector:dess/Paper-v0", num_envs=64)
-    """
-    space = load_scenario(scenario) if isinstance(scenario, str) else scenario
-    return vector_env(space, num_envs, **options)
-
-
-if "dess/Paper-v0" not in gymnasium.registry:
-    gymnasium.register(
-        "dess/Paper-v0",
-        vector_entry_point="dess.env.vector:make_vec",
-        kwargs={"scenario": "paper"},
-    )

@@ -1,6 +1,6 @@
 """``parallel_env`` as a task of BenchMARL.
 
-task = HarvestTask("paper", {"scenario": dess.load_scenario("paper")})
+task = HarvestTask("paper", {"scenario": "paper"})
 experiment = Experiment(task, algorithm_config=MappoConfig.get_from_yaml(), ...)
 """
 

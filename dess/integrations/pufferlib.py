@@ -13,7 +13,7 @@ from gymnasium import spaces
 from pufferlib.models import Default
 
 from dess.env.vector import vector_env
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario import AnyScenario
 
 
 class HarvestPufferEnv(pufferlib.PufferEnv):
@@ -26,9 +26,9 @@ class HarvestPufferEnv(pufferlib.PufferEnv):
 
     def __init__(
         self,
-        scenario: Scenario | ScenarioSpace,
+        scenario: AnyScenario,
         num_envs: int = 1,
-        seed: int = 0,
+        seed: int | None = None,
         guarded: bool = False,
         buf: Any = None,
     ):

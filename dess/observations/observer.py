@@ -5,6 +5,7 @@ observations, masks = observer.observe(state, missions, uavs)    # (R, F) and (R
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -110,8 +111,15 @@ class Observer:
         Returns:
             As ``observe``, with B x I rows.
         """
-        missions, uavs = np.indices(shown.shape)
-        return self.observe(state, missions.ravel(), np.where(shown, uavs, -1).ravel())
+        missions, uavs = _rows(shown.shape)
+        return self.observe(state, missions, np.where(shown, uavs, -1).ravel())
+
+
+@lru_cache(maxsize=16)
+def _rows(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """(B * I,) the mission of each UAV of all missions, and (B, I) its index in the mission."""
+    missions, uavs = np.indices(shape)
+    return missions.ravel(), uavs
 
 
 def rows_of(observations: Observation) -> list[Any]:

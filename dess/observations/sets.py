@@ -80,7 +80,7 @@ def sea_of(mission: Any, world: World) -> Sea:
     others = [40 * arriving / unit, mission["charge_rate"] / 10]
     return Sea(
         world.chart,
-        world.nodes,
+        world.nodes.copy(),
         mission["zone_pads"][: mission["zones"]].copy(),
         np.float32(unit),
         rates.astype(np.float32),

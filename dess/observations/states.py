@@ -111,21 +111,21 @@ def compact_states(state: State, chart: Chart, guarded: bool) -> CompactStates:
     """
     states = empty_states(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
     reach = reach_of(state.missions, chart)
-    _fill(state.missions, state.uavs, state.residual, guarded, chart, reach, states)
+    _fill(state.missions, state.uavs, state.residual, guarded, chart, reach, *states)
     return states
 
 
 @kernel
-def _fill(missions, uavs, residual, guarded, chart, reach, out):
+def _fill(missions, uavs, residual, guarded, chart, reach, out_missions, out_uavs, out_residual):
     memory = guard.parking_memory(chart, uavs.shape[1])
     for b in range(len(missions)):
         mission, team = missions[b], uavs[b]
-        out.missions[b, CHARGE_START] = mission.charge_start
-        out.missions[b, CHARGE_COMPLETE] = mission.charge_complete
-        out.residual[b] = residual[b]
+        out_missions[b, CHARGE_START] = mission.charge_start
+        out_missions[b, CHARGE_COMPLETE] = mission.charge_complete
+        out_residual[b] = residual[b]
         data = data_left(mission, residual[b])
         for i in range(mission.uavs):
-            u, row = team[i], out.uavs[b, i]
+            u, row = team[i], out_uavs[b, i]
             row[X], row[Y], row[BATTERY] = u.x, u.y, u.battery
             row[NEEDED] = min(max(guard.slots_needed(mission, u), 0), _MOST)
             row[ACTIVE], row[LATCH], row[CHARGING] = u.active, u.latch, u.charging
@@ -151,5 +151,14 @@ def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.n
 
     Where ``uavs[r]`` is -1, only Hover is allowed.
     """
-    bits = np.where(uavs < 0, 1 << HOVER, states.uavs[missions, uavs, MASK])
-    return (bits[:, None] >> np.arange(5) & 1).astype(np.bool_)
+    out = np.empty((len(uavs), 5), np.bool_)
+    _write_masks(states.uavs, missions, uavs, out)
+    return out
+
+
+@kernel
+def _write_masks(states, missions, uavs, out):
+    for row in range(len(uavs)):
+        bits = states[missions[row], uavs[row], MASK] if uavs[row] >= 0 else 1 << HOVER
+        for action in range(5):
+            out[row, action] = bits >> action & 1

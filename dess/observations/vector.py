@@ -58,7 +58,7 @@ class Vector:
         """
         out = np.empty((len(missions), *self.shapes[0]), np.float32)
         tables = self._home, self._nearness, self._around
-        _encode(states, missions, uavs, self.layout.grid, self.layout.nodes, *tables, out)
+        _encode(*states, missions, uavs, self.layout.grid, self.layout.nodes, *tables, out)
         return (out,)
 
 
@@ -85,7 +85,9 @@ def _around(slots: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def _encode(states, rows_mission, rows_uav, grid, nodes, home, nearness, around, out):
+def _encode(
+    missions, uavs, residual, rows_mission, rows_uav, grid, nodes, home, nearness, around, out
+):
     count = len(nodes)
     least = np.empty(count, np.float32)
     columns, rows = nodes[:, 0].astype(np.float32), nodes[:, 1].astype(np.float32)
@@ -97,7 +99,7 @@ def _encode(states, rows_mission, rows_uav, grid, nodes, home, nearness, around,
         line[:] = 0.0
         if i < 0:
             continue
-        mission, team, data = states.missions[b], states.uavs[b], states.residual[b]
+        mission, team, data = missions[b], uavs[b], residual[b]
         if b != before:  # the UAVs of a mission share what follows from its data
             before, total = b, 0.0
             for k in range(count):

@@ -24,6 +24,8 @@ FAR = 2**15 - 1  # [cells]: there is no way
 class Chart(NamedTuple):
     """The geometry that all missions of a batch share, for a grid of H rows and W columns.
 
+    Its arrays are read-only; a copy shares them.
+
     Attributes:
         zones: (H, W) the number of the charging zone of a cell, ``OPEN`` or ``NO_FLY``.
         parking: (C, 2) the cells of the zones, zone by zone and row by row.
@@ -38,6 +40,26 @@ class Chart(NamedTuple):
     sizes: np.ndarray
     nearest: np.ndarray
     ways: np.ndarray | None
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Chart":
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _chart_of, tuple(self)
+
+
+def _chart_of(*arrays: Any) -> Chart:
+    return Chart(*map(read_only, arrays))
+
+
+def read_only(array: Any) -> Any:
+    """An array, or None, which from now on cannot be written to.
+
+    To numba, it has another type than an array that can; so this is done before its first use.
+    """
+    if array is not None:
+        array.flags.writeable = False
+    return array
 
 
 def zones_of(
@@ -75,7 +97,7 @@ def chart_at(
         ways = np.empty((cells.size, cells.size), np.int16)
         for number, (y, x) in enumerate(np.ndindex(cells.shape)):
             ways[number] = spread(cells, np.array([[x, y]]))[0]
-    return Chart(cells, parking, sizes, nearest, ways)
+    return _chart_of(cells, parking, sizes, nearest, ways)
 
 
 def geometry(chart: Chart) -> dict[str, Any]:

@@ -26,8 +26,14 @@ def _at_least_a_slot(mean: float) -> float:
 Slots = Annotated[Number, Field(ge=0, le=1_000_000), AfterValidator(_at_least_a_slot)]
 
 
+def plain(value: Any) -> Any:
+    """What numpy or pandas holds as numbers and lists of Python: ``np.int64(3)`` as 3."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
 def tuples(value: Any) -> Any:
     """Convert the lists that TOML gives to tuples, nested ones and those of tables included."""
+    value = plain(value)
     if isinstance(value, dict):
         return {key: tuples(item) for key, item in value.items()}
     return tuple(tuples(item) for item in value) if isinstance(value, list | tuple) else value

@@ -241,7 +241,7 @@ OF_BOTH: list[tuple[dict[str, Any], str]] = [
     ({"policy": [Wanderer()] * 7}, "has 7 policies, but the largest fleet has 6 UAVs; allowed: 6"),
     ({"policy": []}, "at least one policy"),
     ({"seed": -1}, "seed: -1 is out of range"),
-    ({"seed": 1.5}, "integer"),
+    ({"seed": 1.5}, "^seed: 1.5 is of type float; allowed: an integer$"),
 ]
 OF_BATCHES: list[tuple[dict[str, Any], str]] = [
     ({"replications": [0, 2**32]}, "replication: 4294967296 is out of range"),

@@ -12,6 +12,7 @@ from dess import ScenarioSpace
 stable_baselines3 = pytest.importorskip("stable_baselines3")
 vec_env = pytest.importorskip("stable_baselines3.common.vec_env")
 evaluation = pytest.importorskip("stable_baselines3.common.evaluation")
+env_util = pytest.importorskip("stable_baselines3.common.env_util")
 sb3 = pytest.importorskip("dess.integrations.sb3")
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "sb3_ppo.py"
@@ -27,7 +28,7 @@ def harvest(scenario=QUICK, **options):
 
 def test_contract() -> None:
     """Steps are those of ``vector_env``, and ends are told as its wrappers expect it."""
-    env, plain = harvest(), dess.vector_env(QUICK, MISSIONS)
+    env, plain = harvest(seed=0), dess.vector_env(QUICK, MISSIONS, seed=0)
     generator, copies = np.random.default_rng(1), []
     env.set_options({"replication": 5})
     fifth, _ = plain.reset(options={"replication": 5})
@@ -63,3 +64,10 @@ def test_contract() -> None:
     fleet = harvest(ScenarioSpace.of(QUICK, uavs=3))
     rewards, slots = evaluation.evaluate_policy(model, fleet, 24, return_episode_rewards=True)
     assert len(rewards) == 24 and max(slots) <= QUICK.max_slots
+
+
+def test_make_vec_env_makes_missions_of_a_lone_uav() -> None:
+    env = env_util.make_vec_env("dess/Paper-v0", 2, seed=1, env_kwargs={"scenario": QUICK})
+    model = stable_baselines3.PPO("MlpPolicy", env, n_steps=8, batch_size=8, n_epochs=1).learn(32)
+    assert model.num_timesteps == 32
+    assert all(masks.shape == (5,) for masks in env.env_method("action_masks"))

@@ -6,8 +6,11 @@ from pathlib import Path
 import matplotlib as mpl
 import pandas as pd
 import pytest
+from IPython.core.formatters import DisplayFormatter
 
+from dess import load_scenario
 from dess.analysis.figures import style
+from dess.analysis.figures.missions import sea_figure
 from dess.analysis.figures.style import KNOWN_POLICIES, node_colours, policy_colours, signed_points
 
 
@@ -52,3 +55,13 @@ def test_an_axis_holds_all_intervals_and_has_a_least_length() -> None:
         assert low < 0.5 and high > 0.9
         assert high - low >= length
         assert (low < 0) == zero
+
+
+def test_a_notebook_shows_a_figure_though_nothing_has_imported_pyplot() -> None:
+    """Without pyplot, IPython has no hook for figures and shows the name of their class."""
+    with style.panels(2.0) as (figure, _):
+        pass
+    shown = DisplayFormatter().format
+    for drawn in (figure, sea_figure(load_scenario("fig1"))):
+        picture, _ = shown(drawn)
+        assert picture["image/png"].startswith(b"\x89PNG")

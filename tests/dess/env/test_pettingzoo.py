@@ -1,14 +1,12 @@
-"""PettingZoo's and Gymnasium's own tests, for every choice of ``parallel_env``."""
+"""PettingZoo's own tests, for every choice of ``parallel_env``."""
 
 import warnings
 from itertools import product
 from types import SimpleNamespace
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 from matplotlib import pyplot
 from pettingzoo import test as their
 from pettingzoo.utils import parallel_to_aec
@@ -84,31 +82,6 @@ def test_infos_are_numbers_and_arrays_with_the_same_keys_in_every_step(
             own = observations[agent]  # a mask stands in one place
             in_observation = isinstance(own, dict) and "action_mask" in own
             assert in_observation == (choice["mask"] == "observation")
-
-
-class LoneUav(gymnasium.Env):
-    """A mission of one UAV as a Gymnasium ``Env``, which is what ``check_env`` takes."""
-
-    def __init__(self) -> None:
-        self.env = made(1, mask="info", ended="stay", render_mode="rgb_array")
-        self.metadata, self.render_mode = self.env.metadata, self.env.render_mode
-        self.observation_space = self.env.observation_space("uav_0")
-        self.action_space, self.render = self.env.action_space("uav_0"), self.env.render
-
-    def reset(self, *, seed: int | None = None, options: dict | None = None) -> Any:
-        super().reset(seed=seed)
-        return tuple(part["uav_0"] for part in self.env.reset(seed, options))
-
-    def step(self, action: Any) -> Any:
-        return tuple(part["uav_0"] for part in self.env.step({"uav_0": action}))
-
-
-def test_gymnasiums_check_env_passes_for_a_lone_uav() -> None:
-    """``check_env`` takes environments of one agent, so neither those of a team nor vectors."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        warnings.filterwarnings("ignore", ".*(infinity|not within the registry|spec|render)")
-        check_env(LoneUav())
 
 
 # --- pictures ---

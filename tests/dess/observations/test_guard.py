@@ -43,7 +43,8 @@ def _mask(*uavs: dict[str, Any], **scenario: Any) -> np.ndarray:
     """The guard's masks for UAVs in given states, 400 communications short of the quota."""
     rows = np.zeros(len(uavs), int), np.arange(len(uavs))
     state, chart = placed([*uavs], **scenario)
-    return guard(View(state, SimpleNamespace(chart=chart), *rows))
+    world = SimpleNamespace(chart=chart)
+    return guard(View(state, SimpleNamespace(shown=lambda: world), *rows))
 
 
 WALL = [[24, y] for y in range(12)]  # from the northern edge, between the UAV and the zone
