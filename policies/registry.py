@@ -9,6 +9,7 @@ Other packages register theirs under the entry point ``dess.policies``.
 import inspect
 import os
 import re
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module, invalidate_caches
@@ -144,7 +145,7 @@ def _check_untrained(folder: Path) -> None:
     if os.path.exists(folder / CHECKPOINT):  # False for a name that no folder can have
         raise InputError(
             f"policy: {folder} is a training that has no weights yet; allowed: after "
-            f"dess train CONFIG --out {folder} --resume"
+            f"dess train CONFIG --out {shlex.quote(str(folder))} --resume"
         )
 
 

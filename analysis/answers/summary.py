@@ -16,7 +16,7 @@ from dess.analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS, metr
 from dess.analysis.names import parameter, value_text
 from dess.analysis.results.chunks import parts_of
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.choices import may_be_best
+from dess.analysis.stats.choices import may_be_best, within_reach
 from dess.analysis.stats.differences import compare, for_choice
 from dess.analysis.stats.distribution import distribution
 from dess.analysis.stats.intervals import LEVEL, by_replication, summary, values_within
@@ -195,6 +195,7 @@ def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
             missions = results.missions[results.missions["point"] == point]
             wide = by_replication(missions, str(metric), "policy")
             may_be = may_be_best(wide[rows["policy"]].to_numpy(float), str(metric))
+            may_be &= within_reach(rows["low"], rows["high"], str(metric)).to_numpy()
             best = TIED if may_be.sum() > 1 else BEST
             verdicts[rows.index] = np.where(may_be, best, WORSE)
     return means.assign(verdict=verdicts)

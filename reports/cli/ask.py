@@ -1,6 +1,7 @@
 """``dess sweep`` and ``dess what-if``: a question in one line, and its answer with a page."""
 
 import json
+import shlex
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -196,7 +197,7 @@ def _run(
     return complete(
         study.name,
         lambda progress, announce: question.ask(workers, progress, announce, yes),
-        f"dess study run {question.file} --out {folder}",
+        shlex.join(["dess", "study", "run", str(question.file), "--out", str(folder)]),
     )
 
 

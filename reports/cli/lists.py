@@ -9,14 +9,17 @@ from dess.errors import cut
 from dess.reports.cli import console, options
 from dess.reports.cli.options import JsonOption, SetOption, command, load_space
 
-policies = typer.Typer(invoke_without_command=True)
-scenarios = typer.Typer(invoke_without_command=True)
-studies = typer.Typer(invoke_without_command=True)
+policies = typer.Typer(invoke_without_command=True, help="List the policies, or show one.")
+scenarios = typer.Typer(
+    invoke_without_command=True,
+    help="List the shipped scenarios and the families of generated ones, or show one.",
+)
+studies = typer.Typer(invoke_without_command=True, help="List the shipped studies, or show one.")
 
 
 @policies.callback()
 def list_policies(context: typer.Context) -> None:
-    """List the policies, or show one."""
+    """Print the list, unless one is shown."""
     from dess.policies.registry import descriptions
 
     if context.invoked_subcommand is None:
@@ -53,7 +56,7 @@ def show_policy(
 
 @scenarios.callback()
 def list_scenarios(context: typer.Context) -> None:
-    """List the shipped scenarios and the families of generated ones, or show one."""
+    """Print the list, unless one is shown."""
     from dess.scenario import scenario_description, scenario_families, scenario_names
 
     if context.invoked_subcommand is None:
@@ -99,7 +102,7 @@ def show_scenario(
 
 @studies.callback()
 def list_studies(context: typer.Context) -> None:
-    """List the shipped studies, or show one."""
+    """Print the list, unless one is shown."""
     from dess.analysis.study.study import study_descriptions
 
     if context.invoked_subcommand is None:

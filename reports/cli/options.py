@@ -1,11 +1,13 @@
 """The options and arguments that commands share, and their completion by the shell."""
 
+import ast
 import math
 import re
+import sys
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from decimal import Decimal, InvalidOperation
-from inspect import getdoc
+from inspect import getdoc, getsource
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
@@ -96,7 +98,7 @@ def command(app: typer.Typer, name: str | None = None) -> Callable[[Callable], C
     """Make a command of a function; the part ``Args`` of its docstring describes the options."""
 
     def register(function: Callable) -> Callable:
-        summary, _, described = (getdoc(function) or "").partition("\n\nArgs:\n")
+        summary, _, described = docstring(function).partition("\n\nArgs:\n")
         hints = get_type_hints(function, include_extras=True)
         for parameter, text in re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", described, re.M):
             if not hasattr(hints[parameter], "__metadata__"):
@@ -106,6 +108,15 @@ def command(app: typer.Typer, name: str | None = None) -> Callable[[Callable], C
         return app.command(name, help=summary)(function)
 
     return register
+
+
+def docstring(function: Callable) -> str:
+    """The docstring of a function, also under ``python -OO``, which leaves it out."""
+    if sys.flags.optimize < 2:
+        return getdoc(function) or ""
+    (found,) = ast.parse(getsource(function)).body
+    assert isinstance(found, ast.FunctionDef)
+    return ast.get_docstring(found) or ""
 
 
 def load_space(name: str, settings: list[str] | None) -> "ScenarioSpace":

@@ -1,6 +1,7 @@
 """``dess study``: run a study into a results folder; show, compare and bundle results."""
 
 import json
+import shlex
 from collections.abc import Iterable
 from datetime import date
 from pathlib import Path
@@ -119,7 +120,7 @@ def _run(study: "Study", out: Path, workers: int, scheduler: str | None, accept:
         ),
     )
     print_summary(results, out, short=True)
-    console.say(f"more: dess study show {out}")
+    console.say(f"more: {shlex.join(['dess', 'study', 'show', str(out)])}")
 
 
 def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
@@ -304,6 +305,7 @@ def _diff_document(found: "Diff", most: int) -> dict:
         "a": str(found.a.store.folder),
         "b": str(found.b.store.folder),
         "identical": found.identical,
+        "paired": found.unpaired is None,
         "missions": len(found.missions),
         "differ": len(found.changed),
         "origins": diff.origins(found),
@@ -330,6 +332,7 @@ def export(
     from dess.reports.crate import check_page, licence_of, write_crate
     from dess.reports.pages.render import render_study
 
+    console.check_ending("--crate", crate, (".zip",), "a zip file", is_stream=True)
     results, licence = load_results(folder), licence_of(licence)
     if page:
         check_page(page, results)

@@ -9,6 +9,7 @@ from functools import lru_cache
 from hashlib import sha256
 from importlib import metadata
 from pathlib import Path
+from shlex import quote
 from types import MappingProxyType
 from typing import Any
 
@@ -226,7 +227,7 @@ def _check_results(folder: Path) -> None:
     if not (folder / MANIFEST).exists():
         raise InputError(
             f"results: {folder} holds no results of study {folder.name}; "
-            f"allowed: what is made by: dess study run {folder.name} --out {folder}"
+            f"allowed: what is made by: dess study run {folder.name} --out {quote(str(folder))}"
         )
     manifest = Manifest.read(folder / MANIFEST)
     study = manifest.study.name

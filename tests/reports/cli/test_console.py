@@ -17,13 +17,13 @@ RAW = "\x1b[31mred\x1b]0;title\x07\x9b2J \u202egpj.exe\r\x00"
 
 
 def test_compilation_is_announced_once(capsys):
+    console.announce_compiling.cache_clear()
     double = njit(lambda x: 2 * x)
-    with console.compile_notice():
-        assert (double(1), double(1.5)) == (2, 3.0)  # compiled twice
+    for _ in range(2):  # as of a command that checks, simulates and writes a page
+        with console.compile_notice():
+            assert (double(1), double(1.5)) == (2, 3.0)  # compiled twice
+        double = njit(lambda x: 2 * x)
     assert capsys.readouterr().err == "compiling the simulator (first run only) ...\n"
-    with console.compile_notice():
-        assert double(2) == 4
-    assert capsys.readouterr().err == ""
 
 
 def test_a_bar_says_that_something_is_compiled():

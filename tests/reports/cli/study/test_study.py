@@ -23,6 +23,13 @@ def test_a_study_lands_in_the_results_by_default(dess, tmp_path):
     assert len(load_results(tmp_path / "results" / "trial").missions) == 6
 
 
+def test_a_command_that_is_printed_can_be_pasted(dess):
+    code, out, _ = dess("study", "run", "trial.toml", "--missions", 2, "--out", "res ults")
+    command = out.splitlines()[-1].removeprefix("more: ")
+    assert (code, command) == (0, "dess study show 'res ults'")
+    assert dess(*shlex.split(command)[1:])[0] == 0
+
+
 def test_a_dry_run_tells_the_plan_and_writes_nothing(dess, tmp_path):
     before = files_of(tmp_path)
     code, out, _ = dess("study", "run", "trial.toml", "--missions", 30, "--dry-run")
