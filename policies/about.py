@@ -1,12 +1,15 @@
 """What there is to know about a policy: where it comes from, what it can simulate, its card."""
 
 import inspect
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import dess
+from dess.errors import InputError
 from dess.files.reading import Missing, read_text
-from dess.policies.learner.description import read_description
+from dess.policies.learner.description import ranges_of, read_description
 from dess.policies.registry import (
     FILE,
     SHIPPED,
@@ -16,7 +19,7 @@ from dess.policies.registry import (
     package_of,
     trained_names,
 )
-from dess.scenario import SAMPLED, load_scenario, scenario_names
+from dess.scenario import SAMPLED, ScenarioSpace, load_scenario, scenario_names
 
 CARD = "README.md"  # beside the weights of a trained policy
 CARD_LIMIT = 2**20  # bytes
@@ -66,6 +69,32 @@ def about(name: str) -> About:
         else {},
         card=_card(folder) or inspect.getdoc(type(policy)) or "",
     )
+
+
+def departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) -> list[str]:
+    """A line for each trained policy that has to act outside of the ranges of its training.
+
+    Args:
+        policies: The names of policies and teams.
+        spaces: The scenarios in which they act.
+    """
+    lines, here = [], ranges_of(spaces)
+    for name in dict.fromkeys(name for team in policies for name in team.split(",")):
+        with suppress(InputError):  # whoever loads it says what is wrong
+            folder = folder_of(name)
+            trained = read_description(folder).ranges if folder else {}
+            beyond = [
+                f"{field} {_span(here[field])} (trained on {_span([low, high])})"
+                for field, (low, high) in trained.items()
+                if field in here and not low <= here[field][0] <= here[field][1] <= high
+            ]
+            if beyond:
+                lines.append(f"{name} acts outside of its training: {', '.join(beyond)}")
+    return lines
+
+
+def _span(ends: Iterable[float]) -> str:
+    return " to ".join(dict.fromkeys(f"{end:g}" for end in ends))
 
 
 def _card(folder: Path | None) -> str:

@@ -194,6 +194,7 @@ def _run(
         print_plan(question.plan(workers), study, folder, workers)
         raise typer.Exit
     check_pages(out, page)
+    options.note_departures(study.policies, study.scenarios)
     return complete(
         study.name,
         lambda progress, announce: question.ask(workers, progress, announce, yes),

@@ -242,7 +242,14 @@ def compile_notice() -> Iterator[None]:
 @cache
 def announce_compiling() -> None:
     """Print that the simulator is compiled, the first time that this is called."""
-    print("compiling the simulator (first run only) ...", file=sys.stderr)
+    from numba.core.caching import NullCache
+
+    from dess.rules import launch  # any kernel
+
+    when = "first run only"
+    if isinstance(launch._cache, NullCache):  # no folder beside the code can be written
+        when = "in every run; NUMBA_CACHE_DIR=DIR keeps it"
+    print(f"compiling the simulator ({when}) ...", file=sys.stderr)
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """``dess policies``, ``dess scenarios`` and ``dess studies``: lists, and ``show`` for one name."""
 
 import json
+from textwrap import wrap
 from typing import Annotated, Any
 
 import typer
@@ -97,7 +98,12 @@ def show_scenario(
     rows_ = [[f.name, cut(_value(f.value), 20), f.unit, f.meaning] for f in fields(space)]
     columns = [*zip(*rows_, strict=True)][:-1]
     rest = console.WIDTH - sum(max(map(len, column)) + 2 for column in columns)
-    console.print_table(heads, [[*row[:3], cut(row[3], rest)] for row in rows_], left=len(heads))
+    lines = [
+        [*(row[:3] if number == 0 else [""] * 3), line]
+        for row in rows_
+        for number, line in enumerate(wrap(row[3], rest))
+    ]
+    console.print_table(heads, lines, left=len(heads))
 
 
 @studies.callback()

@@ -15,6 +15,7 @@ import typer
 
 from dess.errors import InputError, one_of, shown
 from dess.files.parsing import parse_toml
+from dess.reports.cli.console import say
 
 
 def policies(start: str) -> list[str]:
@@ -119,6 +120,14 @@ def docstring(function: Callable) -> str:
     return ast.get_docstring(found) or ""
 
 
+def note_departures(policies: Iterable[str], spaces: "Iterable[ScenarioSpace]") -> None:
+    """Say on stderr which trained policies act outside of what they were trained on."""
+    from dess.policies.about import departures
+
+    for line in departures(policies, spaces):
+        say(f"note: {line}", sys.stderr)
+
+
 def load_space(name: str, settings: list[str] | None) -> "ScenarioSpace":
     """A scenario by name or file, with the fields that ``--set`` sets.
 
@@ -146,6 +155,10 @@ def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, An
         parsed = parse_toml(f"value = {value}", option)
         if equals and parsed.keys() == {"value"} and _is_plain(parsed["value"]):
             return key, parsed["value"]
+    if allowed == FIELD and (_RANGE.fullmatch(value) or "," in value.partition("[")[0]):
+        raise InputError(
+            f"{option}: {shown(text)} has several values; allowed: one, or dess sweep {SET} {text}"
+        )
     if allowed == FIELD and value:
         _check_word(key, value, option)
         return key, value

@@ -95,6 +95,7 @@ def simulate(
         from dess.reports.player.animation import check_ffmpeg
 
         check_ffmpeg()
+    options.note_departures([asked.policy], [asked.space])
     is_binary = events is not None and console.is_stdout(events)
     if is_binary and as_json:
         raise InputError("--json: standard output has the event log; allowed: --events FILE")
@@ -108,6 +109,9 @@ def simulate(
                 writers[path](mission, temporary, path.suffix[1:].lower())
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
+        fields = record.metrics.dtype.names or ()
+        others = [key for key in fields if key not in (*asked.names, *metrics, "uavs")]
+        metrics |= {key: record.metrics[key].item() for key in others}
         measured = {"operations": record.measured} if record.operations is not None else {}
         print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
     elif not is_binary:

@@ -130,6 +130,13 @@ def render(
     reports = [read(name, notebooks) for name in asked or names_in(notebooks)]
     check_parameters(reports, values)
     lacking = {report.name: _lacking(report, results) for report in reports}
+    commands = dict.fromkeys(command for errors in lacking.values() for command in errors)
+    if asked and len(commands) > 1:
+        names = " ".join(command.rpartition(" ")[2] for command in commands)
+        raise InputError(
+            f"results: {results} lacks complete results of {len(commands)} studies; allowed: what "
+            f"is made by: dess study run {names} --out {quote(str(results))}"
+        )
     for name, errors in lacking.items():
         for error in errors.values():
             if asked:

@@ -6,6 +6,7 @@ import sys
 
 import pytest
 from numba import njit
+from numba.core.caching import NullCache
 from numba.core.event import trigger_event
 
 from dess.reports import cli
@@ -24,6 +25,13 @@ def test_compilation_is_announced_once(capsys):
             assert (double(1), double(1.5)) == (2, 3.0)  # compiled twice
         double = njit(lambda x: 2 * x)
     assert capsys.readouterr().err == "compiling the simulator (first run only) ...\n"
+
+
+def test_code_that_cannot_be_kept_says_how(capsys, monkeypatch):
+    monkeypatch.setattr("dess.rules.launch._cache", NullCache())
+    console.announce_compiling.cache_clear()
+    console.announce_compiling()
+    assert "(in every run; NUMBA_CACHE_DIR=DIR keeps it)" in capsys.readouterr().err
 
 
 def test_a_bar_says_that_something_is_compiled():

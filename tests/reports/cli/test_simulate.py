@@ -96,6 +96,15 @@ def test_packets_in_continuous_time_are_measured_and_printed(dess, dess_json, tm
     assert (tmp_path / "mission.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_the_json_has_all_that_the_table_prints(dess, dess_json):
+    printed = dess("simulate", "--scenario", "small.toml")[1].partition("UAV ")[0]
+    rows = [line.split() for line in printed.splitlines() if len(line.split()) == 2]
+    data = dess_json("simulate", "--scenario", "small.toml")
+    shown = {name: float(value) for name, value in rows if name[0].isalpha()}
+    assert len(shown) > 12 and shown.pop("uavs") == len(data["uavs"])
+    assert {name: data[name] for name in shown} == pytest.approx(shown, rel=1e-5)
+
+
 def test_the_event_log_is_written_as_its_ending_says(dess, tmp_path):
     for name in ("log.parquet", "log.csv", "LOG.CSV"):
         assert dess("simulate", "--scenario", "small.toml", "--events", name)[0] == 0

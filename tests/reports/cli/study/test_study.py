@@ -23,6 +23,13 @@ def test_a_study_lands_in_the_results_by_default(dess, tmp_path):
     assert len(load_results(tmp_path / "results" / "trial").missions) == 6
 
 
+def test_the_name_of_a_study_leads_to_its_folder(dess, refusal):
+    assert dess("study", "run", "trial.toml", "--missions", 2)[0] == 0
+    for command in (("show",), ("diff", "results/trial"), ("export", "--crate", "a.zip")):
+        line = refusal("study", *command, "trial")
+        assert "trial: no such folder; allowed: a results folder: results/trial" in line
+
+
 def test_a_command_that_is_printed_can_be_pasted(dess):
     code, out, _ = dess("study", "run", "trial.toml", "--missions", 2, "--out", "res ults")
     command = out.splitlines()[-1].removeprefix("more: ")
