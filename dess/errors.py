@@ -36,6 +36,10 @@ _REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = _QUOTED // 3
 class InputError(ValueError):
     """Bad input: one line that says where, what, and what is allowed."""
 
+    def _render_traceback_(self) -> list[str]:
+        """What a notebook shows of it, in the place of a traceback."""
+        return [f"InputError: {self}"]
+
 
 def check_type(name: str, value: object, kinds: Any, allowed: str) -> None:
     """Refuse a value that is of none of some types.

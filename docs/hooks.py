@@ -1,7 +1,7 @@
 """What MkDocs builds into the site besides the pages of this folder.
 
-- A line ``[[ NAME ]]`` of a page becomes a part made from the code: the commands, the fields of a
-  scenario, the public names of a package, the changelog.
+- A line ``<!-- [[ NAME ]] -->`` of a page becomes a part made from the code: the commands, the
+  fields of a scenario, the public names of a package, the changelog.
 - A link from a page to a file of the repository outside of ``docs/`` leads to a page of the site
   that shows this file. So the same link works in the repository and in the site.
 """
@@ -26,7 +26,7 @@ from dess.reports.cli.commands import app
 
 ROOT = Path(__file__).parents[1]
 LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)")
-PART = re.compile(r"^\[\[ (\w+)(?: (\w+))? \]\]$", re.M)
+PART = re.compile(r"^<!-- \[\[ (\w+)(?: (\w+))? \]\] -->$", re.M)
 
 
 # --- parts made from the code ---

@@ -17,8 +17,10 @@ Other packages register theirs under the entry point ``dess.policies``.
 import inspect
 import os
 import re
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from importlib import import_module, invalidate_caches
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
@@ -32,8 +34,8 @@ from dess.code.libraries import needs
 from dess.code.sources import path_of
 from dess.errors import InputError, one_of, shown
 from dess.files.reading import Missing, paths_in, read_text
-from dess.policies.learner.config import CHECKPOINT, CONFIG, read_description
-from dess.scenario import SAMPLED, load_scenario, scenario_names
+from dess.policies.learner.config import CHECKPOINT, CONFIG, ranges_of, read_description
+from dess.scenario import SAMPLED, ScenarioSpace, load_scenario, scenario_names
 from dess.view import View
 
 
@@ -180,7 +182,7 @@ def _check_untrained(folder: Path) -> None:
     if os.path.exists(folder / CHECKPOINT):  # False for a name that no folder can have
         raise InputError(
             f"policy: {folder} is a training that has no weights yet; allowed: after "
-            f"dess train CONFIG --out {folder} --resume"
+            f"dess train CONFIG --out {shlex.quote(str(folder))} --resume"
         )
 
 
@@ -353,6 +355,32 @@ def about(name: str) -> About:
         else {},
         card=_card(folder) or inspect.getdoc(type(policy)) or "",
     )
+
+
+def departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) -> list[str]:
+    """A line for each trained policy that has to act outside of the ranges of its training.
+
+    Args:
+        policies: The names of policies and teams.
+        spaces: The scenarios in which they act.
+    """
+    lines, here = [], ranges_of(spaces)
+    for name in dict.fromkeys(name for team in policies for name in team.split(",")):
+        with suppress(InputError):  # whoever loads it says what is wrong
+            folder = folder_of(name)
+            trained = read_description(folder).ranges if folder else {}
+            beyond = [
+                f"{field} {_span(here[field])} (trained on {_span([low, high])})"
+                for field, (low, high) in trained.items()
+                if field in here and not low <= here[field][0] <= here[field][1] <= high
+            ]
+            if beyond:
+                lines.append(f"{name} acts outside of its training: {', '.join(beyond)}")
+    return lines
+
+
+def _span(ends: Iterable[float]) -> str:
+    return " to ".join(dict.fromkeys(f"{end:g}" for end in ends))
 
 
 def _card(folder: Path | None) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from datetime import date
 from importlib import metadata
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import tomli_w
@@ -68,7 +69,7 @@ def check_page(page: Path, results: Results) -> None:
     Raises:
         InputError: If the file is not a page, shows other results, or has been changed.
     """
-    allowed = f"their page, as dess report {results.store.folder} writes it"
+    allowed = f"their page, as dess report {quote(str(results.store.folder))} writes it"
     shown = Page.read(page, LIMIT, allowed)
     keys = [evidence.key for evidence in shown.evidence]
     if keys != [results.store.manifest.key] or not shown.is_sealed:

@@ -181,6 +181,11 @@ def test_links_lead_somewhere(page: str) -> None:
             assert not anchor or anchor in anchors(target), link
 
 
+def test_a_clone_shows_no_placeholder_of_the_site() -> None:
+    assert re.findall(r"^<!-- \[\[ commands \]\] -->$", ALL, re.M)
+    assert not re.findall(r"^\[\[ \w.*\]\]$", ALL, re.M)
+
+
 def test_every_page_is_in_the_site() -> None:
     def pages(entry: Any) -> list[str]:
         if isinstance(entry, str):

@@ -4,9 +4,12 @@
     found.identical, found.changed, effects(found)
 
 A mission is in both folders if policy, scenario, seed and replication are the same. Then it has the
-same random draws in both, so that every difference is an effect of the change.
+same random draws in both, so that every difference is an effect of the change. If no scenario is in
+both, design points with the same values are compared, and the effect is also that of the constants
+that differ. With different seeds, all missions are compared without pairs.
 """
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,8 +23,11 @@ from dess.analysis.metrics import METRICS, PRODUCT, RATIO, REWARD
 from dess.analysis.results.chunks import check_parts
 from dess.analysis.results.provenance import differing
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import compare
+from dess.analysis.stats.differences import Paired, compare, unpaired, with_adjusted
+from dess.analysis.stats.intervals import groups
+from dess.errors import shown
 from dess.record import MISSION_RECORD, OPERATIONS, UAV_RECORD
+from dess.scenario import dotted
 
 _KEYS = ["team", "scenario", "replication"]  # columns by which missions are matched
 _MISSION_FIELDS = [n for n in MISSION_RECORD.names or () if n not in ("seed", "replication")]
@@ -43,17 +49,22 @@ class Diff:
             ``MISSION_RECORD`` and ``OPERATIONS`` (nan where not measured).
         alone: The missions that only one folder has: ``only_in`` (``A`` or ``B``), ``what`` they
             are, and the number ``missions``.
+        points: The pairs of design points that are compared: ``point_a`` and ``point_b``.
+        unpaired: With different seeds, the missions of both that are compared without pairs:
+            ``side`` (``a`` or ``b``), ``policy_a``, ``point_a`` and the metrics; else None.
     """
 
     a: Results
     b: Results
     missions: pd.DataFrame
     alone: pd.DataFrame
+    points: pd.DataFrame
+    unpaired: pd.DataFrame | None = None
 
     @property
     def identical(self) -> bool:
         """Whether both have the same missions, and their records are the same bit for bit."""
-        return self.changed.empty and self.alone.empty
+        return self.changed.empty and self.alone.empty and self.unpaired is None
 
     @cached_property
     def changed(self) -> pd.DataFrame:
@@ -69,40 +80,48 @@ def diff(a: Results, b: Results) -> Diff:
 
     If each has a single policy, the two policies are compared, whatever their names are; otherwise
     policies of the same name are compared. Two design points are the same if their scenarios are
-    equal in all fields. Missions that check a selection are compared as well.
+    equal in all fields or, where no scenario is in both, in those of the design. Missions that
+    check a selection are compared as well.
 
     Raises:
-        InputError: If the seeds differ, or no mission is in both.
+        InputError: If no mission is in both; with different seeds, no policy at a design point.
     """
-    both = f"{a.store.folder} and {b.store.folder}"
-    seeds = a.store.manifest.seed, b.store.manifest.seed
-    if seeds[0] != seeds[1]:
-        raise InputError(
-            f"{both}: their seeds {seeds[0]} and {seeds[1]} give different random draws; "
-            "allowed: two results folders of one seed"
-        )
+    both, is_paired = f"{a.store.folder} and {b.store.folder}", len(_seeds(a, b)) == 1
+    keys = _KEYS if is_paired else _KEYS[:2]
     single = len(a.policies) == len(b.policies) == 1
     teams = dict(zip(b.policies, a.policies if single else b.policies, strict=True))
     of_a, of_b = _scenarios(a, b)
     missions_a = _missions(a, {name: name for name in a.policies}, of_a)
     missions_b = _missions(b, teams, of_b)
-    alone = [_alone("A", a, missions_a, missions_b), _alone("B", b, missions_b, missions_a)]
+    alone = [
+        _alone("A", a, missions_a, missions_b, keys),
+        _alone("B", b, missions_b, missions_a, keys),
+    ]
+    cells = [m.drop_duplicates(_KEYS[:2]) for m in (missions_a, missions_b)]
+    cells = cells[0].merge(cells[1], on=_KEYS[:2], suffixes=("_a", "_b"))
+    cells = cells[[*_KEYS[:2], "policy_a", "point_a", "point_b"]]
     common = missions_a.merge(missions_b, on=_KEYS, suffixes=("_a", "_b"))
-    if common.empty:
+    if (common if is_paired else cells).empty:
         lacking = ", ".join(f"only {rows['only_in'][0]} has {rows['what'][0]}" for rows in alone)
         raise InputError(f"{both}: no mission is in both: {lacking}; allowed: {_ALLOWED}")
+    sides = None
+    if not is_paired:
+        rows = pd.concat([missions_a.assign(side="a"), missions_b.assign(side="b")])
+        common, sides = common[:0], rows.merge(cells, on=_KEYS[:2])
     numbered = common[_KEYS].assign(mission=np.arange(len(common)))
     uavs = [_uavs(a, missions_a, numbered), _uavs(b, missions_b, numbered)]
     pairs = uavs[0].merge(uavs[1], on=["mission", "uav"], how="outer", suffixes=("_a", "_b"))
     common.insert(0, "fields", _differing_fields(common, pairs))
-    return Diff(a, b, common.drop(columns=_KEYS[:2]), pd.concat(alone, ignore_index=True))
+    points = cells[["point_a", "point_b"]].drop_duplicates()
+    missions, alone_in = common.drop(columns=_KEYS[:2]), pd.concat(alone, ignore_index=True)
+    return Diff(a, b, missions, alone_in, points, sides)
 
 
 _ALLOWED = "results folders that share policies, scenarios and replications"
 
 
 def effects(found: Diff, by: Sequence[str] = ("policy_a",)) -> pd.DataFrame:
-    """The paired differences B - A over the missions that both folders have.
+    """The differences B - A: of pairs, over the missions that both folders have, or unpaired.
 
     Args:
         found: The result of ``diff``.
@@ -113,8 +132,10 @@ def effects(found: Diff, by: Sequence[str] = ("policy_a",)) -> pd.DataFrame:
         ``by``, ``missions``, ``differ`` (number of missions that differ), ``metric``, and the
         columns that follow ``metric`` in ``dess.analysis.compare``.
     """
-    groups = found.missions.assign(differ=found.missions["fields"] != "").groupby([*by])
-    counts = groups["differ"].agg(missions="size", differ="sum").reset_index()
+    if found.unpaired is not None:
+        return _unpaired_effects(found.unpaired, by)
+    by_group = found.missions.assign(differ=found.missions["fields"] != "").groupby([*by])
+    counts = by_group["differ"].agg(missions="size", differ="sum").reset_index()
     keys, sides = ["policy_a", "point_a", "replication"], []
     for side in "ab":
         metrics = {f"{name}_{side}": name for name in METRICS}
@@ -124,6 +145,18 @@ def effects(found: Diff, by: Sequence[str] = ("policy_a",)) -> pd.DataFrame:
     table = compare(pd.concat(sides), "a", [*METRICS], by).drop(columns=["policy", "baseline"])
     ordered = counts.merge(table, on=[*by])
     return ordered.sort_values("differ", ascending=False, kind="stable", ignore_index=True)
+
+
+def _unpaired_effects(missions: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
+    """The table of ``effects`` without pairs; its counts are those of both folders together."""
+    rows = []
+    for group, part in groups(missions, by):
+        of_side = dict([*part.groupby("side")])
+        for metric in METRICS:
+            compared = unpaired(of_side["b"][metric], of_side["a"][metric], metric)
+            rows.append((*group, len(part), len(part), metric, *compared))
+    columns = [*by, "missions", "differ", "metric", *Paired._fields]
+    return with_adjusted(pd.DataFrame(rows, columns=columns), "holm")
 
 
 def most_changed(found: Diff, missions: int) -> pd.DataFrame:
@@ -150,7 +183,11 @@ def origins(found: Diff) -> list[str]:
     changed = [" and ".join({p: None, q: None}) for p, q in teams if weights_a[p] != weights_b[q]]
     names = [n for n in {**a.libraries, **b.libraries} if a.libraries.get(n) != b.libraries.get(n)]
     libraries = [f"{n} {a.libraries.get(n, '-')} and {b.libraries.get(n, '-')}" for n in names]
+    seeds, constants = _seeds(found.a, found.b), _constants(found)
     parts = {
+        "seeds": [f"{' and '.join(map(str, seeds))}, so that missions are compared without pairs"]
+        * (len(seeds) > 1),
+        "scenario": [f"{field} {of_a} and {of_b}" for field, of_a, of_b in constants],
         "version": [f"{a.version} and {b.version}"] if a.version != b.version else [],
         "code": modules,
         "weights": changed,
@@ -175,9 +212,28 @@ def _policies(found: Diff) -> pd.DataFrame:
     return found.missions[["policy_a", "policy_b"]].drop_duplicates()
 
 
+def _seeds(a: Results, b: Results) -> list[int]:
+    """The seed of both, or the two seeds."""
+    return [*dict.fromkeys((a.store.manifest.seed, b.store.manifest.seed))]
+
+
+def _constants(found: Diff) -> list[tuple[str, str, str]]:
+    """The fields in which the scenarios of compared design points differ, with their values."""
+    differ: dict[tuple[str, str, str], None] = {}
+    for points in found.points.itertuples(index=False):
+        pair = zip((found.a, found.b), points, strict=True)
+        of_a, of_b = (dotted(r.scenario(n).model_dump(mode="json")) for r, n in pair)
+        for field in {**of_a, **of_b}:
+            if of_a.get(field) != of_b.get(field):
+                differ[field, shown(of_a.get(field)), shown(of_b.get(field))] = None
+    return [*differ]
+
+
 def _scenarios(a: Results, b: Results) -> tuple[np.ndarray, np.ndarray]:
-    """A number for the scenario of every design point, the same for equal scenarios."""
+    """A number for every design point: the same for equal scenarios or, without any, values."""
     texts = [[s.model_dump_json() for s in r.store.manifest.scenarios] for r in (a, b)]
+    if not {*texts[0]} & {*texts[1]}:
+        texts = [[json.dumps(v, sort_keys=True) for v in r.store.manifest.values] for r in (a, b)]
     numbers, _ = pd.factorize(np.array([*texts[0], *texts[1]], object))
     return numbers[: len(texts[0])], numbers[len(texts[0]) :]
 
@@ -224,10 +280,11 @@ def _differs(pairs: pd.DataFrame, name: str) -> np.ndarray:
 
 
 def _alone(
-    side: str, results: Results, missions: pd.DataFrame, others: pd.DataFrame
+    side: str, results: Results, missions: pd.DataFrame, others: pd.DataFrame, keys: list[str]
 ) -> pd.DataFrame:
     """What only one side has: complete policies, complete design points, or replications."""
-    found = missions[_KEYS].merge(others[_KEYS], how="left", indicator="found")["found"]
+    known = others[keys].drop_duplicates()
+    found = missions[keys].merge(known, how="left", indicator="found")["found"]
     rows = missions[found.to_numpy() != "both"]
     scenario = f"the scenario of study {results.manifest['study']['name']}"
     words = pd.Series([setting or scenario for setting in in_words(results)])
@@ -235,9 +292,9 @@ def _alone(
     no_point = ~rows["scenario"].isin(others["scenario"])
     cells = "policy " + rows["policy"] + " at " + points
     what = cells.mask(no_point, points).mask(no_policy, "policy " + rows["policy"])
-    groups = rows.assign(part=~no_policy & ~no_point).groupby(what.rename("what"), sort=False)
-    spans = groups.agg(part=("part", "all"), missions=("part", "size"))
-    first, last = groups["replication"].min(), groups["replication"].max()
+    parts = rows.assign(part=~no_policy & ~no_point).groupby(what.rename("what"), sort=False)
+    spans = parts.agg(part=("part", "all"), missions=("part", "size"))
+    first, last = parts["replication"].min(), parts["replication"].max()
     replications = ", replications " + first.astype(str) + " to " + last.astype(str)
     names = spans.index.to_series() + replications.where(spans["part"], "")
     return pd.DataFrame(

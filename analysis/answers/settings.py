@@ -22,7 +22,7 @@ from dess.analysis.names import parameter, value_text
 from dess.analysis.results.tables import Results, once
 from dess.analysis.stats.differences import column_tests, with_adjusted
 from dess.analysis.stats.intervals import by_replication, column_intervals, stratified
-from dess.analysis.stats.verdict import may_be_best
+from dess.analysis.stats.verdict import may_be_best, within_reach
 from dess.analysis.tables import INTERVALS, MOST_ROWS, YES, Table, counts
 from dess.errors import one_of
 
@@ -199,8 +199,8 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
         A row per policy and design point: ``rank``, ``policy``, ``point``, the varied fields, for
         every metric ``METRIC``, ``METRIC_low`` and ``METRIC_high`` (95 % intervals as in
         ``dess.analysis.summary``), ``n`` missions, and ``tied``: whether the setting may be the
-        best, by ``may_be_best`` over all rows. Of equal settings, the first in the study has the
-        lower rank.
+        best, by ``may_be_best`` and ``within_reach`` over all rows. Of equal settings, the first
+        in the study has the lower rank.
 
     Raises:
         InputError: If there is no such metric or policy.
@@ -216,6 +216,7 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
     # By the ranking metric, which was computed last.
     table["tied"] = may_be_best(wide.to_numpy(float), metric)
+    table["tied"] &= within_reach(table[f"{metric}_low"], table[f"{metric}_high"], metric)
     less = metric_of(metric).less_is_better
     table = table.sort_values(metric, ascending=less, kind="stable", ignore_index=True)
     table.insert(0, "rank", np.arange(1, len(table) + 1))

@@ -20,7 +20,7 @@ from dess.analysis.stats.differences import compare, for_choice
 from dess.analysis.stats.distribution import distribution
 from dess.analysis.stats.intervals import LEVEL, by_replication, summary, values_within
 from dess.analysis.stats.learners import compare_learners
-from dess.analysis.stats.verdict import MARKS, may_be_best, position
+from dess.analysis.stats.verdict import MARKS, may_be_best, position, within_reach
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.design import NOISE, Saltelli
 from dess.analysis.tables import INTERVALS, MOST_ROWS, YES, Table, compared, counts
@@ -194,6 +194,7 @@ def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
             missions = results.missions[results.missions["point"] == point]
             wide = by_replication(missions, str(metric), "policy")
             may_be = may_be_best(wide[rows["policy"]].to_numpy(float), str(metric))
+            may_be &= within_reach(rows["low"], rows["high"], str(metric)).to_numpy()
             best = TIED if may_be.sum() > 1 else BEST
             verdicts[rows.index] = np.where(may_be, best, WORSE)
     return means.assign(verdict=verdicts)

@@ -309,6 +309,23 @@ def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str = "")
     return Paired(*mean, p, correlation, reduction, a.size)
 
 
+def unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Paired:
+    """Compare two samples of different missions by Welch's t test; differences are A - B.
+
+    To both samples of a share, a 0 and a 1 are added for the test (A. Agresti and B. Caffo, The
+    American Statistician 54 (2000) 280-288), so that samples without any failure have an interval.
+
+    Returns:
+        The comparison without what only pairs have, which is nan; ``n`` is that of the smaller one.
+    """
+    more = [] if metric == REWARD else [0.0, 1.0]
+    test = scipy.stats.ttest_ind([*a, *more], [*b, *more], equal_var=False)
+    ends = test.confidence_interval(LEVEL)
+    p = 1.0 if np.isnan(test.pvalue) else float(test.pvalue)
+    n, difference = min(len(a), len(b)), float(np.mean(a) - np.mean(b))
+    return Paired(difference, float(ends.low), float(ends.high), p, np.nan, np.nan, n)
+
+
 def relative_change(values: np.ndarray, reference: np.ndarray) -> Interval:
     """The change of a mean as a share of a reference mean, with the interval of a ratio of means.
 

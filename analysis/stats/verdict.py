@@ -12,6 +12,7 @@ several alternatives, some may be the best, and some are on the front of two met
 from typing import Protocol
 
 import numpy as np
+import pandas as pd
 from scipy.special import stdtrit
 
 from dess.analysis.metrics import metric_of
@@ -154,6 +155,20 @@ def membership(
             axis=0
         )
     return count / draws
+
+
+def within_reach(low: pd.Series, high: pd.Series, metric: str) -> pd.Series:
+    """The settings whose interval does not lie wholly on the worse side of another one.
+
+    Paired tests alone cannot tell a setting of few missions from one of many: they see only the
+    replications of both.
+
+    Args:
+        low: (K,) lower ends of the intervals; nan if unknown.
+        high: (K,) upper ends.
+        metric: The metric.
+    """
+    return ~(low > high.min()) if metric_of(metric).less_is_better else ~(high < low.max())
 
 
 _BLOCK = 512  # settings that are compared with all others at once, which limits the memory

@@ -244,6 +244,10 @@ def locked(path: Path, busy: str, patience: float = 0.0) -> Iterator[None]:
                 lock.acquire(timeout=patience)
             except Timeout:
                 raise InputError(f"{path.parent}: {busy}") from None
+            except NotImplementedError:  # as some network file systems
+                raise InputError(
+                    f"{path}: its file system has no locks; allowed: a folder on a local disk"
+                ) from None
         yield
     finally:
         if lock.is_locked:

@@ -10,7 +10,7 @@ import hashlib
 import json
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -408,6 +408,9 @@ class Description(Document):
         default=None, description="grid, zone and nodes of the training; none for any sea"
     )
     training: TrainingConfig = Field(description="settings of the training")
+    ranges: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(
+        {}, max_length=100, description="least and largest value of each field in the training"
+    )
     run: Run = Field(description="the training so far")
     model_sha256: list[Sha256] | None = Field(
         default=None,
@@ -415,6 +418,26 @@ class Description(Document):
         max_length=2,
         description="checksum of model.safetensors; two while it is replaced, none before dess 0.3",
     )
+
+
+_PLACES = {"grid", "rows", "cell_size", "max_slots", "zones.pads", "wind.seed"}
+
+
+def ranges_of(spaces: Iterable[ScenarioSpace]) -> dict[str, list[float]]:
+    """The least and the largest value of each numeric field in the missions of scenarios.
+
+    Left out is what decides nothing, as rewards, or cannot be compared by a range, as the map.
+    """
+    found: dict[str, list[float]] = {}
+    for space in spaces:
+        for field in space.numeric:
+            if field in _PLACES or "reward" in field:
+                continue
+            value = space.charging_pads if field == "pads" else space.value(field)
+            ends = [*(value if isinstance(value, tuple) else (value, value))]
+            ends += found.get(field, [])
+            found[field] = [min(ends), max(ends)]
+    return found
 
 
 def read_description(folder: Path) -> Description:

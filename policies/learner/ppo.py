@@ -12,7 +12,7 @@ Schulman et al., *High-dimensional continuous control using generalized advantag
 
 import copy
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +25,7 @@ from dess.errors import InputError
 from dess.observations.observer import encoder_of
 from dess.observations.sets import Sets
 from dess.observations.states import CompactStates, masks
-from dess.policies.learner.config import MISSION_SEED, TrainingConfig
+from dess.policies.learner.config import MISSION_SEED, TrainingConfig, ranges_of
 from dess.policies.learner.network import SetNetwork
 from dess.policies.learner.policy import ROWS
 from dess.policies.learner.training import (
@@ -181,6 +181,12 @@ class ProximalTraining(Training):
     """
 
     learner: ProximalLearner
+
+    @cached_property
+    def ranges(self) -> dict[str, list[float]]:
+        """The least and the largest value of each field in the missions, short ones included."""
+        short = self.spaces if self.config.short_ranges else []
+        return ranges_of([*self.spaces, *(_with_range(space, RANGES[0]) for space in short)])
 
     def _learner(self, network: SetNetwork) -> ProximalLearner:
         return ProximalLearner(network, self.config, self.device)

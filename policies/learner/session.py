@@ -243,7 +243,7 @@ def _save_results(out: Path, training: Training) -> None:
         "seconds": round(training.seconds),
         "selection_score": training.best_score,
     }
-    save_policy(out, training.kept, training.config, training.space, run)
+    save_policy(out, training.kept, training.config, training.space, run, training.ranges)
     if not training.curve:
         return
     names = dict.fromkeys(name for row in training.curve for name in row)

@@ -37,6 +37,7 @@ from dess.policies.learner.config import (
     TrainingConfig,
     config_names,
     learner_of,
+    ranges_of,
     read_description,
     resume_command,
 )
@@ -191,6 +192,7 @@ def save_policy(
     config: TrainingConfig,
     space: ScenarioSpace,
     run: Mapping[str, Any] | None = None,
+    ranges: dict[str, list[float]] | None = None,
 ) -> None:
     """Write a trained policy into a folder: the weights and their description.
 
@@ -203,6 +205,7 @@ def save_policy(
         config: The settings of the training.
         space: The scenario space of the training.
         run: Information about the training for readers; ``load_policy`` ignores it.
+        ranges: ``ranges_of`` the scenarios of the training, if these are more than the space.
 
     Raises:
         InputError: If a file cannot be written.
@@ -215,6 +218,7 @@ def save_policy(
         layout=layout
         and LayoutTable(grid=layout.grid, zone=layout.zone.tolist(), nodes=layout.nodes.tolist()),
         training=config,
+        ranges=ranges or ranges_of([space]),
         run=Run(**(run or {})),
     )
     values = {name: value.detach().cpu().contiguous() for name, value in weights.items()}

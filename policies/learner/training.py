@@ -8,6 +8,7 @@ should have any other seed.
 
 import time
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from dess.batch import simulate_batch
 from dess.env.stepper import MissionStepper
 from dess.observations import states as column
 from dess.observations.states import CompactStates, compact_states
-from dess.policies.learner.config import Phase, TrainingConfig
+from dess.policies.learner.config import Phase, TrainingConfig, ranges_of
 from dess.policies.learner.policy import LearnedPolicy
 from dess.policies.learner.trained import build, require_forms
 from dess.scenario import ScenarioSpace
@@ -103,6 +104,11 @@ class Training:
         self.finished: list[np.ndarray] = []
         self.losses: list[dict[str, torch.Tensor]] = []
         self.enter_phase(0)
+
+    @cached_property
+    def ranges(self) -> dict[str, list[float]]:
+        """The least and the largest value of each field in the missions."""
+        return ranges_of(self.spaces)
 
     def _learner(self, network: Any) -> Any:
         """The networks and their optimizers, for a new network."""

@@ -1,6 +1,7 @@
 """``dess sweep`` and ``dess what-if``: a question in one line, and its answer with a page."""
 
 import json
+import shlex
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -194,10 +195,11 @@ def _run(
         print_plan(question.plan(workers), study, folder, workers)
         raise typer.Exit
     check_pages(out, page)
+    options.note_departures(study.policies, study.scenarios)
     return complete(
         study.name,
         lambda progress, announce: question.ask(workers, progress, announce, yes),
-        f"dess study run {question.file} --out {folder}",
+        shlex.join(["dess", "study", "run", str(question.file), "--out", str(folder)]),
     )
 
 

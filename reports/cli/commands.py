@@ -18,6 +18,7 @@ app = typer.Typer(
     help="Discrete-event simulation of UAV data harvesting with charging at sea.",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 

@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
@@ -126,6 +127,25 @@ def outputs(paths: Sequence[Path]) -> Iterator[list[Path]]:
             sys.stdout.flush()
 
 
+def check_ending(
+    option: str, path: Path | None, allowed: Sequence[str], kind: str, is_stream: bool = False
+) -> None:
+    """Refuse an output whose ending does not say what is to be written.
+
+    Args:
+        option: The option that names the file.
+        path: The file, if there is one.
+        allowed: The endings.
+        kind: What is written, for the message.
+        is_stream: Whether it may be standard output, which has no ending.
+
+    Raises:
+        InputError: If the ending is another one.
+    """
+    if path and not (is_stream and is_stdout(path)) and path.suffix.lower() not in allowed:
+        raise InputError(f"{option}: {path} is not {kind}; allowed: {', '.join(allowed)}")
+
+
 def is_stdout(path: Path) -> bool:
     """Whether the name of an output means standard output."""
     return str(path) in ("-", "/dev/stdout")
@@ -214,10 +234,22 @@ def counted_bar(unit: str) -> Iterator[Callable[..., None]]:
 
 @contextmanager
 def compile_notice() -> Iterator[None]:
-    """Print a line, once, if numba compiles something that is not in its cache."""
-    lines = iter(["compiling the simulator (first run only) ..."])
-    with _compiling(lambda: [print(line, file=sys.stderr) for line in lines], lambda: None):
+    """Print a line, once in a process, if numba compiles something that is not in its cache."""
+    with _compiling(announce_compiling, lambda: None):
         yield
+
+
+@cache
+def announce_compiling() -> None:
+    """Print that the simulator is compiled, the first time that this is called."""
+    from numba.core.caching import NullCache
+
+    from dess.rules import launch  # any kernel
+
+    when = "first run only"
+    if isinstance(launch._cache, NullCache):  # no folder beside the code can be written
+        when = "in every run; NUMBA_CACHE_DIR=DIR keeps it"
+    print(f"compiling the simulator ({when}) ...", file=sys.stderr)
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from dess.reports.cli.options import (
     WorkersOption,
     command,
     load_space,
+    note_departures,
 )
 
 app = typer.Typer()
@@ -51,6 +52,7 @@ def evaluate(
     asked = [Asked(space, team, missions, seed, engine, workers) for team in policy]
     with console.compile_notice():
         check_evaluation(asked, yes)
+    note_departures(policy, [space])
     with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
         evaluations = [means(of_team, bar.update) for of_team in asked]
     unknown = dict.fromkeys(("mean", "low", "high"), nan)

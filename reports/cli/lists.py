@@ -1,6 +1,7 @@
 """``dess policies``, ``dess scenarios`` and ``dess studies``: lists, and ``show`` for one name."""
 
 import json
+from textwrap import wrap
 from typing import Annotated, Any
 
 import typer
@@ -9,14 +10,17 @@ from dess.errors import cut
 from dess.reports.cli import console, options
 from dess.reports.cli.options import JsonOption, SetOption, command, load_space
 
-policies = typer.Typer(invoke_without_command=True)
-scenarios = typer.Typer(invoke_without_command=True)
-studies = typer.Typer(invoke_without_command=True)
+policies = typer.Typer(invoke_without_command=True, help="List the policies, or show one.")
+scenarios = typer.Typer(
+    invoke_without_command=True,
+    help="List the shipped scenarios and the families of generated ones, or show one.",
+)
+studies = typer.Typer(invoke_without_command=True, help="List the shipped studies, or show one.")
 
 
 @policies.callback()
 def list_policies(context: typer.Context) -> None:
-    """List the policies, or show one."""
+    """Print the list, unless one is shown."""
     from dess.policies.registry import descriptions
 
     if context.invoked_subcommand is None:
@@ -53,7 +57,7 @@ def show_policy(
 
 @scenarios.callback()
 def list_scenarios(context: typer.Context) -> None:
-    """List the shipped scenarios and the families of generated ones, or show one."""
+    """Print the list, unless one is shown."""
     from dess.scenario import scenario_description, scenario_families, scenario_names
 
     if context.invoked_subcommand is None:
@@ -94,12 +98,17 @@ def show_scenario(
     rows_ = [[f.name, cut(_value(f.value), 20), f.unit, f.meaning] for f in fields(space)]
     columns = [*zip(*rows_, strict=True)][:-1]
     rest = console.WIDTH - sum(max(map(len, column)) + 2 for column in columns)
-    console.print_table(heads, [[*row[:3], cut(row[3], rest)] for row in rows_], left=len(heads))
+    lines = [
+        [*(row[:3] if number == 0 else [""] * 3), line]
+        for row in rows_
+        for number, line in enumerate(wrap(row[3], rest))
+    ]
+    console.print_table(heads, lines, left=len(heads))
 
 
 @studies.callback()
 def list_studies(context: typer.Context) -> None:
-    """List the shipped studies, or show one."""
+    """Print the list, unless one is shown."""
     from dess.analysis.study.study import study_descriptions
 
     if context.invoked_subcommand is None:

@@ -1,11 +1,13 @@
 """The options and arguments that commands share, and their completion by the shell."""
 
+import ast
 import math
 import re
+import sys
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from decimal import Decimal, InvalidOperation
-from inspect import getdoc
+from inspect import getdoc, getsource
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
@@ -13,6 +15,7 @@ import typer
 
 from dess.errors import InputError, one_of, shown
 from dess.files.reading import parse_toml
+from dess.reports.cli.console import say
 
 
 def policies(start: str) -> list[str]:
@@ -96,7 +99,7 @@ def command(app: typer.Typer, name: str | None = None) -> Callable[[Callable], C
     """Make a command of a function; the part ``Args`` of its docstring describes the options."""
 
     def register(function: Callable) -> Callable:
-        summary, _, described = (getdoc(function) or "").partition("\n\nArgs:\n")
+        summary, _, described = docstring(function).partition("\n\nArgs:\n")
         hints = get_type_hints(function, include_extras=True)
         for parameter, text in re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", described, re.M):
             if not hasattr(hints[parameter], "__metadata__"):
@@ -106,6 +109,23 @@ def command(app: typer.Typer, name: str | None = None) -> Callable[[Callable], C
         return app.command(name, help=summary)(function)
 
     return register
+
+
+def docstring(function: Callable) -> str:
+    """The docstring of a function, also under ``python -OO``, which leaves it out."""
+    if sys.flags.optimize < 2:
+        return getdoc(function) or ""
+    (found,) = ast.parse(getsource(function)).body
+    assert isinstance(found, ast.FunctionDef)
+    return ast.get_docstring(found) or ""
+
+
+def note_departures(policies: Iterable[str], spaces: "Iterable[ScenarioSpace]") -> None:
+    """Say on stderr which trained policies act outside of what they were trained on."""
+    from dess.policies.registry import departures
+
+    for line in departures(policies, spaces):
+        say(f"note: {line}", sys.stderr)
 
 
 def load_space(name: str, settings: list[str] | None) -> "ScenarioSpace":
@@ -135,6 +155,10 @@ def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, An
         parsed = parse_toml(f"value = {value}", option)
         if equals and parsed.keys() == {"value"} and _is_plain(parsed["value"]):
             return key, parsed["value"]
+    if allowed == FIELD and (_RANGE.fullmatch(value) or "," in value.partition("[")[0]):
+        raise InputError(
+            f"{option}: {shown(text)} has several values; allowed: one, or dess sweep {SET} {text}"
+        )
     if allowed == FIELD and value:
         _check_word(key, value, option)
         return key, value

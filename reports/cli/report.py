@@ -48,6 +48,8 @@ def report(
         parameters: A parameter of the notebooks, such as missions or policies of what-if, the
             value in TOML syntax; repeatable.
     """
+    if results != RESULTS and not os.path.lexists(results):
+        raise InputError(f"--results: {results}: no such folder; allowed: one with results")
     values = dict(setting(text, "--parameter", PARAMETER) for text in parameters or [])
     if settings:
         if names and WHAT_IF not in names:

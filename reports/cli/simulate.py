@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from dess.record import MissionRecord
     from dess.scenario import Scenario, ScenarioSpace
 
+LOGS = (".parquet", ".csv")
 FIGURES = (".png", ".pdf", ".svg")
 ANIMATIONS = (".gif", ".mp4", ".html")
 # Metrics of ``--json``, between the names and the UAVs.
@@ -59,8 +60,9 @@ def simulate(
             the first of the design point]
         of: Simulate a mission of this results folder again, with its scenario and seed.
         point: With --of: number of the design point, from 0.
-        events: Write the event log of the mission into this file; - for standard output.
-        figure: Draw the mission into this file.
+        events: Write the event log of the mission into this file, .parquet or .csv; - for
+            standard output, as Parquet.
+        figure: Draw the mission into this file: .png, .pdf or .svg.
         animation: Write the mission as an animation: .gif, .mp4 (needs ffmpeg), or .html, a
             page with its player.
     """
@@ -82,16 +84,18 @@ def simulate(
     if not yes:
         check_missions("simulate", [asked.space])
     check_seed(asked.seed, asked.replication)
-    _check_suffix("--figure", figure, FIGURES, "a picture")
-    _check_suffix("--animation", animation, ANIMATIONS, "an animation")
-    if animation and animation.suffix == ".mp4":
-        from dess.reports.player import check_ffmpeg
-
-        check_ffmpeg()
     writers = {events: _write_log, figure: _draw, animation: _animate}
     paths = [path for path in (events, figure, animation) if path]
     if len({path.absolute() for path in paths}) < len(paths):
         raise InputError("--events, --figure: the same file; allowed: a file for each")
+    console.check_ending("--events", events, LOGS, "an event log", is_stream=True)
+    console.check_ending("--figure", figure, FIGURES, "a picture")
+    console.check_ending("--animation", animation, ANIMATIONS, "an animation")
+    if animation and animation.suffix.lower() == ".mp4":
+        from dess.reports.player import check_ffmpeg
+
+        check_ffmpeg()
+    options.note_departures([asked.policy], [asked.space])
     is_binary = events is not None and console.is_stdout(events)
     if is_binary and as_json:
         raise InputError("--json: standard output has the event log; allowed: --events FILE")
@@ -102,9 +106,12 @@ def simulate(
         mission = _Mission(record, sample_scenario(asked.space, *which), asked.title)
         for path, temporary in zip(paths, temporaries, strict=True):
             with writable(path):
-                writers[path](mission, temporary, path.suffix[1:])
+                writers[path](mission, temporary, path.suffix[1:].lower())
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
+        fields = record.metrics.dtype.names or ()
+        others = [key for key in fields if key not in (*asked.names, *metrics, "uavs")]
+        metrics |= {key: record.metrics[key].item() for key in others}
         measured = {"operations": record.measured} if record.operations is not None else {}
         print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
     elif not is_binary:
@@ -184,11 +191,6 @@ def _refuse_given(context: typer.Context, *names: str) -> None:
             raise InputError(f"--{option}: comes from the study; allowed: --of without --{option}")
 
 
-def _check_suffix(option: str, path: Path | None, allowed: Sequence[str], kind: str) -> None:
-    if path and path.suffix not in allowed:
-        raise InputError(f"{option}: {path} is not {kind}; allowed: {', '.join(allowed)}")
-
-
 @dataclass(frozen=True)
 class _Mission:
     """A simulated mission to write into files: its record with its event log, and its names."""
@@ -218,11 +220,16 @@ class _Mission:
 
 def _write_log(mission: _Mission, path: Path, kind: str) -> None:
     import pyarrow as pa
+    from pyarrow.csv import write_csv
 
     from dess.files.tables import parquet_of
     from dess.files.writing import fill
 
-    fill(path, parquet_of(pa.table(mission.log)))
+    table = pa.table(mission.log)
+    if kind == "csv":
+        write_csv(table, path)
+    else:
+        fill(path, parquet_of(table))
 
 
 def _draw(mission: _Mission, path: Path, kind: str) -> None:

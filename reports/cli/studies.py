@@ -1,6 +1,7 @@
 """``dess study``: run a study into a results folder; show, compare and bundle results."""
 
 import json
+import shlex
 from collections.abc import Iterable
 from datetime import date
 from pathlib import Path
@@ -119,7 +120,7 @@ def _run(study: "Study", out: Path, workers: int, scheduler: str | None, accept:
         ),
     )
     print_summary(results, out, short=True)
-    console.say(f"more: dess study show {out}")
+    console.say(f"more: {shlex.join(['dess', 'study', 'show', str(out)])}")
 
 
 def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
@@ -166,13 +167,12 @@ def show(
     """
     from dess.analysis import numbers
     from dess.analysis.answers import summary
-    from dess.analysis.results.tables import load_results
     from dess.reports.cli import tables as printed
 
     if as_csv and as_json:
         raise InputError("--csv: not with --json; allowed: one of them")
     targets = _targets(target or [])
-    results = load_results(folder)
+    results = _results(folder)
     if policy is not None and policy not in results.policies:
         raise InputError(
             f"--policy: {policy!r} is not in the study{one_of(policy, results.policies)}"
@@ -191,6 +191,15 @@ def show(
         printed.print_summary(results, folder, short=False)
         shown = _tables(results, means, policy, worst, folder)
         printed.print_details(results, shown, everything)
+
+
+def _results(folder: Path) -> "Results":
+    """The results in a folder; a study that is kept elsewhere is named with its folder."""
+    from dess.analysis.results.tables import load_results
+
+    if not folder.exists() and (RESULTS / folder).is_dir():
+        raise InputError(f"{folder}: no such folder; allowed: a results folder: {RESULTS / folder}")
+    return load_results(folder)
 
 
 def _targets(texts: Iterable[str]) -> dict[str, float]:
@@ -278,10 +287,9 @@ def diff(
         most: Number of most changed missions to show.
     """
     from dess.analysis.answers import diff
-    from dess.analysis.results.tables import load_results
     from dess.reports.cli.tables import print_diff
 
-    found = diff.diff(load_results(a), load_results(b))
+    found = diff.diff(_results(a), _results(b))
     if as_json:
         print(json.dumps(_diff_document(found, most), indent=2))
     else:
@@ -304,6 +312,7 @@ def _diff_document(found: "Diff", most: int) -> dict:
         "a": str(found.a.store.folder),
         "b": str(found.b.store.folder),
         "identical": found.identical,
+        "paired": found.unpaired is None,
         "missions": len(found.missions),
         "differ": len(found.changed),
         "origins": diff.origins(found),
@@ -326,11 +335,11 @@ def export(
         page: The page of the results.  [default: it is rendered for the crate]
         licence: Licence of the results, by its SPDX identifier.
     """
-    from dess.analysis.results.tables import load_results
     from dess.reports.crate import check_page, licence_of, write_crate
     from dess.reports.pages.render import render_study
 
-    results, licence = load_results(folder), licence_of(licence)
+    console.check_ending("--crate", crate, (".zip",), "a zip file", is_stream=True)
+    results, licence = _results(folder), licence_of(licence)
     if page:
         check_page(page, results)
     with console.outputs([crate]) as (temporary,), TemporaryDirectory() as pages:

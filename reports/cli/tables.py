@@ -229,7 +229,9 @@ MANY, FIELDS = 10, 4  # rows on differences, and fields of a mission, that are p
 def print_diff(found: diff.Diff, most: int) -> None:
     """Print how many missions of two results differ, by how much, and the most changed ones."""
     missions, differ = len(found.missions), len(found.changed)
-    if found.identical:
+    if found.unpaired is not None:
+        console.say(f"{len(found.unpaired):,} missions of both, with different random draws")
+    elif found.identical:
         console.say(f"identical: {missions:,} missions")
     elif not differ:
         console.say(f"identical: the {missions:,} missions that both have")
@@ -238,8 +240,9 @@ def print_diff(found: diff.Diff, most: int) -> None:
     for origin in diff.origins(found):
         console.say(f" {origin}")
     _print_alone(found.alone)
-    if differ:
+    if differ or found.unpaired is not None:
         _print_effects(found)
+    if differ:
         _print_most_changed(found, most)
 
 

@@ -1,5 +1,6 @@
 """``dess train``: train a policy into a folder."""
 
+import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -69,7 +70,9 @@ def train(
         view = missing("tensorboard", "a live view of the curves")
         what = "replay memory" if config.algorithm == "dqn" else "missions of a tick"
         console.say(f"{what}: {memory / 2**20:,.0f} MiB", sys.stderr)
-        console.say(view or f"curves: tensorboard --logdir {out / EVENTS}", sys.stderr)
+        console.say(
+            view or f"curves: tensorboard --logdir {shlex.quote(str(out / EVENTS))}", sys.stderr
+        )
 
     command = resume_command(config, name, out, device)
     try:
@@ -94,13 +97,14 @@ def train(
     if not training.done:
         raise console.Interruption(
             f"interrupted at tick {training.tick:,} of {config.ticks:,}: the policy so far is "
-            f"--policy {out}; continue with {command}"
+            f"--policy {shlex.quote(str(out))}; continue with {command}"
         )
     console.say(
         f"{out}: {training.updates} updates, {training.uav_slots} UAV-slots in "
         f"{training.seconds:.0f} s; best product {training.best_score:.3f} in selection"
     )
-    console.say(f"compare: dess evaluate --policy {out} --policy greedy")
+    evaluated = shlex.join(["dess", "evaluate", "--policy", str(out), "--policy", "greedy"])
+    console.say(f"compare: {evaluated}")
 
 
 @contextmanager

@@ -89,7 +89,7 @@ html.show(costs.judged_table(answer.results))
 # in degrees (`lon`, `lat`) or cells (`x`, `y`). What the file does not set is as in the paper.
 #
 # ```toml
-# nodes = "bay.csv"
+# nodes = "nodes.csv"
 # grid = 40               # cells along one side
 # cell_size = 800         # metres
 # zone = [36, 18, 3, 3]   # where UAVs start and charge: x, y, width and height in cells

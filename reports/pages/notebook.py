@@ -156,13 +156,24 @@ def report_of(name: str, original: NotebookNode) -> Report:
     return Report(name, title, description, *results, scripts, original, notebook)
 
 
+OF_EXAMPLE = ("fields", "prices", "requirements")
+
+
 def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:
     """Refuse parameters that no report has, and ``results``, which has an option of its own.
 
+    A sea of one's own has no answer with the prices of the example.
+
     Raises:
-        InputError: If there is one.
+        InputError: If there is one, or ``own-sea`` lacks some that belong to its scenario.
     """
-    reports = [*reports]
+    reports, names = [*reports], [*names]
+    lacking = [name for name in OF_EXAMPLE if name not in names]
+    if "scenario" in names and lacking and any(r.name == "own-sea" for r in reports):
+        raise InputError(
+            f"parameter: own-sea has the {', '.join(lacking)} of its example, bay; "
+            "allowed: those of the scenario, each by --parameter"
+        )
     known = set().union(*(report.parameters for report in reports)) - {"results"}
     for name in names:
         if name not in known:

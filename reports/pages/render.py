@@ -15,6 +15,7 @@ from functools import lru_cache
 from hashlib import sha256
 from importlib import metadata
 from pathlib import Path
+from shlex import quote
 from types import MappingProxyType
 from typing import Any
 
@@ -206,6 +207,13 @@ def render(
     for report in reports:
         _look_up(report, results, out, values)
     lacking = {r.name: {} if r.is_current else _lacking(r, results) for r in reports}
+    commands = dict.fromkeys(command for errors in lacking.values() for command in errors)
+    if asked and len(commands) > 1:
+        names = " ".join(command.rpartition(" ")[2] for command in commands)
+        raise InputError(
+            f"results: {results} lacks complete results of {len(commands)} studies; allowed: what "
+            f"is made by: dess study run {names} --out {quote(str(results))}"
+        )
     for name, errors in lacking.items():
         for error in errors.values():
             if asked:
@@ -315,7 +323,7 @@ def _check_results(folder: Path) -> None:
     if not (folder / MANIFEST).exists():
         raise InputError(
             f"results: {folder} holds no results of study {folder.name}; "
-            f"allowed: what is made by: dess study run {folder.name} --out {folder}"
+            f"allowed: what is made by: dess study run {folder.name} --out {quote(str(folder))}"
         )
     manifest = Manifest.read(folder / MANIFEST)
     study = manifest.study.name

@@ -14,6 +14,7 @@ from dess.analysis.names import parameter, value_text
 from dess.analysis.results.tables import Results, load_results
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.selection import Selection
+from dess.policies.registry import departures
 from dess.reports.pages import PREFIX, html, notebook
 from dess.reports.pages.notebook import Report, tags_of
 
@@ -38,6 +39,10 @@ def simulated(results: Results) -> html.Marked:
         f"- **Policies:** {policies}.",
         *_design(results),
         f"- **Missions:** {missions}{each}, {len(results.missions):,} in all.",
+        *(
+            html.marked("- **Note:** {line}.", line=line)
+            for line in departures(results.policies, manifest.scenarios)
+        ),
     ]
     return html.Marked("\n".join(lines))
 

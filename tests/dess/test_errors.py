@@ -1,8 +1,10 @@
 """The words of messages: what is allowed, and what may have been meant."""
 
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
 import pytest
+from IPython.core.interactiveshell import InteractiveShell
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from dess.errors import one_of, validation_line
@@ -27,6 +29,13 @@ FIRST = ", ".join(MANY[:18])
 )
 def test_a_close_name_comes_first(name, names, also, end):
     assert one_of(name, names, also) == end
+
+
+def test_bad_input_in_a_notebook_is_a_line(tmp_path: Path, capsys: Any, monkeypatch: Any) -> None:
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
+    cell = "from dess import InputError; raise InputError('settings: uavs is 5; allowed: 6')"
+    InteractiveShell().run_cell(cell)
+    assert capsys.readouterr().out.strip() == "InputError: settings: uavs is 5; allowed: 6"
 
 
 class Part(BaseModel):

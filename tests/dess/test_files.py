@@ -198,6 +198,16 @@ def test_what_is_listed_is_not_opened(odd, tmp_path):
 # --- locks ---
 
 
+def test_a_file_system_without_locks_is_a_line_with_a_path(tmp_path, monkeypatch):
+    def refuse(*_, **__):
+        raise NotImplementedError("no flock")
+
+    monkeypatch.setattr(FileLock, "acquire", refuse)
+    lock = tmp_path / ".lock"
+    with pytest.raises(InputError, match=rf"{lock}: its file system has no locks; allowed: "):
+        locked(lock, "in use").__enter__()
+
+
 def test_temporary_folders_are_removed_and_those_of_killed_processes(tmp_path):
     """A folder whose lock is free was left by a killed process; what is another's stays."""
     for name in ("other", "t-living", "t-dead"):

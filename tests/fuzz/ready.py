@@ -13,7 +13,7 @@ from dess.reports.pages.notebook import NAMES
 from tests.fuzz.case import OUT, Case
 from tests.fuzz.child import STDERR
 from tests.fuzz.forks import Forks
-from tests.fuzz.steps import copy
+from tests.fuzz.steps import copy, write
 from tests.reports.small import STUDIES, quick
 
 # The names of the ready inputs.
@@ -98,6 +98,7 @@ def write_texts(ready: Path) -> None:
 def _run(forks: Forks, name: str, *arguments: str) -> None:
     steps = [copy(path.name, f"in/{path.name}") for path in forks.ready.iterdir()]
     out = () if arguments[-1] == "--results" else ("--out",)
+    steps += [] if out else [write(f"{OUT}/{name}/.kept", b"")]  # a report makes no folder for them
     case = Case("ready", (*arguments, *out, f"../out/{name}"), tuple(steps), seconds=600)
     for _, outcome in forks.outcomes([(0, case)]):
         if outcome.code != 0:

@@ -1,6 +1,8 @@
 """The words of the command line, the keys of its JSON, and the columns of files."""
 
 import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -47,10 +49,20 @@ def _shape(value: Any) -> Any:
     return "number" if type(value) in (int, float) else type(value).__name__
 
 
-def test_every_help_is_the_kept_one() -> None:
+def helps(option: str = "--help") -> str:
+    """The help of every command."""
     command, run = typer.main.get_command(app), CliRunner(env={"COLUMNS": "80"}).invoke
-    texts = [run(command, [*path, "--help"]).output for path in _commands(command)]
-    pinned("help.txt", "\n".join(texts))
+    return "\n".join(run(command, [*path, option]).output for path in _commands(command))
+
+
+def test_every_help_is_the_kept_one() -> None:
+    pinned("help.txt", helps())
+
+
+def test_python_without_docstrings_has_the_same_help_and_so_has_h() -> None:
+    code = "from tests.pins import test_contracts; print(test_contracts.helps('-h'), end='')"
+    command = [sys.executable, "-OO", "-c", code]
+    assert subprocess.run(command, capture_output=True, text=True).stdout == helps()
 
 
 def test_the_keys_of_every_json_document_are_the_kept_ones(dess: Any, dess_json: Any) -> None:

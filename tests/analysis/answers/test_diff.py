@@ -10,12 +10,13 @@ import pytest
 from scipy import stats
 
 from dess import InputError
-from dess.analysis import load_results, run_study
+from dess.analysis import load_results, load_study, run_study
 from dess.analysis.answers.diff import at_hand, diff, effects, most_changed, origins
+from dess.analysis.metrics import PRODUCT
 from dess.analysis.results import provenance
 from dess.analysis.results.tables import Results
 from dess.code import sources
-from tests.analysis.small import grid, small_study
+from tests.analysis.small import grid, small_study, write_scenario
 
 # A policy of another package: UAVs hover from a certain replication on, before it they go east.
 PLUGIN = """
@@ -171,10 +172,29 @@ def test_equal_design_points_count_once(results, tmp_path):
     assert len(found.missions) < len(twice.missions)
 
 
-def test_other_seeds_have_nothing_in_common(results, tmp_path):
-    other = results_of(tmp_path, "other", seed=8)
-    with pytest.raises(InputError, match="their seeds 7 and 8 give different random draws"):
-        diff(results, other)
+def test_with_other_seeds_all_missions_are_compared_without_pairs(results, tmp_path):
+    other = results_of(tmp_path, "other", seed=8, design=grid(quota=[20, 60]))
+    found = diff(results, other)
+    assert not found.identical and found.missions.empty and found.alone.empty
+    assert origins(found) == ["seeds: 7 and 8, so that missions are compared without pairs"]
+    table = effects(found, ["policy_a", "point_a"])
+    row = table[table["metric"] == PRODUCT].iloc[1]
+    assert (row["policy_a"], row["point_a"], row["n"]) == ("greedy", 1, 10)
+    of = [r.missions.query("policy == 'greedy' and point == 1")[PRODUCT] for r in (other, results)]
+    # with a 0 and a 1 added to both, so that 10 of 10 against 10 of 10 has an interval
+    expected = stats.ttest_ind(*([*values, 0, 1] for values in of), equal_var=False)
+    assert row["difference"] == pytest.approx(of[0].mean() - of[1].mean())
+    assert row["p"] == pytest.approx(expected.pvalue)
+    assert [row["low"], row["high"]] == pytest.approx([*expected.confidence_interval()])
+
+
+def test_across_constants_the_points_of_the_same_values_are_compared(results, tmp_path):
+    write_scenario(tmp_path, altitude=20.0)
+    study = load_study(tmp_path / "trial.toml", design=grid(quota=[20, 60]))
+    run_study(study, tmp_path / "high")
+    found = diff(results, load_results(tmp_path / "high"))
+    assert (len(found.missions), found.alone.empty) == (40, True)
+    assert origins(found) == ["scenario: altitude 10.0 and 20.0"]
 
 
 def test_folders_without_a_common_mission_are_refused(results, tmp_path):

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from dess import InputError
@@ -74,6 +75,26 @@ def test_a_planted_best_is_found_and_those_that_equal_it_are_tied(results):
     assert table.head(2)["tied"].all()
     own = settings.ranked(planted(results, metric), policy="greedy")
     assert {*own["policy"]} == {"greedy"} and own["tied"].iloc[0]
+
+
+def test_a_setting_of_few_missions_is_not_tied_when_its_interval_is_below(results):
+    """On the 12 common missions nothing is known; over all 300 the first is far above."""
+    parts = [
+        results.missions.assign(replication=n + results.missions["replication"])
+        for n in range(0, 300, 12)
+    ]
+    many = pd.concat(parts, ignore_index=True)
+
+    def metric(policy, point, replication):
+        odd = replication % 2
+        first = np.where(replication < 12, 0.8 + 0.2 * odd, 0.98 + 0.01 * odd)
+        return np.select([(policy == 1) & (point == 2), policy == 1], [first, 0.3], 1 - 0.3 * odd)
+
+    found = planted(replace(results, missions=many), metric)
+    few = (found.missions["policy"] == "greedy") & (found.missions["replication"] >= 12)
+    table = settings.ranked(replace(found, missions=found.missions[~few]))
+    assert settings.may_be_best(np.array([[0.8, 1.0], [1.0, 0.7]] * 6)).all()
+    assert table["n"].tolist()[:2] == [300, 12] and table["tied"].tolist() == [True] + [False] * 11
 
 
 def test_of_costs_the_lowest_is_the_best(results):

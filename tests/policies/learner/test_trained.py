@@ -14,7 +14,7 @@ from safetensors.torch import load_file, save_file
 
 from dess.batch import simulate_batch
 from dess.policies.learner import trained
-from dess.policies.learner.config import CONFIG, MODEL
+from dess.policies.learner.config import CONFIG, MODEL, read_description
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.trained import load_policy, save_policy
 from tests.analysis.small import files_of
@@ -27,6 +27,12 @@ def folder(training, tmp_path):
     path = tmp_path / "policy"
     save_policy(path, training.learner.online.state_dict(), training.config, training.space)
     return path
+
+
+def test_a_policy_knows_the_ranges_of_its_training(folder, training):
+    ranges, space = read_description(folder).ranges, training.space
+    assert ranges["uavs"] == [*space.uavs] and ranges["quota"] == [space.quota, space.quota]
+    assert ranges == training.ranges
 
 
 def _refusal(folder: Path) -> str:

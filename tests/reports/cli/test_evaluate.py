@@ -27,3 +27,12 @@ def test_a_reader_gets_tables(dess):
     assert code == 0
     assert "collection_ratio_and_communication" in out
     assert "UAV-slots/s" in out
+
+
+def test_a_trained_policy_says_when_it_acts_outside_of_its_training(dess):
+    assert "note" not in dess("evaluate", "--policy", "ddqn", "--missions", 1)[2]
+    beyond = ("--set", "quota=600", "--set", "uavs=6", "--policy", "ddqn,greedy")
+    for command in (("evaluate", "--missions", 1), ("simulate",)):
+        code, _, err = dess(*command, *beyond)
+        words = "quota 600 (trained on 440), uavs 6 (trained on 1 to 3)"
+        assert code == 0 and f"note: ddqn acts outside of its training: {words}\n" in err

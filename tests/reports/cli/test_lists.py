@@ -11,6 +11,7 @@ from click.testing import CliRunner
 import dess as dess_package
 from dess import ScenarioSpace, load_scenario
 from dess.analysis import load_study
+from dess.analysis.names import fields as fields_in
 from dess.policies.registry import SHIPPED, trained_names
 from dess.reports.cli.commands import app
 from dess.scenario import fields_of, scenario_families, scenario_names
@@ -39,6 +40,9 @@ def test_a_scenario_is_shown_field_by_field(dess, dess_json):
     assert rows["uavs"].split()[1] == "2"
     assert {*fields_of(ScenarioSpace)} <= {*rows}
     assert max(map(len, out.splitlines())) <= 100
+    shown_words = " ".join(" ".join(line[40:] for line in out.splitlines()).split())
+    for field in fields_in(load_scenario("fig1")):  # no word is cut
+        assert {*field.meaning.split()} <= {*shown_words.split()}
     full = dess("scenarios", "show", "fig1", "--set", "uavs=2", "--all")[1]
     uavs = re.search(r"^uavs = 2\n.*", full, re.M)[0]
     assert "default [1, 3]; allowed: an integer 1..16 or [low, high]" in uavs

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
@@ -93,6 +94,24 @@ def test_packets_in_continuous_time_are_measured_and_printed(dess, dess_json, tm
     assert {"mission_start", "move", "communication", "mission_end"} <= {*events}
     assert events.count("delivery") == operations["delivered"]
     assert (tmp_path / "mission.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_json_has_all_that_the_table_prints(dess, dess_json):
+    printed = dess("simulate", "--scenario", "small.toml")[1].partition("UAV ")[0]
+    rows = [line.split() for line in printed.splitlines() if len(line.split()) == 2]
+    data = dess_json("simulate", "--scenario", "small.toml")
+    shown = {name: float(value) for name, value in rows if name[0].isalpha()}
+    assert len(shown) > 12 and shown.pop("uavs") == len(data["uavs"])
+    assert {name: data[name] for name in shown} == pytest.approx(shown, rel=1e-5)
+
+
+def test_the_event_log_is_written_as_its_ending_says(dess, tmp_path):
+    for name in ("log.parquet", "log.csv", "LOG.CSV"):
+        assert dess("simulate", "--scenario", "small.toml", "--events", name)[0] == 0
+    log, written = (pd.read_csv(tmp_path / name) for name in ("log.csv", "LOG.CSV"))
+    pd.testing.assert_frame_equal(log, written)
+    table = pd.read_parquet(tmp_path / "log.parquet")
+    pd.testing.assert_frame_equal(log, table, check_dtype=False)
 
 
 def test_a_video_needs_ffmpeg(refusal, monkeypatch):

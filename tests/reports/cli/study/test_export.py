@@ -33,7 +33,7 @@ def test_results_and_page_are_bundled(run, refusal, tmp_path):
 # Arguments, and what the line on stderr must name.
 BAD = {
     "out": "Missing option '--crate'",
-    "out --crate out": "out: is a folder",
+    "out --crate out": "--crate: out is not a zip file; allowed: .zip",
     "out --crate none/a.zip": "none/a.zip: cannot be written",
     "out --crate a.zip --license mine": "--license: 'mine' is unknown; allowed: an identifier of",
     "out --crate a.zip --page none.html": "none.html: no such file",

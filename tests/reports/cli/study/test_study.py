@@ -9,6 +9,20 @@ from tests.analysis import troublesome
 from tests.analysis.small import files_of
 
 
+def test_the_name_of_a_study_leads_to_its_folder(dess, refusal):
+    assert dess("study", "run", "trial.toml", "--missions", 2)[0] == 0
+    for command in (("show",), ("diff", "results/trial"), ("export", "--crate", "a.zip")):
+        line = refusal("study", *command, "trial")
+        assert "trial: no such folder; allowed: a results folder: results/trial" in line
+
+
+def test_a_command_that_is_printed_can_be_pasted(dess):
+    code, out, _ = dess("study", "run", "trial.toml", "--missions", 2, "--out", "res ults")
+    command = out.splitlines()[-1].removeprefix("more: ")
+    assert (code, command) == (0, "dess study show 'res ults'")
+    assert dess(*shlex.split(command)[1:])[0] == 0
+
+
 def test_a_dry_run_tells_the_plan_and_writes_nothing(dess, tmp_path):
     before = files_of(tmp_path)
     code, out, _ = dess("study", "run", "trial.toml", "--missions", 30, "--dry-run")
