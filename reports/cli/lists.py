@@ -1,6 +1,7 @@
 """``dess policies``, ``dess scenarios`` and ``dess studies``: lists, and ``show`` for one name."""
 
 import json
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -8,6 +9,7 @@ import typer
 from dess.errors import cut
 from dess.reports.cli import console, options
 from dess.reports.cli.options import JsonOption, SetOption, command, load_space
+from dess.reports.cli.simulate import FIGURES, check_suffix
 
 policies = typer.Typer(invoke_without_command=True)
 scenarios = typer.Typer(invoke_without_command=True)
@@ -66,6 +68,7 @@ def show_scenario(
     name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=options.scenarios)],
     settings: SetOption = None,
     everything: Annotated[bool, typer.Option("--all")] = False,
+    figure: Annotated[Path | None, typer.Option(metavar="FILE.png")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show every field of a scenario: its value and what it is.
@@ -73,10 +76,18 @@ def show_scenario(
     Args:
         name: A shipped scenario, a generated one such as archipelago:7, or a TOML file.
         everything: Show the defaults and what is allowed as well, in full.
+        figure: Draw the map of the sea into this file, also if its nodes or zones are refused.
     """
     from dess.analysis.names import fields
     from dess.scenario import scenario_description
 
+    check_suffix("--figure", figure, FIGURES, "a picture")
+    if figure:
+        from dess.analysis.figures.missions import sea_figure
+
+        with console.outputs([figure]) as [temporary]:
+            sea = sea_figure(load_space(name, settings, draft=True))
+            sea.savefig(temporary, format=figure.suffix[1:])
     space, description = load_space(name, settings), scenario_description(name)
     if as_json:
         rows = [field._asdict() for field in fields(space)]

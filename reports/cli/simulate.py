@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 FIGURES = (".png", ".pdf", ".svg")
 ANIMATIONS = (".gif", ".mp4", ".html")
+PATHS = (".geojson", ".kml", ".csv")
 # Metrics of ``--json``, between the names and the UAVs.
 METRICS = (
     *("slots", "success", "collection_ratio", "collection_ratio_and_communication"),
@@ -47,6 +48,7 @@ def simulate(
     events: Annotated[Path | None, typer.Option(metavar="FILE.parquet")] = None,
     figure: Annotated[Path | None, typer.Option(metavar="FILE.png")] = None,
     animation: Annotated[Path | None, typer.Option(metavar="FILE.gif")] = None,
+    path: Annotated[Path | None, typer.Option(metavar="FILE.geojson")] = None,
     yes: YesOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -63,6 +65,8 @@ def simulate(
         figure: Draw the mission into this file.
         animation: Write the mission as an animation: .gif, .mp4 (needs ffmpeg), or .html, a
             page with its player.
+        path: Write the path of each UAV with its times, in degrees where the sea has them:
+            .geojson, .kml or .csv.
     """
     from dess import simulate
     from dess.analysis.execution.effort import check_missions
@@ -82,15 +86,18 @@ def simulate(
     if not yes:
         check_missions("simulate", [asked.space])
     check_seed(asked.seed, asked.replication)
-    _check_suffix("--figure", figure, FIGURES, "a picture")
-    _check_suffix("--animation", animation, ANIMATIONS, "an animation")
+    check_suffix("--figure", figure, FIGURES, "a picture")
+    check_suffix("--animation", animation, ANIMATIONS, "an animation")
+    check_suffix("--path", path, PATHS, "a path")
+    if path and path.suffix == ".kml" and asked.space.centre is None:
+        raise InputError(f"--path: {path}: the sea has no degrees; allowed: .geojson, .csv")
     if animation and animation.suffix == ".mp4":
         from dess.reports.player.animation import check_ffmpeg
 
         check_ffmpeg()
-    writers = {events: _write_log, figure: _draw, animation: _animate}
-    paths = [path for path in (events, figure, animation) if path]
-    if len({path.absolute() for path in paths}) < len(paths):
+    writers = {events: _write_log, figure: _draw, animation: _animate, path: _write_path}
+    paths = [file for file in (events, figure, animation, path) if file]
+    if len({file.absolute() for file in paths}) < len(paths):
         raise InputError("--events, --figure: the same file; allowed: a file for each")
     is_binary = events is not None and console.is_stdout(events)
     if is_binary and as_json:
@@ -100,9 +107,9 @@ def simulate(
             which = asked.seed, asked.replication
             record = simulate(asked.space, asked.team, *which, events=bool(paths) or not as_json)
         mission = _Mission(record, sample_scenario(asked.space, *which), asked.title)
-        for path, temporary in zip(paths, temporaries, strict=True):
-            with writable(path):
-                writers[path](mission, temporary, path.suffix[1:])
+        for file, temporary in zip(paths, temporaries, strict=True):
+            with writable(file):
+                writers[file](mission, temporary, file.suffix[1:])
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
         measured = {"operations": record.measured} if record.operations is not None else {}
@@ -184,7 +191,8 @@ def _refuse_given(context: typer.Context, *names: str) -> None:
             raise InputError(f"--{option}: comes from the study; allowed: --of without --{option}")
 
 
-def _check_suffix(option: str, path: Path | None, allowed: Sequence[str], kind: str) -> None:
+def check_suffix(option: str, path: Path | None, allowed: Sequence[str], kind: str) -> None:
+    """Refuse a file whose ending is not one of those allowed."""
     if path and path.suffix not in allowed:
         raise InputError(f"{option}: {path} is not {kind}; allowed: {', '.join(allowed)}")
 
@@ -217,12 +225,16 @@ class _Mission:
 
 
 def _write_log(mission: _Mission, path: Path, kind: str) -> None:
+    import numpy as np
     import pyarrow as pa
 
     from dess.files.tables import parquet_of
     from dess.files.writing import fill
 
-    fill(path, parquet_of(pa.table(mission.log)))
+    columns = dict(mission.log)
+    if names := mission.scenario.names:
+        columns["name"] = np.array([*names, None])[columns["node"]]
+    fill(path, parquet_of(pa.table(columns)))
 
 
 def _draw(mission: _Mission, path: Path, kind: str) -> None:
@@ -238,6 +250,13 @@ def _animate(mission: _Mission, path: Path, kind: str) -> None:
         _write_page(mission, path)
     else:
         write_animation(mission.log, mission.scenario, path, kind, mission.title)
+
+
+def _write_path(mission: _Mission, path: Path, kind: str) -> None:
+    from dess.analysis.results.flight import path_text
+    from dess.files.writing import fill
+
+    fill(path, path_text(mission.log, mission.scenario, kind).encode())
 
 
 def _write_page(mission: _Mission, path: Path) -> None:
@@ -256,7 +275,7 @@ def _write_page(mission: _Mission, path: Path) -> None:
 
 def _print_mission(mission: _Mission) -> None:
     from dess.analysis.metrics import MEASURES
-    from dess.analysis.results.event_log import causes
+    from dess.analysis.results.event_log import causes, residual_data
 
     record = mission.record
     metrics = record.metrics
@@ -268,5 +287,10 @@ def _print_mission(mission: _Mission) -> None:
     uavs = record.uav_rows()
     rows = [[str(number), *map(str, row.values())] for number, row in enumerate(uavs)]
     console.print_table(["UAV", *uavs[0]], rows)
+    if names := mission.scenario.names:
+        data = residual_data(mission.log).to_numpy()
+        of_nodes = zip(names, mission.scenario.nodes, data[0], data[-1], strict=True)
+        rows = [[name, str([*cell]), f"{had:g}", f"{left:g}"] for name, cell, had, left in of_nodes]
+        console.print_table(["node", "cell", "data at the start", "at the end"], rows)
     for cause in causes(mission.log, mission.scenario, first=0):  # as in the table
         console.say(f"{cause}.")

@@ -33,6 +33,7 @@ from dess.analysis import sweep
 from dess.analysis.answers import costs
 from dess.analysis.figures import settings as figures
 from dess.analysis.figures.missions import mission_figure, sea_figure
+from dess.analysis.names import placing
 from dess.analysis.results.resimulate import mission_of
 from dess.policies import load_team
 from dess.reports.pages import html
@@ -107,7 +108,8 @@ html.say("{lines}", lines=html.commands([answer.question.command]))
 # %%
 html.say(
     "The sea has {nodes} sensor nodes on {columns} x {rows} cells of {size:g} m. The sweep has "
-    "{settings} settings and simulated {n:,} missions. Costs are means for {planned:,} missions.",
+    "{settings} settings and simulated {n:,} missions. Costs are means for {planned:,} missions. "
+    "{placing}",
     nodes=len(sea.nodes),
     columns=sea.size[0],
     rows=sea.size[1],
@@ -115,6 +117,7 @@ html.say(
     settings=len(answer.table()),
     n=len(answer.results.missions),
     planned=planned,
+    placing=placing(sea),
 )
 
 # %%
