@@ -501,7 +501,8 @@ def _load(name_or_path: str | Path, overrides: dict[str, Any], context: str = ""
     if named := unread(read) | unread(values):
         draft = validated(ScenarioSpace, values | named, where, DRAFT)
         own = OwnSea(where, partial(_SCENARIOS.beside, name_or_path), draft)
-        values |= own.placed(values, read.get("nodes"))
+        given = {field: of for field, of in values.items() if field not in unread(values)}
+        values = merged(own.placed(values, read.get("nodes")), given)
     return validated(ScenarioSpace, values, where, context)
 
 

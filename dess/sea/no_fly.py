@@ -154,7 +154,8 @@ def _of_places(
             cells[cell[1], cell[0]] = True
         closed |= cells
     if unseen:
-        _note(f"{path}: {listed(unseen)}: no cell is closed; touched closes every cell in reach")
+        names = listed(unseen)
+        _note(f"{path}: {names} close no cell; touched = true closes all cells that they touch")
     elif not closed.any():
         _note(f"{path} closes no cell: it is not on the grid")
     return closed
@@ -175,7 +176,7 @@ def _cells_of(place: Place, projection: Projection, source: NoFlyFile) -> tuple[
         for turned in projection.shapes(rings):
             low, high = turned[0].min(0), turned[0].max(0)
             margin = reach / projection.cell_size
-            if (high + margin <= 0).any() or (low - margin >= size).any():
+            if (high + margin < 0).any() or (low - margin >= size).any():
                 continue
             is_near = True
             if kind == places.POINT and not reach:
@@ -191,16 +192,13 @@ def _cells_of(place: Place, projection: Projection, source: NoFlyFile) -> tuple[
 def _covered(
     kind: str, rings: list[np.ndarray], reach: float, size: Size, touched: bool
 ) -> np.ndarray:
-    """(H, W) whether a cell is in reach [cells] of a shape on the grid, or its centre is."""
+    """(H, W) whether a cell is in reach [cells] of a shape, with a part or with its centre."""
     needs("geo", "no_fly with lines, touched or buffer")
     import shapely
 
     x, y = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
-    shape = {
-        places.POINT: lambda: shapely.Point(rings[0][0]),
-        places.LINE: lambda: shapely.LineString(rings[0]),
-        places.POLYGON: lambda: shapely.make_valid(shapely.Polygon(rings[0], rings[1:])),
-    }[kind]()
+    coordinates = {places.POINT: rings[0][0], places.LINE: rings[0], places.POLYGON: rings}[kind]
+    shape = shapely.make_valid(shapely.geometry.shape({"type": kind, "coordinates": coordinates}))
     edge = reach + 1  # what is further away has no effect
     shape = shapely.clip_by_rect(shape, -edge, -edge, size[0] + edge, size[1] + edge)
     shape = shape.buffer(reach) if reach else shape

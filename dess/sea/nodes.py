@@ -8,7 +8,7 @@ points are taken.
 """
 
 from pathlib import Path
-from typing import Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -34,26 +34,6 @@ class NodesFile(places.Source):
     name: str = Field("", description="the column of their names")
     rate: str = Field("", description="the column of their arrival rates")
     data: str = Field("", description="the column of their initial data")
-
-
-class Nodes(NamedTuple):
-    """Nodes on the grid.
-
-    Attributes:
-        cells: Their cells.
-        names: Their names; empty if they have none.
-        rates: Their arrival rates [data units per slot]; empty if the file has none.
-        data: Their initial data [data units]; empty if the file has none.
-        merged: How many places of the file each stands for; empty if each stands for one.
-        moved: The numbers of those that are not in their own cells.
-    """
-
-    cells: list[Cell]
-    names: list[str]
-    rates: list[float]
-    data: list[float]
-    merged: list[int]
-    moved: list[int]
 
 
 class NodesFound(NamedTuple):
@@ -96,8 +76,10 @@ class NodesFound(NamedTuple):
         """The projection about these places; none if they are cells."""
         return Projection.about(self.spots, size, cell_size) if self.is_geographic else None
 
-    def on(self, size: Size, projection: Projection | None, closed: np.ndarray) -> Nodes:
-        """The nodes on a grid.
+    def fields(
+        self, size: Size, projection: Projection | None, closed: np.ndarray
+    ) -> dict[str, Any]:
+        """The fields of a scenario that these nodes have on a grid, those of ``arrivals`` dotted.
 
         Args:
             size: Cells of the grid from west to east and from north to south.
@@ -112,42 +94,37 @@ class NodesFound(NamedTuple):
             spots = projection.cells(self.spots)
         own: list[Cell] = [(int(x), int(y)) for x, y in np.floor(spots)]
         self._check_on_grid(own, size)
+        moved: list[int] = []
+        if self.source.place == "nearest":
+            own, moved = _nearest_free(own, spots, closed)
         groups: dict[Cell, list[int]] = {}
         for number, cell in enumerate(own):
             groups.setdefault(cell, []).append(number)
         if self.source.place == "own" and len(groups) < len(own):
             raise InputError(f"{self.path}: {self._shared(groups, projection)}")
-        moved: list[int] = []
-        if self.source.place == "nearest":
-            own, moved = _nearest_free(own, spots, closed)
-            groups = {cell: [number] for number, cell in enumerate(own)}
         if len(groups) > MAX_NODES:
             raise InputError(f"{self.path}: has {len(groups):,} nodes; allowed: 1..{MAX_NODES}")
-        names, numbers = [*map(self._name, range(len(own)))], [*groups.values()]
-        return Nodes(
-            [*groups],
-            [_joined([names[n] for n in group]) for group in numbers] if any(names) else [],
-            *(
-                self._sums(numbers, column)
-                for column in ((self.source.rate, RATES), (self.source.data, DATA))
-            ),
-            [*map(len, numbers)] if len(groups) < len(own) else [],
-            moved,
-        )
+        names, members = [*map(self._name, range(len(own)))], [*groups.values()]
+        found = {
+            "nodes": [*groups],
+            "moved": moved,
+            "names": [_joined([names[n] for n in group]) for group in members if any(names)],
+            "arrivals.rates": self._sums(members, self.source.rate, RATES),
+            "arrivals.initial": self._sums(members, self.source.data, DATA),
+            "arrivals.merged": [len(group) for group in members if len(groups) < len(own)],
+        }
+        return {field: values for field, values in found.items() if values}
 
     def _name(self, number: int) -> str:
         return str(self.rows[number].property(self.source.name, NAMES) or "")
 
-    def _sums(self, groups: list[list[int]], column: tuple[str, tuple[str, ...]]) -> list[float]:
+    def _sums(self, groups: list[list[int]], column: str, known: tuple[str, ...]) -> list[float]:
         """The sums of a column over groups of nodes; none if the file has no such column."""
-        texts = [row.property(*column) for row in self.rows]
-        if not any(text is not None for text in texts):
+        texts = [row.property(column, known) for row in self.rows]
+        if all(text is None for text in texts):
             return []
-        name = column[0] or column[1][0]
-        values = [
-            places.number_of(str(text or ""), f"{self.path}: {row.where}: {name}")
-            for row, text in zip(self.rows, texts, strict=True)
-        ]
+        where = [f"{self.path}: {row.where}: {column or known[0]}" for row in self.rows]
+        values = [*map(places.number_of, (str(text or "") for text in texts), where)]
         return [sum(values[number] for number in group) for group in groups]
 
     def _title(self, number: int) -> str:
@@ -159,38 +136,31 @@ class NodesFound(NamedTuple):
         beyond = [number for number, cell in enumerate(own) if not places.is_on_grid(cell, size)]
         if beyond:
             names = listed(f"{self._title(number)} at {[*own[number]]}" for number in beyond)
-            verb, allowed = (
-                "is" if len(beyond) == 1 else "are",
-                _enough(own, size, self.is_geographic),
+            line = (
+                f"{'is' if len(beyond) == 1 else 'are'} off the grid of {size[0]} x {size[1]} cells"
             )
-            line = f"{verb} off the grid of {size[0]} x {size[1]} cells; allowed: {allowed}"
-            raise InputError(f"{self.path}: {names} {line}")
+            enough = _enough(own, size, self.is_geographic)
+            raise InputError(f"{self.path}: {names} {line}; allowed: {enough}")
 
     def _shared(self, groups: dict[Cell, list[int]], projection: Projection | None) -> str:
         """That nodes share cells, and what would part them."""
-        shared = {cell: group for cell, group in groups.items() if len(group) > 1}
         cells = listed(
             f"{' and '.join(map(self._title, group))} lie in one cell, {[*cell]}"
-            for cell, group in shared.items()
+            for cell, group in groups.items()
+            if len(group) > 1
         )
-        allowed = ['place = "merge"', 'place = "nearest" beside the file']
-        if finer := self._finer(projection) if projection else "distinct cells":
-            allowed = [finer, *allowed]
-        return f"{cells}; allowed: {', '.join(allowed)}"
+        parted = self._finer(projection) if projection else "distinct cells, "
+        return f'{cells}; allowed: {parted}place = "merge", place = "nearest" beside the file'
 
     def _finer(self, projection: Projection) -> str:
-        """The largest of some smaller cell sizes that gives each node a cell, if one does."""
-        for power in range(1, 100):
-            cell_size = float(f"{projection.cell_size * 0.9**power:.2g}")
-            largest = projection._replace(size=(MAX_GRID, MAX_GRID), cell_size=cell_size)
-            cells = np.floor(largest.cells(self.spots))
-            reach = max(MAX_GRID / 2 - cells.min(), cells.max() + 1 - MAX_GRID / 2)
-            if reach > MAX_GRID / 2:
-                break
-            if len(np.unique(cells, axis=0)) == len(cells):
-                finer = f"a cell_size below {projection.cell_size:g} m"
-                return f"{finer}, such as {cell_size:g} with grid = {2 * reach:g}"
-        return ""
+        """The smallest cells that the largest grid allows, if they part all nodes."""
+        coarse, largest = projection.cell_size, (MAX_GRID, MAX_GRID)
+        reach = np.abs(projection.cells(self.spots) - np.array(projection.size) / 2).max()
+        finest = float(f"{max(coarse * reach / (MAX_GRID / 2 - 2), 0.01):.2g}")
+        cells = np.floor(projection._replace(size=largest, cell_size=finest).cells(self.spots))
+        if finest >= coarse or len(np.unique(cells, axis=0)) < len(cells):
+            return ""
+        return f"a cell_size below {coarse:g} m, such as {finest:g} with grid = {MAX_GRID}, "
 
 
 def _joined(names: list[str]) -> str:

@@ -81,11 +81,7 @@ class OwnSea(NamedTuple):
         if found and values["nodes"] is of_nodes:
             columns, rows = self.grid.size
             closed = zones_of(columns, rows, (), placed.get("no_fly", self.grid.no_fly)) == NO_FLY
-            nodes = found.on(self.grid.size, projection, closed)
-            placed |= {"nodes": nodes.cells, "names": nodes.names, "moved": nodes.moved}
-            arrivals = {"rates": nodes.rates, "initial": nodes.data, "merged": nodes.merged}
-            given = {key: of for key, of in arrivals.items() if of} | values.get("arrivals", {})
-            placed |= {"arrivals": given} if given else {}
+            placed |= found.fields(self.grid.size, projection, closed)
         return placed
 
     def _no_fly(self, values: Mapping[str, Any], projection: Projection | None) -> dict[str, Any]:

@@ -79,15 +79,15 @@ def show_scenario(
         figure: Draw the map of the sea into this file, also if its nodes or zones are refused.
     """
     from dess.analysis.names import fields
-    from dess.scenario import scenario_description
+    from dess.scenario import draft_scenario, scenario_description
 
     check_suffix("--figure", figure, FIGURES, "a picture")
     if figure:
         from dess.analysis.figures.missions import sea_figure
 
         with console.outputs([figure]) as [temporary]:
-            sea = sea_figure(load_space(name, settings, draft=True))
-            sea.savefig(temporary, format=figure.suffix[1:])
+            sea = draft_scenario(name, **dict(map(options.setting, settings or [])))
+            sea_figure(sea).savefig(temporary, format=figure.suffix[1:])
     space, description = load_space(name, settings), scenario_description(name)
     if as_json:
         rows = [field._asdict() for field in fields(space)]

@@ -108,21 +108,15 @@ def command(app: typer.Typer, name: str | None = None) -> Callable[[Callable], C
     return register
 
 
-def load_space(name: str, settings: list[str] | None, draft: bool = False) -> "ScenarioSpace":
+def load_space(name: str, settings: list[str] | None) -> "ScenarioSpace":
     """A scenario by name or file, with the fields that ``--set`` sets.
-
-    Args:
-        name: The name or file.
-        settings: What ``--set`` was given.
-        draft: Whether its cells may be where they must not be.
 
     Raises:
         InputError: If there is no such scenario, or a setting is not valid.
     """
-    from dess.scenario import draft_scenario, load_scenario
+    from dess import load_scenario
 
-    load = draft_scenario if draft else load_scenario
-    return load(name, **dict(setting(text) for text in settings or []))
+    return load_scenario(name, **dict(setting(text) for text in settings or []))
 
 
 def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, Any]:
