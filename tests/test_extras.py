@@ -46,9 +46,12 @@ def runs(folder: Path, extras: set[str], *lines: str) -> dict[str, tuple[int, st
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a small study."""
+    """A folder with a small study, and a sea with a lane."""
     folder = tmp_path_factory.mktemp("plain")
     small_study(folder)
+    line = {"geometry": {"type": "LineString", "coordinates": [[8, 54], [9, 55]]}}
+    (folder / "lane.json").write_text(json.dumps({"features": [line]}))
+    (folder / "lane.toml").write_text('centre = [8.5, 54.5]\nno_fly = "lane.json"\n')
     return folder
 
 
@@ -75,6 +78,7 @@ def plain(folder: Path) -> dict[str, tuple[int, str, str]]:
         "study export trial --crate trial.zip",
         "simulate --figure mission.png",
         "report ./trial",
+        "scenarios show lane.toml",
     )
 
 
@@ -107,6 +111,7 @@ def test_what_an_extra_adds_is_missed_in_one_line(folder, plain) -> None:
         "study export": ("dess study needs ", "reports"),
         "simulate --figure": ("dess simulate needs matplotlib", "reports"),
         "report": ("dess report needs ", "reports"),
+        "scenarios show": ("no_fly with lines, touched or buffer needs shapely", "geo"),
     }
     for beginning, (what, extra) in missed.items():
         [(code, out, err)] = [plain[line] for line in plain if line.startswith(beginning)]

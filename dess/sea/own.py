@@ -13,14 +13,14 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from dess.errors import InputError, validated
-from dess.sea.chart import NO_FLY, Rectangle, zones_of
+from dess.sea.chart import Rectangle
 from dess.sea.no_fly import NoFlyFile, no_fly_in, zones_in
 from dess.sea.nodes import NodesFile, NodesFound
 from dess.sea.places import Projection
 from dess.sections.section import Integer, Number, Strict
 
 # What stands for a field in a scenario whose files are not read yet.
-UNREAD = {"nodes": [[0, 0]], "no_fly": [], "zone": [0, 0, 1, 1], "zones": []}
+_UNREAD = {"nodes": [[0, 0]], "no_fly": [], "zone": [0, 0, 1, 1]}
 
 
 class ZonePlace(Strict):
@@ -34,16 +34,20 @@ class ZonePlace(Strict):
 
 def unread(values: Mapping[str, Any]) -> dict[str, Any]:
     """The fields that name files or degrees, each with what stands for it."""
-    return {key: value for key, value in UNREAD.items() if _is_named(values.get(key))}
+    zones = {"zones": []} if _are_places(values.get("zones")) else {}
+    return {key: of for key, of in _UNREAD.items() if _is_named(values.get(key))} | zones
 
 
 def _is_named(value: Any) -> bool:
     """Whether a field, or an item of it, names a file or degrees."""
-    if isinstance(value, list | tuple):
-        return any(isinstance(item, str) or _is_named(item) for item in value)
-    if isinstance(value, dict) and "cells" in value:  # a further zone
-        return isinstance(value["cells"], dict)
-    return isinstance(value, dict) and not value.keys() <= {"pads"} or isinstance(value, str)
+    items = value if isinstance(value, list | tuple) else [value]
+    return any(isinstance(item, str | dict) for item in items)
+
+
+def _are_places(zones: Any) -> bool:
+    """Whether a further zone has degrees in the place of cells."""
+    tables = zones if isinstance(zones, list | tuple) else []
+    return any(isinstance(of, dict) and isinstance(of.get("cells"), dict) for of in tables)
 
 
 class OwnSea(NamedTuple):
@@ -79,8 +83,9 @@ class OwnSea(NamedTuple):
         placed = self._zones(values, projection) | self._no_fly(values, projection)
         placed |= {"centre": projection.centre} if projection else {}
         if found and values["nodes"] is of_nodes:
-            columns, rows = self.grid.size
-            closed = zones_of(columns, rows, (), placed.get("no_fly", self.grid.no_fly)) == NO_FLY
+            closed = np.zeros(self.grid.size[::-1], np.bool_)
+            for x, y in placed.get("no_fly", self.grid.no_fly):
+                closed[y : y + 1, x : x + 1] = True  # none for a cell that is refused later
             placed |= found.fields(self.grid.size, projection, closed)
         return placed
 
@@ -97,22 +102,20 @@ class OwnSea(NamedTuple):
 
     def _zones(self, values: Mapping[str, Any], projection: Projection | None) -> dict[str, Any]:
         """The charging zones."""
-        placed: dict[str, Any] = {}
-        zone, zones = values.get("zone"), values.get("zones", ())
+        zone, zones = values.get("zone"), values.get("zones")
         if isinstance(zone, str):
-            placed["zone"], *others = zones_in(self.beside("zone", zone), self.grid.size)
-            zones = [*zones, *({"cells": cells} for cells in others)]
-            placed["zones"] = zones
+            zone, *others = zones_in(self.beside("zone", zone), self.grid.size)
+            zones = zones or [{"cells": cells} for cells in others]
         elif isinstance(zone, dict):
-            placed["zone"] = self._rectangle(zone, "zone", projection)
-        if _is_named(zones):
-            placed["zones"] = [
+            zone = self._rectangle(zone, "zone", projection)
+        if zones and _are_places(zones):
+            zones = [
                 of | {"cells": self._rectangle(of["cells"], f"zones.{n}.cells", projection)}
-                if _is_named(of)
+                if _are_places([of])
                 else of
                 for n, of in enumerate(zones)
             ]
-        return placed
+        return {key: of for key, of in (("zone", zone), ("zones", zones)) if of}
 
     def _rectangle(self, of: Any, key: str, projection: Projection | None) -> Rectangle:
         """The cells of a charging zone about a place."""

@@ -177,7 +177,8 @@ def test_nodes_of_a_cell_are_merged_with_their_data_and_rates(sea: Sea) -> None:
     assert space.names == ("A +2", "C", "D")
     assert space.arrivals.merged == (3, 1, 1)
     assert space.node_data == ((15.0, 60.0), (5.0, 20.0), (5.0, 20.0))
-    assert load_scenario(sea(nodes + GRID, n_csv=NEAR), arrival_rate=0.1).node_rates[0] == pytest.approx(0.3)
+    space = load_scenario(sea(nodes + GRID, n_csv=NEAR), arrival_rate=0.25)
+    assert space.node_rates == (0.75, 0.25, 0.25)
 
 
 def test_a_node_whose_cell_is_taken_or_closed_takes_the_nearest_free_one(sea: Sea) -> None:
