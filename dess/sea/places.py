@@ -250,7 +250,9 @@ class _Feature(Document, extra="ignore"):
     properties: dict[str, Any] | None = None
 
 
-class _Features(Document, extra="ignore"):
+class Features(Document, extra="ignore"):
+    """A GeoJSON file."""
+
     features: tuple[_Feature, ...] = Field(min_length=1, description=_GEOJSON)
 
 
@@ -261,7 +263,7 @@ def read_geojson(path: Path) -> Places:
         InputError: If it cannot be read, or is no GeoJSON.
     """
     places = []
-    features = _Features.load(path, absent=_GEOJSON, limit=TEXT_LIMIT).features
+    features = Features.load(path, absent=_GEOJSON, limit=TEXT_LIMIT).features
     for number, feature in enumerate(features):
         where = f"features.{number}"
         shapes = _shapes(feature.geometry, f"{path}: {where}.geometry") if feature.geometry else ()
