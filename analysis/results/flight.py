@@ -1,4 +1,4 @@
-"""The flown path of a mission with its times, as a table and as files for maps."""
+"""The paths of the UAVs of a mission with its times, as a table and as files for maps."""
 
 import json
 from xml.etree import ElementTree
@@ -12,7 +12,7 @@ from dess.sea.places import Projection
 from dess.sections.fleet import type_of
 
 
-def flown_path(events: Events, scenario: Scenario) -> pd.DataFrame:
+def paths_of(events: Events, scenario: Scenario) -> pd.DataFrame:
     """Where every UAV was at the start of every mission slot, and at its end.
 
     Returns:
@@ -38,14 +38,14 @@ def flown_path(events: Events, scenario: Scenario) -> pd.DataFrame:
 
 
 def path_text(events: Events, scenario: Scenario, kind: str) -> str:
-    """The flown path in a file.
+    """The paths in a file.
 
     Args:
         events: The event log (a data frame, or the columns, of ``dess.record.EventLog``).
         scenario: The scenario of the mission.
         kind: ``csv``, ``geojson``, with cells where the sea has no degrees, or ``kml``.
     """
-    table = flown_path(events, scenario)
+    table = paths_of(events, scenario)
     if kind == "csv":
         return table.to_csv(index=False)
     axes = ["lon", "lat"] if scenario.centre else ["x", "y"]

@@ -3,7 +3,7 @@
     pip install dess               the simulator, the heuristics, evaluations, studies and sweeps
     pip install 'dess[learning]'   trained policies and trainings
     pip install 'dess[reports]'    figures, pages, and studies of sensitivities
-    pip install 'dess[geo]'        lanes, buffers and touched cells of seas from GeoJSON files
+    pip install 'dess[geo]'        shipping lanes and buffers of seas from GeoJSON files
     pip install 'dess[all]'        everything
     pip install 'dess[examples]'   the libraries of the examples, as far as they fit together
 

@@ -1,14 +1,15 @@
 """The no-fly cells and charging zones of a user's own sea, read from files beside its scenario.
 
     no_fly = "islands.txt"  # in the TOML file of a scenario
-    no_fly = ["land.geojson", {file = "lanes.geojson", width = 2000, touched = true}]
+    no_fly = ["land.geojson", {file = "routes.geojson", width = 2000, touched = true}]
 
 Of polygons, a cell is a no-fly cell if its centre lies in one of them, and not in a hole; with
-``touched``, every cell of which a part does. A line with a width is a lane; without one, it closes
-every cell that it touches. A point closes its cell. A map in a text (``.txt``, ``.map``) has a line
-for each row of cells, one in a picture (``.png``) a pixel for each cell.
+``touched``, every cell of which a part does. A line with a width is a shipping lane; without one,
+it closes every cell that it touches. A point closes its cell. A map in a text (``.txt``, ``.map``)
+has a line for each row of cells, one in a picture (``.png``) a pixel for each cell.
 """
 
+import io
 import logging
 from collections.abc import Callable
 from functools import cache
@@ -20,7 +21,7 @@ from pydantic import Field
 
 from dess.code.libraries import absence, needs
 from dess.errors import InputError, listed, shown
-from dess.files.reading import TEXT_LIMIT, checked, read_text
+from dess.files.reading import TEXT_LIMIT, read_bytes, read_text
 from dess.sea import places
 from dess.sea.chart import Rectangle
 from dess.sea.places import Place, Projection, Size
@@ -118,7 +119,7 @@ def _pixels(path: Path, size: Size) -> np.ndarray:
     except ModuleNotFoundError as error:
         raise absence(error, "a map in a picture") or error from None
     try:
-        with Image.open(checked(path, TEXT_LIMIT, "a picture")) as image:
+        with Image.open(io.BytesIO(read_bytes(path, TEXT_LIMIT, "a picture"))) as image:
             there = image.size
             pixels = np.array(image.convert("RGB") if there == size else ())
     except (OSError, SyntaxError):

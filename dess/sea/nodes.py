@@ -101,7 +101,7 @@ class NodesFound(NamedTuple):
         for number, cell in enumerate(own):
             groups.setdefault(cell, []).append(number)
         if self.source.place == "own" and len(groups) < len(own):
-            raise InputError(f"{self.path}: {self._shared(groups, projection)}")
+            self._refuse_shared(groups, projection)
         if len(groups) > MAX_NODES:
             raise InputError(f"{self.path}: has {len(groups):,} nodes; allowed: 1..{MAX_NODES}")
         names, members = [*map(self._name, range(len(own)))], [*groups.values()]
@@ -142,15 +142,16 @@ class NodesFound(NamedTuple):
             enough = _enough(own, size, self.is_geographic)
             raise InputError(f"{self.path}: {names} {line}; allowed: {enough}")
 
-    def _shared(self, groups: dict[Cell, list[int]], projection: Projection | None) -> str:
-        """That nodes share cells, and what would part them."""
+    def _refuse_shared(self, groups: dict[Cell, list[int]], projection: Projection | None) -> None:
+        """Say which nodes share cells, and what would part them."""
         cells = listed(
             f"{' and '.join(map(self._title, group))} lie in one cell, {[*cell]}"
             for cell, group in groups.items()
             if len(group) > 1
         )
         parted = self._finer(projection) if projection else "distinct cells, "
-        return f'{cells}; allowed: {parted}place = "merge", place = "nearest" beside the file'
+        known = 'place = "merge", place = "nearest" beside the file'
+        raise InputError(f"{self.path}: {cells}; allowed: {parted}{known}")
 
     def _finer(self, projection: Projection) -> str:
         """The smallest cells that the largest grid allows, if they part all nodes."""

@@ -17,7 +17,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
-from dess.errors import InputError, one_of, shown
+from dess.errors import InputError, one_of, shown, validated
 from dess.files.documents import Document
 from dess.files.reading import TEXT_LIMIT, read_text
 from dess.sea.chart import Cell
@@ -241,7 +241,7 @@ class _Geometry(Document, extra="ignore"):
         "GeometryCollection",
     ]  # fmt: skip
     coordinates: list[Any] = Field([], description="positions, or lists of them")
-    geometries: "list[_Geometry]" = Field([], description="geometries")
+    geometries: list[dict[str, Any]] = Field([], description="geometries")
 
 
 class _Feature(Document, extra="ignore"):
@@ -274,7 +274,8 @@ def read_geojson(path: Path) -> Places:
 def _shapes(geometry: _Geometry, place: str) -> Iterator[Shape]:
     """The parts of a geometry of GeoJSON, those that are empty left out."""
     for number, inner in enumerate(geometry.geometries):
-        yield from _shapes(inner, f"{place}.geometries.{number}")
+        where = f"{place}.geometries.{number}"
+        yield from _shapes(validated(_Geometry, inner, where), where)
     kind, place = geometry.type.removeprefix("Multi"), f"{place}.coordinates"
     parts = {place: geometry.coordinates}
     if kind != geometry.type:

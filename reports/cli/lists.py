@@ -9,7 +9,7 @@ import typer
 from dess.errors import cut
 from dess.reports.cli import console, options
 from dess.reports.cli.options import JsonOption, SetOption, command, load_space
-from dess.reports.cli.simulate import FIGURES, check_suffix
+from dess.reports.cli.simulate import FIGURES, check_suffix, save_figure
 
 policies = typer.Typer(invoke_without_command=True)
 scenarios = typer.Typer(invoke_without_command=True)
@@ -87,7 +87,7 @@ def show_scenario(
 
         with console.outputs([figure]) as [temporary]:
             sea = draft_scenario(name, **dict(map(options.setting, settings or [])))
-            sea_figure(sea).savefig(temporary, format=figure.suffix[1:])
+            save_figure(sea_figure(sea), temporary, figure.suffix[1:])
     space, description = load_space(name, settings), scenario_description(name)
     if as_json:
         rows = [field._asdict() for field in fields(space)]
