@@ -118,8 +118,9 @@ def _pixels(path: Path, size: Size) -> np.ndarray:
         from PIL import Image
     except ModuleNotFoundError as error:
         raise absence(error, "a map in a picture") or error from None
+    buffer = io.BytesIO(read_bytes(path, TEXT_LIMIT, "a picture"))
     try:
-        with Image.open(io.BytesIO(read_bytes(path, TEXT_LIMIT, "a picture"))) as image:
+        with Image.open(buffer) as image:
             there = image.size
             pixels = np.array(image.convert("RGB") if there == size else ())
     except (OSError, SyntaxError):
