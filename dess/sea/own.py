@@ -34,8 +34,8 @@ class ZonePlace(Strict):
 
 def unread(values: Mapping[str, Any]) -> dict[str, Any]:
     """The fields that name files or degrees, each with what stands for it."""
-    zones = {"zones": []} if _are_places(values.get("zones")) else {}
-    return {key: of for key, of in _UNREAD.items() if _is_named(values.get(key))} | zones
+    found = {key: of for key, of in _UNREAD.items() if _is_named(values.get(key))}
+    return found | ({"zones": []} if _are_places(values.get("zones")) else {})
 
 
 def _is_named(value: Any) -> bool:
