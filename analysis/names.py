@@ -177,15 +177,15 @@ def _single(value: Any) -> Any:
 
 
 def placing(space: ScenarioSpace) -> str:
-    """How nodes of a file that share cells are placed, in a sentence; empty if none do."""
+    """How nodes of a file that share cells are placed, in a sentence to be added to others."""
     if merged := space.arrivals.merged:
         return (
-            f"The file has {sum(merged)} nodes in {len(merged)} cells; those of one cell are one "
+            f" The file has {sum(merged)} nodes in {len(merged)} cells; those of one cell are one "
             "node, with their data and rates added."
         )
     if space.moved:
         return (
-            f"Of the {len(space.nodes)} nodes, {len(space.moved)} are in the nearest free cell, "
+            f" Of the {len(space.nodes)} nodes, {len(space.moved)} are in the nearest free cell, "
             "since their own is taken or closed."
         )
     return ""

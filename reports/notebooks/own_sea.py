@@ -60,11 +60,12 @@ html.say("{lines}", lines=html.composed("\n".join(f"- {line}" for line in answer
 policy = costs.best_policy(answer.results)
 mission = mission_of(load_scenario(scenario, **example), load_team(policy), seed)
 map_of_mission = mission_figure(mission.events, mission.scenario)
+note = placing(sea)
 
 # %%
 html.gallery(
     [
-        (sea_figure(sea), "Map of the sea", f"The n = {len(sea.nodes)} nodes and the zone."),
+        (sea_figure(sea), "Map of the sea", f"The n = {len(sea.nodes)} nodes and the zone.{note}"),
         (map_of_mission, "Map of a mission", f"A mission of {policy}, replication 0 (n = 1)."),
     ]
 )
@@ -108,8 +109,7 @@ html.say("{lines}", lines=html.commands([answer.question.command]))
 # %%
 html.say(
     "The sea has {nodes} sensor nodes on {columns} x {rows} cells of {size:g} m. The sweep has "
-    "{settings} settings and simulated {n:,} missions. Costs are means for {planned:,} missions. "
-    "{placing}",
+    "{settings} settings and simulated {n:,} missions. Costs are means for {planned:,} missions.",
     nodes=len(sea.nodes),
     columns=sea.size[0],
     rows=sea.size[1],
@@ -117,7 +117,6 @@ html.say(
     settings=len(answer.table()),
     n=len(answer.results.missions),
     planned=planned,
-    placing=placing(sea),
 )
 
 # %%
