@@ -362,3 +362,10 @@ def test_charging_zones_are_places_on_the_earth(sea: Sea) -> None:
         load_scenario(sea(lines))
     with pytest.raises(InputError, match="sea.toml: zone: lat: 91 is out of range"):
         load_scenario(sea(lines.replace("lat = 0.0", "lat = 91")))
+
+
+def test_no_uav_waits_to_death_where_another_zone_is_free() -> None:
+    """Two UAVs and two zones with a pad each: no UAV has to wait for long."""
+    space = load_scenario("german-bight", uavs=2, pads=1, **{"zones.pads": 1})
+    records = simulate_batch(space, load_team("greedy"), 1, 16)
+    assert records.missions["success"].all()
