@@ -176,6 +176,21 @@ def _single(value: Any) -> Any:
     return value[0] if is_range and value[0] == value[1] else value
 
 
+def placing(space: ScenarioSpace) -> str:
+    """How nodes of a file that share cells are placed, in a sentence to be added to others."""
+    if merged := space.arrivals.merged:
+        return (
+            f" The file has {sum(merged)} nodes in {len(merged)} cells; those of one cell are one "
+            "node, with their data and rates added."
+        )
+    if space.moved:
+        return (
+            f" Of the {len(space.nodes)} nodes, {len(space.moved)} are in the nearest free cell, "
+            "since their own is taken or closed."
+        )
+    return ""
+
+
 def value_text(value: object) -> str:
     """A value of a parameter as text: ``12.5``, ``yes``, or ``5–7.5`` for a range."""
     if isinstance(value, dict):  # a type of UAVs

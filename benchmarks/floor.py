@@ -75,7 +75,7 @@ def _count(
                         deviates += 1
                         needed[i, k] = True
         blocks += needed.sum() + math.ceil(len(nodes) / 4)
-        rules.arrive(mission, residual, arrivals, batches, search)
+        rules.arrive(mission, residual, sensors, arrivals, batches, search)
         rules.settle(mission, uavs)
     return blocks, deviates
 

@@ -117,6 +117,28 @@ def one_of(name: object, names: Iterable[str], also: str = "") -> str:
     return f"{meant}; allowed: {allowed or 'none'}"
 
 
+def validated(
+    model: "type[BaseModel]", values: dict[str, Any], where: str, context: str = ""
+) -> Any:
+    """The model of these values.
+
+    Args:
+        model: The model.
+        values: The values.
+        where: Their name or path.
+        context: What the validators of the model are told.
+
+    Raises:
+        InputError: If they are not valid.
+    """
+    from pydantic import ValidationError
+
+    try:
+        return model.model_validate(values, context=context)
+    except ValidationError as error:
+        raise InputError(validation_line(error, where, model)) from None
+
+
 def validation_line(error: "ValidationError", where: str, model: "type[BaseModel]") -> str:
     """The first error of pydantic as one line: place, key, problem and allowed values.
 

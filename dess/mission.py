@@ -199,7 +199,7 @@ class MissionModel:
 
     def _clock(self) -> Process:
         """Open every mission slot, run its communication slots and close it."""
-        env, missions, uavs, residual = self.env, *self.state[:3]
+        env, missions, uavs = self.env, *self.state[:2]
         arrays, packets = (*self.state, *self.world, *self.scratch), self.packets
         m = int(self.mission["communication_slots"])
         has_failures = bool(self.mission["has_failures"])
@@ -221,7 +221,7 @@ class MissionModel:
                 if packets is not None:
                     packets.deliver(slot + n / m)
             before = self._team() if self.log is not None else []
-            active = _close(missions, uavs, residual, self.arrivals, *self.scratch)
+            active = _close(*self.state[:4], self.arrivals, *self.scratch)
             slot += 1
             self._log_close(slot, before)
             if has_failures:
@@ -400,8 +400,8 @@ def _communicate(
 
 
 @kernel
-def _close(missions, uavs, residual, arrivals, batches, search):
+def _close(missions, uavs, residual, sensors, arrivals, batches, search):
     """Add the arrivals and settle the slot; return the number of UAVs that are still active."""
-    rules.arrive(missions[0], residual[0], arrivals, batches, search)
+    rules.arrive(missions[0], residual[0], sensors[0], arrivals, batches, search)
     rules.settle(missions[0], uavs[0])
     return missions[0].active

@@ -56,16 +56,17 @@ def launch(state, b, starts, number, replication):
     mission.active = mission.uavs
     state.teeth[b] = 0
     _launch_uavs(mission, starts.uavs[number], state.uavs[b])
-    spread = mission.initial_high - mission.initial_low
     for k in range(mission.nodes):
+        low, high = starts.data[number, k]
         if k % 4 == 0:
             words = streams.block(
                 mission.seed, mission.replication, streams.INITIAL_DATA, 0, 0, k // 4
             )
-        residual[k] = mission.initial_low + spread * streams.uniform(words[k % 4])
+        residual[k] = low + (high - low) * streams.uniform(words[k % 4])
         mission.initial += residual[k]
         sensors[k].newest = sensors[k].hidden = 0.0
         sensors[k].silent = False
+        sensors[k].rate = starts.rates[number, k]
 
 
 @kernel
@@ -335,18 +336,20 @@ def _communicate_all(mission, uavs, residual, sensors, teeth, order, means, batc
 
 
 @kernel
-def arrive(mission, residual, arrivals, batches, search):
+def arrive(mission, residual, sensors, arrivals, batches, search):
     """Add the new data of one slot (eq. 12): a Poisson number of data units per node.
 
     Args:
         mission: ``MISSION`` record.
         residual: (K,) residual data [data units], increased.
+        sensors: (K,) ``SENSOR`` records.
         arrivals: (K,) new data of the slot [data units], overwritten.
         batches, search: As in ``Scratch``; memory for the draws.
     """
     if mission.continuous != 0:  # then they are events of their own (dess.sections.packets)
         return
-    probability_of_none = math.exp(-mission.arrival_rate)
+    rate = mission.arrival_rate
+    probability_of_none = math.exp(-rate)
     batch = batches[0, 0]
     for k in range(mission.nodes):
         block = k // 4 % len(batch.node)
@@ -359,8 +362,11 @@ def arrive(mission, residual, arrivals, batches, search):
             )  # fmt: skip
         word = batch.words[k % 4, block]
         arrivals[k] = 0
+        if mission.own_rates != 0:
+            rate = sensors[k].rate
+            probability_of_none = math.exp(-rate)
         if streams.uniform(word) > probability_of_none:
-            arrivals[k] = streams.poisson(word, mission.arrival_rate)
+            arrivals[k] = streams.poisson(word, rate)
             residual[k] += arrivals[k]
             mission.arrived += arrivals[k]
 
@@ -439,6 +445,6 @@ def advance(
     spend(mission, uavs)
     channel.open_slot(mission, uavs, nodes, mean_snr, order, means, chart, search)
     _communicate_all(mission, uavs, residual, sensors, teeth, order, means, batches, search)
-    arrive(mission, residual, arrivals, batches, search)
+    arrive(mission, residual, sensors, arrivals, batches, search)
     settle(mission, uavs)
     strike_if_on(mission, uavs, residual, sensors, LOST)

@@ -6,8 +6,8 @@ scenario = Scenario.of(uavs=2, forbid_swaps=True)  # a single scenario; Table II
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from functools import cache
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache, partial
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -15,23 +15,34 @@ from typing import Annotated, Any, Self
 import numpy as np
 import tomli_w
 from pydantic import (
-    BaseModel,
     BeforeValidator,
     Field,
     SerializerFunctionWrapHandler,
     TypeAdapter,
-    ValidationError,
+    ValidationInfo,
     model_serializer,
     model_validator,
 )
 from pydantic.fields import FieldInfo
 
-from dess.errors import InputError, check_type, one_of, shown, validation_line
+from dess.errors import InputError, check_type, listed, one_of, shown, validated
 from dess.files.reading import Shipped
-from dess.sea.chart import FAR, Cell, Chart, Rectangle, chart_at, parking_of, spread, zones_of
+from dess.sea.chart import (
+    FAR,
+    MOST_CHARTED,
+    NO_FLY,
+    Cell,
+    Chart,
+    Rectangle,
+    chart_at,
+    parking_of,
+    spread,
+    zones_of,
+)
 from dess.sea.families import FAMILIES, is_generated, sea_of
-from dess.sea.files import no_fly_in, nodes_in, projection_in
+from dess.sea.own import OwnSea, unread
 from dess.sections.age import MOST_TEETH, Age
+from dess.sections.arrivals import MOST as MOST_RATE
 from dess.sections.arrivals import Arrivals
 from dess.sections.charging import Charging
 from dess.sections.failures import MOST_PADS, Failures
@@ -45,8 +56,7 @@ PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 
 # The largest scenario: cells along a side of the grid, nodes, mission slots and UAVs.
 MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS = 256, 1024, 100_000, 64
 
-# The most charging zones, and the most cells of a grid with no-fly cells: 200 MB of distances.
-MOST_ZONES, MOST_CHARTED = 8, 10_000
+MOST_ZONES = 8  # charging zones
 
 # Largest amount of initial data of a node [data units].
 MOST_DATA = 10**9
@@ -61,7 +71,7 @@ MOST_ENTRIES = 2**30
 # The fields that go beyond the paper.
 SECTIONS = ("arrivals", "age", "charging", "failures", "wind", "fleet")
 # The fields of seas that the paper does not have; records are the same with and without them.
-GEOMETRY = ("rows", "zones", "no_fly")
+GEOMETRY = ("rows", "zones", "no_fly", "names", "moved", "centre")
 LANDING = "landing"
 ZONE_PADS = "zones.pads"  # sets the pads of the zones of ``zones``, and leaves their cells
 
@@ -73,8 +83,14 @@ SEA = "scenario"
 
 _SCENARIOS = Shipped("scenario", "dess", "scenarios")
 
+# The context of a scenario whose cells may be where they must not be.
+DRAFT = "draft"
+
 # A reward per event. Sums of many of them are still finite, and so are their squares.
 Reward = Annotated[Number, Field(ge=-(10**9), le=10**9)]
+
+Longitude = Annotated[Number, Field(ge=-180, le=180)]
+Latitude = Annotated[Number, Field(ge=-90, le=90)]
 
 
 def is_number(value: Any) -> bool:
@@ -119,6 +135,14 @@ class Constants(Strict):
         max_length=MOST_NODES,
         description="cells of the sensor nodes: [x, y] for each",
     )
+    names: tuple[str, ...] = Field(
+        (), max_length=MOST_NODES, description="names of the sensor nodes: one for each"
+    )
+    moved: tuple[Integer, ...] = Field(
+        (),
+        max_length=MOST_NODES,
+        description="nodes that are not in their own cells: their numbers, from 0",
+    )
     zone: Rectangle = Field(
         (26, 2, 4, 4), description="start and charging zone (L): [x, y, width, height] in cells"
     )
@@ -132,6 +156,9 @@ class Constants(Strict):
     )
     no_fly: tuple[Cell, ...] = Field(
         (), description="cells that no UAV may enter, such as islands: [x, y] for each"
+    )
+    centre: tuple[Longitude, Latitude] | None = Field(
+        None, description="centre of the grid [degrees]: [lon, lat]"
     )
     forbid_swaps: bool = Field(False, description="cancel the moves of two UAVs that swap cells")
 
@@ -223,8 +250,9 @@ class Constants(Strict):
         return {name: value for name, value in values.items() if name not in off}
 
     @model_validator(mode="after")
-    def _is_consistent(self) -> Self:
-        for check in (_off_the_grid, _too_large, _unreachable, _unfit, _out_of_range):
+    def _is_consistent(self, info: ValidationInfo) -> Self:
+        checks = (_off_the_grid, _too_large, _unreachable, _unfit, _out_of_range)
+        for check in () if info.context == DRAFT else checks:
             for problem in check(self):
                 raise ValueError(problem)
         return self
@@ -252,7 +280,8 @@ class Constants(Strict):
     @property
     def chart(self) -> Chart:
         """The zones, the no-fly cells and the ways between cells."""
-        return chart_at(*self.size, self.rectangles, self.no_fly)
+        nodes = self.nodes if self.size[0] * self.size[1] > MOST_CHARTED else ()
+        return chart_at(*self.size, self.rectangles, self.no_fly, nodes)
 
     @property
     def aim(self) -> str:
@@ -296,9 +325,23 @@ class Constants(Strict):
         """The packets of a mission with continuous arrivals at their highest rate; otherwise 0."""
         if not self.needs_events:
             return 0.0
-        rates = self.arrivals.rates or [self.arrival_rate] * len(self.nodes)
         highest = max([1.0, *(factor for _, factor in self.arrivals.schedule)])
-        return sum(rates) * highest * self.max_slots
+        return sum(self.node_rates) * highest * self.max_slots
+
+    @property
+    def node_rates(self) -> tuple[float, ...]:
+        """The arrival rate of each node [data units per slot]."""
+        merged = self.arrivals.merged or (1,) * len(self.nodes)
+        return self.arrivals.rates or tuple(self.arrival_rate * count for count in merged)
+
+    @property
+    def node_data(self) -> tuple[tuple[float, float], ...]:
+        """The range of the initial data of each node [data units]."""
+        if self.arrivals.initial:
+            return tuple((amount, amount) for amount in self.arrivals.initial)
+        low, high = self.initial_data
+        merged = self.arrivals.merged or (1,) * len(self.nodes)
+        return tuple((low * count, high * count) for count in merged)
 
     def value(self, field: str) -> Any:
         """The value of a field; ``failures.uav_rate`` is the field of a section."""
@@ -357,6 +400,8 @@ def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
         InputError: If ``zones.pads`` has another length than ``zones``.
     """
     result: dict[str, Any] = {}
+    if "nodes" in values:  # the names are those of others
+        base = {name: value for name, value in base.items() if name not in ("names", "moved")}
     for name, value in (dotted(base) | dotted(values)).items():
         section, _, part = name.partition(".")
         table = result.setdefault(section, {}) if part and section in SECTIONS else None
@@ -383,18 +428,6 @@ def dotted(values: dict[str, Any]) -> dict[str, Any]:
         else:
             fields[name] = value
     return fields
-
-
-def validated(model: type[BaseModel], values: dict[str, Any], where: str) -> Any:
-    """The model of these values.
-
-    Raises:
-        InputError: If they are not valid; ``where`` is their name or path.
-    """
-    try:
-        return model.model_validate(values)
-    except ValidationError as error:
-        raise InputError(validation_line(error, where, model)) from None
 
 
 class Scenario(Constants):
@@ -461,19 +494,32 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
 
     Args:
         name_or_path: One of ``scenario_names()``, a sea such as ``archipelago:7``
-            (``dess.sea.families``), or the path of a TOML file. In such a file, ``nodes`` may be
-            the name of a file in the same folder, which ``dess.sea.files`` reads, and ``no_fly``
-            one that ``dess.sea.files`` reads.
+            (``dess.sea.families``), or the path of a TOML file. In such a file, ``nodes`` and
+            ``no_fly`` may name files in its folder, and zones may have degrees (``dess.sea.own``).
         **overrides: Values that replace those of the file. A sampled field that is set to a single
             value is no longer sampled.
 
     Raises:
         InputError: If there is no such scenario, or it is not valid.
     """
+    return _load(name_or_path, overrides)
+
+
+def draft_scenario(name_or_path: str | Path, /, **overrides: Any) -> ScenarioSpace:
+    """The scenario that ``load_scenario`` loads or refuses for where its cells are, to be drawn."""
+    return _load(name_or_path, overrides, DRAFT)
+
+
+def _load(name_or_path: str | Path, overrides: dict[str, Any], context: str = "") -> ScenarioSpace:
     where, read = _read(name_or_path)
     read.pop("description", None)
-    values = merged(read, overrides) | _from_files(name_or_path, where, read, overrides)
-    return validated(ScenarioSpace, values, where)
+    values = merged(read, overrides)
+    if named := unread(read) | unread(values):
+        draft = validated(ScenarioSpace, values | named, where, DRAFT)
+        own = OwnSea(where, partial(_SCENARIOS.beside, name_or_path), draft)
+        given = {field: of for field, of in values.items() if field not in unread(values)}
+        values = merged(own.placed(values, read.get("nodes")), given)
+    return validated(ScenarioSpace, values, where, context)
 
 
 # What a function takes for a scenario: one, or what ``load_scenario`` takes.
@@ -489,26 +535,6 @@ def loaded(scenario: AnyScenario) -> Constants:
     """
     check_type("scenario", scenario, AnyScenario, f"{_NAMED}, Scenario or ScenarioSpace")
     return load_scenario(scenario) if isinstance(scenario, str | Path) else scenario
-
-
-def _from_files(
-    name_or_path: str | Path, where: str, read: dict[str, Any], overrides: dict[str, Any]
-) -> dict[str, Any]:
-    """The nodes and no-fly cells that a scenario names files of, unless others replace them."""
-    named = [key for key in ("nodes", "no_fly") if isinstance(read.get(key), str)]
-    if not {*named} - overrides.keys():
-        return {}
-    placeless = {"nodes": [[0, 0]], "no_fly": [], "arrivals": {}}
-    without = validated(ScenarioSpace, merged(read, overrides) | placeless, where)
-    about = without.size, without.cell_size
-    paths = {key: _SCENARIOS.beside(name_or_path, key, read[key]) for key in named}
-    cells = {}
-    if "nodes" in paths and "nodes" not in overrides:
-        cells["nodes"] = nodes_in(paths["nodes"], *about)
-    if "no_fly" in paths and "no_fly" not in overrides:
-        projection = projection_in(paths["nodes"], *about) if "nodes" in paths else None
-        cells["no_fly"] = no_fly_in(paths["no_fly"], without.size, projection)
-    return cells
 
 
 def scenario_names() -> list[str]:
@@ -582,12 +608,26 @@ def _off_the_grid(c: Constants) -> Iterator[str]:
         if count > 1:
             yield f"zones: two zones have the cell {[*cell]}; allowed: zones without common cells"
     size = f"0 <= x < {columns}, 0 <= y < {rows}" if c.rows else f"0 <= x, y < {columns}"
-    for name in ("nodes", "no_fly"):
-        for (x, y), count in Counter(getattr(c, name)).items():
-            if not (0 <= x < columns and 0 <= y < rows):
-                yield f"{name}: {[x, y]} is off the grid; allowed: {size}"
-            if count > 1:
-                yield f"{name}: {[x, y]} is listed twice; allowed: distinct cells"
+    for name, names in (("nodes", c.names), ("no_fly", ())):
+        places = getattr(c, name)
+        beyond = [n for n, (x, y) in enumerate(places) if not (0 <= x < columns and 0 <= y < rows)]
+        if beyond:
+            yield f"{name}: {_titles(beyond, places, names)} off the grid; allowed: {size}"
+        if twice := [places.index(cell) for cell, count in Counter(places).items() if count > 1]:
+            yield f"{name}: {_titles(twice, places, names)} listed twice; allowed: distinct cells"
+
+
+def _titles(
+    numbers: Sequence[int],
+    cells: Sequence[Cell],
+    names: Sequence[str],
+    verbs: tuple[str, str] = ("is", "are"),
+) -> str:
+    """Some of these cells, with their names if they have some, and the verb."""
+    known = [
+        f"{names[n]} at {[*cells[n]]}" if len(names) > n else f"{[*cells[n]]}" for n in numbers
+    ]
+    return f"{listed(known)} {verbs[len(known) > 1]}"
 
 
 def _too_large(c: Constants) -> Iterator[str]:
@@ -598,10 +638,11 @@ def _too_large(c: Constants) -> Iterator[str]:
             "grid, nodes, communication_slots, fleet: too large together; allowed: 5 * grid^2 * "
             f"nodes * communication_slots <= {MOST_ENTRIES}, and less with slots_per_cell"
         )
-    if c.no_fly and columns * rows > MOST_CHARTED:
+    charted = len(c.nodes) + sum(width * height for *_, width, height in c.rectangles)
+    if c.no_fly and columns * rows > MOST_CHARTED and charted * columns * rows > MOST_CHARTED**2:
         yield (
             f"no_fly: the {columns} x {rows} grid is too large; allowed: at most "
-            f"{MOST_CHARTED:,} cells where some are no-fly cells"
+            f"{MOST_CHARTED**2 // (columns * rows):,} nodes and cells of zones on so many cells"
         )
     has_teeth = c.age.measured and not c.needs_events
     if has_teeth and c.max_slots * c.communication_slots > MOST_TEETH:
@@ -617,27 +658,35 @@ def _too_large(c: Constants) -> Iterator[str]:
 
 
 def _unreachable(c: Constants) -> Iterator[str]:
-    """The first of the cells of zones and nodes that no UAV can reach from the start zone."""
+    """The cells of zones and nodes that no UAV can reach from the start zone."""
     if not c.no_fly:
         return
     zones = zones_of(*c.size, (), c.no_fly)
     x, y, *_ = c.zone
     ways = spread(zones, np.array([[x, y]]))[0].reshape(zones.shape)
-    for name, cells in (("zone", parking_of(c.rectangles)), ("nodes", c.nodes)):
-        for cell in cells:
-            if ways[cell[::-1]] == FAR:
-                is_in = "is a no-fly cell" if cell in c.no_fly else "cannot be reached"
-                yield f"{name}: {[*cell]} {is_in}; allowed: cells with a way from the start zone"
-                return
+    for name, cells, names in (("zone", parking_of(c.rectangles), ()), ("nodes", c.nodes, c.names)):
+        cut = [n for n, cell in enumerate(cells) if ways[cell[::-1]] == FAR]
+        closed = [n for n in cut if zones[cells[n][::-1]] == NO_FLY]
+        lost = [n for n in cut if n not in closed and zones[y, x] != NO_FLY]
+        kind = "a no-fly cell" if len(closed) == 1 else "no-fly cells"
+        problems = [f"{_titles(closed, cells, names)} {kind}"] if closed else []
+        if lost:
+            problems.append(f"{_titles(lost, cells, names, ('cannot', 'cannot'))} be reached")
+        if problems:
+            allowed = "cells with a way from the start zone"
+            yield f"{name}: {', and '.join(problems)}; allowed: {allowed}"
 
 
 def _unfit(c: Constants) -> Iterator[str]:
     """The rates, the pads and the initial data fit to the nodes and the zones."""
-    rates, (low, high) = c.arrivals.rates, c.initial_data
+    count, (low, high) = len(c.nodes), c.initial_data
     if c.quota == 0 and not c.landing:
         yield "quota: 0 needs landing; allowed: 1..1000000, or landing = true"
-    if rates and len(rates) != len(c.nodes):
-        yield f"arrivals.rates: there are {len(rates)}; allowed: {len(c.nodes)}, a rate per node"
+    for name in ("names", "arrivals.rates", "arrivals.initial", "arrivals.merged"):
+        if len(c.value(name)) not in (0, count):
+            yield f"{name}: there are {len(c.value(name))}; allowed: {count}, one per node"
+    if max(c.node_rates) > MOST_RATE:
+        yield f"arrivals.merged: a node has the rate {max(c.node_rates):g}; allowed: {MOST_RATE}"
     for number, ((*_, width, height), pads) in enumerate(
         zip(c.rectangles, c.zone_pads, strict=True)
     ):

@@ -70,6 +70,7 @@ MISSION = np.dtype(
         *fields(np.float64, "initial_low initial_high arrival_rate reward_data reward_overruled"),
         *fields(np.float64, "reward_depleted reward_charging reward_quota reward_step"),
         ("continuous", np.int64),  # whether arrivals are
+        ("own_rates", np.int64),  # whether nodes have their own, and arrival_rate is their mean
         ("age_measured", np.int64),  # in the slotted model
         ("age_reward", np.float64),
         # Progress: mission slots done, UAVs still active, and data [data units], of which
@@ -124,6 +125,7 @@ SENSOR = np.dtype(
         ("newest", np.float64),  # from when the newest data are that were collected [slots]
         ("silent", np.bool_),
         ("hidden", np.float64),  # its data while it is silent [data units]
+        ("rate", np.float64),  # its arrival rate, where nodes have their own
     ],
     align=True,
 )
@@ -176,7 +178,9 @@ def constants_of(scenario: ScenarioSpace) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
-    low, high = scenario.initial_data
+    low, high = np.transpose(scenario.node_data)
+    arrivals = scenario.arrivals
+    own_rates = not scenario.needs_events and bool(arrivals.rates or arrivals.merged)
     slotted_age = scenario.age.measured and not scenario.needs_events
     values = {
         **dict(scenario),
@@ -184,11 +188,13 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         **dict(zip(("zone_x", "zone_y", "zone_width", "zone_height"), scenario.zone, strict=True)),
         **{"nodes": len(scenario.nodes), "pads": scenario.charging_pads},
         "zones": len(scenario.rectangles),
-        **{"initial_low": low, "initial_high": high, "slowest": fleet.slowest(scenario.fleet)},
+        **{"initial_low": low.min(), "initial_high": high.max()},
+        **{"own_rates": own_rates, "slowest": fleet.slowest(scenario.fleet)},
         "communication_slot_length": scenario.slot_length / scenario.communication_slots,
         "shadowing_deviation": np.sqrt(scenario.shadowing_variance),
         **{"continuous": scenario.needs_events, "age_measured": slotted_age},
         "age_reward": scenario.age.reward,
+        **({"arrival_rate": np.mean(scenario.node_rates)} if own_rates else {}),
         **wind.constants(scenario.wind, scenario.size),
         **scenario.charging.constants(),
         **scenario.failures.constants(),
@@ -228,11 +234,15 @@ class Starts(NamedTuple):
         constants: (P,) records of ``constants_of``, with the seed.
         ranges: (P, 4, 2) ranges of the sampled parameters.
         uavs: (P, I) records of ``types_of``.
+        data: (P, K, 2) ranges of the initial data of the nodes.
+        rates: (P, K) arrival rates of the nodes.
     """
 
     constants: np.ndarray
     ranges: np.ndarray
     uavs: np.ndarray
+    data: np.ndarray
+    rates: np.ndarray
 
 
 def starts_of(spaces: Sequence[ScenarioSpace], seed: int = 0) -> Starts:
@@ -244,7 +254,8 @@ def starts_of(spaces: Sequence[ScenarioSpace], seed: int = 0) -> Starts:
     constants["seed"] = seed
     ranges = np.stack([ranges_of(space) for space in spaces])
     types = np.stack([types_of(space, fleet) for space in spaces], dtype=UAV)
-    return Starts(constants, ranges, types)
+    data, rates = (np.array([getattr(s, of) for s in spaces]) for of in ("node_data", "node_rates"))
+    return Starts(constants, ranges, types, data, rates)
 
 
 @kernel

@@ -95,7 +95,7 @@ class Playback:
         aged = scenario.age.measured
         return {
             **{"size": scenario.size, "zones": scenario.rectangles},
-            **{"nodes": scenario.nodes, "noFly": scenario.no_fly},
+            **{"nodes": scenario.nodes, "names": scenario.names, "noFly": scenario.no_fly},
             "thresholds": {"C_S": scenario.charge_start, "C_C": scenario.charge_complete},
             "colours": {"uavs": self.uav_colours, "nodes": self.node_colours},
             "pads": scenario.charging_pads,

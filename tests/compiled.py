@@ -7,7 +7,7 @@ from dess.channel import empty_scratch
 from dess.code.kernels import kernel
 from dess.policies import heuristics
 from dess.sea.chart import FAR, distance, is_open
-from dess.state import STEP_X, STEP_Y
+from dess.state import SENSOR, STEP_X, STEP_Y
 
 
 @kernel
@@ -23,12 +23,13 @@ def move(mission, uavs, chart):
 
 
 def arrive(mission, residual, arrivals):
-    _arrive(mission, residual, arrivals, *empty_scratch(1, len(residual)))
+    sensors = np.zeros(len(residual), SENSOR)
+    _arrive(mission, residual, sensors, arrivals, *empty_scratch(1, len(residual)))
 
 
 @kernel
-def _arrive(mission, residual, arrivals, batches, search):
-    rules.arrive(mission, residual, arrivals, batches, search)
+def _arrive(mission, residual, sensors, arrivals, batches, search):
+    rules.arrive(mission, residual, sensors, arrivals, batches, search)
 
 
 @kernel

@@ -46,9 +46,12 @@ def runs(folder: Path, extras: set[str], *lines: str) -> dict[str, tuple[int, st
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder with a small study."""
+    """A folder with a small study, and a sea with a lane."""
     folder = tmp_path_factory.mktemp("plain")
     small_study(folder)
+    line = {"geometry": {"type": "LineString", "coordinates": [[8, 54], [9, 55]]}}
+    (folder / "lane.json").write_text(json.dumps({"features": [line]}))
+    (folder / "lane.toml").write_text('centre = [8.5, 54.5]\nno_fly = "lane.json"\n')
     return folder
 
 
@@ -71,6 +74,7 @@ MISSED = {
     "study export trial --crate trial.zip": ("dess study needs ", "reports"),
     "simulate --figure mission.png": ("dess simulate needs matplotlib", "reports"),
     "report ./trial": ("dess report needs ", "reports"),
+    "scenarios show lane.toml": ("no_fly with lines, touched or buffer needs shapely", "geo"),
 }
 
 

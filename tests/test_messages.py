@@ -26,7 +26,10 @@ from dess.policies.registry import TRAINED
 from dess.record import MISSION_RECORD
 from dess.reports.pages.page import Card, Learned
 from dess.scenario import Scenario, ScenarioSpace, validated
-from dess.sea import files
+from dess.sea.no_fly import NoFlyFile
+from dess.sea.nodes import NodesFile
+from dess.sea.own import ZonePlace
+from dess.sea.places import Features
 
 SECTIONS = {
     "arrivals": {"process": "continuous", "schedule": [[0, 1.0]], "buffer": 3},
@@ -81,18 +84,20 @@ def documents() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     cost = {"policy": "greedy", "calls": 1, "median": 1e-6, "slow": 1e-6}
     yield Times, {"processor": "x", "costs": [cost]}
     point = {"type": "Point", "coordinates": [1.0, 2.0]}
-    yield files.Points, {"features": [{"geometry": point}]}
+    yield Features, {"features": [{"geometry": point, "properties": {"Name": "A"}}]}
     yield Card, {"title": "", "finding": "", "picture": {"alt": "", "source": "", "narrow": ""}}
     yield Learned, {"files": {"a": ""}}
-    ring = [[1.0, 2.0], [3.0, 2.0], [3.0, 4.0], [1.0, 2.0]]
-    polygon = {"type": "Polygon", "coordinates": [ring]}
-    yield files.Polygons, {"features": [{"geometry": polygon}]}
+    geometries = {"type": "GeometryCollection", "geometries": [point]}
+    yield Features, {"features": [{"geometry": geometries}]}
 
 
 def tables() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     """Valid tables, as TOML and the files of trainings have them."""
     yield Scenario, Scenario.of(**SECTIONS).model_dump(mode="json")
     yield ScenarioSpace, ScenarioSpace.of(**SECTIONS).model_dump(mode="json")
+    yield NodesFile, {"file": "n.csv", "where": {"A": "B"}, "place": "merge", "name": "C"}
+    yield NoFlyFile, {"file": "n.json", "touched": True, "width": 1.0, "colours": ["#ff0000"]}
+    yield ZonePlace, {"lon": 1.0, "lat": 2.0, "width": 3, "height": 4}
     for design in DESIGNS:
         yield Study, study(missions=1, design=design)
     for rule in RULES:

@@ -197,7 +197,9 @@ def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
     record = state.missions[0]
     starts = np.stack([state.uavs[0][axis][: sampled.uavs] for axis in "xy"], axis=1)
     residual = state.residual[0]
-    data = _data_by(record, residual, phases.slots, *empty_scratch(1, len(residual)))
+    data = _data_by(
+        record, residual, state.sensors[0], phases.slots, *empty_scratch(1, len(residual))
+    )
     world = world_of(scenario)
     points = POINTS if scenario.shadowing_variance > 0 else np.zeros(1)
     below = spread(points) if scenario.shadowing_variance > 0 else np.array([0.0, 1.0])
@@ -209,7 +211,7 @@ def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
 
 
 @kernel
-def _data_by(mission, residual, slots, batches, search):
+def _data_by(mission, residual, sensors, slots, batches, search):
     """(T + 1, K) the data that each node has had by the start of slot t = 0..T."""
     data = np.empty((slots + 1, len(residual)))
     arrivals = np.empty(len(residual), np.int64)
@@ -217,7 +219,7 @@ def _data_by(mission, residual, slots, batches, search):
     for t in range(slots):
         data[t] = had
         mission.slot = t
-        rules.arrive(mission, had, arrivals, batches, search)
+        rules.arrive(mission, had, sensors, arrivals, batches, search)
     data[slots] = had
     return data
 

@@ -214,11 +214,14 @@ def _outcome(events: event_log.Events, scenario: Scenario) -> str:
 
 
 def _grid(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
-    """The grid, its zone and its nodes."""
+    """The grid, its zone and its nodes, with their names if they have some."""
     chart(scenario, ax)
     nodes = np.array(scenario.nodes)
     ax.scatter(nodes[:, 0], nodes[:, 1], c=style.node_colours(len(nodes)), s=95,
                edgecolors="white", linewidths=1.2, zorder=3, gid="nodes")  # fmt: skip
+    for (x, y), name in zip(scenario.nodes, scenario.names, strict=False):
+        ax.annotate(name, (x, y), (4, 4), textcoords="offset points", fontsize=5.5, zorder=3,
+                    color=style.INK, annotation_clip=True)  # fmt: skip
 
 
 @mpl.rc_context({"text.parse_math": True})  # an arrow is a symbol in TeX

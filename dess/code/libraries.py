@@ -3,6 +3,7 @@
     pip install dess               the simulator, the heuristics, evaluations, studies and sweeps
     pip install 'dess[learning]'   trained policies and trainings
     pip install 'dess[reports]'    figures, pages, and studies of sensitivities
+    pip install 'dess[geo]'        shipping lanes and buffers of seas from GeoJSON files
     pip install 'dess[all]'        everything
     pip install 'dess[examples]'   the libraries of the examples, as far as they fit together
 
@@ -21,6 +22,7 @@ EXTRAS = {
         *("matplotlib", "PIL", "seaborn", "SALib", "IPython", "jinja2", "jupytext"),
         *("markupsafe", "nbconvert", "nbformat", "packaging", "pygments", "traitlets"),
     ),
+    "geo": ("shapely",),
     "distributed": ("distributed",),
     "tensorboard": ("tensorboard",),
     "examples": ("sb3_contrib", "stable_baselines3", "supersuit", "torchrl"),

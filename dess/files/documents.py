@@ -6,6 +6,7 @@ class Notes(Document):
 notes = Notes.load(Path("notes.json"), "what dess notes has written")
 """
 
+from codecs import BOM_UTF8
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -95,7 +96,7 @@ class Document(BaseModel):
             InputError: If the file cannot be read, or is not valid.
         """
         content = read_bytes(path, limit, absent or allowed or "a file")
-        return cls.parse(content, str(path), allowed, fixed)
+        return cls.parse(content.removeprefix(BOM_UTF8), str(path), allowed, fixed)
 
 
 def _refused(line: str, allowed: str) -> str:

@@ -226,7 +226,7 @@ class Shipped(NamedTuple):
         return sorted(file.name[:-5] for file in files if file.name.endswith(".toml"))
 
     def beside(self, name_or_path: str | Path, key: str, file: str) -> Path:
-        """The path of a file that a TOML file names, which must lie in the same folder.
+        """The path of a file that a TOML file names, which must lie in its folder or below.
 
         Args:
             name_or_path: The TOML file, as ``load`` takes it.
@@ -239,12 +239,15 @@ class Shipped(NamedTuple):
         folder = Path(name_or_path).parent
         if str(name_or_path) in self.names():
             folder = Path(str(resources.files(self.package).joinpath(self.folder)))
-        is_name = Path(file).name == file and file not in ("", "..") and "\0" not in file
-        if not is_name or Path(realpath(folder / file)).parent != Path(realpath(folder)):
+        is_inside = file not in ("", ".") and "\0" not in file
+        if not is_inside or Path(realpath(folder)) not in Path(realpath(folder / file)).parents:
             raise InputError(
                 f"{name_or_path}: {key}: {shown(file)} is not in the same folder; allowed: the "
-                "name of a file beside this one"
+                "name of a file beside this one, or in a folder there"
             )
+        if "\\" in file and not (folder / file).exists():
+            named = file.replace("\\", "/")
+            raise InputError(f"{name_or_path}: {key}: {shown(file)} is no file; allowed: {named}")
         return folder / file
 
     def load(
@@ -270,7 +273,7 @@ class Shipped(NamedTuple):
             file = resources.files(self.package).joinpath(f"{self.folder}/{text}.toml")
             return where, parse_toml(file.read_text("utf-8"), where)
         try:
-            return text, parse_toml(read_text(Path(text), TOML_LIMIT), text)
+            return text, parse_toml(read_text(Path(text), TOML_LIMIT, "utf-8-sig"), text)
         except Missing:
             allowed = one_of(text, [*self.names(), *others], "a TOML file")
             raise InputError(f"{text}: no such {self.kind}{allowed}") from None

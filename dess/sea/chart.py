@@ -20,6 +20,9 @@ Rectangle = tuple[int, int, int, int]  # x, y, width and height
 OPEN, NO_FLY = -1, -2
 FAR = 2**15 - 1  # [cells]: there is no way
 
+# The most cells of a grid of which the ways between all are kept: 200 MB.
+MOST_CHARTED = 10_000
+
 
 class Chart(NamedTuple):
     """The geometry that all missions of a batch share, for a grid of H rows and W columns.
@@ -33,6 +36,8 @@ class Chart(NamedTuple):
         nearest: (H, W) the number of the parking cell that is nearest to a cell.
         ways: (W * H, W * H) cells on the shortest way between two cells, numbered row by row, or
             ``FAR``; None without no-fly cells, so that the compiler leaves out the table.
+        rows: (W * H,) the row of ``ways`` that a cell has, or -1: on a large grid, only parking
+            cells and nodes have one; None where all cells have.
     """
 
     zones: np.ndarray
@@ -40,6 +45,7 @@ class Chart(NamedTuple):
     sizes: np.ndarray
     nearest: np.ndarray
     ways: np.ndarray | None
+    rows: np.ndarray | None
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Chart":
         return self
@@ -85,19 +91,27 @@ def parking_of(zones: Iterable[Rectangle]) -> list[Cell]:
 
 @lru_cache(maxsize=16)
 def chart_at(
-    width: int, height: int, zones: tuple[Rectangle, ...], no_fly: tuple[Cell, ...]
+    width: int,
+    height: int,
+    zones: tuple[Rectangle, ...],
+    no_fly: tuple[Cell, ...],
+    nodes: tuple[Cell, ...] = (),
 ) -> Chart:
-    """The chart of a grid with these zones and no-fly cells."""
+    """The chart of a grid with these zones and no-fly cells; only a large grid needs its nodes."""
     cells = zones_of(width, height, zones, no_fly)
     parking = np.array(parking_of(zones), np.int64)
     sizes = np.array([columns * rows for _, _, columns, rows in zones], np.int64)
     nearest = spread(cells, parking)[1].reshape(cells.shape)
-    ways = None
-    if no_fly:
-        ways = np.empty((cells.size, cells.size), np.int16)
-        for number, (y, x) in enumerate(np.ndindex(cells.shape)):
-            ways[number] = spread(cells, np.array([[x, y]]))[0]
-    return _chart_of(cells, parking, sizes, nearest, ways)
+    if not no_fly:
+        return _chart_of(cells, parking, sizes, nearest, None, None)
+    places, rows = [(x, y) for y, x in np.ndindex(cells.shape)], None
+    if cells.size > MOST_CHARTED:
+        places, rows = [*{*parking_of(zones), *nodes}], np.full(cells.size, -1, np.int64)
+        rows[[y * width + x for x, y in places]] = np.arange(len(places))
+    ways = np.empty((len(places), cells.size), np.int16)
+    for number, place in enumerate(places):
+        ways[number] = spread(cells, np.array([place]))[0]
+    return _chart_of(cells, parking, sizes, nearest, ways, rows)
 
 
 def geometry(chart: Chart) -> dict[str, Any]:
@@ -200,11 +214,25 @@ def in_zone(chart, x, y):
 @inlined
 def distance(chart, x, y, to_x, to_y):
     """The cells on the shortest way between two cells of the grid."""
-    return _distance(chart.ways, chart.zones.shape[1], x, y, to_x, to_y)
+    return _distance(chart.ways, chart.rows, chart.zones, x, y, to_x, to_y)
 
 
 @inlined
-def _distance(ways, width, x, y, to_x, to_y):
+def _distance(ways, rows, zones, x, y, to_x, to_y):
     if ways is None:
         return abs(x - to_x) + abs(y - to_y)
-    return np.int64(ways[to_y * width + to_x, y * width + x])
+    cell, to = y * zones.shape[1] + x, to_y * zones.shape[1] + to_x
+    if rows is None:
+        return np.int64(ways[to, cell])
+    return _distance_on_large_grid(ways, rows, zones, cell, to)
+
+
+@kernel
+def _distance_on_large_grid(ways, rows, zones, cell, to):
+    if rows[to] >= 0:
+        return np.int64(ways[rows[to], cell])
+    if rows[cell] >= 0:
+        return np.int64(ways[rows[cell], to])
+    width = zones.shape[1]
+    none = np.empty(0, np.int64)
+    return length_around(zones, none, cell % width, cell // width, to % width, to // width)

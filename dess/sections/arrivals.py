@@ -8,6 +8,7 @@ the policy nor on those of other nodes.
 """
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
@@ -22,6 +23,7 @@ from dess.sections.section import Integer, Number, Section
 MOST, LAST, MOST_ROWS = 100, 1_000_000, 10_000
 
 Rate = Annotated[Number, Field(ge=0, le=MOST)]
+Amount = Annotated[Number, Field(ge=0, le=10**9)]
 Time = Annotated[Number, Field(ge=0, le=LAST)]
 
 # The Poisson process of one node.
@@ -35,7 +37,10 @@ SOURCE = np.dtype(
 
 
 class Arrivals(Section):
-    """Packets of one data unit that arrive in continuous time; only the SimPy engine has them."""
+    """What data nodes have of their own, and packets of one data unit in continuous time.
+
+    Only the SimPy engine has arrivals in continuous time.
+    """
 
     process: Literal["slotted", "continuous"] = Field(
         "slotted",
@@ -47,6 +52,18 @@ class Arrivals(Section):
         max_length=1024,
         description="arrival rate per node [data units per slot]: a number 0..100 per node; "
         "without it, arrival_rate for all",
+    )
+    initial: tuple[Amount, ...] = Field(
+        (),
+        max_length=1024,
+        description="initial data per node [data units]: a number for each; without it, "
+        "initial_data for all",
+    )
+    merged: tuple[Annotated[Integer, Field(ge=1)], ...] = Field(
+        (),
+        max_length=1024,
+        description="how many sensor nodes each node stands for: it has as many times the "
+        "arrival_rate and the initial_data",
     )
     schedule: tuple[tuple[Time, Rate], ...] = Field(
         (),
@@ -63,10 +80,9 @@ class Arrivals(Section):
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
-        if self.process == "slotted" and self.is_on:
+        if self.process == "slotted" and (self.schedule or self.buffer or self.service != "oldest"):
             raise ValueError(
-                "process: slotted arrivals have no rates, schedule, buffer or service; "
-                "allowed: continuous"
+                "process: slotted arrivals have no schedule, buffer or service; allowed: continuous"
             )
         for (earlier, _), (later, _) in pairwise(self.schedule):
             if later <= earlier:
@@ -76,10 +92,10 @@ class Arrivals(Section):
         return self
 
 
-def sources_of(arrivals: Arrivals, arrival_rate: float, nodes: int) -> np.ndarray:
-    """The (K,) ``SOURCE`` records of the nodes, before their first arrival."""
-    sources = np.zeros(nodes, SOURCE)
-    sources["rate"] = arrivals.rates or arrival_rate
+def sources_of(rates: Sequence[float]) -> np.ndarray:
+    """The (K,) ``SOURCE`` records of nodes with these rates, before their first arrival."""
+    sources = np.zeros(len(rates), SOURCE)
+    sources["rate"] = rates
     return sources
 
 

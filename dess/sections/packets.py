@@ -172,7 +172,7 @@ class Packets:
         self._residual, self._sensors = state.residual[0], state.sensors[0]
         arrivals, nodes = scenario.arrivals, len(scenario.nodes)
         self._measures_age = scenario.age.measured
-        self._sources = sources_of(arrivals, scenario.arrival_rate, nodes)
+        self._sources = sources_of(scenario.node_rates)
         self._factors = factors_of(arrivals)
         self.buffers = Buffers(nodes, arrivals.buffer, arrivals.service == "newest")
         for k in range(nodes):

@@ -1,6 +1,7 @@
 """``dess policies``, ``dess scenarios`` and ``dess studies``: lists, and ``show`` for one name."""
 
 import json
+from pathlib import Path
 from textwrap import wrap
 from typing import Annotated, Any
 
@@ -9,6 +10,7 @@ import typer
 from dess.errors import cut
 from dess.reports.cli import console, options
 from dess.reports.cli.options import JsonOption, SetOption, command, load_space
+from dess.reports.cli.simulate import FIGURES, save_figure
 
 policies = typer.Typer(invoke_without_command=True, help="List the policies, or show one.")
 scenarios = typer.Typer(
@@ -70,6 +72,7 @@ def show_scenario(
     name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=options.scenarios)],
     settings: SetOption = None,
     everything: Annotated[bool, typer.Option("--all")] = False,
+    figure: Annotated[Path | None, typer.Option(metavar="FILE.png")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show every field of a scenario: its value and what it is.
@@ -77,10 +80,18 @@ def show_scenario(
     Args:
         name: A shipped scenario, a generated one such as archipelago:7, or a TOML file.
         everything: Show the defaults and what is allowed as well, in full.
+        figure: Draw the map of the sea into this file, also if its nodes or zones are refused.
     """
     from dess.analysis.names import fields
-    from dess.scenario import scenario_description
+    from dess.scenario import draft_scenario, scenario_description
 
+    console.check_ending("--figure", figure, FIGURES, "a picture")
+    if figure:
+        from dess.analysis.figures.missions import sea_figure
+
+        with console.outputs([figure]) as [temporary]:
+            sea = draft_scenario(name, **dict(map(options.setting, settings or [])))
+            save_figure(sea_figure(sea), temporary, figure.suffix[1:])
     space, description = load_space(name, settings), scenario_description(name)
     if as_json:
         rows = [field._asdict() for field in fields(space)]

@@ -15,6 +15,7 @@ from dess.reports.cli.console import YesOption
 
 if TYPE_CHECKING:
     import numpy as np
+    from matplotlib.figure import Figure
 
     from dess.policies.registry import Policy
     from dess.record import MissionRecord
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 LOGS = (".parquet", ".csv")
 FIGURES = (".png", ".pdf", ".svg")
 ANIMATIONS = (".gif", ".mp4", ".html")
+PATHS = (".geojson", ".kml", ".csv")
 # Metrics of ``--json``, between the names and the UAVs.
 METRICS = (
     *("slots", "success", "collection_ratio", "collection_ratio_and_communication"),
@@ -48,6 +50,7 @@ def simulate(
     events: Annotated[Path | None, typer.Option(metavar="FILE.parquet")] = None,
     figure: Annotated[Path | None, typer.Option(metavar="FILE.png")] = None,
     animation: Annotated[Path | None, typer.Option(metavar="FILE.gif")] = None,
+    path: Annotated[Path | None, typer.Option(metavar="FILE.geojson")] = None,
     yes: YesOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -65,6 +68,8 @@ def simulate(
         figure: Draw the mission into this file: .png, .pdf or .svg.
         animation: Write the mission as an animation: .gif, .mp4 (needs ffmpeg), or .html, a
             page with its player.
+        path: Write the path of each UAV with its times, in degrees where the sea has them:
+            .geojson, .kml or .csv.
     """
     from dess import simulate
     from dess.analysis.execution.effort import check_missions
@@ -84,13 +89,16 @@ def simulate(
     if not yes:
         check_missions("simulate", [asked.space])
     check_seed(asked.seed, asked.replication)
-    writers = {events: _write_log, figure: _draw, animation: _animate}
-    paths = [path for path in (events, figure, animation) if path]
-    if len({path.absolute() for path in paths}) < len(paths):
+    if path and path.suffix.lower() == ".kml" and asked.space.centre is None:
+        raise InputError(f"--path: {path}: the sea has no degrees; allowed: .geojson, .csv")
+    writers = {events: _write_log, figure: _draw, animation: _animate, path: _write_path}
+    paths = [file for file in (events, figure, animation, path) if file]
+    if len({file.absolute() for file in paths}) < len(paths):
         raise InputError("--events, --figure: the same file; allowed: a file for each")
     console.check_ending("--events", events, LOGS, "an event log", is_stream=True)
     console.check_ending("--figure", figure, FIGURES, "a picture")
     console.check_ending("--animation", animation, ANIMATIONS, "an animation")
+    console.check_ending("--path", path, PATHS, "a path")
     if animation and animation.suffix.lower() == ".mp4":
         from dess.reports.player import check_ffmpeg
 
@@ -104,9 +112,9 @@ def simulate(
             which = asked.seed, asked.replication
             record = simulate(asked.space, asked.team, *which, events=bool(paths) or not as_json)
         mission = _Mission(record, sample_scenario(asked.space, *which), asked.title)
-        for path, temporary in zip(paths, temporaries, strict=True):
-            with writable(path):
-                writers[path](mission, temporary, path.suffix[1:].lower())
+        for file, temporary in zip(paths, temporaries, strict=True):
+            with writable(file):
+                writers[file](mission, temporary, file.suffix[1:].lower())
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
         fields = record.metrics.dtype.names or ()
@@ -219,13 +227,17 @@ class _Mission:
 
 
 def _write_log(mission: _Mission, path: Path, kind: str) -> None:
+    import numpy as np
     import pyarrow as pa
     from pyarrow.csv import write_csv
 
     from dess.files.tables import parquet_of
     from dess.files.writing import fill
 
-    table = pa.table(mission.log)
+    columns = dict(mission.log)
+    if names := mission.scenario.names:
+        columns["name"] = np.array([*names, None])[columns["node"]]
+    table = pa.table(columns)
     if kind == "csv":
         write_csv(table, path)
     else:
@@ -235,7 +247,12 @@ def _write_log(mission: _Mission, path: Path, kind: str) -> None:
 def _draw(mission: _Mission, path: Path, kind: str) -> None:
     from dess.analysis.figures.missions import mission_figure
 
-    mission_figure(mission.log, mission.scenario).savefig(path, format=kind)
+    save_figure(mission_figure(mission.log, mission.scenario), path, kind)
+
+
+def save_figure(figure: "Figure", path: Path, kind: str) -> None:
+    """Write a figure into a temporary file; ``kind`` is the ending of its final name."""
+    figure.savefig(path, format=kind)
 
 
 def _animate(mission: _Mission, path: Path, kind: str) -> None:
@@ -245,6 +262,13 @@ def _animate(mission: _Mission, path: Path, kind: str) -> None:
         _write_page(mission, path)
     else:
         write_animation(mission.log, mission.scenario, path, kind, mission.title)
+
+
+def _write_path(mission: _Mission, path: Path, kind: str) -> None:
+    from dess.analysis.results.flight import path_text
+    from dess.files.writing import fill
+
+    fill(path, path_text(mission.log, mission.scenario, kind).encode())
 
 
 def _write_page(mission: _Mission, path: Path) -> None:
@@ -263,7 +287,7 @@ def _write_page(mission: _Mission, path: Path) -> None:
 
 def _print_mission(mission: _Mission) -> None:
     from dess.analysis.metrics import MEASURES
-    from dess.analysis.results.event_log import causes
+    from dess.analysis.results.event_log import causes, residual_data
 
     record = mission.record
     metrics = record.metrics
@@ -275,5 +299,10 @@ def _print_mission(mission: _Mission) -> None:
     uavs = record.uav_rows()
     rows = [[str(number), *map(str, row.values())] for number, row in enumerate(uavs)]
     console.print_table(["UAV", *uavs[0]], rows)
+    if names := mission.scenario.names:
+        data = residual_data(mission.log).to_numpy()
+        of_nodes = zip(names, mission.scenario.nodes, data[0], data[-1], strict=True)
+        rows = [[name, str([*cell]), f"{had:g}", f"{left:g}"] for name, cell, had, left in of_nodes]
+        console.print_table(["node", "cell", "data at the start", "at the end"], rows)
     for cause in causes(mission.log, mission.scenario, first=0):  # as in the table
         console.say(f"{cause}.")

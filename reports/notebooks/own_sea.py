@@ -33,6 +33,7 @@ from dess.analysis import sweep
 from dess.analysis.answers import costs
 from dess.analysis.figures import settings as figures
 from dess.analysis.figures.missions import mission_figure, sea_figure
+from dess.analysis.names import placing
 from dess.analysis.results.resimulate import mission_of
 from dess.policies import load_team
 from dess.reports.pages import html
@@ -59,11 +60,12 @@ html.say("{lines}", lines=html.composed("\n".join(f"- {line}" for line in answer
 policy = costs.best_policy(answer.results)
 mission = mission_of(load_scenario(scenario, **example), load_team(policy), seed)
 map_of_mission = mission_figure(mission.events, mission.scenario)
+note = placing(sea)
 
 # %%
 html.gallery(
     [
-        (sea_figure(sea), "Map of the sea", f"The n = {len(sea.nodes)} nodes and the zone."),
+        (sea_figure(sea), "Map of the sea", f"The n = {len(sea.nodes)} nodes and the zone.{note}"),
         (map_of_mission, "Map of a mission", f"A mission of {policy}, replication 0 (n = 1)."),
     ]
 )

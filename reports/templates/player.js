@@ -288,7 +288,7 @@ function playMission(id, mission) {
         if (!p || !p.isMap) return;
         const i = uavs.findIndex((_, i) => near([fleet.x[slot][i], fleet.y[slot][i]])), k = nodes.findIndex(near);
         if (i >= 0) canvas.title = `UAV ${i + 1}: battery ${fleet.battery[slot][i]} %`;
-        else if (k >= 0) canvas.title = `node ${k}: ${residual[slot][k].toFixed(1)} data units`;
+        else if (k >= 0) canvas.title = `${mission.names[k] ?? `node ${k}`}: ${residual[slot][k].toFixed(1)} data units`;
     });
     function follow() {
         const asked = location.hash.match(/^#slot=(\d+)$/);

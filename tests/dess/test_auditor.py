@@ -84,7 +84,8 @@ SEA: dict[str, Any] = {
 }
 ISLANDS, ALL = ScenarioSpace.of(SCENARIO, **SEA), ScenarioSpace.of(BEYOND, **SEA)
 SCENARIOS = {"paper": SCENARIO, "beyond": BEYOND, "data lost": DATA_LOST, "packets": PACKETS}
-SCENARIOS |= {"islands": ISLANDS, "all": ALL}
+OWN = ScenarioSpace.of(SCENARIO, arrivals={"rates": [0.0, 0.6], "initial": [60, 50]})
+SCENARIOS |= {"islands": ISLANDS, "all": ALL, "own": OWN}
 # What they must have logged, beside what every mission of theirs logs.
 EVENTS = {"collision", "charge_request", "charge_withdrawal", "charge_end"}
 BEYONDS = EVENTS | {"uav_failure", "pad_failure", "pad_repair", "node_failure", "node_repair"}
@@ -95,6 +96,7 @@ LOGGED = {
     "packets": BEYONDS | {"loss", "delivery"},
     "islands": EVENTS | {"quota_filled", "battery_empty"},
     "all": BEYONDS | {"uav_repair"},
+    "own": EVENTS | {"quota_filled", "battery_empty"},
 }
 # What the log alone cannot contradict: the key of the random streams, a level between two
 # batteries, and the SNR at which a node is emptied.

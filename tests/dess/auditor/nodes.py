@@ -27,6 +27,12 @@ class Nodes:
         self.ages = Ages(len(self.cells))
         self.loses = constants.get("failures", {}).get("node_data") == "lost"
         arrivals = constants.get("arrivals", {"process": "slotted"})
+        count = len(self.cells)
+        merged = arrivals.get("merged") or [1] * count
+        self.rates = arrivals.get("rates") or [constants["arrival_rate"] * n for n in merged]
+        low, high = constants["initial_data"]
+        own = [(data, data) for data in arrivals.get("initial", ())]
+        self.ranges = own or [(low * n, high * n) for n in merged]
         is_continuous = arrivals["process"] == "continuous"
         self.packets = Packets(log, arrivals, self.cells) if is_continuous else None
 
@@ -37,8 +43,7 @@ class Nodes:
 
     def begin(self) -> None:
         """Take the initial data from the log."""
-        low, high = self.c["initial_data"]
-        for k in range(len(self.cells)):
+        for k, (low, high) in enumerate(self.ranges):
             amount, packet = self.log.next_row.value, {}
             if self.packets is not None and amount > 0:
                 packet = {"packet": len(self.packets.all), "generated": 0.0}
@@ -129,7 +134,7 @@ class Nodes:
             self.log.require(last < k < len(self.cells), "an arrival out of order")
             self.take("arrival", self.log.slot, k, value=amount)
             is_count = amount >= 1 and amount == int(amount)
-            self.log.require(is_count and self.c["arrival_rate"] > 0, "no number of packets")
+            self.log.require(is_count and self.rates[k] > 0, "no number of packets")
             self.residual[k] += amount
             self.arrived += amount
             last = k
@@ -141,7 +146,7 @@ class Nodes:
             time, k, number = row.time, row.node, len(packets.all)
             self.log.require(now <= time and 0 <= k < len(self.cells), "an arrival out of order")
             self.take("arrival", time, k, value=1.0, packet=number, generated=time)
-            packets.check_rate(k, time, self.c["arrival_rate"])
+            packets.check_rate(k, time, self.rates[k])
             now, gained = time, 1.0
             self.arrived += 1.0
             lost = packets.store(k, time, 1.0)

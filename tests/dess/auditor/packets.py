@@ -59,8 +59,7 @@ class Packets:
     def check_rate(self, node: int, time: float, rate: float) -> None:
         """Check that a packet can arrive at a node at a time."""
         factors = [1.0, *(factor for start, factor in self.arrivals["schedule"] if start <= time)]
-        own = self.arrivals["rates"][node] if self.arrivals["rates"] else rate
-        self.log.require(own * factors[-1] > 0, "a packet where none can arrive")
+        self.log.require(rate * factors[-1] > 0, "a packet where none can arrive")
 
     def metrics(self) -> dict[str, float]:
         """What the record has of the packets."""

@@ -11,11 +11,35 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dess import InputError, load_scenario
-from dess.sea.files import Projection, centres_in, no_fly_in, nodes_in
+from dess.sea import no_fly
+from dess.sea.chart import Cell
+from dess.sea.no_fly import NoFlyFile, centres_in
+from dess.sea.nodes import NodesFile, NodesFound
+from dess.sea.places import Projection, Size
 
 # A cell is a hundredth of a degree of latitude and, at the equator, of longitude; 0, 0 is the
 # centre of the grid.
 EQUATOR = Projection((0.0, 0.0), (8, 6), 1111.95)
+
+
+def nodes_in(path: Path, size: Size, cell_size: float, **source: Any) -> tuple[Cell, ...]:
+    """The cells of the nodes of a file, on a grid about their centre."""
+    return tuple(fields_in(path, size, cell_size, **source)["nodes"])
+
+
+def fields_in(path: Path, size: Size, cell_size: float, **source: Any) -> dict[str, Any]:
+    """The fields of a scenario that has these nodes."""
+    found = NodesFound.read(path, NodesFile(file=path.name, **source))
+    return found.fields(size, found.projection(size, cell_size), np.zeros(size[::-1], np.bool_))
+
+
+def no_fly_in(
+    path: Path, size: Size, projection: Projection | None, **source: Any
+) -> tuple[Cell, ...]:
+    """The no-fly cells of a file, row by row."""
+    closed = no_fly.no_fly_in(path, size, projection, NoFlyFile(file=path.name, **source))
+    return tuple((x, y) for y, x in np.argwhere(closed).tolist())
+
 
 Write = Callable[[str, Any], Path]
 
@@ -73,7 +97,7 @@ def test_a_grid_that_is_not_square_has_the_same_centre(write: Write) -> None:
     """0.09 degrees of latitude at the equator are ten cells of 1 km and a bit."""
     path = write("buoys.csv", "lon,lat\n0,0.045\n0,-0.045\n0.045,0\n-0.045,0\n")
     assert nodes_in(path, (20, 12), 1000.0) == ((10, 0), (10, 11), (15, 6), (4, 6))
-    with pytest.raises(InputError, match=r"at \[10, -1\]; allowed: grid = 20, rows = 12 or"):
+    with pytest.raises(InputError, match=r"at \[10, -1\].*; allowed: grid = 20, rows = 12 or"):
         nodes_in(path, (20, 10), 1000.0)
 
 
@@ -92,21 +116,24 @@ def test_a_scenario_names_a_file_beside_it(write: Write, tmp_path: Path) -> None
 
 @pytest.mark.parametrize(
     "name", ["../secret.csv", "{}/secret.csv", "in/../../secret.csv", "link.csv", "deep.csv"]
-    + ["in/own.csv", "", "..", ".", "a\0b", "/etc/passwd", "/etc/shadow", "loop/secret.csv"],
+    + ["in/../../sea/../secret.csv", "", "..", ".", "a\0b", "/etc/passwd", "/etc/shadow"]
+    + ["loop/secret.csv", "out/secret.csv"],
 )  # fmt: skip
 @pytest.mark.parametrize("key", ["nodes", "no_fly"])
 def test_a_table_lies_in_the_folder_of_its_scenario(key: str, name: str, tmp_path: Path) -> None:
-    """What a stranger's scenario names is neither read nor shown, be it by a link."""
+    """What a stranger's scenario names elsewhere is neither read nor shown, be it by a link."""
     secret, folder = tmp_path / "secret.csv", tmp_path / "sea"
     secret.write_text("password\n")
     (folder / "in").mkdir(parents=True)
     (folder / "in" / "own.csv").write_text("password\n")
     (folder / "link.csv").symlink_to(secret)
-    (folder / "deep.csv").symlink_to("in/own.csv")
+    (folder / "deep.csv").symlink_to("in/../../secret.csv")
+    (folder / "out").symlink_to(tmp_path)
     (folder / "loop").symlink_to("loop")
     path, named = folder / "sea.toml", json.dumps(name.format(tmp_path))
     path.write_text(f"{key} = {named}\n")
-    with pytest.raises(InputError, match=f"^{path}: {key}: .*allowed: the name of a file") as error:
+    lines = f"^{path}: {key}: .*allowed: the name of a file|^{folder}/loop/secret.csv: cannot be"
+    with pytest.raises(InputError, match=lines) as error:
         load_scenario(path)
     assert "password" not in str(error.value)
 
@@ -167,7 +194,7 @@ def test_polygons_share_the_projection_of_the_nodes(write: Write) -> None:
 
 def test_polygons_on_both_sides_of_the_180th_meridian(write: Write) -> None:
     path = write("land.geojson", features(("Polygon", [square(179.99, -0.0105, 179.995, 0.0105)])))
-    projection = EQUATOR._replace(middle=(-179.995, 0.0))
+    projection = EQUATOR._replace(centre=(-179.995, 0.0))
     assert no_fly_in(path, (8, 6), projection) == ((2, 2), (2, 3))
 
 
@@ -185,7 +212,7 @@ def test_a_mirrored_polygon_closes_mirrored_cells(corners: list[tuple[int, int]]
 # --- refusals ---
 
 LINE = {"features": [{"geometry": {"type": "LineString", "coordinates": [8, 54]}}]}
-LOST: dict[str, Any] = {"features": [*points((8, 54))["features"], {"geometry": None}]}
+ODD = features(("Circle", [8, 54]))
 # Of nodes on a grid of 8 x 8 cells of 800 m: the name of a file, what it has, and the line.
 NODES: list[tuple[str, Any, str]] = [
     ("n.csv", "", "has columns none; allowed: x and y, or lon and lat"),
@@ -195,32 +222,45 @@ NODES: list[tuple[str, Any, str]] = [
     ("n.csv", "x,y\n1,1\n\n2\n", "line 4: y is ''; allowed: a number"),
     ("n.csv", "x,y\nnan,1\n", "line 2: x is nan; allowed: -99,999..99,999"),
     ("n.csv", "x,y\n1.5,1\n", "line 2: x is 1.5; allowed: an integer"),
-    ("n.csv", "x,y\n1,-1\n", r"line 2 is off .*8 x 8 .* \[1, -1\]; allowed: 0 <= x, y < 256"),
-    ("n.csv", "x,y\n1,1\n3,11\n", r"line 3 is off .* at \[3, 11\]; allowed: grid = 12 or more$"),
+    ("n.csv", "x,y\n1,-1\n", r"line 2 at \[1, -1\] is off .*8 x 8 .*; allowed: 0 <= x, y < 256"),
+    ("n.csv", "x,y\n1,1\n3,11\n", r"line 3 at \[3, 11\] is off .*; allowed: grid = 12 or more$"),
     ("n.csv", "x,y\n1,999\n", ".*allowed: 0 <= x, y < 256"),
     ("n.csv", "x,y\n1,1\n2,2\n1,1\n", r"line 2 and line 4 lie in one cell, \[1, 1\]; .* distinct"),
     ("n.csv", "lon,lat\n181,54\n", "line 2: lon is 181; allowed: -180..180"),
-    ("n.csv", "lon,lat\n8,54\n8.02,54.02\n8.00001,54.00001\n", "line 2 .*cell_size below 800 m"),
+    (
+        "n.csv",
+        "lon,lat\n8,54\n8.02,54.02\n8.001,54.001\n",
+        "line 2 .*cell_size below 800 m, such as",
+    ),
+    (
+        "n.csv",
+        "lon,lat\n8,54\n8.02,54.02\n8,54\n",
+        'line 2 and .*; allowed: place = "merge", place',
+    ),
     # 0.09 degrees are 10,008 m, 12.5 cells: 6.25 to both sides of the middle, at 4.
-    ("n.csv", "lon,lat\n0,0\n0,0.09\n", r"line 2 .* \[4, 10\]; allowed: grid = 14 or more, or a"),
+    (
+        "n.csv",
+        "lon,lat\n0,0\n0,0.09\n",
+        r"line 2 at \[4, 10\].*; allowed: grid = 14 or more, or a",
+    ),
     ("n.csv", "lon,lat\n0,0\n0,80\n", ".*off the grid .*; allowed: a larger cell_size$"),
     ("n.csv", 'x,y\n"1,1\n', "is not a CSV file"),
     ("n.csv", b"x,y\n\xff", "cannot be read: it is not text"),
-    ("n.csv", "x,y\n" + "1,1\n" * 300_000, "is too large; allowed: 1,048,576 bytes at most"),
+    ("n.csv", b"x,y\n" + b"\n" * 2**26, "is too large; allowed: 67,108,864 bytes at most"),
     ("none.csv", None, "no such file; allowed: a CSV file"),
     ("none.json", None, "no such file; allowed: a GeoJSON"),
-    ("n.xlsx", "", "has no known file ending; allowed: .csv, .geojson, .json"),
+    ("n.xlsx", "", "has no known file ending; allowed: .csv, .tsv, .geojson, .json"),
     ("n.json", "{", "not valid JSON"),
     ("n.json", {"type": "Point"}, "features: is missing; allowed: a list"),
-    ("n.json", LINE, "features.0.geometry.type: 'LineString' is unknown; allowed: Point"),
-    ("n.json", LOST, "features.1.geometry: "),
+    ("n.json", LINE, "features.0.geometry.coordinates: has not two numbers; allowed: "),
+    ("n.json", ODD, "features.0.geometry.type: 'Circle' is unknown; allowed: Point, "),
+    ("n.json", features(("Polygon", [square(0, 0, 1, 1)])), "has 0 nodes; allowed: 1..1024"),
     ("n.json", points((8,)), "features.0.geometry.coordinates: has not two numbers; allowed: "),
     ("n.json", points((8, 91)), "features.0.geometry.coordinates: lat is 91; allowed: -90..90"),
     ("n.json", points((8, 54), (8, 54)), "features.0 and features.1 lie in one cell"),
 ]
-RING, SHAPE = square(0, 0, 1, 1), "features.0.geometry.Polygon.coordinates.0"
-FAR_OFF = features(("Polygon", [RING]), ("Polygon", [square(8.005, 8.005, 9, 9)]))
-DEGREES = "has degrees, and the nodes are cells; allowed: cells, or nodes from a file with degrees"
+RING, SHAPE = square(0, 0, 1, 1), "features.0.geometry.coordinates.0"
+DEGREES = "has degrees, and the nodes are cells; allowed: cells, nodes from a file with degrees, or"
 # Of no-fly cells on a grid of 3 x 2 cells, or of 8 x 6 where the nodes have degrees.
 NO_FLY: list[tuple[str, Any, str]] = [
     ("map.txt", "..#\n", "has 1 lines; allowed: 2 lines of 3 cells, as grid and rows say"),
@@ -231,18 +271,17 @@ NO_FLY: list[tuple[str, Any, str]] = [
     ("land.csv", "x,y\n0,0.5\n", "line 2: y is 0.5; allowed: an integer"),
     ("land.csv", "lon,lat\n8,54\n", DEGREES),
     ("land.geojson", features(("Polygon", [RING])), DEGREES),
-    ("land.shp", "", "has no known file ending; allowed: .txt, .csv, .geojson, .json"),
+    ("land.shp", "", "has no known file ending; allowed: .txt, .map, .png, .csv, .tsv, .geojson"),
 ]
 POLYGONS: list[tuple[str, Any, str]] = [
     ("p.json", {"type": "Polygon", "coordinates": [RING]}, "features: is missing; allowed: a list"),
     ("p.json", {"features": []}, "features: .* is too short"),
-    ("p.json", points((8, 54)), "features.0.geometry.type: 'Point' is unknown; allowed: Poly"),
     ("p.json", features(("Polygon", [RING[:4]])), f"{SHAPE}: is no ring; allowed: four positions"),
     (
         *("p.json", features(("Polygon", [[[8, 54], [8, 91], [9, 54], [8, 54]]]))),
         f"{SHAPE}.1: lat is 91; allowed: -90..90",
     ),
-    ("p.json", FAR_OFF, r"features.1 .* 8 x 6 cells, at \[804, -798\]; allowed: polygons"),
+    ("p.json", features(("MultiPolygon", [5])), "features.0.geometry.coordinates.0.0: has not two"),
 ]
 READERS: dict[Any, list[tuple[str, Any, str]]] = {
     (nodes_in, (8, 8), 800.0): NODES,

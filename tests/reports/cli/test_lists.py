@@ -123,3 +123,16 @@ def test_the_shell_completes_names(words, completed):
     asked["COMP_CWORD"] = str(len(words.split()) - 1)
     command = typer.main.get_command(app)
     assert CliRunner().invoke(command, prog_name="dess", env=asked).output.split() == completed
+
+
+def test_the_map_of_a_sea_is_drawn_be_it_refused(dess, tmp_path):
+    """A zone in the sea, and one that is not: the picture is there, the line as well."""
+    for zone, expected in (("[5, 0, 3, 2]", 0), ("[7, 7, 3, 2]", 2)):
+        show = ("scenarios", "show", "small.toml", "--set", f"zone={zone}", "--figure", "sea.png")
+        code, _, err = dess(*show)
+        assert code == expected
+        assert ("zone: [7, 7, 3, 2] does not lie on" in err) == (expected == 2)
+        picture = tmp_path / "sea.png"
+        assert picture.read_bytes()[:4] == b"\x89PNG"
+        picture.unlink()
+    assert dess("scenarios", "show", "small.toml", "--figure", "sea.txt")[0] == 2

@@ -1,19 +1,25 @@
 """``dess simulate``: its JSON, the event log, the figure."""
 
 import io
+import json
 import os
 import resource
 import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from xml.etree import ElementTree
 
+import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from dess import load_scenario
 from dess.analysis import load_results
+from dess.analysis.figures.missions import sea_figure
 from dess.record import EventLog
+from dess.sea.places import Projection
 from tests.analysis.small import files_of
 
 # What the JSON of a mission and a record have in common.
@@ -112,6 +118,64 @@ def test_the_event_log_is_written_as_its_ending_says(dess, tmp_path):
     pd.testing.assert_frame_equal(log, written)
     table = pd.read_parquet(tmp_path / "log.parquet")
     pd.testing.assert_frame_equal(log, table, check_dtype=False)
+
+
+BUOYS = "name,lon,lat\nAlpha,8.50,54.25\nBeta,8.53,54.27\n"
+AT_SEA = ("--scenario", "buoys.toml", "--set", "uavs=2", "--policy", "greedy")
+
+
+@pytest.fixture
+def buoys(tmp_path):
+    """A sea with names and degrees, and with a slow UAV."""
+    (tmp_path / "buoys.csv").write_text(BUOYS)
+    lines = ['nodes = "buoys.csv"', "grid = 8", "zone = [5, 0, 3, 2]", "quota = 60"]
+    lines += ["[[fleet]]", "[[fleet]]", "slots_per_cell = 2"]
+    (tmp_path / "buoys.toml").write_text("\n".join(lines))
+    return load_scenario(tmp_path / "buoys.toml", uavs=2)
+
+
+def test_the_flown_path_is_written_with_its_times_in_degrees(dess, refusal, tmp_path, buoys):
+    """The places of all files are the same; a slow UAV is also between two cells."""
+    for kind in ("csv", "geojson", "kml"):
+        assert dess("simulate", *AT_SEA, "--path", f"p.{kind}", "--json")[0] == 0
+    table = pd.read_csv(tmp_path / "p.csv")
+    projection = Projection(buoys.centre, buoys.size, buoys.cell_size)
+    places = projection.cells(table[["lon", "lat"]].to_numpy())
+    assert np.allclose(places, table[["x", "y"]] + 0.5)
+    for uav, of in table.groupby("uav"):
+        assert of["time"].tolist() == [*range(len(of))]
+        steps = of[["x", "y"]].diff().abs().sum(axis=1).iloc[1:]
+        assert set(steps) == {0.0, 1.0 / (1 + uav)}
+    features = json.loads((tmp_path / "p.geojson").read_text())["features"]
+    lines = [line for of in features for line in of["geometry"]["coordinates"]]
+    assert np.allclose(lines, table[["lon", "lat", "altitude"]])
+    assert sum((of["properties"]["times"] for of in features), []) == table["time"].tolist()
+    spaces = {"gx": "http://www.google.com/kml/ext/2.2", "": "http://www.opengis.net/kml/2.2"}
+    tracks = ElementTree.parse(tmp_path / "p.kml").findall(".//gx:Track", spaces)
+    coords = [c.text.split() for of in tracks for c in of.findall("gx:coord", spaces)]
+    assert np.allclose(np.array(coords, float), lines)
+    assert [of.find("when", spaces).text for of in tracks] == ["1970-01-01T00:00:00Z"] * 2
+    small = ("simulate", "--scenario", "small.toml")
+    assert dess(*small, "--path", "q.geojson")[0] == 0  # in cells
+    assert refusal(*small, "--path", "q.kml").endswith("no degrees; allowed: .geojson, .csv")
+    assert refusal(*small, "--path", "q.txt").endswith("allowed: .geojson, .kml, .csv")
+
+
+def test_nodes_have_their_names_in_table_log_and_maps(dess, tmp_path, buoys):
+    code, out, _ = dess("simulate", *AT_SEA, "--events", "e.parquet", "--animation", "m.html")
+    assert code == 0
+    assert "Alpha" in out and "data at the start" in out
+    log = pq.read_table(tmp_path / "e.parquet").to_pandas()
+    named = log[log["node"] >= 0]
+    assert (named["name"] == np.array(["Alpha", "Beta"])[named["node"]]).all()
+    assert log.loc[log["node"] < 0, "name"].isna().all()
+    assert '"names":["Alpha","Beta"]' in (tmp_path / "m.html").read_text().replace(
+        ", ", ","
+    ).replace(": ", ":")
+    texts = [text.get_text() for text in sea_figure(buoys).axes[0].texts]
+    assert texts == ["Alpha", "Beta"]
+    assert dess("simulate", "--scenario", "small.toml", "--events", "e.parquet")[0] == 0
+    assert "name" not in pq.read_schema(tmp_path / "e.parquet").names
 
 
 def test_a_video_needs_ffmpeg(refusal, monkeypatch):
