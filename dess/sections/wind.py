@@ -138,7 +138,7 @@ def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
     """
     if "is_plain" in (
         missions.dtype.names or ()
-    ):  # no section is on, so neither wind nor slow UAVs
+    ):  # neither wind nor slow UAVs
         return None
     mission = missions[0]
     if mission["wind_most"] == 0 and mission["slowest"] == 1:
