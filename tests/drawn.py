@@ -178,7 +178,7 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
         "fleet": draw(st.lists(_uav_types, max_size=3)),
         "landing": draw(st.booleans()),
     }
-    if sections["landing"] and draw(st.booleans()):
+    if (sections | fixed)["landing"] and draw(st.booleans()):
         sections["quota"] = 0
     return draw(spaces(**(sections | fixed)))
 

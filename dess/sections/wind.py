@@ -136,9 +136,7 @@ def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
         missions: (B,) ``MISSION`` records of one batch, which share wind and fleet.
         chart: Their chart.
     """
-    if "is_plain" in (
-        missions.dtype.names or ()
-    ):  # neither wind nor slow UAVs
+    if "is_plain" in (missions.dtype.names or ()):  # neither wind nor slow UAVs
         return None
     mission = missions[0]
     if mission["wind_most"] == 0 and mission["slowest"] == 1:

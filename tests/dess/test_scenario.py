@@ -160,6 +160,10 @@ def test_fixing_one_field_leaves_the_other_draws(space, seed, replication, name)
 # --- limits ---
 
 
+# C_S must be below C_C, and no quota needs landing.
+NOT_ALONE = [("charge_start", 100), ("charge_complete", 10), ("quota", 0)]
+
+
 def test_values_at_the_limits_are_allowed_and_those_beyond_are_not():
     space = ScenarioSpace.of(charge_start=10, charge_complete=100)
     fields = (*SAMPLED, "pads", "quota", "arrival_rate", "communication_slots", "edge_snr")
@@ -167,7 +171,7 @@ def test_values_at_the_limits_are_allowed_and_those_beyond_are_not():
         low, high = space.limits(field)
         kind = type(getattr(space, field)[0] if field in SAMPLED else getattr(space, field) or 1)
         for allowed in (low, high):
-            if (field, allowed) not in {("charge_start", 100), ("charge_complete", 10)}:
+            if (field, allowed) not in NOT_ALONE:
                 ScenarioSpace.of(space, **{field: kind(allowed)})
         for refused in (low - 1, high + 1):
             with pytest.raises(InputError, match=field):

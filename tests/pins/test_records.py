@@ -23,7 +23,7 @@ SEAS: dict[str, dict[str, Any]] = {"paper": {}, "archipelago:7": {}, "bay": EXTE
 TEAMS = ["greedy", "age", "planner-short", "ddqn", "any"]
 
 
-def _bytes(table: np.ndarray) -> bytes:
+def bytes_of(table: np.ndarray) -> bytes:
     """The bytes of a table without the columns that are younger than the pins."""
     names = [name for name in table.dtype.names or () if name not in ("home", "way_home")]
     return repack_fields(table[names]).tobytes()
@@ -36,6 +36,6 @@ def test_the_records_of_a_policy_are_the_kept_ones(team: str) -> None:
         if team == "ddqn" and sea != "paper":
             continue  # it acts on the paper's sea only
         records = simulate_batch(load_scenario(sea, **changes), policies.load(team), 2030, 8)
-        content = sha256(b"".join(map(_bytes, records))).hexdigest()
+        content = sha256(b"".join(map(bytes_of, records))).hexdigest()
         hashes.append(f"{sea} {content}\n")
     pinned(f"records/{team}.txt", "".join(hashes))

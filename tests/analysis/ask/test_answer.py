@@ -225,7 +225,7 @@ def test_a_conclusion_names_the_side_of_the_whole_interval_or_how_many_missions_
     ends, said
 ):
     about = {"policy": "greedy", "metric": PRODUCT, "before": 0.9, "after": 0.9 + ends[0]}
-    assert said in found.conclusion(pd.Series({**row(*ends, p=0.2), **about}))
+    assert said in found.conclusion(pd.Series({**row(*ends, p=0.2), "n": 100, **about}))
 
 
 def test_another_variation_of_the_same_baseline_simulates_that_side_only(tmp_path):

@@ -40,7 +40,7 @@ def test_a_plain_study_stores_no_column_of_them(studied):
     plain = studied()
     assert measured_in(plain.missions) == []
     paths = (plain.store.folder / "missions").rglob("*.parquet")
-    assert {len(pq.read_schema(path)) for path in paths} == {17}
+    assert {len(pq.read_schema(path)) for path in paths} == {18}
 
 
 def test_a_resumed_study_and_one_that_takes_over_missions_have_them(tmp_path, results):

@@ -154,7 +154,7 @@ def test_starts_rates_and_shadowing_of_another_simulator_are_found_out() -> None
     assert failing(draws.shadowing_checks(np.repeat(deviates[::2], 2)))
 
 
-@given(extended_spaces(), policies, seeds, replications)
+@given(extended_spaces(landing=False), policies, seeds, replications)
 def test_the_batteries_of_every_scenario_follow_the_rules(
     space: ScenarioSpace, policy: object, seed: int, replication: int
 ) -> None:

@@ -105,7 +105,7 @@ CELLS += [("replay.action", (0, 0), 9)]
 # Bytes that stand for truths, but are neither 0 nor 1 then.
 TRUTHS = {"replay.acted": 0, "early": 0, "stepper.uavs": UAV.fields["latch"][1]}  # type: ignore[index]
 # Fields of the first record of a tensor that holds records; an age is an index, too.
-UAVS = {"x": 10**6, "y": -1, "from_x": 32, "executed": 77, "end": 5, "served": 25, "slots_left": 1}
+UAVS = {"x": 10**6, "y": -1, "from_x": 32, "executed": 77, "end": 6, "served": 25, "slots_left": 1}
 UAVS |= {"pad": 10**6, "zone": 9, "slots_per_cell": 100}
 RECORDS: dict[str, tuple[np.dtype, dict[str, Any]]] = {
     "stepper.uavs": (UAV, UAVS),
