@@ -108,7 +108,6 @@ PARSED = {
     "dess.analysis.results.parquet": {"validate_json"},
     # Keys of dictionaries and of a cache, which are texts of JSON.
     "dess.analysis.study.cheapest": {"loads"},
-    "dess.analysis.results.provenance": {"loads"},
     "dess.analysis.study.study": {"loads"},
     "dess.policies.learner.trained": {"model_validate_json"},
     # Lines from the process that has started this one.

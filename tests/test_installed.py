@@ -44,8 +44,9 @@ def test_the_wheel_runs_without_the_repository(installed, tmp_path):
 
 def test_a_checkout_without_links_says_how_to_make_them(tmp_path):
     (tmp_path / "dess").mkdir()
-    for name in ("__init__.py", "__main__.py"):
-        shutil.copy(ROOT / "dess" / name, tmp_path / "dess")
+    (tmp_path / "dess/env").mkdir()
+    for name in ("__init__.py", "__main__.py", "env/__init__.py", "env/registration.py"):
+        shutil.copy(ROOT / "dess" / name, tmp_path / "dess" / name)
     (tmp_path / "dess/reports").write_text("../reports", "utf-8")  # as git writes it on Windows
     command = [sys.executable, "-m", "dess", "policies"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)

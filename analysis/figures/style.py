@@ -74,9 +74,9 @@ class Picture(Figure):
 
     def _repr_png_(self) -> bytes:
         """The picture, as IPython asks for it."""
-        png = BytesIO()
-        self.savefig(png, format="png", bbox_inches="tight")
-        return png.getvalue()
+        buffer = BytesIO()
+        self.savefig(buffer, format="png", bbox_inches="tight")
+        return buffer.getvalue()
 
 
 @contextmanager

@@ -26,7 +26,7 @@ from dess import InputError
 from dess.analysis.results.chunks import MANIFEST
 from dess.analysis.results.manifest import Manifest
 from dess.files.documents import LIMIT
-from dess.files.reading import paths_in, read_bytes
+from dess.files.reading import Missing, paths_in, read_bytes
 from dess.files.writing import delete, locked, write_files
 from dess.reports.pages import INDEX, LOCK, PREFIX, check_pages, html, kernels, notebook
 from dess.reports.pages.html import fill, template
@@ -207,11 +207,11 @@ def render(
     for report in reports:
         _look_up(report, results, out, values)
     lacking = {r.name: {} if r.is_current else _lacking(r, results) for r in reports}
-    commands = dict.fromkeys(command for errors in lacking.values() for command in errors)
-    if asked and len(commands) > 1:
+    commands = {c: error for errors in lacking.values() for c, error in errors.items()}
+    if asked and len(commands) > 1 and all(isinstance(e, Missing) for e in commands.values()):
         names = " ".join(command.rpartition(" ")[2] for command in commands)
         raise InputError(
-            f"results: {results} lacks complete results of {len(commands)} studies; allowed: what "
+            f"results: {results} holds no results of {len(commands)} studies; allowed: what "
             f"is made by: dess study run {names} --out {quote(str(results))}"
         )
     for name, errors in lacking.items():
@@ -321,7 +321,7 @@ def _lacking(report: notebook.Report, results: Path) -> dict[str, InputError]:
 
 def _check_results(folder: Path) -> None:
     if not (folder / MANIFEST).exists():
-        raise InputError(
+        raise Missing(
             f"results: {folder} holds no results of study {folder.name}; "
             f"allowed: what is made by: dess study run {folder.name} --out {quote(str(folder))}"
         )

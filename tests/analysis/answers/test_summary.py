@@ -126,8 +126,8 @@ def stub(**policies):
         for name, values in policies.items()
     ]
     results = SimpleNamespace(missions=pd.concat(tables, ignore_index=True))
-    rows = [(name, 0, PRODUCT, np.mean(values), 0.0) for name, values in policies.items()]
-    return results, pd.DataFrame(rows, columns=["policy", "point", "metric", "mean", "low"])
+    rows = [(name, 0, PRODUCT, np.mean(values), 0.0, 1.0) for name, values in policies.items()]
+    return results, pd.DataFrame(rows, columns=["policy", "point", "metric", "mean", "low", "high"])
 
 
 def test_policies_are_compared_on_common_replications():

@@ -124,7 +124,7 @@ def arrivals_of(space: ScenarioSpace, k: int, seed: int = 1, replication: int = 
     """The times [slots] of all arrivals at node ``k`` until the last slot of a mission."""
     missions = constants_of(space)
     missions["seed"], missions["replication"] = seed, replication
-    sources = sources_of(space.arrivals, space.arrival_rate, len(space.nodes))
+    sources = sources_of(space.node_rates)
     factors = factors_of(space.arrivals)
     found = []
     while sources["time"][k] < np.inf:

@@ -25,6 +25,7 @@ ENDINGS = {  # of files that an option writes
     "--figure": (".png",),
     "--animation": (".gif", ".html"),
     "--crate": (".zip",),
+    "--path": (".geojson", ".csv"),
 }
 OUTPUTS = {"--out", *ENDINGS}
 # The kinds of inputs that a parameter reads: that of a command, or of all that have it. Those of
