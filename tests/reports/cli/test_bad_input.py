@@ -41,10 +41,7 @@ BAD = {
     "simulate --set uavs=two": ["uavs: 'two' has the wrong form", "an integer or [low, high]"],
     "simulate --set arrival_rate=lots": ["arrival_rate: 'lots' is not a number", "0..100"],
     "simulate --set arrivals.process=poisson": ["'poisson' is unknown; allowed: slotted, contin"],
-    "simulate --set arrivals.buffer=3": [
-        "slotted arrivals have no schedule",
-        "allowed: continuous",
-    ],
+    "simulate --set arrivals.buffer=3": ["slotted arrivals have no schedule", "allowed: con"],
     "simulate --set uavz=1": ["uavz: unknown key (did you mean uavs?)"],
     "simulate --set uavs=17": ["uavs: 17", "1..16"],
     "simulate --of .": ["manifest.json: no such file", "a results folder"],
