@@ -362,13 +362,19 @@ def arrive(mission, residual, sensors, arrivals, batches, search):
             )  # fmt: skip
         word = batch.words[k % 4, block]
         arrivals[k] = 0
-        if mission.own_rates != 0:
+        if _has_own_rates(mission):
             rate = sensors[k].rate
             probability_of_none = math.exp(-rate)
         if streams.uniform(word) > probability_of_none:
             arrivals[k] = streams.poisson(word, rate)
             residual[k] += arrivals[k]
             mission.arrived += arrivals[k]
+
+
+@for_sections
+def _has_own_rates(mission):
+    """Whether nodes have arrival rates of their own."""
+    return mission.own_rates
 
 
 @inlined
