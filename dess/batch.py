@@ -167,11 +167,11 @@ def _run(spaces, team, source, batch_size, records, progress, stopped) -> None:
     queue = np.array([0, 0])  # next job, jobs done
     for b in range(size):
         _next_mission(b, job_of, queue, source, state)
-    ways = ways_home(state.missions, world.chart)
+    ways, shown = ways_home(state.missions, world.chart), world.shown()
     # Reporting holds Python's global lock, so about a hundred reports are made in all.
     reported, step = 0, max(1, len(jobs) // 100)
     while queue[1] < len(jobs) and not stopped.is_set():
-        decide(team, state, world)
+        decide(team, state, shown)
         _advance(job_of, queue, source, state, world, scratch, ways, records)
         if progress and (queue[1] >= reported + step or queue[1] == len(jobs)):
             progress(int(queue[1]) - reported)

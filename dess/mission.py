@@ -201,12 +201,13 @@ class MissionModel:
         """Open every mission slot, run its communication slots and close it."""
         env, missions, uavs = self.env, *self.state[:2]
         arrays, packets = (*self.state, *self.world, *self.scratch), self.packets
+        shown = self.world.shown()
         m = int(self.mission["communication_slots"])
         has_failures = bool(self.mission["has_failures"])
         pads_fail = bool(self.mission["pad_rate"] > 0)
         slot, active, allowed = 0, len(self.fleet), 0
         while active:
-            decide(self.team, self.state, self.world)
+            decide(self.team, self.state, shown)
             may_charge, granted = _resolve(missions, uavs, self.world.chart), _NOBODY
             if may_charge != allowed or pads_fail:
                 allowed = may_charge

@@ -37,7 +37,7 @@ class View:
     """
 
     def __init__(self, state: State, world: World, mission: np.ndarray, uav: np.ndarray):
-        self.state, self.world, self.mission, self.uav = state, world.shown(), mission, uav
+        self.state, self.world, self.mission, self.uav = state, world, mission, uav
 
     def __len__(self) -> int:
         return len(self.mission)
@@ -182,7 +182,8 @@ def decide(team: Sequence[Any], state: State, world: World) -> None:
     """Write the actions that the policies of a team choose into the state.
 
     UAV i follows policy ``team[i % len(team)]``. All policies decide before any action is written,
-    so that no policy sees what a teammate decided in the same slot.
+    so that no policy sees what a teammate decided in the same slot. ``world`` is what policies may
+    see of it (``World.shown``).
 
     Raises:
         ValueError: If a policy does not return one action per row.

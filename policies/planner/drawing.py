@@ -72,7 +72,7 @@ def first_plan(
     """
     watched = _Watched(planner or Planner())
     model = MissionModel(scenario, [watched], seed, replication, None)
-    decide(model.team, model.state, model.world)
+    decide(model.team, model.state, model.world.shown())
     return watched.plans[0]
 
 

@@ -44,7 +44,7 @@ def _mask(*uavs: dict[str, Any], **scenario: Any) -> np.ndarray:
     rows = np.zeros(len(uavs), int), np.arange(len(uavs))
     state, chart = placed([*uavs], **scenario)
     world = SimpleNamespace(chart=chart)
-    return guard(View(state, SimpleNamespace(shown=lambda: world), *rows))
+    return guard(View(state, world, *rows))
 
 
 WALL = [[24, y] for y in range(12)]  # from the northern edge, between the UAV and the zone
