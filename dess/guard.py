@@ -33,6 +33,8 @@ MARGIN_PER_TEAMMATE = 2
 MEAN_RATE, SLOTS_PER_PACKET = 0.3, 1.0
 # Margin [slots] for the quota when little data is left, as some slots may find no data to collect.
 SCARCE_SLOTS = 6
+# Slots before the end of a mission without a quota in which UAVs do not leave a zone any more.
+LAST_SLOTS = 16
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
 CELLS_PER_UAV = 4
 
@@ -120,11 +122,21 @@ def _most_wind(mission, u, slots):
 
 @inlined
 def is_parked(mission, u):
-    """Whether a UAV blocks its cell: it charges or is about to charge, or is grounded."""
-    charges = u.latch
+    """Whether a UAV blocks its cell: it charges or is about to charge, or is grounded.
+
+    Shortly before the end of a mission that ends on the ground, it stands on the ground, too.
+    """
+    stays = u.latch
     if lands(mission):  # there the latch is set whenever a UAV may charge
-        charges = u.charging or u.pad_request >= 0 or u.battery <= mission.charge_start
-    return u.active and (u.grounded or (charges and u.zone >= 0))
+        stays = u.charging or u.pad_request >= 0 or u.battery <= mission.charge_start
+        stays = stays or ends_soon(mission, u)
+    return u.active and (u.grounded or (stays and u.zone >= 0))
+
+
+@inlined
+def ends_soon(mission, u):
+    """Whether UAV ``u`` does not leave a zone any more, as it has to be on the ground soon."""
+    return lands(mission) and u.quota == 0 and mission.max_slots - mission.slot <= LAST_SLOTS
 
 
 @inlined
@@ -147,7 +159,7 @@ def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
             between += before + distance(chart, closed_x, closed_y, to_x, to_y) == length
     if between == 0:
         return length
-    if between == 1 and chart.ways is None:
+    if between == 1 and chart.ways is None and not ends_soon(mission, uavs[i]):
         # without no-fly cells, a way that does not follow a line has others of the same length
         return length + 2 if x == to_x or y == to_y else length
     return _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y)
@@ -168,7 +180,8 @@ def _closed(mission, uavs, i, j, chart, planned):
 def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     """The way around all cells that teammates close.
 
-    Or, if that is shorter, the way through and the time that a teammate charges in it.
+    Or, if that is shorter, the way through and the time that a teammate charges in it, unless none
+    leaves its cell any more.
     """
     width = chart.zones.shape[1]
     closed, count = np.empty(mission.uavs, np.int64), 0
@@ -178,6 +191,8 @@ def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
             closed[count] = closed_y * width + closed_x
             count += 1
     around = length_around(chart.zones, closed[:count], x, y, to_x, to_y)
+    if ends_soon(mission, uavs[i]):
+        return around
     lacking = mission.charge_complete - mission.charge_start
     through = distance(chart, x, y, to_x, to_y)
     return min(around, through + (lacking + mission.charge_rate - 1) // mission.charge_rate)
@@ -647,8 +662,8 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         The safe actions, a bit for each.
     """
     u = uavs[i]
-    if charge and u.pad_request >= 0:
-        return 1 << HOVER  # it would lose its place in the queue
+    if charge and (u.pad_request >= 0 or (lands(mission) and is_parked(mission, u))):
+        return 1 << HOVER  # it would lose its place in the queue, or on the ground
     reserve = margin(mission, u) + home.wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
     # that lead nearest to the parking cell, and those after which it is reached if the margin and

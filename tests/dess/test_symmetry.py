@@ -56,8 +56,9 @@ def _cases(draw: st.DrawFn) -> tuple[ScenarioSpace, list[dict[str, Any]], np.nda
     """A sea, its UAVs and the data of its nodes; and a generator."""
     wind = {"strength": draw(st.integers(0, 2)), "direction": 90 * draw(st.integers(0, 3))}
     fleet = draw(st.sampled_from(FLEETS))
-    space = draw(spaces(wind=wind, fleet=fleet, flight_cost=1))
-    space = ScenarioSpace.of(space, uavs=min(4, space.zone_cells), quota=500)
+    lands, quota = draw(st.sampled_from([(False, 500), (True, 500), (True, 0)]))
+    space = draw(spaces(wind=wind, fleet=fleet, flight_cost=1, landing=lands))
+    space = ScenarioSpace.of(space, uavs=min(4, space.zone_cells), quota=quota)
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     water = [*reached(space.zone[:2], *space.size, {*space.no_fly})]
     cells = rng.permutation(water)[: space.uavs[1]].tolist()

@@ -27,7 +27,17 @@ def test_a_seed_repeats_a_sequence_of_whole_episodes() -> None:
     assert seen == [(7, 0), (7, 1), (7, 40), (7, 41), (8, 0)]
 
 
-@given(spaces(), seeds, replications, st.sampled_from([Wanderer(), Commuter()]), st.integers(0, 9))
+# A third of the missions end on the ground, with a quota or without one.
+ENDINGS = st.sampled_from([{}, {}, {}, {}, {"landing": True}, {"landing": True, "quota": 0}])
+
+
+@given(
+    ENDINGS.flatmap(lambda ending: spaces(**ending)),
+    seeds,
+    replications,
+    st.sampled_from([Wanderer(), Commuter()]),
+    st.integers(0, 9),
+)
 def test_the_same_actions_give_the_record_of_simulate(
     space: ScenarioSpace, seed: int, replication: int, policy: Any, whims: int
 ) -> None:
@@ -47,7 +57,7 @@ def test_the_same_actions_give_the_record_of_simulate(
             rewards[agent] += gained[agent]
             ends[agent] = END_NAMES[info["end"]]
             assert gained[agent] == sum(info["reward_terms"].tolist())
-            assert terminated[agent] == (ends[agent] in ("quota", "battery"))
+            assert terminated[agent] == (ends[agent] in ("quota", "battery", "landed"))
             assert truncated[agent] == (ends[agent] == "truncated")
         own = sum(info["collected"] for info in infos.values())
         assert {info["team_collected"] for info in infos.values()} == {info["team_collected"]}

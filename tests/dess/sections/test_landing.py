@@ -90,3 +90,11 @@ def test_guarded_uavs_end_on_the_ground(family: str, quota: int | None) -> None:
     space = ScenarioSpace.of(space, pads=max(space.uavs[1] // 2, 1))
     ends = simulate_batch(space, policies.load("greedy"), 7, 40).uavs["end"]
     assert np.isin(ends[ends > 0], [LANDED]).mean() > 0.99
+
+
+def test_uavs_land_beside_those_that_stand_in_their_way_at_the_end() -> None:
+    """Three pads in a zone of two rows: who comes last has to fly around those who stand."""
+    space = load_scenario("scattered:2177", landing=True, quota=0, max_slots=500)
+    space = ScenarioSpace.of(space, pads=3)
+    ends = simulate_batch(space, policies.load("greedy"), 1_400_000, 8).uavs["end"]
+    assert np.isin(ends[ends > 0], [LANDED]).all()

@@ -19,6 +19,8 @@ PLAIN = (
     "failures={pad_rate=0.3, pad_repair=2}",
     "wind={strength=0.7, direction=225, gusts=0.3, seed=9}",
     "fleet=[{slots_per_cell=2, rate=0.5}, {flying_time=60, quota=9}]",
+    "landing=true",
+    "quota=0",  # which needs landing
 )
 # Values at the ends of what sections allow, and past them.
 _ENDS = st.sampled_from(
