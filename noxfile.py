@@ -22,6 +22,7 @@ STUDIES = {
     "explorer age": "--missions 50",
     "gap": "--missions 12",
     "seas": "--missions 1 --policy any --policy greedy --policy planner",
+    "seas-landing seas-horizon": "--missions 1",
 }
 # Runs commands in one process, since each would start workers and import libraries for seconds.
 ONE_AFTER_THE_OTHER = """
@@ -37,6 +38,9 @@ for command in sys.argv[1:]:
 REQUIREMENTS = ("pyproject.toml", "constraints.txt")
 # Two test files at a time, in the order of their collection.
 SIDE_BY_SIDE = ("-n", "2", "--dist", "loadfile", "--no-loadscope-reorder")
+# The tests simulate little and compile much, so they compile with less optimization, which changes
+# no number, into a cache of their own. All other sessions compile as users do.
+QUICK_COMPILING = {"NUMBA_OPT": "1", "NUMBA_CACHE_DIR": str(Path("build/numba").resolve())}
 RESULTS, REPORTS = Path("results"), Path("build/reports")
 # The tests of a library, and the pins of one that cannot be installed with those of the project.
 LIBRARIES, PINS = Path("tests/integrations"), Path("examples/requirements")
@@ -64,7 +68,7 @@ def install(session: nox.Session, extras: str = "") -> None:
 def tests(session: nox.Session) -> None:
     """Run the tests."""
     install(session, "[test]")
-    session.run("pytest", "-q", *SIDE_BY_SIDE, *session.posargs)
+    session.run("pytest", "-q", *SIDE_BY_SIDE, *session.posargs, env=QUICK_COMPILING)
 
 
 @nox.session

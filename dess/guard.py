@@ -33,6 +33,8 @@ MARGIN_PER_TEAMMATE = 2
 MEAN_RATE, SLOTS_PER_PACKET = 0.3, 1.0
 # Margin [slots] for the quota when little data is left, as some slots may find no data to collect.
 SCARCE_SLOTS = 6
+# Further margin [slots] of a UAV with teammates in missions that end on the ground.
+MARGIN_LANDING = 3
 # Slots before the end of a mission without a quota in which UAVs do not leave a zone any more.
 LAST_SLOTS = 16
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
@@ -143,6 +145,13 @@ def ends_soon(mission, u):
 def is_crowded(mission, chart, zone):
     """Whether a zone is so small that UAVs in it close the way to its other cells."""
     return chart.sizes[zone] < CELLS_PER_UAV * mission.uavs
+
+
+@inlined
+def _lasts(mission, u):
+    """Whether the battery lasts to the end of the mission in any wind, so that only time counts."""
+    left = mission.max_slots - mission.slot
+    return ends_soon(mission, u) and u.battery > left * (1 + mission.wind_most)
 
 
 @inlined
@@ -536,7 +545,9 @@ def margin(mission, u):
 
     A detour goes forth and back, so the wind costs the most in one direction only.
     """
-    return (mission.active - 1) * (MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most)
+    teammates = mission.active - 1
+    slots = teammates * (MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most)
+    return slots + MARGIN_LANDING if lands(mission) and teammates > 0 else slots
 
 
 @inlined
@@ -564,6 +575,8 @@ def _battery(mission, u, chart, x, y, home_x, home_y, cells, reach):
     """The battery [%] for a way home of so many cells, those of a detour included."""
     if reach is None:
         return cells
+    if _lasts(mission, u):
+        return cells * u.slots_per_cell
     dearest = u.slots_per_cell + mission.wind_most
     if reach.size == 0:  # too many cells for a table
         return cells * dearest
@@ -713,6 +726,8 @@ def _cost(mission, u, chart, action, x, y):
     """The battery [%] for an action of a UAV that leads to a cell, in wind or at a low speed."""
     if action == HOVER:
         return 0 if u.latch and in_zone(chart, x, y) else 1
+    if _lasts(mission, u):
+        return u.slots_per_cell
     return u.slots_per_cell + move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
 
 

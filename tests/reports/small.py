@@ -26,6 +26,8 @@ from dess.scenario import ScenarioSpace
 EMBEDDED = re.compile("data:image/svg\\+xml;base64,([A-Za-z0-9+/=]+)")
 
 POLICIES = ["random", "greedy", "ddqn"]
+# Three generated seas of as many families.
+_SEAS = {"kind": "grid", "values": {"scenario": ["coast:2", "scattered:2", "large:2"]}}
 RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.01, "budget": 60, "check": 12}
 STUDIES: dict[str, dict[str, Any]] = {
     "table4": {"policies": POLICIES, "missions": 40},
@@ -68,7 +70,14 @@ STUDIES: dict[str, dict[str, Any]] = {
     "seas": {
         "policies": ["any", "greedy", "planner"],
         "missions": 4,
-        "design": {"kind": "grid", "values": {"scenario": ["coast:2", "scattered:2", "large:2"]}},
+        "design": _SEAS,
+    },
+    "seas-landing": {"policies": ["any", "greedy"], "missions": 4, "design": _SEAS},
+    "seas-horizon": {
+        "policies": ["any", "greedy"],
+        "missions": 4,
+        "set": {"landing": True, "quota": 0, "max_slots": 60},
+        "design": _SEAS,
     },
     "sensitivity": {
         "policies": ["greedy"],

@@ -1,7 +1,7 @@
 # ---
 # jupyter:
 #   dess:
-#     studies: [seas]
+#     studies: [seas, seas-landing, seas-horizon]
 #   jupytext:
 #     text_representation:
 #       extension: .py
@@ -14,7 +14,7 @@
 # Every policy on seas of seven families that no policy has learned on, beside its time.
 
 # %% tags=["parameters"]
-results = "../../results"  # folder that holds the results folder seas
+results = "../../results"  # folder that holds the results folders seas, seas-landing, seas-horizon
 policy = "any"  # the learned policy for any sea
 reference = "planner"  # a slow policy that is hard to beat
 heuristic = "greedy"  # a fast policy without learning
@@ -26,7 +26,9 @@ from dess.analysis.metrics import METRICS, SUCCESS
 from dess.reports.pages import html
 
 # %%
-study = load_results(f"{results}/seas")
+study, landing, horizon = (
+    load_results(f"{results}/{name}") for name in ("seas", "seas-landing", "seas-horizon")
+)
 for name in (policy, reference, heuristic):
     study.check_policy(name)
 times = comparison.read(results, study)
@@ -64,6 +66,18 @@ html.table(
     "Every policy over all seas, and the time of a decision in batches on one core",
 )
 
+# %% [markdown]
+# ### Missions that end on the ground
+#
+# Every UAV must have landed at the end, with its quota filled or, without a quota, after eight
+# hours of flying and charging. No shipped policy has learned on such missions.
+
+# %%
+html.table(seas.summary(landing, times), "Missions with a quota that end on the ground")
+
+# %%
+html.table(seas.summary(horizon, times), "Eight hours without a quota")
+
 # %%
 rows = seas.quality(study, "family", SUCCESS)
 html.table(
@@ -85,4 +99,4 @@ html.table(
 # ## How this page was made
 
 # %%
-html.provenance([study])
+html.provenance([study, landing, horizon])

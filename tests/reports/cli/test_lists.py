@@ -24,8 +24,17 @@ def test_names_are_listed(dess):
         "scenarios": [*scenario_names(), *scenario_families()],
         "studies": [
             *("age", "charge-limits", "comparison", "explorer", "failures", "fig1", "fig4", "fig5"),
-            *("fig5-paper", "gap", "pads", "precise", "screening", "seas", "sensitivity"),
-            *("sweet-spot", "sweet-spot-paper", "table4", "verification"),
+            *(
+                "fig5-paper",
+                "gap",
+                "pads",
+                "precise",
+                "screening",
+                "seas",
+                "seas-horizon",
+                "seas-landing",
+            ),
+            *("sensitivity", "sweet-spot", "sweet-spot-paper", "table4", "verification"),
         ],
     }.items():
         code, out, err = dess(command)
