@@ -126,7 +126,7 @@ def variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str, alt: str) -
         f"(Student's t). Dashed: the mean of {baseline}. An arrow: all trainings are left of the "
         "axis."
     )
-    return Drawing(_variants(table, last, baseline), alt, caption)
+    return Drawing(_variants(table, last, baseline), alt, caption, table)
 
 
 def _variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> "Figure":
@@ -331,6 +331,7 @@ def transfer_drawings(curves: pd.DataFrame) -> list[Drawing]:
             trainings(curves, metric, dict(zip(pairs[name], _SIDES, strict=True))),
             f"{SHOWN[metric]} against training step, {name}, with and without transfer",
             f"Trainings with {name}.",
+            smoothed(curves[curves["variant"].isin(pairs[name])], metric),
         )
         for name in dict.fromkeys([[*pairs][0], [*pairs][-1]])
         for metric in SHOWN
