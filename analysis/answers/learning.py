@@ -382,7 +382,7 @@ def _steps_axis(curves: pd.DataFrame, ax: "Axes") -> None:
     ax.set(xlim=(0, longest["updates"] * 1.02), xlabel="training step [1000 updates]")
     ax.xaxis.set_major_formatter(lambda x, _: f"{x / 1000:g}")
     slots = longest["uav_slots"] / longest["updates"] / 1e6
-    top = ax.secondary_xaxis("top", (lambda x: x * slots, lambda x: x / slots))
+    top = ax.secondary_xaxis("top", functions=(lambda x: x * slots, lambda x: x / slots))
     top.set_xlabel("UAV-slots [millions]")
 
 

@@ -274,8 +274,12 @@ class Store:
         for folder, _ in self._places("missions", chunks[0].team):
             for path in parquet.files_in(folder):
                 of_file = held.get(name := parquet.content_hash(path), [])
-                if name not in names and of_file and not any(
-                    gaps(range(start, stop), merged[key]) for key, start, stop in of_file
+                if (
+                    name not in names
+                    and of_file
+                    and not any(
+                        gaps(range(start, stop), merged[key]) for key, start, stop in of_file
+                    )
                 ):
                     delete(path)
         self._scan()
