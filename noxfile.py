@@ -39,10 +39,10 @@ REQUIREMENTS = ("pyproject.toml", "constraints.txt")
 # Two test files at a time, in the order of their collection.
 SIDE_BY_SIDE = ("-n", "2", "--dist", "loadfile", "--no-loadscope-reorder")
 RESULTS, REPORTS = Path("results"), Path("build/reports")
-# The tests of a library, and the pins of one that cannot be installed with those of the project.
 # Beside the quick tests, what shows the lowest versions of the libraries for pages and commands.
 LOWEST = ("tests/reports/pages/test_body.py", "tests/reports/cli/test_lists.py")
 LOWEST += ("tests/reports/cli/test_console.py", "tests/analysis/results/test_parquet.py")
+# The tests of a library, and the pins of one that cannot be installed with those of the project.
 LIBRARIES, PINS = Path("tests/integrations"), Path("examples/requirements")
 FORCED = {"pufferlib"}  # asks for libraries that it does not need; its pins are all that it needs
 
