@@ -60,8 +60,8 @@ def evaluate(
     space, policy = load_space(scenario, settings), typed(policy)
     engine = engine_of([space], engine)
     if out:
-        study = {"scenario": scenario, "set": dict(map(setting, settings or []))}
-        study |= {"policies": policy, "missions": missions, "seed": seed, "engine": engine}
+        study: dict[str, Any] = {"scenario": scenario, "policies": policy, "missions": missions}
+        study |= {"set": dict(map(setting, settings or [])), "seed": seed, "engine": engine}
         evaluations = _kept(study, out, workers, yes)
     else:
         asked = [Asked(space, team, missions, seed, engine, workers) for team in policy]
