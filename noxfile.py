@@ -1,5 +1,6 @@
-"""The sessions: tests, lint, docs, reports, bench, verify, fuzz, integrations; see ``nox -l``."""
+"""The sessions: tests, lowest, lint, docs, reports, bench, verify, fuzz, integrations."""
 
+import re
 import shutil
 import sys
 from functools import cache
@@ -42,6 +43,9 @@ SIDE_BY_SIDE = ("-n", "2", "--dist", "loadfile", "--no-loadscope-reorder")
 # no number, into a cache of their own. All other sessions compile as users do.
 QUICK_COMPILING = {"NUMBA_OPT": "1", "NUMBA_CACHE_DIR": str(Path("build/numba").resolve())}
 RESULTS, REPORTS = Path("results"), Path("build/reports")
+# Beside the quick tests, what shows the lowest versions of the libraries for pages and commands.
+LOWEST = ("tests/reports/pages/test_body.py", "tests/reports/cli/test_lists.py")
+LOWEST += ("tests/reports/cli/test_console.py", "tests/analysis/results/test_parquet.py")
 # The tests of a library, and the pins of one that cannot be installed with those of the project.
 LIBRARIES, PINS = Path("tests/integrations"), Path("examples/requirements")
 FORCED = {"pufferlib"}  # asks for libraries that it does not need; its pins are all that it needs
@@ -69,6 +73,27 @@ def tests(session: nox.Session) -> None:
     """Run the tests."""
     install(session, "[test]")
     session.run("pytest", "-q", *SIDE_BY_SIDE, *session.posargs, env=QUICK_COMPILING)
+
+
+@nox.session
+def lowest(session: nox.Session) -> None:
+    """Install the lowest versions that ``pyproject.toml`` allows, and run the quick tests.
+
+    With ``--no-venv`` it only finds out whether these versions fit together.
+    """
+    bounds = re.findall(r'"([\w.-]+)>=([\w.]+)', Path("pyproject.toml").read_text("utf-8"))
+    pins = {name: f"{name}=={version}" for name, version in bounds}
+    # Of older ones, PyPI has only builds with CUDA, of several GB.
+    pins |= {"torch": re.findall("^torch==.*", Path("constraints.txt").read_text("utf-8"), re.M)[0]}
+    constraints = Path(session.create_tmp(), "lowest.txt")
+    constraints.write_text("\n".join(pins.values()), "utf-8")
+    wanted = ("-e", ".[test]", "-c", str(constraints))
+    if session.virtualenv.venv_backend == "none":
+        session.run("pip", "install", "-q", "--dry-run", "--ignore-installed", *wanted)
+        return
+    session.install(*wanted)
+    session.run("pytest", "-q", "-m", "quick", *session.posargs)
+    session.run("pytest", "-q", *LOWEST, *session.posargs)
 
 
 @nox.session

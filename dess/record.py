@@ -71,7 +71,7 @@ def measures_of(space: Constants) -> list[str]:
 
 
 class Event(NamedTuple):
-    """A row of the event log; ``docs/concepts/model.md`` says what its columns mean."""
+    """A row of the event log; ``docs/reference/event-log.md`` says what its columns mean."""
 
     time: float
     event: str

@@ -209,7 +209,7 @@ def test_tests_that_are_named_exist(page: str) -> None:
 
 def test_fields_of_the_scenario_are_named_rightly() -> None:
     fields = {*dess.Scenario.model_fields}
-    page = PAGES["docs/concepts/model.md"]
+    page = PAGES["docs/concepts/model.md"] + PAGES["docs/concepts/beyond.md"]
     decisions = page.split("## Decisions")[1].split("\n## ")[0]
     cells = [row.split("|")[3] for row in decisions.splitlines() if row.startswith("| ")][2:]
     named = {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}
@@ -221,8 +221,10 @@ def test_fields_of_the_scenario_are_named_rightly() -> None:
 
 def test_the_columns_of_records_and_events_are_all_explained() -> None:
     columns = EventLog().columns()
+    pages = ("concepts/model.md", "concepts/beyond.md", "reference/event-log.md")
+    text = "".join(PAGES[f"docs/{page}"] for page in pages)
     for name in (*EVENT_NAMES, *columns, *MISSION_RECORD.names, *UAV_RECORD.names):
-        assert f"`{name}`" in PAGES["docs/concepts/model.md"], name
+        assert f"`{name}`" in text, name
 
 
 # --- snippets ---
@@ -330,7 +332,7 @@ def test_the_table_by_fleet_is_what_its_commands_print(capsys: pytest.CaptureFix
 
 def test_the_table_of_what_learning_needs_is_that_of_the_shipped_curves() -> None:
     curves = pd.read_parquet(ROOT / "policies/trained/curves.parquet")
-    assert learning_curves.table(curves) in PAGES["docs/concepts/learner.md"]
+    assert learning_curves.table(curves) in PAGES["docs/concepts/trainings.md"]
     for variant in ("quick", "no transfer"):  # Fig. 3: three training seeds, the same budget
         runs = curves[curves["variant"] == variant].groupby("seed")["tick"].max()
         assert len(runs) >= 3

@@ -126,7 +126,7 @@ def variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str, alt: str) -
         f"(Student's t). Dashed: the mean of {baseline}. An arrow: all trainings are left of the "
         "axis."
     )
-    return Drawing(_variants(table, last, baseline), alt, caption)
+    return Drawing(_variants(table, last, baseline), alt, caption, table)
 
 
 def _variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> "Figure":
@@ -331,6 +331,7 @@ def transfer_drawings(curves: pd.DataFrame) -> list[Drawing]:
             trainings(curves, metric, dict(zip(pairs[name], _SIDES, strict=True))),
             f"{SHOWN[metric]} against training step, {name}, with and without transfer",
             f"Trainings with {name}.",
+            smoothed(curves[curves["variant"].isin(pairs[name])], metric),
         )
         for name in dict.fromkeys([[*pairs][0], [*pairs][-1]])
         for metric in SHOWN
@@ -381,7 +382,7 @@ def _steps_axis(curves: pd.DataFrame, ax: "Axes") -> None:
     ax.set(xlim=(0, longest["updates"] * 1.02), xlabel="training step [1000 updates]")
     ax.xaxis.set_major_formatter(lambda x, _: f"{x / 1000:g}")
     slots = longest["uav_slots"] / longest["updates"] / 1e6
-    top = ax.secondary_xaxis("top", (lambda x: x * slots, lambda x: x / slots))
+    top = ax.secondary_xaxis("top", functions=(lambda x: x * slots, lambda x: x / slots))
     top.set_xlabel("UAV-slots [millions]")
 
 

@@ -1,7 +1,8 @@
 """Evaluate single teams: many missions of one scenario, kept as records or as means alone."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import reduce
+from math import nan
 from time import perf_counter
 from typing import NamedTuple
 
@@ -18,9 +19,10 @@ from dess.analysis.execution.jobs import (
     simulate_missions,
 )
 from dess.analysis.execution.workers import Here, Pool
-from dess.analysis.metrics import ALWAYS, HOME, SUCCESS
+from dess.analysis.metrics import ALWAYS, HOME, SUCCESS, measured_in
 from dess.analysis.results.chunks import Part, split
 from dess.analysis.results.manifest import Cell
+from dess.analysis.results.tables import Results
 from dess.analysis.stats.intervals import Moments
 from dess.errors import check_type
 from dess.policies.registry import TypedByUser, load_team
@@ -33,6 +35,7 @@ from dess.view import check_team
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
 # sums depend on it.
 MEMORY = 2**24
+ByFleet = dict[str, dict[int, Moments]]  # by metric and number of UAVs
 
 
 class Asked(NamedTuple):
@@ -72,7 +75,8 @@ class Evaluation(NamedTuple):
         moments: For each metric its moments, which have its mean and interval. What an extended
             scenario measures is among the metrics; missions without a value are left out.
         uav_slots: Mission slots in which a UAV was active, summed over the UAVs of all missions.
-        seconds: Time of the simulation [s], without compilation and the start of workers.
+        seconds: Time of the simulation [s], without compilation and the start of workers; nan where
+            results are kept, of which some may have been there.
         records: The records of the missions; None if only their moments are kept.
     """
 
@@ -134,26 +138,44 @@ def means(asked: Asked, progress: Progress | None = None) -> Evaluation:
 def _evaluated(asked: Asked, size: int, progress: Progress | None) -> Evaluation:
     """The evaluation, by ``size`` missions at a time; their records are kept if these are all."""
     asked.check()
-    moments: dict[str, dict[int, Moments]] = {}
+    moments: ByFleet = {}
     uav_slots, seconds = 0, 0.0
     records: Records | None = None
     pieces = (range(n, min(n + size, asked.missions)) for n in range(0, asked.missions, size))
     for records, took in _simulated(asked, pieces, progress):
-        fleets = records.missions["uavs"]
-        for metric, values in _metrics(records).items():
-            for fleet in np.unique(fleets[~np.isnan(values)]):
-                new = Moments.of(values[(fleets == fleet) & ~np.isnan(values)])
-                old = moments.setdefault(metric, {}).get(fleet)
-                moments[metric][int(fleet)] = old.with_others(new) if old else new
+        _add(moments, _metrics(records), records.missions["uavs"])
         uav_slots += int(records.missions["uav_slots"].sum())
         seconds += took
-    low, high = asked.scenario.uavs
-    over_space = {
-        metric: Moments.of_space([of.get(n) for n in range(low, high + 1)], asked.missions)
-        for metric, of in moments.items()
-    }
     kept = records if size >= asked.missions else None
+    over_space = _over_space(moments, asked.scenario, asked.missions)
     return Evaluation(asked.team, over_space, uav_slots, seconds, kept)
+
+
+def of_results(results: Results) -> list[Evaluation]:
+    """The evaluations of the teams of a study that has the scenario as its only design point."""
+    evaluations = []
+    for team, rows in results.missions.groupby("policy", sort=False):
+        metrics = {name: rows[name].to_numpy(float) for name in (SUCCESS, HOME, *ALWAYS)}
+        metrics |= {name: rows[name].to_numpy(float) for name in measured_in(rows)}
+        moments: ByFleet = {}
+        _add(moments, metrics, rows["uavs"].to_numpy())
+        over_space = _over_space(moments, results.scenario(), len(rows))
+        evaluations.append(Evaluation(str(team), over_space, int(rows["uav_slots"].sum()), nan))
+    return evaluations
+
+
+def _add(moments: ByFleet, metrics: Mapping[str, np.ndarray], fleets: np.ndarray) -> None:
+    """Add the metrics of missions, by the number of UAVs of each; those without a value are not."""
+    for metric, values in metrics.items():
+        for fleet in np.unique(fleets[~np.isnan(values)]):
+            new = Moments.of(values[(fleets == fleet) & ~np.isnan(values)])
+            old = moments.setdefault(metric, {}).get(fleet)
+            moments[metric][int(fleet)] = old.with_others(new) if old else new
+
+
+def _over_space(moments: ByFleet, space: ScenarioSpace, missions: int) -> dict[str, Moments]:
+    fleets = range(space.uavs[0], space.uavs[1] + 1)
+    return {m: Moments.of_space([of.get(n) for n in fleets], missions) for m, of in moments.items()}
 
 
 def _metrics(records: Records) -> dict[str, np.ndarray]:

@@ -152,7 +152,13 @@ class _Run:
             wanted = [self._more(team, wanted[team]) for team in teams]
         selected = [self._select(team, wanted[team]) for team in teams]
         chosen = manifest.model_copy(update={"selected": selected})
-        self._round([part for team in teams for part in check_parts(chosen, team)])
+        checks = [check_parts(chosen, team) for team in teams]
+        self._round([part for of_team in checks for part in of_team])
+        if self.study.rule and not manifest.accepted:  # files of other code may have other columns
+            for team in teams:
+                all_of_team = parts_of(manifest, team, wanted[team]), checks[team]
+                parts = new_parts(all_of_team, defaultdict(list))
+                self.store.merge([*split(parts, CHUNK[self.study.engine])])
         self._make((BoundsJob, new_parts([bound_parts(manifest, wanted)], asked)))
         self.store.finish(wanted, selected)
 

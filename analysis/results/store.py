@@ -34,6 +34,8 @@ from dess.analysis.results.chunks import (
     Part,
     Present,
     absent,
+    gaps,
+    name_of,
     rows_of,
     stacked,
 )
@@ -81,13 +83,17 @@ class Store:
     def __init__(self, folder: Path, manifest: Manifest):
         self.folder, self.manifest = folder, manifest
         self._lock = ExitStack()  # what holds it
+        self.damaged: list[Path] = []
+        self._clear()
+
+    def _clear(self) -> None:
+        """Know of no missions, until the folder is scanned."""
         self._present: dict[str, Present] = {kind: defaultdict(list) for kind in TABLES}
         # By kind and key of a cell, the tables that contain it: missions and UAVs, or bounds alone.
         self._tables: dict[tuple[str, str], list[Sequence[pa.Table]]] = defaultdict(list)
         # The rows of several tables, until there are new ones: every round of a rule needs them.
         self._stacked: dict[tuple, pd.DataFrame] = {}
         self._logs: dict[tuple[str, int], Path] = {}  # by the key of a cell and the replication
-        self.damaged: list[Path] = []
 
     @classmethod
     def open(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
@@ -158,6 +164,7 @@ class Store:
 
     def _scan(self) -> None:
         """Find out what is present, and which files are damaged."""
+        self._clear()
         teams = range(len(self.manifest.policies))
         for kind, team in [*(("missions", team) for team in teams), ("bounds", NO_TEAM)]:
             found = [parquet.tables_in(*place) for place in self._places(kind, team)]
@@ -242,14 +249,44 @@ class Store:
         """
         for team, of_team in groupby(self.missing("missions", parts), lambda part: part.cell.team):
             if shared := other._held([*of_team]):
-                chunk = Chunk(team, tuple(shared))
-                tables = zip(*other._tables_with("missions", shared), strict=True)
                 try:
-                    rows = [rows_of(shared, stacked(of_kind)) for of_kind in tables]
+                    frames = other._frames(shared)
                 except InputError:
                     return
-                columns = ({str(n): of_kind[n].to_numpy() for n in of_kind} for of_kind in rows)
-                self.keep("missions", chunk, parquet.tables_with(chunk, *columns))
+                chunk = Chunk(team, tuple(shared))
+                self.keep("missions", chunk, _tables_of(chunk, frames))
+
+    def merge(self, chunks: Sequence[Chunk]) -> None:
+        """Keep the missions of a team in the files of these chunks, in place of many small ones.
+
+        A file that has other missions as well stays.
+        """
+        parts, names = [part for chunk in chunks for part in chunk.parts], {c.name for c in chunks}
+        rows = [parquet.parts_in(tables[0]) for tables in self._tables_with("missions", parts)]
+        held = {name_of(of_file): of_file for of_file in rows}
+        if held.keys() == names:
+            return
+        frames, merged = self._frames(parts), defaultdict(list)
+        for chunk in (chunk for chunk in chunks if chunk.name not in held):
+            self.keep("missions", chunk, _tables_of(chunk, frames))
+        for part in parts:
+            merged[part.cell.key].append(part.replications)
+        for folder, _ in self._places("missions", chunks[0].team):
+            for path in parquet.files_in(folder):
+                of_file = held.get(name := parquet.content_hash(path), [])
+                if (
+                    name not in names
+                    and of_file
+                    and not any(
+                        gaps(range(start, stop), merged[key]) for key, start, stop in of_file
+                    )
+                ):
+                    delete(path)
+        self._scan()
+
+    def _frames(self, parts: Iterable[Part]) -> list[pd.DataFrame]:
+        """The rows of the files with missions of some parts, and those of the files with UAVs."""
+        return [*map(stacked, zip(*self._tables_with("missions", parts), strict=True))]
 
     def _held(self, parts: Sequence[Part]) -> list[Part]:
         """What of the missions of some parts is present."""
@@ -377,6 +414,13 @@ class Store:
         return parquet.read(path) if path else None
 
 
+def _tables_of(chunk: Chunk, frames: Iterable[pd.DataFrame]) -> list[pa.Table]:
+    """The tables of a chunk, from frames that have its missions and UAVs among others."""
+    rows = (rows_of(chunk.parts, frame) for frame in frames)
+    columns = ({str(name): of_kind[name].to_numpy() for name in of_kind} for of_kind in rows)
+    return parquet.tables_with(chunk, *columns)
+
+
 def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
     """The manifest for a folder into which this study will be written.
 
@@ -412,7 +456,7 @@ def _source(folder: Path, keys: set[str]) -> Store | None:
         if manifest.accepted or not keys & _keys(manifest):
             return None
         return Store.read(folder)
-    except InputError:
+    except (InputError, FileNotFoundError):  # another run may merge its files
         return None
 
 

@@ -355,7 +355,8 @@ def _interval(missions: pd.DataFrame, metric: str, level: float, strata: bool) -
     if strata and missions["point"].nunique() > 1:
         wide = by_replication(missions, metric, "point").dropna(axis="columns", how="all")
         if (wide.count() > 1).all():
-            return stratified(wide.to_numpy(float), metric, level)
+            # In this order, so that the last bits of sums are the same with every pandas.
+            return stratified(np.ascontiguousarray(wide, float), metric, level)
     values = values_within(missions, metric, ())
     return interval_of(metric, values[~np.isnan(values)], level)
 

@@ -1,8 +1,11 @@
 """``dess evaluate``: metrics of many missions, with intervals."""
 
 import json
+import re
+import shlex
 from math import nan
-from typing import Annotated, Any, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -17,7 +20,11 @@ from dess.reports.cli.options import (
     command,
     load_space,
     note_departures,
+    setting,
 )
+
+if TYPE_CHECKING:
+    from dess.analysis.execution.evaluation import Evaluation
 
 app = typer.Typer()
 
@@ -31,6 +38,7 @@ def evaluate(
     seed: SeedOption = 0,
     engine: Literal["batch", "events"] | None = None,
     workers: WorkersOption = 1,
+    out: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -41,6 +49,8 @@ def evaluate(
         missions: Number of missions (replications 0, 1, ...).
         engine: batch is faster, and both engines give the same records; continuous arrivals
             need events.  [default: batch, or events where it is needed]
+        out: Keep the missions in this results folder, which dess study show and dess report read;
+            with more missions, those that are there are not simulated again.
     """
     from dess.analysis.execution.evaluation import Asked, check_evaluation, means
     from dess.analysis.study.study import engine_of
@@ -49,12 +59,17 @@ def evaluate(
 
     space, policy = load_space(scenario, settings), typed(policy)
     engine = engine_of([space], engine)
-    asked = [Asked(space, team, missions, seed, engine, workers) for team in policy]
-    with console.compile_notice():
-        check_evaluation(asked, yes)
-    note_departures(policy, [space])
-    with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
-        evaluations = [means(of_team, bar.update) for of_team in asked]
+    if out:
+        study: dict[str, Any] = {"scenario": scenario, "policies": policy, "missions": missions}
+        study |= {"set": dict(map(setting, settings or [])), "seed": seed, "engine": engine}
+        evaluations = _kept(study, out, workers, yes)
+    else:
+        asked = [Asked(space, team, missions, seed, engine, workers) for team in policy]
+        with console.compile_notice():
+            check_evaluation(asked, yes)
+        note_departures(policy, [space])
+        with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
+            evaluations = [means(of_team, bar.update) for of_team in asked]
     unknown = dict.fromkeys(("mean", "low", "high"), nan)
     rows = [
         {
@@ -73,6 +88,29 @@ def evaluate(
         print(json.dumps([_without_nan(row) for row in rows], indent=2, allow_nan=False))
     else:
         _print_rows(rows)
+        if out:
+            console.say(f"more: {shlex.join(['dess', 'study', 'show', str(out)])}")
+
+
+def _kept(data: dict[str, Any], out: Path, workers: int, yes: bool) -> "list[Evaluation]":
+    """Run the scenario as a study, which is named after its folder."""
+    from dess.analysis.execution.effort import check_run
+    from dess.analysis.execution.evaluation import of_results
+    from dess.analysis.execution.runner import run_study
+    from dess.analysis.study.study import MOST_CHARACTERS, study_from
+
+    name = re.sub(r"[^A-Za-z0-9._-]+|^[._-]+", "-", out.absolute().name).lstrip("-")
+    data |= {"name": name[:MOST_CHARACTERS] or "evaluation", "description": "an evaluation"}
+    study = study_from(data, "evaluate")
+    with console.compile_notice():
+        check_run(study, out, workers, yes=yes)
+    note_departures(study.policies, study.scenarios)
+    return of_results(
+        console.complete(
+            study.name,
+            lambda progress, announce: run_study(study, out, workers, None, progress, announce),
+        )
+    )
 
 
 def _without_nan(row: Any) -> Any:
@@ -87,9 +125,7 @@ def _print_rows(rows: list[dict[str, Any]]) -> None:
         metrics = {name: value for name, value in row.items() if isinstance(value, dict)}
         cells = [[name, *(f"{x:.4f}" for x in value.values())] for name, value in metrics.items()]
         console.print_table([row["policy"], "mean", "low", "high"], cells)
-        speed = row["uav_slots"] / row["seconds"]
         engine = ", SimPy engine" if row["engine"] == "events" else ""
-        console.say(
-            f" {row['missions']} missions, {row['uav_slots']} UAV-slots in "
-            f"{row['seconds']:.2f} s: {speed:,.0f} UAV-slots/s{engine}"
-        )
+        speed = f" in {row['seconds']:.2f} s: {row['uav_slots'] / row['seconds']:,.0f} UAV-slots/s"
+        took = "" if row["seconds"] != row["seconds"] else speed
+        console.say(f" {row['missions']} missions, {row['uav_slots']} UAV-slots{took}{engine}")

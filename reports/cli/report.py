@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dess import InputError
+from dess.errors import InputError, one_of, shown
 from dess.reports.cli import console
 from dess.reports.cli.console import YesOption
 from dess.reports.cli.options import PAGES, PARAMETER, RESULTS, JsonOption, command, setting
+from dess.reports.pages import PICTURES
 
 if TYPE_CHECKING:
     from dess.reports.pages.kernels import Progress
@@ -33,6 +34,7 @@ def report(
     parameters: Annotated[
         list[str] | None, typer.Option("--parameter", metavar="NAME=VALUE")
     ] = None,
+    figures: Annotated[str, typer.Option(metavar="FORMAT[,FORMAT]")] = "",
     yes: YesOption = False,
 ) -> None:
     """Render results as HTML pages with an index: reports on the paper, and pages of any study.
@@ -47,7 +49,13 @@ def report(
             value in TOML syntax; repeatable.
         parameters: A parameter of the notebooks, such as missions or policies of what-if, the
             value in TOML syntax; repeatable.
+        figures: Also write every figure as a file into the folder NAME-figures beside its page:
+            svg, pdf or png, or several of them.
     """
+    formats = [kind.strip() for kind in figures.split(",")] if figures else []
+    for kind in formats:
+        if kind not in PICTURES:
+            raise InputError(f"--figures: {shown(kind)} is unknown{one_of(kind, PICTURES)}")
     if results != RESULTS and not os.path.lexists(results):
         raise InputError(f"--results: {results}: no such folder; allowed: one with results")
     values = dict(setting(text, "--parameter", PARAMETER) for text in parameters or [])
@@ -65,9 +73,11 @@ def report(
     reports = [name for name in names or [] if name not in folders]
     with rendering() as progress:
         if reports or not folders:
-            console.say(render(reports, results, out, progress=progress, parameters=values))
+            console.say(render(reports, results, out, progress, values, formats=formats))
         for folder in folders:
-            console.say(render_study(folder, out, progress=progress, parameters=values))
+            console.say(render_study(folder, out, progress, values, formats))
+    if formats:
+        console.say(f"figures: {out / '*-figures'}")
 
 
 @contextmanager

@@ -99,13 +99,16 @@ html.table(
     answers.ablation_table(table, equal, baseline),
     "Means over n trainings with 95 % intervals, the prediction interval of one new training, "
     "and differences with Welch's t interval. ▲ better, ▼ worse, ≈ inconclusive",
+    table,
 )
 
 # %%
+compared = answers.transfer_table(transfers, verdicts)
 html.table(
-    answers.transfer_table(transfers, verdicts),
+    compared,
     "With transfer against without: the last difference with its 99 % interval (of the product "
     "in points)",
+    compared,
 )
 
 # %% [markdown]

@@ -49,6 +49,7 @@ html.lead(
     "The product against every parameter",
     f"n = {numbers.span(effects['n'])} missions per dot, with all other parameters drawn from "
     f"Table II; bars are {level} intervals.",
+    data=effects,
     narrow=settings.one_by_one(most, fig5.policies),
 )
 
@@ -64,6 +65,8 @@ html.gallery(
         (
             settings.effect(effects, field, pairs, fig5.policies),
             f"The three metrics against the {names.parameter(field).within}",
+            "",
+            effects[effects["field"] == field],
         )
         for field, pairs in changes.items()
     ],
@@ -132,6 +135,7 @@ html.gallery(
 html.table(
     main_effects.listed(effects, changes, ratios),
     f"Product; differences in points with {level} intervals, also of the collection ratio",
+    effects,
 )
 
 # %%
@@ -140,6 +144,7 @@ html.table(
     f"The selected settings and their checks: means with {level} intervals, the difference "
     "from the paper in points (▲ above, ▼ below, ≈ contains it), missions, settings not ruled "
     "out, and what the selection guarantees",
+    checks,
     wrap=True,
 )
 

@@ -49,6 +49,7 @@ html.lead(
     settings.performance(overall, PRODUCT, values.TABLE_IV[PRODUCT]),
     "The product of every policy, and the paper's number",
     f"{caption} Dashed: the paper's number.",
+    overall,
 )
 
 # %% [markdown]
@@ -94,6 +95,7 @@ html.gallery(
             f"{METRICS[m]} against the number of UAVs, and the paper's numbers",
             f"n = {numbers.span(fig4_fleets['n'])} missions per dot; diamonds: the paper's "
             "numbers.",
+            fig4_fleets[fig4_fleets["metric"] == m],
         )
         for m in values.FIG_4[1]
     ]
@@ -127,6 +129,7 @@ marks = "▲ our interval is above the paper's number, ▼ below, ≈ contains i
 html.table(
     questions.beside_paper(overall, {None: values.TABLE_IV}),
     f"Table IV: means with 95 % intervals, and the difference in points; {marks}",
+    overall,
 )
 
 # %%
@@ -136,12 +139,14 @@ html.say("{text}", text=html.composed(questions.home_in_words(overall)))
 html.table(
     questions.beside_paper(fig4_fleets, values.FIG_4),
     f"Fig. 4: means with 95 % intervals, and the difference in points; {marks}",
+    fig4_fleets,
 )
 
 # %%
 html.table(
     tables.estimates(fleets[fleets["metric"].isin(METRICS)], ["policy", "uavs", "n"]),
     "Means with 95 % intervals, by number of UAVs",
+    fleets,
 )
 
 # %% [markdown]

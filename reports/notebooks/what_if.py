@@ -32,6 +32,7 @@ from dess.analysis import metrics, what_if
 from dess.analysis.ask.what_if import measured
 from dess.analysis.metrics import metric_of
 from dess.reports.pages import html
+from dess.reports.pages import study as page
 
 # %%
 asked = what_if(
@@ -91,7 +92,7 @@ html.gallery([drawing for example in examples for drawing in example.drawings()]
 # far from its training, a new training may do better.
 
 # %%
-html.say("{answer}", answer=html.composed(asked.answer()))
+html.say("{answer}\n\n{notes}", answer=html.composed(asked.answer()), notes=page.notes(found))
 
 # %%
 html.table(

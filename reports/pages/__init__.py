@@ -15,6 +15,8 @@ sys.modules["rfc3987_syntax"] = None  # type: ignore[assignment]
 INDEX = "index.html"
 LOCK = ".index.lock"  # held while the index is written, which shows the pages of all processes
 PREFIX = "study-"  # of the names of the pages of studies
+PICTURES = ("svg", "pdf", "png")  # formats of the files with its figures
+ASKED = "DESS_FIGURES"  # the variable with those that are asked for, in the process of notebooks
 ENDINGS = (".html", ".partial.html", ".ipynb")  # of the files of a page
 
 

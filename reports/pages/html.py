@@ -10,6 +10,7 @@ html.gallery([(drawing, "Success of every policy", "n = 300 missions")])
 
 import io
 import json
+import os
 import re
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -33,6 +34,7 @@ from dess.analysis.results.tables import Results
 from dess.analysis.study.study import budget_of
 from dess.analysis.tables import Table
 from dess.errors import printable
+from dess.reports.pages import ASKED
 from dess.reports.pages.page import FILES, STUDY, Learned, Page, hidden
 
 SHORT = 12  # characters of a hash that are shown
@@ -61,7 +63,9 @@ _PLACES, _DIGITS = re.compile(rb' (?:d|x|y)="[^"]*"'), re.compile(rb"(\.\d)\d+")
 _EMPTY_HEADER = re.compile(r"<th[^>]*></th>")  # which is no header for a screen reader
 _BREAKS = re.compile(rb"\s+([LCQz]) ?")
 _INDEX = re.compile(r"\bC_([SC])\b")  # as in C_S, a threshold of charging
-_NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
+# What a file says of its origin, without the time.
+_NO_METADATA: dict = {"svg": dict.fromkeys(("Creator", "Date", "Format", "Type"))}
+_NO_METADATA |= {"pdf": {"CreationDate": None}, "png": {}}
 
 
 # What all templates have in common: they escape values, and one that is undefined is an error.
@@ -318,13 +322,13 @@ def gallery(drawings: Iterable[tuple[Any, ...]], note: str = "") -> Part:
     return figures([_figure(*parts) for parts in drawings], "gallery", note)
 
 
-def figures(values: Sequence[Mapping[str, str]], look: str = "", note: str = "") -> Part:
+def figures(values: Sequence[Mapping[str, Any]], look: str = "", note: str = "") -> Part:
     """Figures as data, in one of the looks of ``style.css``.
 
     Args:
         values: Of each its ``caption``, and ``links`` to its data. A drawing has ``alt``,
-            ``source`` and, for narrow windows, ``narrow``; what a script draws is HTML, ``player``,
-            with ``name``, which is its anchor.
+            ``source``, ``files`` if they are asked for and, for narrow windows, ``narrow``; what a
+            script draws is HTML, ``player``, with ``name``, which is its anchor.
         look: ``lead``, ``gallery``, or none.
         note: What holds for all of them, in a paragraph below.
     """
@@ -340,16 +344,18 @@ def show(*parts: Table | HTML | Markdown | Iterable[tuple[Any, ...]]) -> None:
             display(table(*part) if isinstance(part, Table) else gallery(part))
 
 
-def svg(drawing: "Figure") -> bytes:
-    """A figure as SVG; the same figure gives the same bytes."""
+def picture(drawing: "Figure", kind: str) -> bytes:
+    """A figure in one of ``PICTURES``; the same figure gives the same bytes."""
     import matplotlib as mpl
 
     buffer = io.BytesIO()
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams |= {"svg.hashsalt": "dess", "svg.fonttype": "none"}  # text, not outlines
-        drawing.savefig(buffer, format="svg", metadata=_NO_METADATA)
-    return _PLACES.sub(_shorter, buffer.getvalue())
+        mpl.rcParams |= {"pdf.fonttype": 42, "savefig.dpi": 200}  # journals refuse Type 3
+        drawing.savefig(buffer, format=kind, metadata=_NO_METADATA[kind])
+    content = buffer.getvalue()
+    return _PLACES.sub(_shorter, content) if kind == "svg" else content
 
 
 def _shorter(coordinates: re.Match[bytes]) -> bytes:
@@ -359,14 +365,17 @@ def _shorter(coordinates: re.Match[bytes]) -> bytes:
 
 def _figure(
     drawing: "Figure", alt: str, caption: str = "", data: pd.DataFrame | None = None
-) -> dict[str, str]:
+) -> dict[str, Any]:
     links = "" if data is None else _downloads(alt, data, data)
-    return {"alt": alt, "source": _source(drawing), "caption": caption, "links": links}
+    kinds = filter(None, os.environ.get(ASKED, "").split(","))
+    files = {kind: b64encode(picture(drawing, kind)).decode() for kind in kinds}
+    shown = {"alt": alt, "source": _source(drawing), "caption": caption, "links": links}
+    return shown | ({"files": files} if files else {})
 
 
 def _source(drawing: "Figure") -> str:
     """The address of a figure, which contains it."""
-    return f"data:image/svg+xml;base64,{b64encode(svg(drawing)).decode()}"
+    return f"data:image/svg+xml;base64,{b64encode(picture(drawing, 'svg')).decode()}"
 
 
 def _downloads(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:

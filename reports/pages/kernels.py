@@ -5,7 +5,7 @@ import logging
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryFile, gettempdir
@@ -16,7 +16,7 @@ from nbformat import from_dict
 from dess import InputError
 from dess.analysis.results.tables import load_results
 from dess.files.writing import temporary_folder
-from dess.reports.pages import cells
+from dess.reports.pages import ASKED, cells
 from dess.reports.pages.cells import kill
 from dess.reports.pages.notebook import Report
 
@@ -48,7 +48,8 @@ def run(
     codes = [[cell.source for cell in report.cells] for report in reports]
     work = {"cells": codes, "folders": [str(folder.absolute()) for folder in shared]}
     with temporary_folder(Path(gettempdir()), HOME) as home, TemporaryFile() as errors:
-        with _process(home, errors) as (asked, answers):
+        formats = dict.fromkeys(kind for report in reports for kind in report.formats)
+        with _process(home, errors, formats) as (asked, answers):
             with suppress(BrokenPipeError):
                 asked.write(json.dumps(work).encode() + b"\n")
                 asked.flush()
@@ -84,15 +85,19 @@ def _cell(report: Report) -> str:
 
 
 @contextmanager
-def _process(home: Path, errors: IO[bytes]) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
+def _process(
+    home: Path, errors: IO[bytes], formats: Iterable[str]
+) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
     """Input and output of the process that runs notebooks in a folder; it is killed at the end.
+
+    Its figures are files as well, in some formats.
 
     A session of its own keeps Ctrl-C from it and its children, and makes them a group to kill.
     """
     process = subprocess.Popen(
         [sys.executable, "-m", cells.__name__],
         cwd=home,
-        env=_environment(home),
+        env=_environment(home) | {ASKED: ",".join(formats)},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=errors,

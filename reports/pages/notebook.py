@@ -60,6 +60,7 @@ class Report:
         scripts: Whether the page has scripts, such as those of sliders.
         original: The complete notebook, as in its file.
         notebook: The cells of the page, with values for the parameters.
+        formats: Formats of the files with its figures that are asked for.
         key: What its page depends on; empty if it has other parameters than by default.
         is_current: Whether its page is there, and has this key.
         done: Number of cells that have been run.
@@ -75,6 +76,7 @@ class Report:
     scripts: bool
     original: NotebookNode
     notebook: NotebookNode
+    formats: tuple[str, ...] = ()
     key: str = ""
     is_current: bool = False
     done: int = 0
@@ -85,6 +87,11 @@ class Report:
     def page(self) -> str:
         """File name of the page; a failed report gets another name, to keep an older page."""
         return f"{self.name}{'.partial' if self.failure else ''}.html"
+
+    @property
+    def folder(self) -> str:
+        """The name of the folder with its figures, beside the page."""
+        return f"{self.name}-figures"
 
     @property
     def cells(self) -> list[NotebookNode]:

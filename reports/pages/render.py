@@ -8,8 +8,9 @@ import logging
 import os
 import re
 import sys
+from base64 import b64decode
 from collections import Counter
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from hashlib import sha256
@@ -174,6 +175,7 @@ def render(
     progress: Progress | None = None,
     parameters: Mapping[str, Any] | None = None,
     notebooks: Path = notebook.SHIPPED,
+    formats: Sequence[str] = (),
 ) -> Path:
     """Run reports on the results of studies and write their pages, their notebooks and an index.
 
@@ -189,6 +191,7 @@ def render(
         parameters: Values for the parameters of the notebooks, beside ``results``; paths in them
             are relative to the working directory.
         notebooks: The folder of the notebooks.
+        formats: Of ``PICTURES``: the figures are also written as such files.
 
     Returns:
         The path of ``index.html``.
@@ -205,6 +208,7 @@ def render(
     reports = [notebook.read(name, notebooks) for name in asked or notebook.names_in(notebooks)]
     notebook.check_parameters(reports, values)
     for report in reports:
+        report.formats = (*formats,)
         _look_up(report, results, out, values)
     lacking = {r.name: {} if r.is_current else _lacking(r, results) for r in reports}
     commands = {c: error for errors in lacking.values() for c, error in errors.items()}
@@ -232,6 +236,7 @@ def render_study(
     out: str | Path,
     progress: Progress | None = None,
     parameters: Mapping[str, Any] | None = None,
+    formats: Sequence[str] = (),
 ) -> Path:
     """Write the page of a results folder of any study, its notebook and the index.
 
@@ -240,6 +245,7 @@ def render_study(
         out: The folder to write to.
         progress: Called after every cell.
         parameters: Values for the parameters of the notebook, beside ``results``.
+        formats: As in ``render``.
 
     Returns:
         The path of the page, ``study-NAME.html``.
@@ -253,6 +259,7 @@ def render_study(
     report = report_of(folder, values)
     notebook.check_parameters([report], values)
     report.set({"results": str(folder.absolute()), **values})
+    report.formats = (*formats,)
     _look_up(report, folder, out, values)
     _write([report], folder, out, progress, values)
     return out / report.page
@@ -278,7 +285,11 @@ def _write(
 
         made = {report.page: page_of(report) for report in changed}
     complete = [report for report in reports if not report.failure]
-    files = {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
+    files: dict[str, str | bytes] = {
+        f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete
+    }
+    for report in complete:
+        files |= {f"{report.folder}/{name}": picture for name, picture in _pictures(report)}
     with locked(out / LOCK, _BUSY, PATIENCE):
         others = pages_in(out, but=made)
         pages = with_bars(others | made)
@@ -292,13 +303,22 @@ def _write(
         raise ReportError("; ".join(lines))
 
 
+def _pictures(report: notebook.Report) -> Iterator[tuple[str, bytes]]:
+    """The files with the figures of a report that has been run, by the numbers on its page."""
+    from dess.reports.pages.body import parts_of
+
+    for figure in (figure for part in parts_of(report.cells) for figure in part.get("figures", [])):
+        for kind, content in figure.get("files", {}).items():
+            yield f"{figure['name']}.{kind}", b64decode(content)
+
+
 def _look_up(report: notebook.Report, results: Path, out: Path, values: Mapping[str, Any]) -> None:
     """Find out whether the page of a report is there and of these results, which are sound then."""
     if values:
         return
     with suppress(InputError):  # there are none, or ``_lacking`` finds out what is wrong with them
         report.key = key_of(report, _folders(report, results))
-        report.is_current = has_key(out / report.page, report.key)
+        report.is_current = not report.formats and has_key(out / report.page, report.key)
 
 
 def _folders(report: notebook.Report, results: Path) -> dict[str, Path]:

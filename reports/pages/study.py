@@ -39,11 +39,15 @@ def simulated(results: Results) -> html.Marked:
         f"- **Policies:** {policies}.",
         *_design(results),
         f"- **Missions:** {missions}{each}, {len(results.missions):,} in all.",
-        *(
-            html.marked("- **Note:** {line}.", line=line)
-            for line in departures(results.policies, manifest.scenarios)
-        ),
+        notes(results),
     ]
+    return html.Marked("\n".join(filter(None, lines)))
+
+
+def notes(results: Results) -> html.Marked:
+    """Which trained policies act outside of their training, as a list."""
+    found = departures(results.policies, results.store.manifest.scenarios)
+    lines = [html.marked("- **Note:** {line}.", line=line) for line in found]
     return html.Marked("\n".join(lines))
 
 

@@ -168,7 +168,7 @@ def shown_by(source: str | Report, **parameters: Any) -> str:
     with pytest.MonkeyPatch.context() as patch:
         for module in (IPython.display, html):
             patch.setattr(module, "display", lambda *pieces: shown.extend(pieces))
-        patch.setattr(html, "svg", lambda drawing: b"")
+        patch.setattr(html, "picture", lambda drawing, kind: b"")
         for cell in report.cells:
             tree = ast.parse(cell.source)
             last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None

@@ -9,7 +9,7 @@ from dess import InputError, simulate
 from dess.analysis import evaluate, load_results, resimulate, run_study
 from dess.analysis.answers.summary import sensitivity
 from dess.analysis.execution import jobs
-from dess.analysis.results import parquet
+from dess.analysis.results import parquet, store
 from dess.analysis.study.study import CHECK
 from dess.policies import load_team
 from dess.policies.heuristics import Greedy
@@ -243,6 +243,28 @@ def test_points_that_are_one_scenario_share_their_missions(tmp_path):
     assert sizes == [n for of_team in results.manifest["missions"] for n in of_team]
     stored = pd.read_parquet(tmp_path / "out" / "missions" / "policy=greedy")
     assert not stored.duplicated(["cell", "replication"]).any()
+
+
+def test_the_missions_of_rounds_end_in_the_files_of_one(tmp_path, monkeypatch):
+    """Asked again, nothing is written; after an end between writing and deleting, it goes on."""
+    study, folder = selecting(tmp_path), tmp_path / "out"
+    monkeypatch.setattr(store.Store, "merge", lambda *_: None)
+    before = run_study(study, folder)
+    many = [*folder.rglob("*.parquet")]
+    monkeypatch.undo()
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(store, "delete", raises(KeyboardInterrupt()))
+        run_study(study, folder)
+    merged = run_study(study, folder)
+    few = [*folder.rglob("*.parquet")]
+    assert len(few) == 2 * len(study.policies) < len(many)
+    for old, new in ((before, merged), (before, load_results(folder))):
+        pd.testing.assert_frame_equal(old.missions, new.missions)
+        pd.testing.assert_frame_equal(old.checks, new.checks)
+        pd.testing.assert_frame_equal(old.uavs, new.uavs)
+    monkeypatch.setattr(parquet, "write", raises(AssertionError()))
+    run_study(study, folder)
+    assert [*folder.rglob("*.parquet")] == few
 
 
 def test_a_full_disk_is_no_failure_of_a_chunk(tmp_path, monkeypatch):

@@ -1,4 +1,6 @@
-"""``dess evaluate``: its JSON, and its tables."""
+"""``dess evaluate``: its JSON, its tables, and the missions that it keeps."""
+
+from dess.analysis import load_results
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 
@@ -36,3 +38,21 @@ def test_a_trained_policy_says_when_it_acts_outside_of_its_training(dess):
         code, _, err = dess(*command, *beyond)
         words = "quota 600 (trained on 440), uavs 6 (trained on 1 to 3)"
         assert code == 0 and f"note: ddqn acts outside of its training: {words}\n" in err
+
+
+def test_missions_can_be_kept_as_results(dess, dess_json, tmp_path):
+    """With the means of an evaluation that keeps none; with more missions, they are added."""
+    asked = ("--policy", "greedy", "--policy", "greedy,random", "--set", "failures.uav_rate=0.001")
+    asked += ("--missions", 30, "--seed", 3)
+    kept = dess_json("evaluate", *asked, "--out", "my results")
+    others = dess_json("evaluate", *asked)
+    assert [row.pop("seconds") for row in kept] == [None, None]
+    assert [row.pop("seconds") > 0 for row in others] == [True, True]
+    assert kept == others
+    code, out, err = dess("evaluate", *asked, "--missions", 40, "--out", "my results")
+    assert code == 0 and "80 missions, 60 of them present" in err
+    assert out.splitlines()[-1] == "more: dess study show 'my results'"
+    results = load_results(tmp_path / "my results")
+    assert len(results.missions) == 80 and results.store.manifest.study.name == "my-results"
+    assert dess("study", "show", "my results")[0] == 0
+    assert dess("evaluate", "--policy", "greedy", "--seed", 4, "--out", "my results")[0] == 2

@@ -13,11 +13,11 @@ def rendered(monkeypatch):
     """The pages that commands render: nothing is rendered, only noted."""
     pages = []
 
-    def note_reports(names, results, out, progress=None, parameters=None):
+    def note_reports(names, results, out, progress=None, parameters=None, formats=()):
         pages.append((*names, str(results), str(out)))
         return Path(out, "index.html")
 
-    def note_study(folder, out, progress=None, parameters=None):
+    def note_study(folder, out, progress=None, parameters=None, formats=()):
         pages.append((str(folder), str(out), parameters))
         return Path(out, f"study-{Path(folder).name}.html")
 
@@ -67,7 +67,7 @@ def test_a_notebook_that_fails_is_one_line(dess, monkeypatch, tmp_path):
 def test_yes_is_for_the_notebooks_that_simulate(dess, monkeypatch):
     given = []
 
-    def note(names, results, out, progress=None, parameters=None):
+    def note(names, results, out, progress=None, parameters=None, formats=()):
         given.append(parameters)
         return Path(out, "index.html")
 
@@ -76,6 +76,13 @@ def test_yes_is_for_the_notebooks_that_simulate(dess, monkeypatch):
     assert given == [{"yes": True}, {}]
     for name in ("what-if", "sweep", "own-sea"):
         assert notebook.read(name).parameters["yes"] is False
+
+
+def test_formats_of_figures_are_named(dess, rendered, refusal):
+    assert "'gif' is unknown; allowed: svg, pdf, png" in refusal("report", "--figures", "pdf,gif")
+    code, out, _ = dess("report", "mission", "--figures", "pdf, svg")
+    where = Path("build", "reports")
+    assert (code, out) == (0, f"{where / 'index.html'}\nfigures: {where / '*-figures'}\n")
 
 
 def odd(path: Path, kind: str) -> None:

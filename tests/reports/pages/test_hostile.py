@@ -126,7 +126,7 @@ def test_a_name_is_no_formula_in_a_figure(name: str) -> None:
     with style.panels(3) as (drawing, axes):
         axes.plot([1, 2], label=name)
         axes.set_title(name)
-    assert html.svg(drawing)
+    assert html.picture(drawing, "svg")
     assert mpl.rcParams["text.parse_math"]
 
 

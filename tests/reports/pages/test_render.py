@@ -250,6 +250,28 @@ def test_the_same_results_give_the_same_bytes(
         assert (folder / name).read_text("utf-8") == text, name
 
 
+def test_figures_are_files_on_request(
+    files: dict[str, str],
+    results: Path,
+    notebooks: Path,
+    out: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Beside a page that is the same, rendered again though it is current; always the same."""
+    folder = another_environment(results, out, tmp_path, monkeypatch)
+    asked = ["mission"], tmp_path / results.name, folder, None, {}, notebooks, ("svg", "pdf", "png")
+    made = []
+    for _ in range(2):
+        render(*asked)
+        made.append({p.name: p.read_bytes() for p in (folder / "mission-figures").iterdir()})
+    assert made[0] == made[1]
+    begins = {"figure-1.svg": b"<?xml", "figure-1.pdf": b"%PDF", "figure-1.png": b"\x89PNG"}
+    assert {name: content[: len(begins[name])] for name, content in made[0].items()} == begins
+    for name, text in files.items():
+        assert (folder / name).read_text("utf-8") == text, name
+
+
 @pytest.mark.usefixtures("files")
 def test_a_notebook_runs_in_jupyter_and_shows_what_the_page_shows(
     results: Path, notebooks: Path, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -98,3 +98,13 @@ def test_parameters_choose_the_metric_and_the_baseline(tmp_path):
     text = page_of(tmp_path / "out", metric="reward", baseline=1)
     assert "compared with itself at design point 1: 2 UAVs." in text
     assert re.search(r"The best setting is greedy with \d UAVs?: reward −?[\d,.]+ ", text)
+
+
+def test_pages_say_when_a_trained_policy_acts_outside_of_its_training(tmp_path):
+    """That of a study, and of a what-if question, be it on one side only."""
+    question = {"settings": {"quota": 600}, "baseline": {}, "policies": ["ddqn"], "missions": 2}
+    shown = shown_by("what-if", results=str(tmp_path), **question)
+    note = "Note:** ddqn acts outside of its training: quota 440 to 600 (trained on 440)."
+    assert note in shown
+    run_study(small_study(tmp_path, policies=["greedy"], missions=2), tmp_path / "out")
+    assert "Note:" not in page_of(tmp_path / "out")
