@@ -19,6 +19,7 @@ from dess.code.kernels import inlined, kernel
 from dess.rules import data_left
 from dess.scenario import MOST_ZONES
 from dess.sea.chart import distance, in_zone, is_open, length_around
+from dess.sections.charging import slots_to_charge
 from dess.sections.failures import working_pads
 from dess.sections.landing import flies, lands
 from dess.sections.section import for_sections
@@ -180,7 +181,7 @@ def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     around = length_around(chart.zones, closed[:count], x, y, to_x, to_y)
     lacking = mission.charge_complete - mission.charge_start
     through = distance(chart, x, y, to_x, to_y)
-    return min(around, through + (lacking + mission.charge_rate - 1) // mission.charge_rate)
+    return min(around, through + slots_to_charge(mission, lacking))
 
 
 class Parking(NamedTuple):
@@ -403,7 +404,7 @@ def _kept(mission, u, o, zone, followers):
     pads = working_pads(mission, zone)
     if pads == 0 or followers % pads != 0:
         return 0
-    charge = (mission.charge_complete + mission.charge_rate - 1) // mission.charge_rate
+    charge = slots_to_charge(mission, mission.charge_complete)
     return followers // pads * charge - (o.battery - u.battery) // max(mission.flight_cost, 1)
 
 
@@ -509,10 +510,11 @@ def _take_pad(mission, u, zone, asked, free):
     begin = max(free[zone, pad], asked)
     flying = 0 if u.charging else begin
     lacking = mission.charge_complete - max(u.battery - flying * mission.flight_cost, 0)
-    rate = mission.charge_rate
+    slots = slots_to_charge(mission, lacking)
     if mission.power > 0:
-        rate = max(min(rate, mission.power // working_pads(mission, zone)), 1)
-    free[zone, pad] = begin + (lacking + rate - 1) // rate
+        share = max(mission.power // working_pads(mission, zone), 1)
+        slots = max(slots, (lacking + share - 1) // share)
+    free[zone, pad] = begin + slots
 
 
 @inlined
@@ -572,7 +574,9 @@ def round_trip(mission, u, chart, x, y, home, reach):
     cells = distance(chart, u.x, u.y, x, y)
     if reach is None:
         return cells + back
-    against = max(mission.wind_x * (u.x - x), 0.0) + max(mission.wind_y * (u.y - y), 0.0)
+    along_x = mission.wind_east if x > u.x else mission.wind_west
+    along_y = mission.wind_south if y > u.y else mission.wind_north
+    against = max(along_x * abs(x - u.x), 0.0) + max(along_y * abs(y - u.y), 0.0)
     return cells * u.slots_per_cell + int(against) + back
 
 

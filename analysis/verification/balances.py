@@ -145,7 +145,7 @@ def _first_battery(scenario: Scenario) -> dict[int, int]:
 def _surcharges(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
     """(N,) the battery [%] that the wind costs in each UAV slot; a move pays in its first."""
     wind = scenario.wind
-    field = surcharges(scenario.size, *wind.push(), wind.gusts, wind.seed)
+    field = surcharges(scenario.size, *wind.pushes(), wind.gusts, wind.seed)
     x, y = table["x"].to_numpy(), table["y"].to_numpy()
     step_x, step_y = x - table["from_x"], y - table["from_y"]
     action = np.select([step_y < 0, step_x > 0, step_y > 0], [NORTH, EAST, SOUTH], WEST)
