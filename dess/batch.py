@@ -147,7 +147,8 @@ def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
 
     def key(index: int) -> tuple:
         s = spaces[index]
-        channel = (s.edge_snr, s.path_loss_exponent, s.cell_size, s.altitude)
+        radio = (s.radio.anchor, s.radio.range)
+        channel = (s.edge_snr, s.path_loss_exponent, s.cell_size, s.altitude, radio)
         speeds = tuple(kind.slots_per_cell for kind in s.fleet)
         wind = tuple(s.wind.model_dump().values())
         geometry = (s.size, s.rectangles, s.no_fly, s.nodes)

@@ -18,6 +18,7 @@ from dess.code.kernels import inlined, kernel, log10
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import Chart, read_only
 from dess.sections import fleet
+from dess.sections.radio import has_max_rate
 from dess.state import STEP_X, STEP_Y
 
 GROUP = 4  # communication slots whose shadowing one Philox block holds
@@ -49,9 +50,9 @@ class World(NamedTuple):
     Attributes:
         nodes: (K, 2) cells of the sensor nodes.
         mean_snr: (M, F * (M - 1) + 1) mean SNR [dB] at a distance of ``a`` cells along one axis and
-            ``b / F`` cells along the other, where M is the longer side of the grid. These are all
-            relative positions from which a UAV can serve a node. F is m, or a multiple of it if a
-            move may take several slots.
+            ``b / F`` cells along the other, where M is the longer side of the grid; minus infinity
+            out of range. These are all relative positions from which a UAV can serve a node. F is
+            m, or a multiple of it if a move may take several slots.
         order: (5 * W * H, K + 1) for each step on a grid of W x H cells, the nodes in descending
             order of their highest mean SNR in the slot; the last column tells whether the row is
             filled. If a move may take several slots, there are such rows for each leg
@@ -134,14 +135,14 @@ def _world_of(scenario: ScenarioSpace, thread: int) -> World:
     places, longest = m * fleet.places_per_slot(scenario.fleet), max(columns, rows)
     fine = np.arange(places * (longest - 1) + 1)
     diagonal = np.sqrt(2) * np.sqrt((columns**2 + rows**2) / 2) * scenario.cell_size
-    edge = diagonal / 2
+    edge, reach = scenario.radio.anchor or diagonal / 2, scenario.radio.range or math.inf
     mean_snr = np.empty((longest, len(fine)))
     for row in range(longest):  # each takes a moment, all of a large grid may take seconds
         # From an integer: at equal distances, the SNR is equal to the bit.
         horizontal = scenario.cell_size * (np.sqrt((places * row) ** 2 + fine**2) / places)
         distance = np.hypot(horizontal, scenario.altitude)
         loss = 10 * scenario.path_loss_exponent * log10(distance / edge)
-        mean_snr[row] = scenario.edge_snr - loss
+        mean_snr[row] = np.where(distance <= reach, scenario.edge_snr - loss, -math.inf)
     nodes = np.array(scenario.nodes, np.int64)
     steps = 5 * columns * rows * fleet.legs(scenario.fleet)
     return World.of(nodes, mean_snr, scenario.chart, steps, m)
@@ -331,4 +332,7 @@ def _top(node, snr, word, width):
 def rate(mission, snr):
     """Data units per communication slot at an SNR [dB] (eq. 9)."""
     length = mission.communication_slot_length
+    if has_max_rate(mission):
+        efficiency = _PER_LOG_2 * math.log1p(math.exp(snr * _DB_TO_LOG))
+        return length * min(efficiency, mission.max_rate)
     return length * _PER_LOG_2 * math.log1p(math.exp(snr * _DB_TO_LOG))

@@ -19,8 +19,10 @@ from dess.code.kernels import inlined, kernel
 from dess.rules import data_left
 from dess.scenario import MOST_ZONES
 from dess.sea.chart import distance, in_zone, is_open, length_around
+from dess.sections.charging import slots_to_charge
 from dess.sections.failures import working_pads
 from dess.sections.landing import flies, lands
+from dess.sections.radio import has_range
 from dess.sections.section import for_sections
 from dess.sections.wind import move_surcharge, reach_of
 from dess.state import HOVER, STEP_X, STEP_Y
@@ -52,8 +54,9 @@ def slots_needed(mission, u):
 def slots_expected(mission, u, data):
     """Flying slots until the quota of UAV ``u`` is filled, as far as data are there for it.
 
-    A UAV collects some ``MEAN_RATE`` data units in a slot. Once the residual data are collected,
-    it may count on ``SLOTS_PER_PACKET`` communication slots for each data unit that arrives.
+    A UAV collects some ``MEAN_RATE`` data units in a slot, and is no more often in range of a node
+    than chance would have it. Once the residual data are collected, it may count on
+    ``SLOTS_PER_PACKET`` communication slots for each data unit that arrives.
 
     Args:
         mission: ``MISSION`` record.
@@ -61,6 +64,8 @@ def slots_expected(mission, u, data):
         data: Residual data of all nodes together [data units].
     """
     needed = slots_needed(mission, u)
+    if has_range(mission):  # slots out of range do not count
+        needed = int(math.ceil(needed / mission.covered))
     if data >= MEAN_RATE * needed * mission.active:
         return needed
     served = data / (MEAN_RATE * mission.active)
@@ -204,7 +209,7 @@ def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
         return around
     lacking = mission.charge_complete - mission.charge_start
     through = distance(chart, x, y, to_x, to_y)
-    return min(around, through + (lacking + mission.charge_rate - 1) // mission.charge_rate)
+    return min(around, through + slots_to_charge(mission, lacking))
 
 
 class Parking(NamedTuple):
@@ -427,7 +432,7 @@ def _kept(mission, u, o, zone, followers):
     pads = working_pads(mission, zone)
     if pads == 0 or followers % pads != 0:
         return 0
-    charge = (mission.charge_complete + mission.charge_rate - 1) // mission.charge_rate
+    charge = slots_to_charge(mission, mission.charge_complete)
     return followers // pads * charge - (o.battery - u.battery) // max(mission.flight_cost, 1)
 
 
@@ -533,10 +538,11 @@ def _take_pad(mission, u, zone, asked, free):
     begin = max(free[zone, pad], asked)
     flying = 0 if u.charging else begin
     lacking = mission.charge_complete - max(u.battery - flying * mission.flight_cost, 0)
-    rate = mission.charge_rate
+    slots = slots_to_charge(mission, lacking)
     if mission.power > 0:
-        rate = max(min(rate, mission.power // working_pads(mission, zone)), 1)
-    free[zone, pad] = begin + (lacking + rate - 1) // rate
+        share = max(mission.power // working_pads(mission, zone), 1)
+        slots = max(slots, (lacking + share - 1) // share)
+    free[zone, pad] = begin + slots
 
 
 @inlined
@@ -600,7 +606,9 @@ def round_trip(mission, u, chart, x, y, home, reach):
     cells = distance(chart, u.x, u.y, x, y)
     if reach is None:
         return cells + back
-    against = max(mission.wind_x * (u.x - x), 0.0) + max(mission.wind_y * (u.y - y), 0.0)
+    along_x = mission.wind_east if x > u.x else mission.wind_west
+    along_y = mission.wind_south if y > u.y else mission.wind_north
+    against = max(along_x * abs(x - u.x), 0.0) + max(along_y * abs(y - u.y), 0.0)
     return cells * u.slots_per_cell + int(against) + back
 
 

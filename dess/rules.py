@@ -20,7 +20,7 @@ from dess import channel, streams
 from dess.code.kernels import inlined, kernel
 from dess.sea.chart import is_open
 from dess.sections import age, fleet, wind
-from dess.sections.charging import is_before, share_power
+from dess.sections.charging import gain, is_before, share_power
 from dess.sections.failures import strike_if_on, take_pad, working_pads
 from dess.sections.landing import flies, has_filled, has_landed, lands, stands
 from dess.sections.section import for_sections
@@ -261,6 +261,7 @@ def start_charging(mission, uavs, i):
     """Give a free pad to UAV ``i``."""
     take_pad(mission, uavs, uavs[i])
     uavs[i].charging = True
+    uavs[i].charge_slots = 0
 
 
 @inlined
@@ -272,8 +273,10 @@ def spend(mission, uavs):
         if not u.active:
             continue
         if u.charging:
+            u.charge_slots += 1
             if not limited:
-                u.battery = min(u.battery + mission.charge_rate, mission.charge_complete)
+                added = gain(mission, u.charge_slots)
+                u.battery = min(u.battery + added, mission.charge_complete)
             u.slots_charging += 1
         elif u.grounded:
             mission.slots_grounded += 1

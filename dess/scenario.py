@@ -19,6 +19,7 @@ from pydantic import (
     Field,
     SerializerFunctionWrapHandler,
     TypeAdapter,
+    ValidationError,
     ValidationInfo,
     model_serializer,
     model_validator,
@@ -26,7 +27,7 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 
 from dess.errors import InputError, check_type, listed, one_of, shown, validated
-from dess.files.reading import Shipped
+from dess.files.reading import Shipped, parse_toml
 from dess.sea.chart import (
     FAR,
     MOST_CHARTED,
@@ -45,8 +46,10 @@ from dess.sections.age import MOST_TEETH, Age
 from dess.sections.arrivals import MOST as MOST_RATE
 from dess.sections.arrivals import Arrivals
 from dess.sections.charging import Charging
+from dess.sections.data_sheet import OPEN, DataSheet, Units
 from dess.sections.failures import MOST_PADS, Failures
 from dess.sections.fleet import UavType, legs, places_per_slot
+from dess.sections.radio import Radio
 from dess.sections.section import Integer, Number, Section, Strict, tuples
 from dess.sections.wind import Wind
 
@@ -69,7 +72,7 @@ MOST_PACKETS = 2_000_000
 MOST_ENTRIES = 2**30
 
 # The fields that go beyond the paper.
-SECTIONS = ("arrivals", "age", "charging", "failures", "wind", "fleet")
+SECTIONS = ("arrivals", "age", "charging", "radio", "failures", "wind", "fleet", "data_sheet")
 # The fields of seas that the paper does not have; records are the same with and without them.
 GEOMETRY = ("rows", "zones", "no_fly", "names", "moved", "centre")
 LANDING = "landing"
@@ -179,8 +182,11 @@ class Constants(Strict):
     )
 
     # Energy
-    charge_rate: Integer = Field(
-        10, ge=1, le=100, description="battery gained in a charging slot [%]"
+    charge_rate: Integer | Number = Field(
+        10,
+        ge=0.01,
+        le=100,
+        description="battery gained in a charging slot [%]; what is not whole waits for the next",
     )
     flight_cost: Integer = Field(
         1,
@@ -192,7 +198,10 @@ class Constants(Strict):
 
     # Channel
     edge_snr: Number = Field(
-        -25.0, ge=-300, le=300, description="mean SNR at half the grid's diagonal [dB]"
+        -25.0,
+        ge=-300,
+        le=300,
+        description="mean SNR at half the grid's diagonal, or at radio.anchor [dB]",
     )
     path_loss_exponent: Number = Field(
         2.27, ge=0.01, le=10, description="path loss exponent (alpha)"
@@ -234,6 +243,7 @@ class Constants(Strict):
     arrivals: Arrivals = Arrivals.off()
     age: Age = Age.off()
     charging: Charging = Charging.off()
+    radio: Radio = Radio.off()
     failures: Failures = Failures.off()
     wind: Wind = Wind.off()
     fleet: tuple[UavType, ...] = Field(
@@ -241,13 +251,41 @@ class Constants(Strict):
         max_length=MOST_UAVS,
         description="types of UAVs: a table for each; UAV i has type i modulo their number",
     )
+    data_sheet: DataSheet = DataSheet.off()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _follow_the_data_sheet(cls, values: Any) -> Any:
+        """Add the fields that follow from the data sheet, which may not be given as well."""
+        sheet = values.get("data_sheet") if isinstance(values, dict) else None
+        try:
+            found = DataSheet.model_validate(sheet or {})
+        except ValidationError:  # it is told where the field is validated
+            return values
+        if not found.is_on:
+            return values
+        values = {n: dict(of) if isinstance(of, Section) else of for n, of in values.items()}
+        for name in sorted(found.fields().keys() & dotted(values).keys() - {*OPEN}):
+            raise InputError(f"{name}: follows from the data sheet; allowed: without this field")
+        return merged(found.fields(), values)
 
     @model_serializer(mode="wrap")
     def _without_what_is_off(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out the sections that are off: so scenarios without them are stored as before."""
-        values = handler(self)
-        off = [n for n in (*SECTIONS, *GEOMETRY, LANDING) if not self.has(n)]
-        return {name: value for name, value in values.items() if name not in off}
+        """Leave out the sections that are off: so scenarios without them are stored as before.
+
+        What follows from a data sheet is left out as well.
+        """
+        optional = (*SECTIONS, *GEOMETRY, *(() if self.data_sheet.is_on else (LANDING,)))
+        off = [name for name in optional if not self.has(name)]
+        values = {name: value for name, value in handler(self).items() if name not in off}
+        if not self.data_sheet.is_on:
+            return values
+        follows = {
+            name
+            for name, value in self.data_sheet.fields().items()
+            if self.value(name) in (value, (value, value))
+        }
+        return merged({n: of for n, of in dotted(values).items() if n not in follows}, {})
 
     @model_validator(mode="after")
     def _is_consistent(self, info: ValidationInfo) -> Self:
@@ -308,7 +346,12 @@ class Constants(Strict):
     @property
     def is_extended(self) -> bool:
         """Whether the scenario goes beyond the paper, so that records have ``OPERATIONS``."""
-        return any(self.has(name) for name in (*SECTIONS, LANDING))
+        return any(self.has(name) for name in (*SECTIONS, LANDING)) or self.charge_rate % 1 > 0
+
+    @property
+    def units(self) -> Units | None:
+        """What a slot, a cell and a data unit are; None without a data sheet."""
+        return self.data_sheet.units if self.data_sheet.is_on else None
 
     def has(self, section: str) -> bool:
         """Whether a section is on."""
@@ -510,8 +553,15 @@ def draft_scenario(name_or_path: str | Path, /, **overrides: Any) -> ScenarioSpa
     return _load(name_or_path, overrides, DRAFT)
 
 
-def _load(name_or_path: str | Path, overrides: dict[str, Any], context: str = "") -> ScenarioSpace:
-    where, read = _read(name_or_path)
+def parsed_scenario(text: str, path: Path) -> ScenarioSpace:
+    """The scenario that ``load_scenario`` would load if a file had this text."""
+    return _load(path, {}, found=(str(path), parse_toml(text, str(path))))
+
+
+def _load(
+    name_or_path: str | Path, overrides: dict[str, Any], context: str = "", found: Any = None
+) -> ScenarioSpace:
+    where, read = found or _read(name_or_path)
     read.pop("description", None)
     values = merged(read, overrides)
     if named := unread(read) | unread(values):
@@ -680,6 +730,13 @@ def _unreachable(c: Constants) -> Iterator[str]:
 def _unfit(c: Constants) -> Iterator[str]:
     """The rates, the pads and the initial data fit to the nodes and the zones."""
     count, (low, high) = len(c.nodes), c.initial_data
+    if c.data_sheet.is_on:
+        if c.data_sheet.data_rate is None:
+            yield f"data_sheet.data_rate: is missing; allowed: {DataSheet.form_of('data_rate')}"
+        full = c.data_sheet.fields()["charge_complete"]
+        for name in ("flying_time", "charge_complete"):
+            if np.max(c.value(name)) > full:
+                yield f"{name}: {c.value(name)} is more than the reserve leaves; allowed: {full}"
     if c.quota == 0 and not c.landing:
         yield "quota: 0 needs landing; allowed: 1..1000000, or landing = true"
     for name in ("names", "arrivals.rates", "arrivals.initial", "arrivals.merged"):
@@ -693,6 +750,8 @@ def _unfit(c: Constants) -> Iterator[str]:
         name, cells = f"zones.{number - 1}.pads" if number else "pads", width * height
         if pads > cells:
             yield f"{name}: {pads} is more than the zone has cells; allowed: 1..{cells}"
+    if 0 < c.radio.range <= c.altitude:
+        yield f"radio.range: {c.radio.range:g} m is too short; allowed: above {c.altitude:g} m"
     if c.failures.pad_rate > 0 and c.charging_pads > MOST_PADS:
         yield f"pads: {c.charging_pads} are too many to fail; allowed: {MOST_PADS} at most"
     if not 0 <= low <= high <= MOST_DATA:

@@ -15,7 +15,7 @@ from dess import streams
 from dess.code.kernels import kernel
 from dess.errors import InputError, check_type
 from dess.scenario import MOST_ZONES, SAMPLED, AnyScenario, Scenario, ScenarioSpace, loaded
-from dess.sections import fleet, wind
+from dess.sections import fleet, radio, wind
 from dess.sections.failures import MOST_PADS
 
 NORTH, EAST, SOUTH, WEST, HOVER = range(5)
@@ -48,6 +48,7 @@ MISSION = np.dtype(
         # Time, fleet and energy.
         *fields(np.int64, "communication_slots max_slots uavs flying_time charge_start"),
         *fields(np.int64, "charge_complete charge_rate flight_cost quota"),
+        ("charge_gain", np.float64),  # the battery gained in a charging slot, if it is not whole
         ("landing", np.int64),  # whether missions end on the ground
         # Charging (dess.sections.charging); ``plans_waits`` tells whether the return guard allows
         # for the wait for a pad.
@@ -60,9 +61,11 @@ MISSION = np.dtype(
         ("node_data_lost", np.int64),
         # Channel.
         *fields(np.float64, "communication_slot_length shadowing_deviation"),
-        # Wind: its mean and its deviation from cell to cell, as pushes [% of battery per cell], and
-        # the largest surcharge of a move [%], 0 without wind.
-        *fields(np.float64, "wind_x wind_y wind_gusts"),
+        # The radio, 0 without: its largest rate, and the share of cells in range of a node.
+        *fields(np.float64, "max_rate covered"),
+        # Wind: what its mean takes of moves and its deviation from cell to cell [% of battery per
+        # cell], and the largest surcharge of a move [%], 0 without wind.
+        *fields(np.float64, "wind_north wind_east wind_south wind_west wind_gusts"),
         ("wind_seed", np.uint64),
         ("wind_most", np.int64),
         ("slowest", np.int64),  # the most slots that a UAV of the fleet takes for a cell
@@ -105,6 +108,7 @@ UAV = np.dtype(
         ("pad", np.int64),  # index of the pad held, where pads may fail
         ("zone", np.int64),  # number of the charging zone that it is in, negative for none
         *fields(np.int64, "slots_flying slots_charging slots_waiting"),
+        ("charge_slots", np.int64),  # of the present charge
         ("overruled_by", np.int64),  # if overruled: the UAV in its way, -1 at the edge of the grid
         ("served", np.int64),  # node served in the present communication slot, -1 for none
         # ``latch`` is the charging latch iota; who is ``charging`` holds a pad, and who is
@@ -193,6 +197,9 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         "communication_slot_length": scenario.slot_length / scenario.communication_slots,
         "shadowing_deviation": np.sqrt(scenario.shadowing_variance),
         **{"continuous": scenario.needs_events, "age_measured": slotted_age},
+        "charge_gain": scenario.charge_rate if scenario.charge_rate % 1 > 0 else 0.0,
+        "max_rate": scenario.radio.max_rate,
+        "covered": radio.covered(scenario) if scenario.radio.range > 0 else 0.0,
         "age_reward": scenario.age.reward,
         **({"arrival_rate": np.mean(scenario.node_rates)} if own_rates else {}),
         **wind.constants(scenario.wind, scenario.size),

@@ -98,7 +98,7 @@ def phases_of(scenario: Scenario) -> Phases:
 def _without_battery(scenario: Scenario, flying: np.ndarray) -> Phases:
     """One phase without a deadline: flying takes no battery, so a UAV charges once at most."""
     needed = scenario.charge_complete - scenario.flying_time
-    charging = -(-needed // scenario.charge_rate)
+    charging = int(-(-needed // scenario.charge_rate))
     if scenario.flying_time > scenario.charge_start:
         charging = 0
     slots, never = np.array([len(flying)]), np.array([0])

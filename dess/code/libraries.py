@@ -4,6 +4,7 @@
     pip install 'dess[learning]'   trained policies and trainings
     pip install 'dess[reports]'    figures, pages, and studies of sensitivities
     pip install 'dess[geo]'        shipping lanes and buffers of seas from GeoJSON files
+    pip install 'dess[units]'      data sheets of scenarios
     pip install 'dess[all]'        everything
     pip install 'dess[examples]'   the libraries of the examples, as far as they fit together
 
@@ -23,6 +24,7 @@ EXTRAS = {
         *("markupsafe", "nbconvert", "nbformat", "packaging", "pygments", "traitlets"),
     ),
     "geo": ("shapely",),
+    "units": ("pint",),
     "distributed": ("distributed",),
     "tensorboard": ("tensorboard",),
     "examples": ("sb3_contrib", "stable_baselines3", "supersuit", "torchrl"),

@@ -38,7 +38,7 @@ _PROBES = (1.0, 3.0, 8.0)
 # The fields of ``MISSION`` that ``sea_of`` reads and that a batch need not share.
 _FIELDS = (
     *("zone_pads", "initial_low", "initial_high", "arrival_rate", "charge_rate"),
-    "communication_slot_length",
+    *("charge_gain", "max_rate", "communication_slot_length"),
 )
 
 
@@ -75,9 +75,11 @@ def sea_of(mission: Any, world: World) -> Sea:
     snr = world.mean_snr[0, :: (world.mean_snr.shape[1] - 1) // (len(world.mean_snr) - 1)]
     low, high, arriving = (mission[n] for n in ("initial_low", "initial_high", "arrival_rate"))
     unit = max(0.75 * low + 0.25 * high, 40 * arriving, 1e-3)
-    rates = length * log10(1 + 10 ** (snr / 10)) / np.log10(2) / unit
+    most = length * (float(mission["max_rate"]) or np.inf)
+    rates = np.minimum(length * log10(1 + 10 ** (snr / 10)) / np.log10(2), most) / unit
     probes = np.interp(_PROBES, np.arange(len(rates)), rates)
-    others = [40 * arriving / unit, mission["charge_rate"] / 10]
+    charging = mission["charge_gain"] or mission["charge_rate"]
+    others = [40 * arriving / unit, charging / 10]
     return Sea(
         world.chart,
         world.nodes.copy(),

@@ -7,6 +7,7 @@ A CSV file has places, as cells (``x``, ``y``) or degrees (``lon``, ``lat``); of
 points are taken.
 """
 
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Self
 
@@ -17,10 +18,12 @@ from dess.errors import InputError, listed
 from dess.sea import places
 from dess.sea.chart import Cell
 from dess.sea.places import Place, Projection, Size
+from dess.sections.data_sheet import quantity_of
 
 MAX_NODES, MAX_GRID = 1024, 256  # as of a scenario
 # What columns are called that are used without being asked for, whatever the case.
-NAMES, RATES, DATA = ("name", "label", "id"), ("rate", "arrival_rate"), ("data", "initial_data")
+NAMES = ("name", "label", "id")
+RATES, DATA = ("rate", "arrival_rate", "data_rate"), ("data", "initial_data", "backlog")
 
 
 class NodesFile(places.Source):
@@ -77,7 +80,7 @@ class NodesFound(NamedTuple):
         return Projection.about(self.spots, size, cell_size) if self.is_geographic else None
 
     def fields(
-        self, size: Size, projection: Projection | None, closed: np.ndarray
+        self, size: Size, projection: Projection | None, closed: Any, has_sheet: bool = False
     ) -> dict[str, Any]:
         """The fields of a scenario that these nodes have on a grid, those of ``arrivals`` dotted.
 
@@ -85,6 +88,7 @@ class NodesFound(NamedTuple):
             size: Cells of the grid from west to east and from north to south.
             projection: That of the sea.
             closed: (H, W) whether a cell is a no-fly cell.
+            has_sheet: Whether the scenario has a data sheet: then rates and data are in units.
 
         Raises:
             InputError: If a node is off the grid, two share a cell, or a rate is no number.
@@ -109,23 +113,32 @@ class NodesFound(NamedTuple):
             "nodes": [*groups],
             "moved": moved,
             "names": [_joined([names[n] for n in group]) for group in members if any(names)],
-            "arrivals.rates": self._sums(members, self.source.rate, RATES),
-            "arrivals.initial": self._sums(members, self.source.data, DATA),
             "arrivals.merged": [len(group) for group in members if len(groups) < len(own)],
         }
+        rates, data = (self.source.rate, RATES), (self.source.data, DATA)
+        if has_sheet:
+            found["data_sheet.data_rate"] = self._sums(members, *rates, "bit/s")
+            found["data_sheet.backlog"] = self._sums(members, *data, "bit")
+        else:
+            found["arrivals.rates"] = self._sums(members, *rates)
+            found["arrivals.initial"] = self._sums(members, *data)
         return {field: values for field, values in found.items() if values}
 
     def _name(self, number: int) -> str:
         return str(self.rows[number].property(self.source.name, NAMES) or "")
 
-    def _sums(self, groups: list[list[int]], column: str, known: tuple[str, ...]) -> list[float]:
+    def _sums(
+        self, groups: list[list[int]], column: str, known: tuple[str, ...], unit: str = ""
+    ) -> list[Any]:
         """The sums of a column over groups of nodes; none if the file has no such column."""
         texts = [row.property(column, known) for row in self.rows]
         if all(text is None for text in texts):
             return []
         where = [f"{self.path}: {row.where}: {column or known[0]}" for row in self.rows]
-        values = [*map(places.number_of, (str(text or "") for text in texts), where)]
-        return [sum(values[number] for number in group) for group in groups]
+        read = partial(quantity_of, unit=unit) if unit else places.number_of
+        values = [*map(read, (str(text or "") for text in texts), where)]
+        sums = [sum(values[number] for number in group) for group in groups]
+        return [f"{total!r} {unit}" for total in sums] if unit else sums
 
     def _title(self, number: int) -> str:
         """Where a node stands in the file, and its name."""

@@ -86,7 +86,8 @@ class OwnSea(NamedTuple):
             closed = np.zeros(self.grid.size[::-1], np.bool_)
             for x, y in placed.get("no_fly", self.grid.no_fly):
                 closed[y : y + 1, x : x + 1] = True  # none for a cell that is refused later
-            placed |= found.fields(self.grid.size, projection, closed)
+            has_sheet = self.grid.data_sheet.is_on
+            placed |= found.fields(self.grid.size, projection, closed, has_sheet)
         return placed
 
     def _no_fly(self, values: Mapping[str, Any], projection: Projection | None) -> dict[str, Any]:

@@ -56,6 +56,32 @@ def is_before(mission, u, other):
 
 
 @for_sections
+def _is_fractional(mission):
+    """Whether what a charging slot adds is not whole."""
+    return mission.charge_gain > 0.0
+
+
+@inlined
+def gain(mission, k):
+    """The battery [%] that slot ``k`` = 1, 2, ... of a charge adds.
+
+    It is whole; at a rate of g, the first k slots add ``floor(k g)``.
+    """
+    if _is_fractional(mission):
+        rate = mission.charge_gain
+        return int(math.floor(k * rate)) - int(math.floor((k - 1) * rate))
+    return mission.charge_rate
+
+
+@inlined
+def slots_to_charge(mission, lacking):
+    """The slots that a charge takes that adds so much battery [%]."""
+    if _is_fractional(mission):
+        return int(math.ceil(lacking / mission.charge_gain))
+    return (lacking + mission.charge_rate - 1) // mission.charge_rate
+
+
+@for_sections
 def share_power(mission, uavs):
     """Charge the UAVs on the pads if the power is limited; return whether it is."""
     if mission.power > 0:
@@ -81,9 +107,9 @@ def _share_power(mission, uavs, zone):
         if first < 0:
             return
         u = uavs[first]
-        gain = min(mission.charge_rate, mission.charge_complete - u.battery, left)
-        u.battery += gain
-        left -= gain
+        added = min(gain(mission, u.charge_slots + 1), mission.charge_complete - u.battery, left)
+        u.battery += added
+        left -= added
         charged[first] = True
 
 

@@ -12,6 +12,7 @@ Without wind and slow UAVs there is no table.
 
 import math
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -21,6 +22,11 @@ from dess.code.kernels import inlined, kernel
 from dess.sea.chart import NO_FLY, Chart
 from dess.sections.section import Integer, Number, Section, for_sections
 
+MOST = 10  # the largest surcharge of a move in the mean wind [%]
+
+Moves = tuple[float, float, float, float]
+Push = Annotated[Number, Field(ge=0, le=MOST)]
+
 
 class Wind(Section):
     """A field of wind over the grid, drawn from its own seed and the same in all missions."""
@@ -28,7 +34,7 @@ class Wind(Section):
     strength: Number = Field(
         0.0,
         ge=0,
-        le=10,
+        le=MOST,
         description="battery that a move against the mean wind costs more [%]; 0 for none",
     )
     direction: Number = Field(
@@ -38,18 +44,50 @@ class Wind(Section):
         description="where the mean wind comes from [degrees from north, clockwise]",
     )
     gusts: Number = Field(
-        0.0, ge=0, le=10, description="standard deviation of the wind from cell to cell [%]"
+        0.0, ge=0, le=MOST, description="standard deviation of the wind from cell to cell [%]"
     )
     seed: Integer = Field(0, ge=0, le=2**32 - 1, description="seed of the field of wind")
+    moves: tuple[Push, Push, Push, Push] = Field(
+        (0.0, 0.0, 0.0, 0.0),
+        description="battery that moves cost more beside this [%]: [north, east, south, west]",
+    )
 
-    def push(self) -> tuple[float, float]:
-        """The mean wind [% per cell] towards east and towards south."""
-        towards = math.radians(self.direction)
-        return -self.strength * math.sin(towards), self.strength * math.cos(towards)
+    def pushes(self) -> Moves:
+        """What the mean wind takes of moves to the north, east, south and west [% per cell]."""
+        towards, (north, east, south, west) = math.radians(self.direction), self.moves
+        x, y = -self.strength * math.sin(towards), self.strength * math.cos(towards)
+        return y + north, -x + east, -y + south, x + west
+
+
+def moves_in(wind: float, direction: float, cruise: float) -> Moves:
+    """What a wind from a direction [degrees] takes of the four moves [% per cell].
+
+    The ground speed along a move is what the wind adds along it, and what the cruising speed has
+    left when it holds against the wind across it.
+
+    Args:
+        wind, cruise: Speeds [m/s]; the wind must not be above ``largest_wind``.
+        direction: Where the wind comes from [degrees from north, clockwise].
+    """
+    found = []
+    for course in (0, 90, 180, 270):
+        angle = math.radians(direction - course)
+        ground = math.sqrt(cruise**2 - (wind * math.sin(angle)) ** 2) - wind * math.cos(angle)
+        found.append(max(cruise / ground - 1, 0.0))
+    north, east, south, west = found
+    return north, east, south, west
+
+
+def largest_wind(direction: float, cruise: float) -> float:
+    """The wind [m/s] in which a move against it costs ``MOST`` percent more (law of cosines)."""
+    ground = cruise / (MOST + 1)
+    turn = math.radians(direction % 90)
+    angle = min(turn, math.pi / 2 - turn)
+    return math.sqrt(cruise**2 - (ground * math.sin(angle)) ** 2) - ground * math.cos(angle)
 
 
 @inlined
-def surcharge(columns, wind_x, wind_y, gusts, seed, step_x, step_y, x, y):
+def surcharge(columns, north, east, south, west, gusts, seed, step_x, step_y, x, y):
     """The battery [%] that a move into cell ``x, y`` costs beyond that in still air.
 
     Batteries are integers, so a fraction is rounded up or down by a draw per cell; its expected
@@ -57,16 +95,16 @@ def surcharge(columns, wind_x, wind_y, gusts, seed, step_x, step_y, x, y):
 
     Args:
         columns: Cells of the grid from west to east.
-        wind_x, wind_y: The mean wind [% per cell].
+        north, east, south, west: What the mean wind takes of moves [% per cell].
         gusts: Standard deviation of the wind from cell to cell [% per cell].
         seed: Seed of the field.
         step_x, step_y: The step of the move [cells].
         x, y: The cell that the move leads to.
     """
     words = streams.block(seed, 0, streams.WIND, 0, 0, y * columns + x)
-    east = wind_x + gusts * streams.normal(words[0])
-    south = wind_y + gusts * streams.normal(words[1])
-    against = -(east * step_x + south * step_y)
+    mean = (south if step_y > 0 else north) if step_x == 0 else (east if step_x > 0 else west)
+    along = streams.normal(words[0]) * step_x + streams.normal(words[1]) * step_y
+    against = mean - gusts * along
     if against <= 0.0:
         return 0
     return int(math.floor(against + streams.uniform(words[2 if step_y == 0 else 3])))
@@ -78,52 +116,52 @@ def move_surcharge(mission, step_x, step_y, x, y):
     if mission.wind_most == 0 or (step_x == 0 and step_y == 0):
         return 0
     return surcharge(
-        mission.grid, mission.wind_x, mission.wind_y, mission.wind_gusts, mission.wind_seed,
-        step_x, step_y, x, y,
+        mission.grid, mission.wind_north, mission.wind_east, mission.wind_south, mission.wind_west,
+        mission.wind_gusts, mission.wind_seed, step_x, step_y, x, y,
     )  # fmt: skip
 
 
 @lru_cache(maxsize=16)
 def surcharges(
-    size: tuple[int, int], wind_x: float, wind_y: float, gusts: float, seed: int
-) -> np.ndarray:
+    size: tuple[int, int], north: float, east: float, south: float, west: float, gusts: float,
+    seed: int,
+) -> np.ndarray:  # fmt: skip
     """(4, H, W) surcharges [%] of the moves north, east, south and west into cell ``y, x``."""
     columns, rows = size
     table = np.zeros((4, rows, columns), np.int64)
-    if wind_x or wind_y or gusts:
-        _fill(wind_x, wind_y, gusts, seed, table)
+    if north or east or south or west or gusts:
+        _fill(north, east, south, west, gusts, seed, table)
     table.flags.writeable = False
     return table
 
 
 @kernel
-def _fill(wind_x, wind_y, gusts, seed, table):
+def _fill(north, east, south, west, gusts, seed, table):
     rows, columns = table.shape[1:]
     for action, (step_x, step_y) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
         for y in range(rows):
             for x in range(columns):
                 table[action, y, x] = surcharge(
-                    columns, wind_x, wind_y, gusts, seed, step_x, step_y, x, y
+                    columns, north, east, south, west, gusts, seed, step_x, step_y, x, y
                 )
+
+
+# The fields of ``MISSION`` that describe the wind, in the order in which ``surcharges`` takes them.
+FIELDS = (
+    *(f"wind_{move}" for move in ("north", "east", "south", "west")),
+    "wind_gusts",
+    "wind_seed",
+)
 
 
 def constants(wind: Wind, size: tuple[int, int]) -> dict[str, float]:
     """The fields of ``MISSION`` that describe the wind."""
-    wind_x, wind_y = wind.push()
-    return {
-        "wind_x": wind_x,
-        "wind_y": wind_y,
-        "wind_gusts": wind.gusts,
-        "wind_seed": wind.seed,
-        "wind_most": surcharges(size, wind_x, wind_y, wind.gusts, wind.seed).max(),
-    }
+    field = (*wind.pushes(), wind.gusts, wind.seed)
+    return dict(zip(FIELDS, field, strict=True)) | {"wind_most": surcharges(size, *field).max()}
 
 
 FAR = 2**15 - 1  # [%]: further than any cell
 _MOST_ENTRIES = 2**26  # 128 MB
-
-# The fields of ``MISSION`` that a table depends on.
-_FIELDS = ("slowest", "wind_x", "wind_y", "wind_gusts", "wind_seed")
 
 
 def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
@@ -142,7 +180,7 @@ def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
     if mission["wind_most"] == 0 and mission["slowest"] == 1:
         return None
     sea = (chart.zones.shape, chart.zones.tobytes(), chart.parking.tobytes())
-    return _table(*sea, *(mission[field].item() for field in _FIELDS))
+    return _table(*sea, *(mission[field].item() for field in ("slowest", *FIELDS)))
 
 
 @lru_cache(maxsize=16)
@@ -169,7 +207,7 @@ def ways_home(missions: np.ndarray, chart: Chart) -> np.ndarray:
         chart: Their chart.
     """
     sea = (chart.zones.shape, chart.zones.tobytes(), chart.parking.tobytes())
-    return _ways_home(*sea, *(missions[0][field].item() for field in _FIELDS))
+    return _ways_home(*sea, *(missions[0][field].item() for field in ("slowest", *FIELDS)))
 
 
 @lru_cache(maxsize=16)

@@ -24,9 +24,11 @@ import numpy as np
 from dess.code.kernels import inlined, kernel
 from dess.guard import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
 from dess.sea.chart import distance, in_zone, is_open
+from dess.sections.charging import gain
 from dess.sections.failures import working_pads
 from dess.sections.fleet import leg
 from dess.sections.landing import lands
+from dess.sections.radio import has_range
 from dess.sections.section import for_sections
 from dess.state import HOVER, STEP_X, STEP_Y, fields
 
@@ -256,13 +258,13 @@ def fly(mission, rates, plan, source, first, flight, slots, lag=math.inf):
             if v.active == 0:
                 continue
             if v.charging != 0:
-                v.battery = min(v.battery + mission.charge_rate, mission.charge_complete)
+                v.battery = min(v.battery + gain(mission, t + 1), mission.charge_complete)
                 continue
             if v.next > v.last_charge and not lands(mission):
                 penalty += _unplanned(mission, v, active, data_left)
             penalty += _act(mission, rates, waypoints, team, i, t, active)
             if _may_charge(rates.chart, v) and _has_pad(mission, rates.chart, team, v):
-                penalty += _begin_to_charge(mission, v, active)
+                penalty += _begin_to_charge(mission, v, t, active)
             elif _stands(mission, rates.chart, v):
                 v.battery += mission.flight_cost
         active = 0
@@ -365,6 +367,8 @@ def _collect(mission, rates, sea, v, t, wait, data_left):
         c = candidates[row, rank]
         node = sea[c.node]
         rank += 1
+        if has_range(mission) and c.rate == 0.0:
+            break
         if t < node.since:
             continue
         held, amount = node.base + rate * t, c.rate * v.rate
@@ -376,7 +380,8 @@ def _collect(mission, rates, sea, v, t, wait, data_left):
         left -= int(math.ceil(held / amount))
         collected += held
         node.base, node.since = -rate * t, t + wait
-    if rate * mission.nodes < _SOME_ARRIVE and data_left - collected < _NOTHING:
+    is_empty = rate * mission.nodes < _SOME_ARRIVE and data_left - collected < _NOTHING
+    if is_empty or (has_range(mission) and left > 0):
         v.counted -= left
     return collected
 
@@ -439,11 +444,11 @@ def _has_pad(mission, chart, team, v):
 
 
 @inlined
-def _begin_to_charge(mission, v, active):
+def _begin_to_charge(mission, v, t, active):
     """Let a UAV charge, and return the penalty if its battery is below the guard's reserve."""
     before = v.battery + mission.flight_cost
     v.charging = 1
-    v.battery = min(before + mission.charge_rate, mission.charge_complete)
+    v.battery = min(before + gain(mission, t + 1), mission.charge_complete)
     return _LATE * max(1 + _reserve(mission, v, active) - before, 0)
 
 

@@ -6,6 +6,7 @@ tables.candidates[row, 0]      # the node with the highest rate in a step
 A step is an action together with the cell that it leads to.
 """
 
+import math
 from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
@@ -14,7 +15,7 @@ import numpy as np
 
 from dess.code.memory import check_memory
 from dess.sea.chart import Chart
-from dess.sections.wind import surcharges
+from dess.sections import wind
 from dess.state import STEP_X, STEP_Y
 from dess.view import View
 
@@ -56,22 +57,23 @@ def rates_of(view: View) -> Rates:
         int(mission["slowest"]),
         float(mission["communication_slot_length"]),
         float(mission["shadowing_deviation"]),
+        float(mission["max_rate"]) or math.inf,
     )
     extra = np.zeros((0, 0, 0), np.int64)
     if mission["wind_most"] > 0:
-        wind = (mission[name].item() for name in ("wind_x", "wind_y", "wind_gusts", "wind_seed"))
-        extra = surcharges((columns, rows), *wind).copy()
+        field = (mission[name].item() for name in wind.FIELDS)
+        extra = wind.surcharges((columns, rows), *field).copy()
     return Rates(candidates, extra, chart)
 
 
 @lru_cache(maxsize=8)
 def _candidates(
     nodes: bytes, mean_snr: bytes, size: tuple[int, int], m: int, slowest: int, length: float,
-    deviation: float,
+    deviation: float, most: float,
 ) -> np.ndarray:  # fmt: skip
     cells, snr = np.frombuffer(nodes, np.int64).reshape(-1, 2), np.frombuffer(mean_snr)
     (columns, rows), longest = size, max(size)
-    rates = _mean_rate(snr.reshape(longest, -1), length, deviation)
+    rates = _mean_rate(snr.reshape(longest, -1), length, deviation, most)
     kept, legs = min(_RANKS, len(cells)), slowest * (slowest + 1) // 2
     check_memory(
         f"planner: a grid of {columns:,} x {rows:,} cells",
@@ -106,8 +108,8 @@ def _of_steps(
     return rates[np.abs(across)[..., None], np.minimum(fine, farthest)].mean(-1)
 
 
-def _mean_rate(snr: np.ndarray, length: float, deviation: float) -> np.ndarray:
-    """The mean of the rate (eq. 9) over the shadowing, for mean SNRs [dB].
+def _mean_rate(snr: np.ndarray, length: float, deviation: float, most: float) -> np.ndarray:
+    """The mean of the rate (eq. 9), at most ``most``, over the shadowing, for mean SNRs [dB].
 
     It is computed once for each SNR, so that nodes at equal distances have equal rates.
     """
@@ -117,5 +119,6 @@ def _mean_rate(snr: np.ndarray, length: float, deviation: float) -> np.ndarray:
     rates = np.empty_like(distinct)
     for part in np.array_split(np.arange(len(distinct)), len(snr)):  # all would take gigabytes
         levels = distinct[part, None] + deviation * points
-        rates[part] = length * np.log2(1.0 + 10.0 ** (levels / 10.0)) @ weights
+        efficiency = np.minimum(np.log2(1.0 + 10.0 ** (levels / 10.0)), most)
+        rates[part] = length * efficiency @ weights
     return rates[places].reshape(snr.shape)

@@ -1,0 +1,323 @@
+"""The data sheet of a mission in units, and the fields of a scenario that follow from it.
+
+    [data_sheet]                # in the TOML file of a scenario
+    endurance = "35 min"
+    cruise = "15 m/s"
+
+A full battery is 100 slots: a slot is the hundredth part of the endurance, a cell the way of a slot
+at cruising speed, and a data unit what the bandwidth carries in a slot at 1 bit/s/Hz. The library
+pint reads the units; it is imported when there is a sheet.
+"""
+
+import math
+import re
+from functools import cache, lru_cache
+from typing import Any, NamedTuple, NoReturn, Self
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from dess.code.libraries import needs
+from dess.errors import InputError, shown
+from dess.sections.section import Section
+from dess.sections.wind import Moves, largest_wind, moves_in
+
+# What a quantity is and an example, by its units. A word in between parts two quantities.
+_KINDS = {
+    "s": ("a time", "35 min"),
+    "m/s": ("a speed", "15 m/s"),
+    "m": ("a distance", "2 km"),
+    "bit/s": ("a data rate", "3 MB/h"),
+    "bit": ("an amount of data", "20 MB"),
+    "Hz": ("a frequency", "125 kHz"),
+    "bit/s/Hz": ("a spectral efficiency", "6 bit/s/Hz"),
+    "percent": ("a share", "20 %"),
+    "dB": ("a ratio", "12 dB"),
+    "dBm": ("a power", "20 dBm"),
+    "dB at m": ("a ratio at a distance", "12 dB at 2 km"),
+    "m/s from deg": ("a speed and where it comes from", "10 m/s from SW"),
+}
+_NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d\d?)?) ?([a-zµμ%°/ ]*)", re.I)
+_POINTS = re.findall(r"\w+", "N NNE NE ENE E ESE SE SSE S SSW SW WSW W WNW NW NNW")
+
+# Units in which amounts are printed, with their sizes.
+_PRINTED = {
+    "s": {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0},
+    "m": {"m": 1.0, "km": 1000.0},
+    "bit": {"bit": 1.0, "B": 8.0, "kB": 8e3, "MB": 8e6, "GB": 8e9},
+}
+_LINK_BUDGET = ("tx_power", "noise_figure", "frequency")
+
+# The fields that a scenario with a sheet may set otherwise.
+OPEN = ("flying_time", "charge_start", "charge_complete", "landing", "quota")
+
+
+@cache
+def _registry() -> Any:
+    needs("units", "a data sheet")
+    import pint
+
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+
+
+@lru_cache(maxsize=4096)
+def measured(text: str, units: str) -> tuple[float, ...]:
+    """The numbers of a quantity in the units of ``_KINDS``: ``12 dB at 2 km`` as 12 and 2000.
+
+    Raises:
+        InputError: If it has no unit, or one of another kind.
+    """
+    unit, *others = units.split(" ")
+    texts = re.split(rf"\s+{others[0]}\s+", text) if others else [text]
+    if len(texts) != len(units.split(" ")[::2]):
+        _refuse(text, f"is not {_KINDS[units][0]}", units)
+    return tuple(_number(*of, units) for of in zip(texts, (unit, *others[1:]), strict=True))
+
+
+def quantity_of(text: str, place: str, unit: str) -> float:
+    """A quantity in a unit; ``place`` says in messages where it stands."""
+    try:
+        return measured(text, unit)[0]
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from None
+
+
+def _number(text: str, unit: str, units: str) -> float:
+    """A single quantity in a unit; ``units`` is for the message."""
+    text = " ".join(text.split())
+    if unit == "deg" and text.upper() in _POINTS:
+        return _POINTS.index(text.upper()) * 360 / len(_POINTS)
+    found = _NUMBER.fullmatch(text)
+    if not found or not found[2]:
+        _refuse(text, "has no unit" if found else "is not a number and a unit", units)
+    registry, wanted = _registry(), _registry().Quantity(1.0, unit)
+    try:
+        given = registry.Quantity(float(found[1]), registry.parse_units(found[2]))
+    except Exception:  # pint raises errors of many types for what is no unit
+        _refuse(text, "has an unknown unit", units)
+    if given.to_root_units().units != wanted.to_root_units().units:
+        _refuse(text, "has a unit of another kind", units)
+    return float(given.to(unit).magnitude)
+
+
+def _refuse(value: object, problem: str, units: str) -> NoReturn:
+    raise InputError(f"{shown(value)} {problem}; allowed: {_form(units)}")
+
+
+def _form(units: str) -> str:
+    kind, example = _KINDS[units]
+    return f'{kind}, such as "{example}"'
+
+
+def printed(value: float, unit: str) -> str:
+    """An amount of ``s``, ``m`` or ``bit`` in the unit that suits it: 2100 s as ``35 min``."""
+    sizes = _PRINTED[unit]
+    name = max((of for of in sizes if sizes[of] <= value), key=sizes.__getitem__, default=unit)
+    return f"{value / sizes[name]:.4g} {name}"
+
+
+class Units(NamedTuple):
+    """What a slot, a cell and a data unit of a scenario are.
+
+    Attributes:
+        slot: A mission slot [s].
+        cell: The side of a cell [m].
+        data: A data unit [bit].
+    """
+
+    slot: float
+    cell: float
+    data: float
+
+    def __str__(self) -> str:
+        """How coarse they are, in words."""
+        data = f"a data unit {printed(self.data, 'bit')}"
+        return f"a slot is {printed(self.slot, 's')}, a cell {printed(self.cell, 'm')}, {data}"
+
+
+def _quantity(
+    units: str, description: str, least: float = 1e-6, most: float = 1e15, example: str = ""
+) -> Any:
+    """A field in units of ``_KINDS``, with the limits of its first number."""
+    extra: dict[str, Any] = {"units": units, "limits": [least, most]}
+    examples = [example or _KINDS[units][1]]
+    return Field(None, description=description, examples=examples, json_schema_extra=extra)
+
+
+class DataSheet(Section):
+    """What an engineer knows of the UAVs, the radio and the nodes, each with its unit."""
+
+    endurance: str | None = _quantity("s", "flying time of a full battery")
+    cruise: str | None = _quantity("m/s", "cruising speed in still air")
+    charging: str | None = _quantity("s", "time to charge a battery from empty to full")
+    reserve: str | None = _quantity("percent", "share of the battery that is never used", 0, 60)
+    horizon: str | None = _quantity("s", "length of a mission, or else max_slots", example="8 h")
+    data_rate: str | tuple[str, ...] | None = _quantity(
+        "bit/s", "new data of a node: one for all, or a list for each", 0
+    )
+    backlog: str | tuple[str, ...] | None = _quantity(
+        "bit", "data of a node at the start, or else none: one for all, or a list for each", 0
+    )
+    bandwidth: str | None = _quantity("Hz", "bandwidth of the radio")
+    snr: str | None = _quantity("dB at m", "mean SNR at a distance", -200, 200)
+    tx_power: str | None = _quantity("dBm", "transmitted power (EIRP), without snr", -99, 99)
+    noise_figure: str | None = _quantity("dB", "noise figure of the receiver", 0, 99, "6 dB")
+    frequency: str | None = _quantity("Hz", "carrier frequency", 1e6, 1e12, "868 MHz")
+    free_space: str | None = _quantity(
+        "m",
+        "where free space ends and path_loss_exponent begins, or else 1 m",
+        0.01,
+        1e6,
+        "1 m",
+    )
+    range: str | None = _quantity("m", "distance beyond which there is no service", 0.01, 1e7)
+    max_rate: str | None = _quantity("bit/s/Hz", "largest spectral efficiency", 0.001, 1000)
+    wind: str | None = _quantity("m/s from deg", "mean wind, and where it comes from", 0)
+    mtbf: str | None = _quantity("s", "mean flying time of a UAV between failures", example="30 d")
+    repair: str | None = _quantity("s", "mean time of a repair, or else it is lost", example="2 h")
+
+    @classmethod
+    def extra(cls, name: str) -> dict[str, Any]:
+        """The units of a field and the limits of its first number."""
+        return cls.model_fields[name].json_schema_extra  # type: ignore[return-value]
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _is_quantity(cls, value: Any, info: ValidationInfo) -> Any:
+        cls.check(info.field_name or "", value)
+        return value
+
+    @classmethod
+    def check(cls, name: str, value: Any) -> None:
+        """Refuse a value of a field that is no quantity of its kind.
+
+        Raises:
+            InputError: If it has no unit or another one, or is out of range.
+        """
+        units, (least, most) = cls.extra(name).values()
+        for item in value if isinstance(value, list | tuple) else (value,):
+            if isinstance(item, bool | int | float):
+                _refuse(item, "has no unit", units)
+            if isinstance(item, str) and not least <= measured(item, units)[0] <= most:
+                raise InputError(f"{shown(item)} is out of range; allowed: {least:g}..{most:g}")
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> Self:
+        """A scenario can follow; ``data_rate`` may still come from the file of the nodes."""
+        if self.is_on:
+            has_budget = any(getattr(self, name) for name in _LINK_BUDGET)
+            if has_budget and self.snr:
+                raise InputError("snr: follows from tx_power; allowed: one of both")
+            needed = [
+                *(_LINK_BUDGET if has_budget else ["snr"]),
+                *(["mtbf"] if self.repair else []),
+            ]
+            for name in ("endurance", "cruise", "charging", "bandwidth", *needed):
+                if getattr(self, name) is None:
+                    raise InputError(f"{name}: is missing; allowed: {self.form_of(name)}")
+            self.fields()
+        return self
+
+    @classmethod
+    def example(cls, name: str) -> tuple[str, str]:
+        """A quantity that a field may have, and its meaning."""
+        field = cls.model_fields[name]
+        return (field.examples or [""])[0], field.description or ""
+
+    @classmethod
+    def form_of(cls, name: str) -> str:
+        """What a field means, with an example."""
+        example, meaning = cls.example(name)
+        return f'{meaning.partition(":")[0]}, such as "{example}"'
+
+    @property
+    def units(self) -> Units:
+        """What a slot, a cell and a data unit are."""
+        slot = self.number("endurance") / 100
+        return Units(slot, slot * self.number("cruise"), slot * self.number("bandwidth"))
+
+    def number(self, name: str, missing: float = 0.0) -> float:
+        """The first number of a field in SI units, bits, percent or decibels."""
+        text = getattr(self, name)
+        return measured(text, self.extra(name)["units"])[0] if text else missing
+
+    def fields(self) -> dict[str, Any]:
+        """The fields of a scenario that follow, those of sections dotted.
+
+        Raises:
+            InputError: If slots and cells are too coarse or too fine for the sheet.
+        """
+        full = 100 - math.ceil(self.number("reserve") - 1e-9)
+        gain = 100 / self._slots("charging", 10_000)
+        found: dict[str, Any] = {
+            **{"cell_size": self.units.cell, "slot_length": 1.0, "landing": True, "quota": 0},
+            **{"flying_time": full, "charge_start": 30, "charge_complete": full},
+            "charge_rate": int(gain) if gain.is_integer() else gain,
+            **self._data(),
+            **self._radio(),
+        }
+        if self.horizon:
+            found["max_slots"] = int(self._slots("horizon", 100_000) + 1e-9)
+        if self.wind:
+            found["wind.moves"] = self._wind(*measured(self.wind, "m/s from deg"))
+        if self.mtbf:
+            found["failures.uav_rate"] = 1 / self._slots("mtbf")
+            found["failures.uav_repair"] = self._slots("repair", 1e6) if self.repair else 0.0
+        return found
+
+    def _refuse(self, name: str, problem: str, allowed: str) -> NoReturn:
+        raise InputError(f"{name}: {shown(getattr(self, name))} {problem}; allowed: {allowed}")
+
+    def _slots(self, name: str, most: float = 1e12) -> float:
+        """A time in slots, of which there are at least one and no more than ``most``."""
+        slot = self.units.slot
+        slots, least = self.number(name) / slot, printed(slot, "s")
+        if slots < 1:
+            self._refuse(name, f"is less than a slot of {least}", f"{least} or more")
+        if slots > most:
+            problem = f"is {slots:,.0f} slots of {least}"
+            self._refuse(name, problem, f"{printed(most * slot, 's')} at most")
+        return slots
+
+    def _data(self) -> dict[str, Any]:
+        """New data and initial data [data units]."""
+        found: dict[str, Any] = {"initial_data": (0.0, 0.0)}
+        for name, size, field in (
+            ("data_rate", self.number("bandwidth"), "arrival_rate"),
+            ("backlog", self.units.data, "initial_data"),
+        ):
+            given = getattr(self, name) or ()
+            texts = (given,) if isinstance(given, str) else given
+            values = [measured(text, self.extra(name)["units"])[0] / size for text in texts]
+            if values:
+                mean = sum(values) / len(values)
+                found[field] = (mean, mean) if name == "backlog" else mean
+                own = "arrivals.initial" if name == "backlog" else "arrivals.rates"
+                found[own] = () if isinstance(given, str) else tuple(values)
+        return found
+
+    def _radio(self) -> dict[str, Any]:
+        """The SNR at a distance, the range and the largest rate."""
+        if self.snr:
+            snr, anchor = measured(self.snr, "dB at m")
+        else:  # Friis' equation, and thermal noise at 290 K
+            anchor = self.number("free_space", 1.0)
+            loss = 20 * math.log10(4 * math.pi * anchor * self.number("frequency") / 299_792_458)
+            noise = 10 * math.log10(1.380649e-20 * 290 * self.number("bandwidth"))
+            snr = self.number("tx_power") - loss - noise - self.number("noise_figure")
+        reach, cell = self.number("range"), self.units.cell
+        if self.range and reach < cell:
+            size = printed(cell, "m")
+            self._refuse("range", f"is less than a cell of {size}", f"{size} or more")
+        return {
+            **{"edge_snr": snr, "radio.anchor": anchor},
+            **{"radio.range": reach, "radio.max_rate": self.number("max_rate")},
+        }
+
+    def _wind(self, speed: float, direction: float) -> Moves:
+        """The surcharge of each move [% per cell]."""
+        cruise = self.number("cruise")
+        most = math.floor(100 * largest_wind(direction, cruise)) / 100
+        if speed > most:
+            problem = f"cannot be flown against at {self.cruise}"
+            self._refuse("wind", problem, f"{most:g} m/s at most")
+        return moves_in(speed, direction, cruise)
