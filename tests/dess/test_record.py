@@ -53,7 +53,7 @@ def test_the_way_home_is_the_cheapest_in_battery() -> None:
     wind = {"strength": 0.7, "direction": 70.0, "gusts": 0.5, "seed": 3}
     space = load_scenario("archipelago:2", wind=wind, fleet=[{"slots_per_cell": 2}, {}])
     columns, rows = space.size
-    extras = surcharges(space.size, *space.wind.push(), space.wind.gusts, space.wind.seed)
+    extras = surcharges(space.size, *space.wind.pushes(), space.wind.gusts, space.wind.seed)
     record = simulate(space, shipped.load("random-unguarded"), 3, events=True)
     for i, uav in enumerate(record.uavs):
         at = next((e.x, e.y) for e in reversed(record.events or []) if e.uav == i)

@@ -28,7 +28,7 @@ winds = st.builds(
 
 
 def _table(wind: Wind, grid: int, rows: int | None = None) -> np.ndarray:
-    return surcharges((grid, rows or grid), *wind.push(), wind.gusts, wind.seed)
+    return surcharges((grid, rows or grid), *wind.pushes(), wind.gusts, wind.seed)
 
 
 def test_a_move_against_the_wind_costs_its_strength_more_and_no_other_does():
