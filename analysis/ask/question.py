@@ -178,19 +178,8 @@ def sweep_question(
 ) -> Question:
     """Which combination of values is the best, or the cheapest that meets requirements?
 
-    Args:
-        values: For each field of the scenario its values. A field with one value is fixed.
-        scenario: The name of a shipped scenario, or a TOML file.
-        policies: Teams: ``"P"`` or ``"P,P,..."``. Without any, the best policy that five minutes
-            allow, and ``greedy``.
-        missions: Number of missions of every setting. With requirements, the number of additional
-            missions that check each selected setting.
-        seed: Seed of the missions.
-        prices: Fields of ``Costs``.
-        requirements: For each required metric its lowest acceptable mean. With requirements the
-            study searches for the cheapest setting that meets them, and needs prices.
-        name: Name of the sweep. Without one, it is made of the fields and a hash.
-        folder: It is kept in ``FOLDER/sweeps/NAME``.
+    The arguments are those of ``analysis.sweep``, but each of the fields ``values`` has a list of
+    values; one with a single value is fixed. It is kept in ``FOLDER/sweeps/NAME``.
 
     Raises:
         InputError: If a field, a value, a policy, a price or a requirement is not allowed.
@@ -268,20 +257,10 @@ def what_if_question(
     seed: int = 0,
     folder: str | Path = "results",
 ) -> Question:
-    """What if the baseline had these settings?
+    """What if the baseline had these settings? The arguments are those of ``analysis.what_if``.
 
-    Where fields of a section are set, both sides measure what the section can measure.
-
-    Args:
-        settings: Fields of the scenario that the variation sets.
-        baseline: Fields of the scenario that are set in both; in the variation, ``settings`` comes
-            first.
-        scenario: The name of a shipped scenario, or a TOML file.
-        policies: Teams, each compared with itself. Without any, the best policy that five minutes
-            allow, and ``greedy``.
-        missions: Number of missions of each policy on each side, at least 2.
-        seed: Seed of the missions.
-        folder: It is kept in ``FOLDER/what-if/HASH``.
+    Where fields of a section are set, both sides measure what the section can measure. It is kept
+    in ``FOLDER/what-if/HASH``.
 
     Raises:
         InputError: If a field, a value or a policy is unknown or not allowed, or if ``settings``

@@ -408,6 +408,7 @@ class Example:
         figure = mission_figure(mission.events, mission.scenario)
         ends = [uav["end"] for uav in mission.record.uav_rows()]
         fates = {"battery": "deplete their battery", "truncated": "run out of time"}
+        fates |= {"lost": "are lost"}
         failures = [
             f"{ends.count(end)} of {len(ends)} UAVs {fate}"
             for end, fate in fates.items()

@@ -1,7 +1,6 @@
 """The paths of the UAVs of a mission with its times, as a table and as files for maps."""
 
 import json
-from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
@@ -10,6 +9,9 @@ from dess.analysis.results.event_log import Events, battery_levels, uav_slots
 from dess.scenario import Scenario
 from dess.sea.places import Projection
 from dess.sections.fleet import type_of
+
+_KML = """<?xml version='1.0' encoding='UTF-8'?>
+<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">"""
 
 
 def paths_of(events: Events, scenario: Scenario) -> pd.DataFrame:
@@ -68,17 +70,12 @@ def _geojson(paths: dict[int, pd.DataFrame]) -> str:
 
 def _kml(paths: dict[int, pd.DataFrame]) -> str:
     """A track for each UAV; a mission slot is a second, from 1970 on, as KML has no other times."""
-    root = ElementTree.Element("kml", {
-        "xmlns": "http://www.opengis.net/kml/2.2", "xmlns:gx": "http://www.google.com/kml/ext/2.2"
-    })  # fmt: skip
-    document = ElementTree.SubElement(root, "Document")
+    marks = []
     for uav, of in paths.items():
-        mark = ElementTree.SubElement(document, "Placemark")
-        ElementTree.SubElement(mark, "name").text = f"UAV {uav + 1}"
-        track = ElementTree.SubElement(mark, "gx:Track")
-        ElementTree.SubElement(track, "altitudeMode").text = "relativeToGround"
-        for time in pd.to_datetime(of["time"], unit="s"):
-            ElementTree.SubElement(track, "when").text = f"{time:%Y-%m-%dT%H:%M:%SZ}"
-        for place in of.iloc[:, :3].to_numpy():
-            ElementTree.SubElement(track, "gx:coord").text = "{} {} {}".format(*place)
-    return ElementTree.tostring(root, "unicode", xml_declaration=True)
+        times = pd.to_datetime(of["time"], unit="s")
+        track = [f"<when>{time:%Y-%m-%dT%H:%M:%SZ}</when>" for time in times]
+        track += ["<gx:coord>{} {} {}</gx:coord>".format(*at) for at in of.iloc[:, :3].to_numpy()]
+        track.insert(0, "<altitudeMode>relativeToGround</altitudeMode>")
+        mark = f"<name>UAV {uav + 1}</name><gx:Track>{''.join(track)}</gx:Track>"
+        marks.append(f"<Placemark>{mark}</Placemark>")
+    return f"{_KML}<Document>{''.join(marks)}</Document></kml>"
