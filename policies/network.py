@@ -9,7 +9,7 @@ to the type in which the network computes.
 """
 
 from collections.abc import Mapping, Sequence
-from itertools import chain, pairwise
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,9 +24,12 @@ NARROWEST = 2 * (KERNEL_SIZE - 1) + 1  # smallest width of a map: two convolutio
 DENSE = (256, 256, 256)
 SETS = range(3)  # nodes, teammates and zones
 
+# Layers without a bias, by the last part of their names.
+UNBIASED = {"action", "inputs", "of_all", "nearer", "along"}
+
 Weights = Mapping[str, np.ndarray]
-Forms = dict[str, tuple[int, ...]]
 Shapes = Sequence[Sequence[int]]
+Sizes = dict[str, tuple[int, ...]]  # of layers by name: the outputs and the inputs
 Layer = tuple[np.ndarray, np.ndarray]  # the matrix (inputs, outputs) and the bias (outputs,)
 
 
@@ -40,22 +43,19 @@ class PaperNetwork:
     rows = 32
 
     @staticmethod
-    def forms(shapes: Shapes, hidden: Sequence[int] = ()) -> Forms:
-        """The shapes of the weights by their names.
+    def layers(shapes: Shapes, hidden: Sequence[int] = ()) -> Sizes:
+        """The sizes of the layers.
 
         Args:
             shapes: Shapes of one row of each input.
             hidden: Widths of the hidden layers of the other networks; not used.
         """
-        *maps, (own,) = shapes
-        width = own
-        forms: Forms = {}
-        for name, (layers, rows, columns) in zip(("local", "far"), maps, strict=True):
-            for number, inputs in ((0, layers), (2, KERNELS)):
-                size = (KERNELS, inputs, KERNEL_SIZE, KERNEL_SIZE)
-                forms |= {f"{name}.{number}.weight": size, f"{name}.{number}.bias": (KERNELS,)}
+        width, size = sum(shapes[2]), (KERNEL_SIZE, KERNEL_SIZE)
+        sizes: Sizes = {}
+        for name, (layers, rows, columns) in zip(("local", "far"), shapes[:2], strict=True):
+            sizes |= {f"{name}.0": (KERNELS, layers, *size), f"{name}.2": (KERNELS, KERNELS, *size)}
             width += KERNELS * (rows - NARROWEST + 1) * (columns - NARROWEST + 1)
-        return forms | _dense_forms([width, *DENSE]) | _form("values", DENSE[-1], ACTIONS)
+        return sizes | _dense_layers([width, *DENSE]) | {"values": (ACTIONS, DENSE[-1])}
 
     def __init__(self, weights: Weights, dtype: Any) -> None:
         """Make it of weights for computing in ``dtype``, float32 or float64."""
@@ -80,11 +80,11 @@ class DuelingNetwork:
     rows = 1024
 
     @staticmethod
-    def forms(shapes: Shapes, hidden: Sequence[int]) -> Forms:
-        """The shapes of the weights by their names, as for ``PaperNetwork``."""
-        sizes = [*shapes[0], *hidden]
-        ends = _form("value", sizes[-1], 1) | _form("advantage", sizes[-1], ACTIONS)
-        return _dense_forms(sizes) | ends
+    def layers(shapes: Shapes, hidden: Sequence[int]) -> Sizes:
+        """The sizes of the layers, as for ``PaperNetwork``."""
+        widths = [*shapes[0], *hidden]
+        ends = {"value": (1, widths[-1]), "advantage": (ACTIONS, widths[-1])}
+        return _dense_layers(widths) | ends
 
     def __init__(self, weights: Weights, dtype: Any) -> None:
         """Make it of weights for computing in ``dtype``, float32 or float64."""
@@ -101,26 +101,21 @@ class DuelingNetwork:
 class SetNetwork:
     """A dueling network for the sets of any sea: it takes the best of what is in them."""
 
-    rows = 256
+    rows = 64
 
     @staticmethod
-    def forms(shapes: Shapes, hidden: Sequence[int]) -> Forms:
-        """The shapes of the weights by their names, as for ``PaperNetwork``."""
+    def layers(shapes: Shapes, hidden: Sequence[int]) -> Sizes:
+        """The sizes of the layers, as for ``PaperNetwork``."""
         (own,), (_, action), *sets = shapes
         nodes, others, joint = hidden
-        forms = _form("own", own, joint) | _form("action", action, joint, bias=False)
-        forms |= _form("state", joint, joint) | _form("hidden", joint, joint // 2)
-        forms |= _form("value", joint, 1) | _form("advantage", joint // 2, 1)
-        for number, (width, shape) in enumerate(
-            zip((nodes, others, others), sets[::2], strict=True)
-        ):
-            name = f"sets.{number}"
-            forms |= _form(f"{name}.context", own, width) | _form(f"{name}.layer", width, width)
-            forms |= _form(f"{name}.inputs", shape[-1], width, bias=False)
-            forms |= _form(f"{name}.values", width, 2 * width)
-            for meaning in ("of_all", "nearer", "along"):
-                forms |= _form(f"{name}.{meaning}", 2 * width, joint, bias=False)
-        return forms
+        sizes: Sizes = {"own": (joint, own), "action": (joint, action), "state": (joint, joint)}
+        sizes |= {"hidden": (joint // 2, joint), "value": (1, joint), "advantage": (1, joint // 2)}
+        for number, width in enumerate((nodes, others, others)):
+            of_set = {"context": (width, own), "inputs": (width, sets[2 * number][-1])}
+            of_set |= {"layer": (width, width), "values": (2 * width, width)}
+            of_set |= dict.fromkeys(("of_all", "nearer", "along"), (joint, 2 * width))
+            sizes |= {f"sets.{number}.{name}": size for name, size in of_set.items()}
+        return sizes
 
     def __init__(self, weights: Weights, dtype: Any) -> None:
         """Make it of weights for computing in ``dtype``, float32 or float64."""
@@ -165,17 +160,17 @@ class SetNetwork:
         return state @ self._value[0] + self._value[1] + (self._centred @ advantage).T
 
 
-def _form(name: str, inputs: int, outputs: int, bias: bool = True) -> Forms:
-    """The shapes of the weights of a linear layer."""
-    forms: Forms = {f"{name}.weight": (outputs, inputs), f"{name}.bias": (outputs,)}
-    return forms if bias else {f"{name}.weight": (outputs, inputs)}
+def forms_of(layers: Sizes) -> dict[str, tuple[int, ...]]:
+    """The shapes of the weights of layers, by name."""
+    biased = {name: size for name, size in layers.items() if name.split(".")[-1] not in UNBIASED}
+    forms = {f"{name}.weight": size for name, size in layers.items()}
+    return forms | {f"{name}.bias": size[:1] for name, size in biased.items()}
 
 
-def _dense_forms(sizes: Sequence[int]) -> Forms:
-    """The shapes of the weights of dense layers of the given widths, inputs first."""
-    layers = enumerate(pairwise(sizes))
-    forms = (_form(f"hidden.{2 * number}", *ends).items() for number, ends in layers)
-    return dict(chain.from_iterable(forms))
+def _dense_layers(widths: Sequence[int]) -> Sizes:
+    """The sizes of dense layers of the given widths, inputs first."""
+    pairs = enumerate(pairwise(widths))
+    return {f"hidden.{2 * number}": (outputs, inputs) for number, (inputs, outputs) in pairs}
 
 
 def _layer(weights: Weights, name: str) -> Layer:
@@ -187,9 +182,8 @@ def _layer(weights: Weights, name: str) -> Layer:
 
 def _dense(weights: Weights, dtype: Any) -> list[Layer]:
     """The dense layers, each of which is followed by a ReLU."""
-    names = (name.removesuffix(".weight") for name in weights if name.endswith(".weight"))
-    hidden = sorted((n for n in names if n.startswith("hidden.")), key=lambda n: int(n[7:]))
-    return [_in(dtype, *_layer(weights, name)) for name in hidden]
+    count = sum(name.startswith("hidden.") for name in weights) // 2
+    return [_in(dtype, *_layer(weights, f"hidden.{2 * number}")) for number in range(count)]
 
 
 def _convolution(weights: Weights, name: str, dtype: Any) -> Layer:

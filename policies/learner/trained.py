@@ -25,6 +25,7 @@ from dess.observations.maps import POOL
 from dess.observations.observer import ENCODERS
 from dess.observations.sets import Sets
 from dess.observations.states import Layout, layout_of
+from dess.policies import network
 from dess.policies.learner.config import (
     CONFIG,
     FORMAT,
@@ -40,14 +41,7 @@ from dess.policies.learner.config import (
     resume_command,
 )
 from dess.policies.learner.policy import LearnedPolicy
-from dess.policies.network import (
-    NARROWEST,
-    DuelingNetwork,
-    Forms,
-    PaperNetwork,
-    SetNetwork,
-    Weights,
-)
+from dess.policies.network import Weights
 from dess.scenario import ScenarioSpace
 
 Arrays = dict[str, np.ndarray]
@@ -166,7 +160,11 @@ def _is_sound(array: np.ndarray) -> bool:
 MODEL_LIMIT = 2**30
 
 
-_NETWORKS: dict[str, Any] = {"maps": PaperNetwork, "vector": DuelingNetwork, "sets": SetNetwork}
+_NETWORKS: dict[str, Any] = {
+    "maps": network.PaperNetwork,
+    "vector": network.DuelingNetwork,
+    "sets": network.SetNetwork,
+}
 
 
 def observed(config: TrainingConfig, space: ScenarioSpace) -> tuple[Layout | None, Any]:
@@ -182,7 +180,7 @@ def observed(config: TrainingConfig, space: ScenarioSpace) -> tuple[Layout | Non
     if config.algorithm == "ppo":
         return None, Sets
     layout = layout_of(space)
-    if config.observation == "maps" and (2 * layout.grid - 1) // POOL < NARROWEST:
+    if config.observation == "maps" and (2 * layout.grid - 1) // POOL < network.NARROWEST:
         raise InputError(
             f"observation: a grid of {layout.grid} is too small for maps; allowed: vector, sets"
         )
@@ -191,16 +189,16 @@ def observed(config: TrainingConfig, space: ScenarioSpace) -> tuple[Layout | Non
 
 def forms_of(config: TrainingConfig, observation: Any) -> Arrays:
     """Arrays of the forms of the weights of a config's network, without their memory."""
-    forms: Forms = _NETWORKS[config.observation].forms(observation.shapes, config.hidden)
-    return {name: form(shape) for name, shape in forms.items()}
+    layers = _NETWORKS[config.observation].layers(observation.shapes, config.hidden)
+    return {name: form(shape) for name, shape in network.forms_of(layers).items()}
 
 
 def policy_of(
     config: TrainingConfig, layout: Layout | None, observation: Any, weights: Weights
 ) -> LearnedPolicy:
     """The policy of a config with these weights."""
-    network = _NETWORKS[config.observation]
-    return LearnedPolicy(config.name, observation, network, weights, config.guard, layout)
+    kind = _NETWORKS[config.observation]
+    return LearnedPolicy(config.name, observation, kind, weights, config.guard, layout)
 
 
 def save_policy(

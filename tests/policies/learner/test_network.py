@@ -96,7 +96,8 @@ def test_a_policy_acts_with_the_values_of_the_network_that_is_trained(
     trained, kind, shapes, hidden, rows
 ):
     generator, weights = np.random.default_rng(rows), arrays_of(trained.state_dict())
-    assert kind.forms(shapes, hidden) == {name: value.shape for name, value in weights.items()}
+    forms = {name: value.shape for name, value in weights.items()}
+    assert acting.forms_of(kind.layers(shapes, hidden)) == forms
     inputs = [generator.uniform(-1, 1, (rows, *shape)) for shape in shapes]
     inputs[0][generator.random(inputs[0].shape) < 0.5] = 0  # as most cells of a map are
     for dtype, off in ((np.float32, 1e-5), (np.float64, 1e-12)):

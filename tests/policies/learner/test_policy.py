@@ -16,7 +16,7 @@ from dess.observations.sets import Sets, sea_of
 from dess.observations.states import ACTIVE, Layout, compact_states, layout_of
 from dess.observations.vector import Vector
 from dess.policies.learner.policy import LearnedPolicy
-from dess.policies.network import DuelingNetwork, Forms, SetNetwork
+from dess.policies.network import DuelingNetwork, SetNetwork, Sizes, forms_of
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import constants_of
 from tests.dess.flights import assert_same_alone, cells_of
@@ -26,19 +26,19 @@ from tests.policies.learner.tiny import refusal_of
 PAPER = load_scenario("paper")
 
 
-def _weights(forms: Forms, seed: int = 1) -> dict[str, np.ndarray]:
+def _weights(layers: Sizes, seed: int = 1) -> dict[str, np.ndarray]:
     """Random weights, of the size that a training begins with."""
     generator = np.random.default_rng(seed)
     return {
         name: (generator.uniform(-1, 1, form) / np.sqrt(form[-1])).astype(np.float32)
-        for name, form in forms.items()
+        for name, form in forms_of(layers).items()
     }
 
 
 def _random(layout: Layout, guarded: bool = True, seed: int = 1) -> LearnedPolicy:
     """A policy of random weights."""
     vector = Vector(layout)
-    weights = _weights(DuelingNetwork.forms(vector.shapes, [32, 32]), seed)
+    weights = _weights(DuelingNetwork.layers(vector.shapes, [32, 32]), seed)
     return LearnedPolicy("random weights", vector, DuelingNetwork, weights, guarded, layout)
 
 
@@ -122,12 +122,12 @@ def test_away_from_home_it_refuses(fly):
 # --- on any sea ---
 
 
-SETS_FORMS = SetNetwork.forms(Sets.shapes, [16, 8, 16])
+LAYERS = SetNetwork.layers(Sets.shapes, [16, 8, 16])
 
 
 def _any(seed: int = 1) -> LearnedPolicy:
     """A policy of random weights that decides on any sea."""
-    return LearnedPolicy("any", Sets, SetNetwork, _weights(SETS_FORMS, seed), True, None)
+    return LearnedPolicy("any", Sets, SetNetwork, _weights(LAYERS, seed), True, None)
 
 
 @settings(max_examples=8)
@@ -153,7 +153,7 @@ def test_missions_with_other_fleets_pads_and_data_beside_it_change_nothing():
 @given(spaces(), st.integers(0, 3))
 def test_on_any_sea_values_turn_with_it(space, seed):
     """The value of a move is that of the mirrored move on the mirrored sea."""
-    network = SetNetwork(_weights(SETS_FORMS, seed), np.float32)
+    network = SetNetwork(_weights(LAYERS, seed), np.float32)
     sets = Sets(sea_of(constants_of(space)[0], world_of(space)))
     stepper = MissionStepper(space, 3, seed)
     stepper.launch(stepper.indices)
