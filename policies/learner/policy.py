@@ -14,7 +14,7 @@ from dess.view import View
 
 # The rounding errors of a network depend on the number of rows that it evaluates together and on
 # the processor, but the action must not. So if the two best values differ by less than a share
-# CLOSE of the best one (and of 1), some ten times the largest error seen, the values are computed
+# CLOSE of the best one (and of 1), fifteen times the largest error seen, the values are computed
 # again in double precision and rounded to DECIMALS.
 CLOSE, DECIMALS = 1e-5, 9
 

@@ -21,10 +21,10 @@ from safetensors.numpy import load, save, save_file
 from dess.errors import InputError, shown
 from dess.files.reading import Missing, checked, read_bytes
 from dess.files.writing import replacing, write_file
-from dess.observations.maps import POOL
-from dess.observations.observer import ENCODERS
+from dess.observations.maps import POOL, Maps
 from dess.observations.sets import Sets
 from dess.observations.states import Layout, layout_of
+from dess.observations.vector import Vector
 from dess.policies import network
 from dess.policies.learner.config import (
     CONFIG,
@@ -160,10 +160,11 @@ def _is_sound(array: np.ndarray) -> bool:
 MODEL_LIMIT = 2**30
 
 
-_NETWORKS: dict[str, Any] = {
-    "maps": network.PaperNetwork,
-    "vector": network.DuelingNetwork,
-    "sets": network.SetNetwork,
+# The encoder and the network of each kind of observation.
+_KINDS: dict[str, tuple[Any, Any]] = {
+    "maps": (Maps, network.PaperNetwork),
+    "vector": (Vector, network.DuelingNetwork),
+    "sets": (Sets, network.SetNetwork),
 }
 
 
@@ -184,12 +185,12 @@ def observed(config: TrainingConfig, space: ScenarioSpace) -> tuple[Layout | Non
         raise InputError(
             f"observation: a grid of {layout.grid} is too small for maps; allowed: vector, sets"
         )
-    return layout, ENCODERS[config.observation](layout)
+    return layout, _KINDS[config.observation][0](layout)
 
 
 def forms_of(config: TrainingConfig, observation: Any) -> Arrays:
     """Arrays of the forms of the weights of a config's network, without their memory."""
-    layers = _NETWORKS[config.observation].layers(observation.shapes, config.hidden)
+    layers = _KINDS[config.observation][1].layers(observation.shapes, config.hidden)
     return {name: form(shape) for name, shape in network.forms_of(layers).items()}
 
 
@@ -197,8 +198,8 @@ def policy_of(
     config: TrainingConfig, layout: Layout | None, observation: Any, weights: Weights
 ) -> LearnedPolicy:
     """The policy of a config with these weights."""
-    kind = _NETWORKS[config.observation]
-    return LearnedPolicy(config.name, observation, kind, weights, config.guard, layout)
+    acting = _KINDS[config.observation][1]
+    return LearnedPolicy(config.name, observation, acting, weights, config.guard, layout)
 
 
 def save_policy(
@@ -229,7 +230,7 @@ def save_policy(
     description = Description(
         format=FORMAT,
         name=config.name,
-        observation_version=ENCODERS[config.observation].version,
+        observation_version=_KINDS[config.observation][0].version,
         layout=layout
         and LayoutTable(grid=layout.grid, zone=layout.zone.tolist(), nodes=layout.nodes.tolist()),
         training=config,
