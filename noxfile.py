@@ -138,7 +138,7 @@ def reports(session: nox.Session) -> None:
     if session.posargs and not full and not dry:
         unknown = " ".join(session.posargs)
         session.error(f"reports: {unknown} is unknown; allowed: --full, --dry-run")
-    install(session, "[learning,reports]")
+    install(session, "[reports]")
     results, reports = (folder / "full" if full else folder for folder in (RESULTS, REPORTS))
     commands = []
     for studies, less in STUDIES.items():

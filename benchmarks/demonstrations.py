@@ -32,9 +32,8 @@ from dess.observations.observer import encoder_of
 from dess.observations.sets import Sets
 from dess.observations.states import CompactStates, compact_states, masks
 from dess.policies.learner.config import MISSION_SEED, TrainingConfig, load_config
-from dess.policies.learner.network import SetNetwork
-from dess.policies.learner.policy import LearnedPolicy
-from dess.policies.learner.trained import save_policy
+from dess.policies.learner.network import SetNetwork, arrays_of
+from dess.policies.learner.trained import policy_of, save_policy
 from dess.policies.learner.training import soft_update
 from dess.policies.planner import LongPlanner, Planner
 from dess.sea.families import FAMILIES, SETS
@@ -124,7 +123,7 @@ def examples_on(name: str, kind: Round, weights: Path | None) -> Examples:
     space = load_scenario(name, uavs=uavs)
     other = None
     if weights:
-        other = LearnedPolicy("other", Sets, _network(load_config("any"), weights), True, None)
+        other = policy_of(load_config("any"), None, Sets, arrays_of(torch.load(weights)))
     planner = TEACHERS.get(family, Planner)()
     demonstrator = Demonstrator(planner, kind.deviations, other, int(seed))
     simulate_batch(space, demonstrator, MISSION_SEED + int(seed), len(kind.deviations))

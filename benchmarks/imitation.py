@@ -29,7 +29,8 @@ from dess.guard import guard
 from dess.observations.states import CompactStates, masks
 from dess.policies.learner.config import MISSION_SEED, TrainingConfig, load_config
 from dess.policies.learner.dqn import Batch, DQNLearner, DQNTraining
-from dess.policies.learner.trained import save_policy
+from dess.policies.learner.trained import save_policy, weights_of
+from dess.policies.registry import TRAINED
 from dess.view import View
 
 RECORDED, EVALUATED = 777_002, 777_001  # seeds of the planner's missions and of the evaluation
@@ -176,7 +177,7 @@ def main() -> None:
             if not folder.exists():
                 training = ImitatingTraining(config, planned, *VARIANTS[variant], given.weight)
                 if given.start:
-                    training.begin_with(policies.load(given.start).network.state_dict())
+                    training.begin_with(weights_of(TRAINED / given.start))
                 training.run(given.ticks)
                 save_policy(folder, training.best, config, training.space)
         for name in [*folders, given.start] if given.start else folders:

@@ -7,7 +7,6 @@ The tool replaces the text between two marks in the file, and keeps the text aro
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -22,6 +21,7 @@ from dess.analysis.stats.intervals import interval_of, post_stratified
 from dess.files.reading import read_text
 from dess.files.writing import write_file
 from dess.policies.learner.config import MISSION_SEED, load_config, read_description
+from dess.policies.learner.trained import weights_of
 from dess.policies.registry import CARD, HEURISTICS, load
 
 # The seed of the missions of model cards, which neither training nor selection of weights uses.
@@ -39,7 +39,7 @@ def card(folder: Path, command: str, missions: int) -> str:
     if load_config(config.name, seed=config.seed) != config:
         raise SystemExit(f"{folder}: was not trained by the config of its name")
     space = load_config(config.name).space
-    policy: Any = load(folder)  # whose network is counted below
+    policy = load(folder)
     curve = read_curve(folder / "training.parquet")
     learned = simulate_batch(space, policy, EVALUATION_SEED, missions).missions
     others = {
@@ -67,7 +67,7 @@ def card(folder: Path, command: str, missions: int) -> str:
         seed=EVALUATION_SEED,
         mission_seed=MISSION_SEED,
         described=described,
-        weights=sum(weight.numel() for weight in policy.network.parameters()),
+        weights=sum(weight.size for weight in weights_of(folder).values()),
         curve=curve.assign(**{name: curve[of] for name, of in evaluated.items()}).iloc[shown],
         random_missions=_means({folder.name: learned} | fleets | others),
         gains={

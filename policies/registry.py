@@ -30,7 +30,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 import dess
-from dess.code.libraries import MissingLibraryError, needs
+from dess.code.libraries import MissingLibraryError
 from dess.code.sources import path_of
 from dess.errors import InputError, one_of, shown
 from dess.files.reading import Missing, paths_in, read_text
@@ -146,8 +146,7 @@ def load(name: str | Path) -> Policy:
     if name in SHIPPED:
         return _made(name, SHIPPED[name][0], lambda: _class_of(*SHIPPED[name][0].split(":")))
     if folder := folder_of(name):
-        needs("learning", f"policy {name}")
-        from dess.policies.learner.trained import load_policy  # imports torch
+        from dess.policies.learner.trained import load_policy  # imports numba
 
         policy = load_policy(folder)
         if name in trained_names():

@@ -30,8 +30,8 @@ ROOMS = {
 }
 # What a floor must not import, besides the floors above it.
 REFUSED = {"dess": {"pandas"}, "policies": {"pandas"}}
-# What only the learner may import: it takes seconds to load, and most commands need none of it.
-LEARNER, LEARNING = "dess.policies.learner", {"torch", "safetensors"}
+# What only the learner may import: it takes seconds to load, and only trainings need it.
+LEARNER, LEARNING = "dess.policies.learner", {"torch"}
 # The libraries that only the classes made for them import; who uses these classes imports them.
 INTEGRATIONS = "dess.integrations"
 FOREIGN = {"agilerl", "benchmarl", "pufferlib", "ray", "rliable", "sb3_contrib"}
@@ -271,10 +271,10 @@ def test_the_command_line_loads_nothing_heavy():
     assert not HEAVY & loaded_by("from dess.reports.cli import main; main(['--help'])")
 
 
-def test_torch_is_loaded_only_for_the_learner():
+def test_torch_is_loaded_only_for_trainings():
     script = "import dess.policies, dess.analysis; from dess.reports.cli import main\n"
-    script += "dess.policies.load_team('random,nearest,greedy,tour'), dess.policies.names()\n"
-    script += "for line in ('policies', 'evaluate --policy greedy --missions 1'):\n"
+    script += "dess.policies.load_team('greedy,any,ddqn,ddqn-paper'), dess.policies.names()\n"
+    script += "for line in ('policies', 'evaluate --policy ddqn --missions 1'):\n"
     script += "    assert main(line.split()) == 0\n"
     assert not LEARNING & loaded_by(script + "assert main(['train', 'none', '--out', 'none']) == 2")
 

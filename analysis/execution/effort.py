@@ -1,6 +1,5 @@
 """How long missions take and how much memory, which policies to ask, and plans of runs."""
 
-import logging
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -17,9 +16,8 @@ from dess.analysis.results.chunks import bound_parts, check_parts, missions_in, 
 from dess.analysis.results.store import Store, sources
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.study import Study
-from dess.code.libraries import missing
 from dess.code.memory import check_memory
-from dess.policies.registry import SHIPPED, folder_of, load_team, trained_names
+from dess.policies.registry import SHIPPED, folder_of, load_team
 from dess.scenario import ScenarioSpace
 
 # The policies from the slowest to the fastest: the time of a decision [s] as measured on one core.
@@ -44,10 +42,7 @@ def policies_for(spaces: Iterable[ScenarioSpace], missions: int) -> tuple[str, .
     made = missions * sum(map(decisions, spaces))
     is_small = mean(mean(space.uavs) for space in spaces) <= SMALL
     ranked = OF_SMALL_FLEETS if is_small else OF_LARGE_FLEETS
-    best, *others = [*(name for name in ranked if made * SECONDS[name] <= BUDGET), BASELINE]
-    if best in trained_names() and (absent := missing("learning", f"policy {best}")):
-        best = others[0]
-        logging.getLogger(__name__).warning("note: %s; %s answers", absent, best)
+    best = next((name for name in ranked if made * SECONDS[name] <= BUDGET), BASELINE)
     return tuple(dict.fromkeys((best, BASELINE)))
 
 

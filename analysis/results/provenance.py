@@ -11,7 +11,6 @@ import subprocess
 from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property, lru_cache
 from importlib import metadata
-from importlib.util import find_spec
 from pathlib import Path
 from platform import python_version
 from typing import Annotated, Any, Literal, Self
@@ -36,7 +35,7 @@ from dess.scenario import SEA, ScenarioSpace, scenario_at
 
 ENGINES = ("dess.batch", "dess.mission")
 BOUND = ("dess.analysis.bound",)
-LIBRARIES = ("numpy", "numba", "simpy", "scipy", "torch", "pandas", "pyarrow")
+LIBRARIES = ("numpy", "numba", "simpy", "scipy", "pandas", "pyarrow")
 
 # Strings of a known form: a module, a class, a library, a version.
 Module = Annotated[str, Field(pattern=r"^[\w.]+$", max_length=500)]
@@ -177,7 +176,7 @@ class Origin(Document):
                 f"made by a Python file that was not read, of policy {', '.join(closed)}"
             )
         versions = library_versions()
-        made = self.libraries  # torch may be absent, here or where the results were made
+        made = self.libraries
         if others := [n for n in versions if n in made and made[n] != versions[n]]:
             changes.append(f"made with other versions of {', '.join(others)}")
         return changes
@@ -234,12 +233,8 @@ def differing(old: Mapping[str, str], new: Mapping[str, str]) -> dict[str, tuple
 
 
 def library_versions() -> dict[str, str]:
-    """The versions of Python and of the libraries on which records may depend.
-
-    A library that is not installed is left out.
-    """
-    installed = [name for name in LIBRARIES if find_spec(name)]
-    return {"python": python_version()} | {name: metadata.version(name) for name in installed}
+    """The versions of Python and of the libraries on which records may depend."""
+    return {"python": python_version()} | {name: metadata.version(name) for name in LIBRARIES}
 
 
 def commit_of_source() -> str | None:

@@ -1,7 +1,7 @@
 """Optional libraries: which extra installs each, and one line that says so where it is absent.
 
-    pip install dess               the simulator, the heuristics, evaluations, studies and sweeps
-    pip install 'dess[learning]'   trained policies and trainings
+    pip install dess               the simulator, all policies, evaluations, studies and sweeps
+    pip install 'dess[learning]'   trainings
     pip install 'dess[reports]'    figures, pages, and studies of sensitivities
     pip install 'dess[geo]'        shipping lanes and buffers of seas from GeoJSON files
     pip install 'dess[units]'      data sheets of scenarios
@@ -18,7 +18,7 @@ from dess.errors import InputError
 
 # The extras, by the names under which their libraries are imported.
 EXTRAS = {
-    "learning": ("torch", "safetensors"),
+    "learning": ("torch",),
     "reports": (
         *("matplotlib", "PIL", "seaborn", "SALib", "IPython", "jinja2", "jupytext"),
         *("markupsafe", "nbconvert", "nbformat", "packaging", "pygments", "traitlets"),

@@ -90,6 +90,11 @@ def sea_of(mission: Any, world: World) -> Sea:
     )
 
 
+def sea_constants(mission: Any) -> bytes:
+    """What ``sea_of`` reads of a mission."""
+    return b"".join(mission[name].tobytes() for name in _FIELDS)
+
+
 def sea_kinds(missions: np.ndarray) -> np.ndarray:
     """(B,) numbers that are equal for missions of a batch on the same sea."""
     fields = [missions[name].reshape(len(missions), -1) for name in _FIELDS]

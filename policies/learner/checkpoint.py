@@ -21,8 +21,16 @@ from dess.observations import states as column
 from dess.policies.learner import trained
 from dess.policies.learner.config import CHECKPOINT, Name, Number, TrainingConfig
 from dess.policies.learner.dqn import DQNTraining
+from dess.policies.learner.network import arrays_of, tensors_of
 from dess.policies.learner.ppo import ProximalTraining
-from dess.policies.learner.trained import Tensors, array_of, bytes_of, part, require_version
+from dess.policies.learner.trained import (
+    Arrays,
+    array_of,
+    bytes_of,
+    form,
+    part,
+    require_version,
+)
 from dess.policies.learner.training import METRICS, Training
 from dess.record import MISSION_RECORD
 from dess.scenario import SAMPLED, ScenarioSpace
@@ -97,11 +105,12 @@ def save_training(path: Path, training: Training) -> None:
     values = _arrays(training)
     for optimizer, of_optimizer in training.learner.optimizers.items():
         for index, state in of_optimizer.state_dict()["state"].items():
-            values |= {f"{optimizer}.{index}.{key}": value for key, value in state.items()}
+            values |= arrays_of({f"{optimizer}.{index}.{key}": state[key] for key in state})
     if training.finished:
         values["finished"] = bytes_of(np.concatenate(training.finished))
     for name in training.losses[0] if training.losses else ():
-        values[f"losses.{name}"] = torch.stack([loss[name] for loss in training.losses])
+        losses = torch.stack([loss[name] for loss in training.losses])
+        values |= arrays_of({f"losses.{name}": losses})
     header = {
         "format": FORMAT,
         "config": training.config.model_dump(mode="json"),
@@ -117,7 +126,7 @@ def save_training(path: Path, training: Training) -> None:
         header["stepper"] = [training.stepper.seed, training.stepper.replication]
         header["replay"] = training.replay.count if training.config.checkpoint_replay else None
     header["sha256"] = trained.digest(header, values)
-    trained.write_tensors(path, values, {"dess": json.dumps(header)})
+    trained.write_arrays(path, values, {"dess": json.dumps(header)})
 
 
 def load_training(
@@ -136,9 +145,7 @@ def load_training(
     Raises:
         InputError: If the file is missing, damaged, of another version or of another config.
     """
-    values, metadata = trained.read_tensors(
-        path, HEADER_LIMIT + (2**36 if limit is None else limit)
-    )
+    values, metadata = trained.read_arrays(path, HEADER_LIMIT + (2**36 if limit is None else limit))
     if "dess" not in metadata:
         raise InputError(f"{path}: no checkpoint of a training; allowed: {CHECKPOINT} of one")
     header = Header.parse(metadata["dess"], str(path), fixed={"format": FORMAT})
@@ -171,15 +178,15 @@ def load_training(
     return training
 
 
-def _restore(training: Training, values: Tensors, header: dict[str, Any]) -> None:
+def _restore(training: Training, values: Arrays, header: dict[str, Any]) -> None:
     """Restore the state of a saved training in a new training that is in the same phase."""
     with torch.no_grad():
         for name, network in _networks(training).items():
-            for key, value in part(values, name).items():
+            for key, value in tensors_of(part(values, name)).items():
                 network[key].copy_(value)
     for optimizer, of_optimizer in training.learner.optimizers.items():
-        states: dict[int, Tensors] = {}
-        for key, value in part(values, optimizer).items():
+        states: dict[int, dict[str, torch.Tensor]] = {}
+        for key, value in tensors_of(part(values, optimizer)).items():
             index, _, field = key.partition(".")
             states.setdefault(int(index), {})[field] = value
         groups = of_optimizer.state_dict()["param_groups"]
@@ -189,7 +196,7 @@ def _restore(training: Training, values: Tensors, header: dict[str, Any]) -> Non
         for name, array in _missions(training).items():
             held = values[name]
             is_bytes = name.startswith("stepper.")
-            restored = array_of(held, array.dtype) if is_bytes else held.numpy()
+            restored = array_of(held, array.dtype) if is_bytes else held
             array[...] = restored.reshape(array.shape)
         _check_state(training.stepper.state, training.stepper.space)
         if training.config.checkpoint_replay:
@@ -197,16 +204,16 @@ def _restore(training: Training, values: Tensors, header: dict[str, Any]) -> Non
             _check_replay(training.replay.arrays, max(training.space.size))
     if "finished" in values:
         training.finished = [array_of(values["finished"], MISSION_RECORD)]
-    losses = {key: value.to(training.device) for key, value in part(values, "losses").items()}
+    losses = tensors_of(part(values, "losses"), training.device)
     for row in zip(*losses.values(), strict=True):
         training.losses.append(dict(zip(losses, row, strict=True)))
     training.curve = header["curve"]
     training.generator.bit_generator.state = header["random"]
-    torch.set_rng_state(values["random.torch"])
+    torch.set_rng_state(torch.tensor(values["random.torch"]))
 
 
-def _forms(training: Training, finished: int) -> Tensors:
-    """Tensors of the forms that a checkpoint of a training has at its tick.
+def _forms(training: Training, finished: int) -> Arrays:
+    """Arrays of the forms that a checkpoint of a training has at its tick.
 
     Args:
         training: The training, with its progress restored.
@@ -217,29 +224,27 @@ def _forms(training: Training, finished: int) -> Tensors:
         if training.tick - training.phase_start <= training.learner.waits(optimizer):
             continue
         for index, weight in enumerate(of_optimizer.param_groups[0]["params"]):
-            forms[f"{optimizer}.{index}.step"] = torch.empty((), device="meta")
+            forms[f"{optimizer}.{index}.step"] = form(())
             for name in ("exp_avg", "exp_avg_sq"):
-                forms[f"{optimizer}.{index}.{name}"] = torch.empty(weight.shape, device="meta")
+                forms[f"{optimizer}.{index}.{name}"] = form(weight.shape)
     last = training.tick - training.tick % config.evaluate_every
     updates = (training.tick - max(last, training.phase_start)) * config.updates
     if updates and not training.done:
         for name in ("loss", "value", "gradient_norm"):
-            forms[f"losses.{name}"] = torch.empty(updates, device="meta")
+            forms[f"losses.{name}"] = form((updates,))
     if finished:
-        forms["finished"] = torch.empty(
-            finished * MISSION_RECORD.itemsize, dtype=torch.uint8, device="meta"
-        )
+        forms["finished"] = form((finished * MISSION_RECORD.itemsize,), np.uint8)
     return forms
 
 
-def _arrays(training: Training) -> Tensors:
+def _arrays(training: Training) -> Arrays:
     """The arrays that every checkpoint of a training has, by name."""
-    arrays: Tensors = {"random.torch": torch.get_rng_state()}
+    arrays = arrays_of({"random.torch": torch.get_rng_state()})
     for name, network in _networks(training).items():
-        arrays |= {f"{name}.{key}": value for key, value in network.items()}
+        arrays |= arrays_of({f"{name}.{key}": value for key, value in network.items()})
     for name, array in _missions(training).items():
         is_bytes = name.startswith("stepper.")
-        arrays[name] = bytes_of(array) if is_bytes else torch.from_numpy(array)
+        arrays[name] = bytes_of(array) if is_bytes else array
     return arrays
 
 
@@ -254,7 +259,7 @@ def _missions(training: Training) -> dict[str, np.ndarray]:
     return arrays
 
 
-def _networks(training: Training) -> dict[str, Tensors]:
+def _networks(training: Training) -> dict[str, dict[str, torch.Tensor]]:
     """The weights of all networks of a training, by name."""
     networks = {name: of.state_dict() for name, of in training.learner.networks.items()}
     return networks | {"best": training.best}

@@ -1,27 +1,45 @@
-"""The Q-networks: the paper's for maps, a dueling one for vectors, and one for sets.
+"""The Q-networks in training: the paper's for maps, a dueling one for vectors, and one for sets.
 
     values = DuelingNetwork(inputs=454, hidden=(512, 512))(vector)     # (R, 5)
 
-All weights are float32. If ``precision`` is bfloat16, the hidden layers compute in bfloat16 during
+Policies act with those of the same names in ``dess.policies.network``, which compute the same. All
+weights are float32. If ``precision`` is bfloat16, the hidden layers compute in bfloat16 during
 training (autocast). The output layers always, and all layers in evaluation mode, compute in the
 type of the weights.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from itertools import pairwise
 from typing import Any, cast
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
 from dess.code.kernels import kernel
-from dess.state import ACTION_NAMES
+from dess.policies.learner.config import TrainingConfig
+from dess.policies.network import ACTIONS, DENSE, KERNEL_SIZE, KERNELS
 
-ACTIONS = len(ACTION_NAMES)
-KERNELS, KERNEL_SIZE = 16, 5
-NARROWEST = 2 * (KERNEL_SIZE - 1) + 1  # smallest width of a map: two convolutions leave one cell
-DENSE = (256, 256, 256)
+
+def network_of(config: TrainingConfig, shapes: Sequence[Sequence[int]]) -> nn.Module:
+    """A new network of a config, for inputs whose rows have these shapes."""
+    precision = getattr(torch, config.precision)
+    if config.observation == "sets":
+        return SetNetwork(shapes, config.hidden, precision)
+    if config.observation == "maps":
+        return PaperNetwork(shapes, precision)
+    return DuelingNetwork(shapes[0][0], config.hidden, precision)
+
+
+def arrays_of(tensors: Mapping[str, Tensor]) -> dict[str, np.ndarray]:
+    """The values of tensors as arrays, which may share their memory."""
+    return {name: value.detach().cpu().numpy() for name, value in tensors.items()}
+
+
+def tensors_of(arrays: Mapping[str, np.ndarray], device: Any = "cpu") -> dict[str, Tensor]:
+    """The values of arrays as tensors with memory of their own."""
+    return {name: torch.tensor(value, device=device) for name, value in arrays.items()}
 
 
 class PaperNetwork(nn.Module):
@@ -206,13 +224,9 @@ class _Highest(torch.autograd.Function):
         """Compute the products; remember which rows have the highest."""
         values, factors = values.contiguous(), factors.to(values.dtype).contiguous()
         shape = len(values), factors.shape[1], values.shape[2]
-        if not values.requires_grad:
-            out = torch.zeros(shape, dtype=values.dtype)
-            _pool(values.numpy(), factors.numpy(), out.numpy())
-            return out
         out, best = torch.zeros(shape, dtype=values.dtype), torch.full(shape, -1, dtype=torch.int16)
         arrays = (tensor.detach().numpy() for tensor in (values, factors, out, best))
-        _pool_and_remember(*arrays)
+        _pool(*arrays)
         context.save_for_backward(factors, best)
         return out
 
@@ -227,19 +241,7 @@ class _Highest(torch.autograd.Function):
 
 
 @kernel
-def _pool(values, factors, out):
-    for row in range(len(values)):
-        for number in range(values.shape[1]):
-            value = values[row, number]
-            for move in range(factors.shape[1]):
-                factor, to = factors[row, move, number], out[row, move]
-                if factor > 0:
-                    for c in range(len(value)):
-                        to[c] = max(to[c], factor * value[c])
-
-
-@kernel
-def _pool_and_remember(values, factors, out, best):
+def _pool(values, factors, out, best):
     for row in range(len(values)):
         for number in range(values.shape[1]):
             value = values[row, number]

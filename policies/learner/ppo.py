@@ -27,7 +27,6 @@ from dess.observations.sets import Sets
 from dess.observations.states import CompactStates, masks
 from dess.policies.learner.config import MISSION_SEED, TrainingConfig, ranges_of
 from dess.policies.learner.network import SetNetwork
-from dess.policies.learner.policy import ROWS
 from dess.policies.learner.training import (
     MISSIONS_PER_PHASE,
     SELECT_BY,
@@ -49,6 +48,7 @@ WORTH = 10.0  # by which products are multiplied, so that the critic's values ha
 CRITIC_RATE = 1e-3  # learning rate of the critic, whose task changes all the time
 # Ranges, in ways to the farthest node: 1.8 on the paper's sea, 2.8 or more on generated ones.
 RANGES = (1.4, 2.8)
+ROWS = 256  # decisions that a network evaluates together
 SEAS = 300  # of which the ways are kept in memory
 
 

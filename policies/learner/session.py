@@ -28,8 +28,8 @@ from dess.observations.observer import encoder_of
 from dess.policies.learner.checkpoint import load_training, new_training, save_training
 from dess.policies.learner.config import CHECKPOINT, MODEL, TrainingConfig
 from dess.policies.learner.dqn import ReplayMemory
-from dess.policies.learner.network import units_of
-from dess.policies.learner.trained import build, load_policy, save_policy
+from dess.policies.learner.network import arrays_of, network_of, units_of
+from dess.policies.learner.trained import observed, save_policy, weights_of
 from dess.policies.learner.training import Training
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace
@@ -95,7 +95,7 @@ def sizes_of(config: TrainingConfig) -> Sizes:
     fleet, nodes = (max(n) for n in zip(*((s.uavs[1], len(s.nodes)) for s in spaces), strict=True))
     largest = max(spaces, key=lambda space: len(space.nodes))
     with torch.device("meta"):  # the sizes of the network, without its memory
-        _, _, network = build(config, spaces[0])
+        network = network_of(config, observed(config, spaces[0])[1].shapes)
     shapes = encoder_of(config.observation, largest).shapes
     weights = sum(weight.numel() for weight in network.parameters())
     rows = max(2 * config.batch, config.num_envs * fleet, BATCH_SIZE * fleet)
@@ -164,7 +164,7 @@ def train(
             else:
                 training = new_training(config, place)
                 if start:
-                    training.begin_with(load_policy(Path(start)).network.state_dict())
+                    training.begin_with(weights_of(Path(start)))
                 save_training(path, training)
         except (MemoryError, RuntimeError) as error:
             if isinstance(error, RuntimeError) and "alloc" not in str(error):
@@ -243,7 +243,9 @@ def _save_results(out: Path, training: Training) -> None:
         "seconds": round(training.seconds),
         "selection_score": training.best_score,
     }
-    save_policy(out, training.kept, training.config, training.space, run, training.ranges)
+    save_policy(
+        out, arrays_of(training.kept), training.config, training.space, run, training.ranges
+    )
     if not training.curve:
         return
     names = dict.fromkeys(name for row in training.curve for name in row)

@@ -8,25 +8,24 @@ import copy
 import hashlib
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import load, save, save_file
-from torch import nn
+from safetensors.numpy import load, save, save_file
 
 from dess.errors import InputError, shown
 from dess.files.reading import Missing, checked, read_bytes
 from dess.files.writing import replacing, write_file
-from dess.observations.maps import POOL
-from dess.observations.observer import ENCODERS
+from dess.observations.maps import POOL, Maps
 from dess.observations.sets import Sets
 from dess.observations.states import Layout, layout_of
+from dess.observations.vector import Vector
+from dess.policies import network
 from dess.policies.learner.config import (
     CONFIG,
     FORMAT,
@@ -41,154 +40,171 @@ from dess.policies.learner.config import (
     read_description,
     resume_command,
 )
-from dess.policies.learner.network import NARROWEST, DuelingNetwork, PaperNetwork, SetNetwork
 from dess.policies.learner.policy import LearnedPolicy
+from dess.policies.network import Weights
 from dess.scenario import ScenarioSpace
 
-Tensors = dict[str, torch.Tensor]
+Arrays = dict[str, np.ndarray]
 
 
-def write_tensors(
-    path: Path, tensors: Mapping[str, torch.Tensor], metadata: dict[str, str]
-) -> None:
-    """Write tensors into a file, completely or not at all.
+def write_arrays(path: Path, arrays: Weights, metadata: dict[str, str]) -> None:
+    """Write arrays into a file, completely or not at all.
 
     Args:
         path: The file.
-        tensors: The tensors, on any device.
+        arrays: The arrays.
         metadata: One text by name. With more than one, their order in the file would be random.
 
     Raises:
         InputError: If it cannot be written.
     """
-    plain = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
     with replacing(path) as temporary:
         try:
-            save_file(plain, temporary, metadata)
+            save_file(_contiguous(arrays), temporary, metadata)
         except SafetensorError as error:
             raise InputError(f"{path}: cannot be written: {error}; allowed: another path") from None
 
 
-def read_tensors(path: Path, limit: int) -> tuple[Tensors, dict[str, str]]:
-    """The tensors of a file of at most ``limit`` bytes, and its metadata.
+def read_arrays(path: Path, limit: int) -> tuple[Arrays, dict[str, str]]:
+    """The arrays of a file of at most ``limit`` bytes, and its metadata.
 
     Raises:
         InputError: If it does not exist, is too large or is no such file.
     """
     try:
-        with safe_open(checked(path, limit, "a file of a training"), "pt") as file:
+        with safe_open(checked(path, limit, "a file of a training"), "np") as file:
             names = file.keys()
             return {name: file.get_tensor(name) for name in names}, file.metadata() or {}
     except InputError:
         raise
-    except (OSError, SafetensorError, ValueError) as error:
+    except (OSError, SafetensorError, ValueError, TypeError) as error:
         raise damaged(path, error) from None
 
 
 def damaged(path: Path, error: Exception) -> InputError:
     """What is said about a file that cannot be read."""
-    return InputError(f"{path}: damaged: {error}; allowed: a safetensors file")
+    problem = f"numbers of the type {error}" if isinstance(error, KeyError) else error
+    return InputError(f"{path}: damaged: {problem}; allowed: a safetensors file")
 
 
-def digest(content: Any, tensors: Mapping[str, torch.Tensor]) -> str:
-    """A SHA-256 of plain values and of named tensors."""
+def digest(content: Any, arrays: Weights) -> str:
+    """A SHA-256 of plain values and of named arrays."""
     hashed = hashlib.sha256(json.dumps(content).encode())
-    for name in sorted(tensors):
+    for name, value in sorted(_contiguous(arrays).items()):
         hashed.update(name.encode() + b"\0")
-        content = tensors[name].detach().cpu().contiguous().reshape(-1)
-        hashed.update(content.view(torch.uint8).numpy().data)
+        hashed.update(value.reshape(-1).view(np.uint8).data)
     return hashed.hexdigest()
 
 
-def require_forms(
-    tensors: Mapping[str, torch.Tensor], wanted: Mapping[str, torch.Tensor], where: str
-) -> None:
-    """Refuse tensors whose names, types or shapes are not the wanted ones, or that are not finite.
+def form(shape: Sequence[int], dtype: Any = np.float32) -> np.ndarray:
+    """An array of a form, without its memory."""
+    return np.broadcast_to(np.zeros((), dtype), shape)
+
+
+def require_forms(arrays: Weights, wanted: Weights, where: str) -> None:
+    """Refuse arrays whose names, types or shapes are not the wanted ones, or that are not finite.
 
     Args:
-        tensors: The tensors.
-        wanted: Tensors of the right form; their values do not matter.
-        where: The file of the tensors.
+        arrays: The arrays.
+        wanted: Arrays of the right form; their values do not matter.
+        where: The file of the arrays.
 
     Raises:
-        InputError: If a tensor is missing, one too many, of another form, or not finite.
+        InputError: If an array is missing, one too many, of another form, or not finite.
     """
-    for name in sorted(tensors.keys() ^ wanted.keys()):
+    for name in sorted(arrays.keys() ^ wanted.keys()):
         problem = "is missing" if name in wanted else "is one too many"
         raise InputError(f"{where}: {shown(name)} {problem}; allowed: the tensors of the config")
     for name, value in wanted.items():
-        actual, allowed = _form(tensors[name]), _form(value)
+        actual, allowed = (f"{array.dtype} {[*array.shape]}" for array in (arrays[name], value))
         if actual != allowed:
             raise InputError(f"{where}: {name} is {actual}; allowed: {allowed}, as the config says")
-        if not _is_sound(tensors[name]):
+        if not _is_sound(arrays[name]):
             raise InputError(f"{where}: {name} has impossible values; allowed: finite numbers")
 
 
-def part(tensors: Mapping[str, torch.Tensor], name: str) -> Tensors:
-    """The tensors whose names begin with ``name.``, without that prefix."""
+def part(arrays: Weights, name: str) -> Arrays:
+    """The arrays whose names begin with ``name.``, without that prefix."""
     prefix = name + "."
     return {
-        key.removeprefix(prefix): value for key, value in tensors.items() if key.startswith(prefix)
+        key.removeprefix(prefix): value for key, value in arrays.items() if key.startswith(prefix)
     }
 
 
-def bytes_of(array: np.ndarray) -> torch.Tensor:
+def bytes_of(array: np.ndarray) -> np.ndarray:
     """The bytes of an array, which may be structured; those between its fields are 0."""
     if array.dtype.names:
         whole, array = array, np.zeros(array.shape, array.dtype)
         for name in whole.dtype.names or ():
             array[name] = whole[name]
-    return torch.from_numpy(np.frombuffer(array.tobytes(), np.uint8).copy())
+    return np.frombuffer(array.tobytes(), np.uint8)
 
 
-def array_of(content: torch.Tensor, dtype: np.dtype) -> np.ndarray:
+def array_of(content: np.ndarray, dtype: np.dtype) -> np.ndarray:
     """The (N,) array of a type that ``bytes_of`` made the bytes of."""
-    return np.frombuffer(content.numpy().tobytes(), dtype).copy()
+    return np.frombuffer(content.tobytes(), dtype).copy()
 
 
-def _form(tensor: torch.Tensor) -> str:
-    """The type and shape of a tensor, like ``float32 [5, 16]``."""
-    return f"{str(tensor.dtype).removeprefix('torch.')} {list(tensor.shape)}"
+def _contiguous(arrays: Weights) -> Arrays:
+    return {name: np.asarray(value, order="C") for name, value in arrays.items()}
 
 
-def _is_sound(tensor: torch.Tensor) -> bool:
+def _is_sound(array: np.ndarray) -> bool:
     """Whether all numbers are finite, and all truth values 0 or 1."""
-    if tensor.dtype == torch.bool:
-        return bool((tensor.contiguous().view(torch.uint8) <= 1).all())
-    return bool(torch.isfinite(tensor).all()) if tensor.is_floating_point() else True
+    if array.dtype == np.bool_:
+        return bool((array.view(np.uint8) <= 1).all())
+    return bool(np.isfinite(array).all())
 
 
 # The largest file of weights that is read [bytes]; the largest network of a config is half of it.
 MODEL_LIMIT = 2**30
 
 
-def build(config: TrainingConfig, space: ScenarioSpace) -> tuple[Layout | None, Any, nn.Module]:
-    """What a policy of a config is made of, for missions of a scenario.
+# The encoder and the network of each kind of observation.
+_KINDS: dict[str, tuple[Any, Any]] = {
+    "maps": (Maps, network.PaperNetwork),
+    "vector": (Vector, network.DuelingNetwork),
+    "sets": (Sets, network.SetNetwork),
+}
+
+
+def observed(config: TrainingConfig, space: ScenarioSpace) -> tuple[Layout | None, Any]:
+    """What a policy of a config sees of missions of a scenario.
 
     Returns:
-        The layout that it learns, None if it learns to fly on any sea; the encoder of its
-        observations, or the kind of it for any sea; and a new network.
+        The layout that it learns, None if it learns to fly on any sea; and the encoder of its
+        observations, or the kind of it for any sea.
 
     Raises:
         InputError: If the observation cannot be made of the scenario.
     """
-    precision = getattr(torch, config.precision)
     if config.algorithm == "ppo":
-        return None, Sets, SetNetwork(Sets.shapes, config.hidden, precision)
+        return None, Sets
     layout = layout_of(space)
-    if config.observation == "maps" and (2 * layout.grid - 1) // POOL < NARROWEST:
+    if config.observation == "maps" and (2 * layout.grid - 1) // POOL < network.NARROWEST:
         raise InputError(
             f"observation: a grid of {layout.grid} is too small for maps; allowed: vector, sets"
         )
-    observation = ENCODERS[config.observation](layout)
-    if config.observation == "maps":
-        return layout, observation, PaperNetwork(observation.shapes, precision)
-    return layout, observation, DuelingNetwork(observation.shapes[0][0], config.hidden, precision)
+    return layout, _KINDS[config.observation][0](layout)
+
+
+def forms_of(config: TrainingConfig, observation: Any) -> Arrays:
+    """Arrays of the forms of the weights of a config's network, without their memory."""
+    layers = _KINDS[config.observation][1].layers(observation.shapes, config.hidden)
+    return {name: form(shape) for name, shape in network.forms_of(layers).items()}
+
+
+def policy_of(
+    config: TrainingConfig, layout: Layout | None, observation: Any, weights: Weights
+) -> LearnedPolicy:
+    """The policy of a config with these weights."""
+    acting = _KINDS[config.observation][1]
+    return LearnedPolicy(config.name, observation, acting, weights, config.guard, layout)
 
 
 def save_policy(
     folder: Path,
-    weights: Mapping[str, torch.Tensor],
+    weights: Weights,
     config: TrainingConfig,
     space: ScenarioSpace,
     run: Mapping[str, Any] | None = None,
@@ -214,15 +230,14 @@ def save_policy(
     description = Description(
         format=FORMAT,
         name=config.name,
-        observation_version=ENCODERS[config.observation].version,
+        observation_version=_KINDS[config.observation][0].version,
         layout=layout
         and LayoutTable(grid=layout.grid, zone=layout.zone.tolist(), nodes=layout.nodes.tolist()),
         training=config,
         ranges=ranges or ranges_of([space]),
         run=Run(**(run or {})),
     )
-    values = {name: value.detach().cpu().contiguous() for name, value in weights.items()}
-    content = save(values, {"format": str(FORMAT)})
+    content = save(_contiguous(weights), {"format": str(FORMAT)})
     sums = [_sha256(content)]
     with suppress(Missing):
         held = _sha256(read_bytes(folder / MODEL, MODEL_LIMIT))
@@ -242,17 +257,32 @@ def load_policy(folder: Path) -> LearnedPolicy:
     Raises:
         InputError: If a file is missing, damaged, of another version or of another shape.
     """
+    content, description = _read(folder)
+    return copy.copy(_policy(folder, content, description.model_dump_json()))
+
+
+def weights_of(folder: Path) -> Arrays:
+    """The weights that ``save_policy`` wrote.
+
+    Raises:
+        InputError: If a file is missing or damaged.
+    """
+    return _weights_in(_read(folder)[0], folder / MODEL)
+
+
+def _read(folder: Path) -> tuple[bytes, Description]:
+    """The content of the file of weights, and its description."""
     path, description = folder / MODEL, read_description(folder)
     content = read_bytes(path, MODEL_LIMIT, "the folder of a trained policy")
     sums = description.model_sha256
     if sums is not None and _sha256(content) not in sums:
         if read_description(folder) != description:  # a training has just replaced both files
-            return load_policy(folder)
+            return _read(folder)
         raise InputError(
             f"{path}: damaged: it has not the checksum in {CONFIG}; allowed: the file it was made "
             "with"
         )
-    return copy.copy(_policy(folder, content, description.model_dump_json()))
+    return content, description
 
 
 @lru_cache(maxsize=4)
@@ -263,18 +293,13 @@ def _policy(folder: Path, content: bytes, text: str) -> LearnedPolicy:
     config = description.training
     values = description.layout and description.layout.model_dump()
     try:
-        with torch.device("meta"):  # the forms of the weights, without their memory
-            space = ScenarioSpace.of(uavs=1, **(values or {}))
-            layout, observation, network = build(config, space)
+        layout, observation = observed(config, ScenarioSpace.of(uavs=1, **(values or {})))
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     require_version(description.observation_version, observation, where)
     weights = _weights_in(content, path)
-    require_forms(weights, network.state_dict(), str(path))
-    network = network.to_empty(device="cpu")
-    network.load_state_dict(weights)
-    policy = LearnedPolicy(config.name, observation, network, config.guard, layout)
-    policy.exact = copy.deepcopy(network).double()
+    require_forms(weights, forms_of(config, observation), str(path))
+    policy = policy_of(config, layout, observation, weights)
     policy.learner = learner_of(config)
     policy.weights = digest([config.observation, config.guard, values], weights)
     ticks = description.run.ticks
@@ -298,10 +323,10 @@ def require_version(version: int, observation: Any, path: Path) -> None:
         raise InputError(f"{path}: observation version {version!r}; allowed: {observation.version}")
 
 
-def _weights_in(content: bytes, path: Path) -> Tensors:
+def _weights_in(content: bytes, path: Path) -> Arrays:
     try:
         return load(content)
-    except (SafetensorError, ValueError) as error:
+    except (SafetensorError, ValueError, KeyError) as error:
         raise damaged(path, error) from None
 
 

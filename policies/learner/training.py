@@ -20,8 +20,10 @@ from dess.env.stepper import MissionStepper
 from dess.observations import states as column
 from dess.observations.states import CompactStates, compact_states
 from dess.policies.learner.config import Phase, TrainingConfig, ranges_of
+from dess.policies.learner.network import arrays_of, network_of, tensors_of
 from dess.policies.learner.policy import LearnedPolicy
-from dess.policies.learner.trained import build, require_forms
+from dess.policies.learner.trained import forms_of, observed, policy_of, require_forms
+from dess.policies.network import Weights
 from dess.scenario import ScenarioSpace
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
@@ -95,7 +97,8 @@ class Training:
         torch.manual_seed(config.seed)
         self.spaces = config.spaces()
         self.space = self.spaces[0]
-        self.layout, self.observation, network = build(config, self.space)
+        self.layout, self.observation = observed(config, self.space)
+        network = network_of(config, self.observation.shapes)
         self.learner = self._learner(network)
         self.tick = self.updates = self.uav_slots = 0
         self.seconds = 0.0
@@ -157,25 +160,19 @@ class Training:
                 network.load_state_dict(self.best)
             self.enter_phase(self.phase_index + 1)
 
-    def policy(self, weights: dict[str, torch.Tensor]) -> LearnedPolicy:
+    def policy(self, weights: Mapping[str, torch.Tensor]) -> LearnedPolicy:
         """A policy with these weights."""
-        *_, network = build(self.config, self.space)
-        network.load_state_dict(weights)
-        return self._as_policy(network)
+        return policy_of(self.config, self.layout, self.observation, arrays_of(weights))
 
-    def _as_policy(self, network: nn.Module) -> LearnedPolicy:
-        config = self.config
-        return LearnedPolicy(config.name, self.observation, network, config.guard, self.layout)
-
-    def begin_with(self, weights: Mapping[str, torch.Tensor]) -> None:
+    def begin_with(self, weights: Weights) -> None:
         """Begin with the weights of another training.
 
         Raises:
             InputError: If they are not those of such a network.
         """
-        require_forms(weights, self.learner.online.state_dict(), "from")
+        require_forms(weights, forms_of(self.config, self.observation), "from")
         for network in self.learner.networks.values():
-            network.load_state_dict(weights)
+            network.load_state_dict(tensors_of(weights))
         self.best = _weights(self.learner.evaluated)
 
     @property
@@ -197,14 +194,14 @@ class Training:
 
     def _evaluate(self) -> None:
         """Simulate the selection missions; keep the weights with the best moving average."""
-        config, network = self.config, self.learner.evaluated
+        config = self.config
         records = self._selection_missions()
         settled = len(self.scores) == config.window  # before that, the latest weights are selected
         self.scores = [*self.scores, float(records[SELECT_BY].mean())][-config.window :]
         average = float(np.mean(self.scores))
         is_best = not settled or self.best_score is None or average > self.best_score
         if is_best:
-            self.best, self.best_score = _weights(network), average
+            self.best, self.best_score = _weights(self.learner.evaluated), average
         self.curve.append(self._row(records, average, is_best))
         self.finished, self.losses = [], []
 
@@ -220,18 +217,16 @@ class Training:
 
     def _selection_missions(self) -> np.ndarray:
         """The records of the selection missions under the present policy."""
-        network, missions = self.learner.evaluated, range(self.config.evaluation_missions)
+        missions = range(self.config.evaluation_missions)
         spaces = [self._in_phase(space) for space in self.config.spaces(of_evaluations=True)]
-        records = simulate_batch(
+        return simulate_batch(
             [spaces[mission % len(spaces)] for mission in missions]
             if len(spaces) > 1
             else spaces[0],
-            self._as_policy(network),
+            self.policy(self.learner.evaluated.state_dict()),
             self.config.evaluation_seed,
             missions,
         ).missions
-        network.train()
-        return records
 
     def _row(self, records: np.ndarray, average: float, is_best: bool) -> dict[str, Any]:
         """A row of the curve: progress, metrics of an evaluation, metrics and losses since."""

@@ -15,7 +15,7 @@ from dess.mission import simulate
 from dess.policies import registry
 from dess.policies.heuristics import Greedy
 from dess.policies.learner.config import config_of
-from dess.policies.learner.trained import build, save_policy
+from dess.policies.learner.trained import forms_of, observed, save_policy
 from dess.policies.registry import SHIPPED, Policy, TypedByUser, about
 from dess.scenario import Scenario, load_scenario, scenario_names
 from tests.policies.learner.tiny import refusal_of
@@ -72,8 +72,8 @@ def _trained(folder: Path) -> Path:
     """The folder of a policy that is called ``novice`` and has learned nothing."""
     settings = {"name": "novice", "hidden": [8], "phases": [{"name": "none", "ticks": 1}]}
     config, space = config_of(settings, "here"), load_scenario("paper")
-    *_, network = build(config, space)
-    save_policy(folder, network.state_dict(), config, space)
+    weights = forms_of(config, observed(config, space)[1])
+    save_policy(folder, weights, config, space)
     return folder
 
 

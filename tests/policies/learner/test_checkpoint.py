@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 from safetensors import safe_open
-from safetensors.torch import load_file, save_file
+from safetensors.numpy import load_file, save_file
 
 from dess import InputError
 from dess.policies.learner import trained
@@ -66,16 +66,14 @@ def test_the_checkpoint_of_another_config_is_refused(training, file):
     )
 
 
-def _forged(
-    file: Path, tensors: dict[str, torch.Tensor | None] | None = None, **header: Any
-) -> None:
+def _forged(file: Path, tensors: dict[str, np.ndarray | None] | None = None, **header: Any) -> None:
     """Change tensors (None: leave out) and the header of a checkpoint, and its checksum with them.
 
     So it is what somebody makes who wants to be believed, not what a damaged disk makes.
     """
     values = load_file(file) | (tensors or {})
     kept = {name: value for name, value in values.items() if value is not None}
-    with safe_open(file, "pt") as opened:
+    with safe_open(file, "np") as opened:
         new = json.loads(opened.metadata()["dess"]) | header
     del new["sha256"]
     new["sha256"] = trained.digest(new, kept)
@@ -91,13 +89,13 @@ def test_the_checkpoint_of_another_version_is_refused(training, file):
 
 
 # What stands in the place of a tensor; None: it is left out.
-TENSORS: dict[str, torch.Tensor | None] = {
+TENSORS: dict[str, np.ndarray | None] = {
     "online.value.bias": None,
-    "average.value.bias": torch.zeros(3),
-    "stepper.uavs": torch.zeros(7, dtype=torch.uint8),
-    "optimizer.99999999.exp_avg": torch.zeros(1),
-    "losses.loss": torch.zeros(9),
-    "\U0001f4a3\n": torch.zeros(1),
+    "average.value.bias": np.zeros(3, np.float32),
+    "stepper.uavs": np.zeros(7, np.uint8),
+    "optimizer.99999999.exp_avg": np.zeros(1, np.float32),
+    "losses.loss": np.zeros(9, np.float32),
+    "\U0001f4a3\n": np.zeros(1, np.float32),
 }
 # A tensor, where in it, and the index that stands there then.
 CELLS = [("replay.uavs", (0, 0, 0), 30_000), ("replay.uavs", (0, 0, 1), -1)]
@@ -114,21 +112,21 @@ RECORDS: dict[str, tuple[np.dtype, dict[str, Any]]] = {
 }
 
 
-def _forgeries(file: Path) -> Iterator[tuple[str, torch.Tensor | None]]:
+def _forgeries(file: Path) -> Iterator[tuple[str, np.ndarray | None]]:
     """What is forged of a checkpoint: the name of a tensor, and what stands in its place."""
     whole = load_file(file)
     yield from TENSORS.items()
     for name, place, value in CELLS:
-        tensor = whole[name].clone()
+        tensor = whole[name].copy()
         tensor[place] = value
         yield name, tensor
     for name, place in TRUTHS.items():
-        tensor = whole[name].clone()
-        tensor.view(torch.uint8).flatten()[place] = 7
+        tensor = whole[name].copy()
+        tensor.view(np.uint8).reshape(-1)[place] = 7
         yield name, tensor
     for name, (dtype, fields) in RECORDS.items():
         for field, value in fields.items():
-            records = whole[name].numpy().copy().view(dtype)
+            records = whole[name].copy().view(dtype)
             records[:1][field] = value
             yield name, trained.bytes_of(records)
 

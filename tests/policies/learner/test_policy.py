@@ -1,13 +1,11 @@
 """The policy: the best allowed action, the same in either engine, and at home only."""
 
-import copy
+from typing import Any
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
-from torch import Tensor, nn
 
 from dess.batch import simulate_batch
 from dess.channel import world_of
@@ -17,8 +15,8 @@ from dess.mission import simulate
 from dess.observations.sets import Sets, sea_of
 from dess.observations.states import ACTIVE, Layout, compact_states, layout_of
 from dess.observations.vector import Vector
-from dess.policies.learner.network import DuelingNetwork, SetNetwork
 from dess.policies.learner.policy import LearnedPolicy
+from dess.policies.network import DuelingNetwork, SetNetwork, Sizes, forms_of
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import constants_of
 from tests.dess.flights import assert_same_alone, cells_of
@@ -28,34 +26,37 @@ from tests.policies.learner.tiny import refusal_of
 PAPER = load_scenario("paper")
 
 
+def _weights(layers: Sizes, seed: int = 1) -> dict[str, np.ndarray]:
+    """Random weights, of the size that a training begins with."""
+    generator = np.random.default_rng(seed)
+    return {
+        name: (generator.uniform(-1, 1, form) / np.sqrt(form[-1])).astype(np.float32)
+        for name, form in forms_of(layers).items()
+    }
+
+
 def _random(layout: Layout, guarded: bool = True, seed: int = 1) -> LearnedPolicy:
     """A policy of random weights."""
-    torch.manual_seed(seed)
     vector = Vector(layout)
-    network = DuelingNetwork(vector.shapes[0][0], [32, 32])
-    return _exact(LearnedPolicy("random weights", vector, network, guarded, layout))
+    weights = _weights(DuelingNetwork.layers(vector.shapes, [32, 32]), seed)
+    return LearnedPolicy("random weights", vector, DuelingNetwork, weights, guarded, layout)
 
 
-def _exact(policy: LearnedPolicy) -> LearnedPolicy:
-    """The policy with close decisions in double precision, as one that is loaded has it."""
-    policy.exact = copy.deepcopy(policy.network).double()
-    return policy
-
-
-class _Fixed(nn.Module):
+class _Fixed:
     """Gives every UAV the same values."""
 
-    def __init__(self, values: list[float]):
-        super().__init__()
-        self.values = nn.Parameter(torch.tensor(values, dtype=torch.float64))
+    rows = 10
 
-    def forward(self, vector: Tensor) -> Tensor:
-        return self.values.expand(len(vector), 5)
+    def __init__(self, weights: dict[str, np.ndarray], dtype: Any):
+        self.values = weights["values"].astype(dtype)
+
+    def __call__(self, vector: np.ndarray) -> np.ndarray:
+        return np.tile(self.values, (len(vector), 1))
 
 
 def _fixed(values: list[float], space: ScenarioSpace, guarded: bool = False) -> LearnedPolicy:
-    layout = layout_of(space)
-    return _exact(LearnedPolicy("fixed", Vector(layout), _Fixed(values), guarded, layout))
+    layout, weights = layout_of(space), {"values": np.array(values)}
+    return LearnedPolicy("fixed", Vector(layout), _Fixed, weights, guarded, layout)
 
 
 @settings(max_examples=10)
@@ -121,10 +122,12 @@ def test_away_from_home_it_refuses(fly):
 # --- on any sea ---
 
 
+LAYERS = SetNetwork.layers(Sets.shapes, [16, 8, 16])
+
+
 def _any(seed: int = 1) -> LearnedPolicy:
     """A policy of random weights that decides on any sea."""
-    torch.manual_seed(seed)
-    return _exact(LearnedPolicy("any", Sets, SetNetwork(Sets.shapes, [16, 8, 16]), True, None))
+    return LearnedPolicy("any", Sets, SetNetwork, _weights(LAYERS, seed), True, None)
 
 
 @settings(max_examples=8)
@@ -150,14 +153,15 @@ def test_missions_with_other_fleets_pads_and_data_beside_it_change_nothing():
 @given(spaces(), st.integers(0, 3))
 def test_on_any_sea_values_turn_with_it(space, seed):
     """The value of a move is that of the mirrored move on the mirrored sea."""
-    policy, sets = _any(seed), Sets(sea_of(constants_of(space)[0], world_of(space)))
+    network = SetNetwork(_weights(LAYERS, seed), np.float32)
+    sets = Sets(sea_of(constants_of(space)[0], world_of(space)))
     stepper = MissionStepper(space, 3, seed)
     stepper.launch(stepper.indices)
     states = compact_states(stepper.state, space.chart, True)
     missions, uavs = np.nonzero(states.uavs[..., ACTIVE])
-    own, actions, *parts = (torch.from_numpy(a) for a in sets.encode(states, missions, uavs))
+    own, actions, *parts = sets.encode(states, missions, uavs)
     turned = [own, actions[:, [0, 3, 2, 1, 4]], *parts]
     for number in (3, 5, 7):
         turned[number] = parts[number - 2][:, [0, 3, 2, 1, 4, 7, 6, 5, 8]]
-    values = policy.network(own, actions, *parts)
-    torch.testing.assert_close(policy.network(*turned), values[:, [0, 3, 2, 1, 4]])
+    values = network(own, actions, *parts)
+    np.testing.assert_allclose(network(*turned), values[:, [0, 3, 2, 1, 4]], atol=1e-5)
