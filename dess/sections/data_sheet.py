@@ -94,6 +94,14 @@ def printed(value: float, unit: str) -> str:
     return f"{value / size:.4g} {name}"
 
 
+def times(text: str, factor: float) -> str:
+    """A quantity, or the first of two, times a factor: ``5 m/s from SW`` as ``10 m/s from SW``."""
+    amount, *others = re.split(r"(?= from | at )", " ".join(text.split()), maxsplit=1)
+    found = _NUMBER.fullmatch(amount)
+    assert found
+    return f"{float(found[1]) * factor:g} {found[2]}{''.join(others)}"
+
+
 def _refuse(value: object, problem: str, units: str) -> NoReturn:
     kind, example = _KINDS[units]
     raise InputError(f'{shown(value)} {problem}; allowed: {kind}, such as "{example}"')
