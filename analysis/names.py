@@ -148,10 +148,12 @@ class Declared(NamedTuple):
 def fields(space: ScenarioSpace) -> list[Declared]:
     """Every field of a scenario, in the order of the model."""
     default = ScenarioSpace.of()
+    follows = space.data_sheet.fields() if space.units else {}
     return [
         Declared(
             name,
-            *_meaning(name),
+            _meaning(name)[0] + (", from the data sheet" if name in follows else ""),
+            _meaning(name)[1],
             _allowed(space, name),
             *(_single(side.plain_value(name)) for side in (default, space)),
         )

@@ -22,6 +22,7 @@ from dess.sea.chart import distance, in_zone, is_open, length_around
 from dess.sections.charging import slots_to_charge
 from dess.sections.failures import working_pads
 from dess.sections.landing import flies, lands
+from dess.sections.radio import has_range
 from dess.sections.section import for_sections
 from dess.sections.wind import move_surcharge, reach_of
 from dess.state import HOVER, STEP_X, STEP_Y
@@ -49,8 +50,9 @@ def slots_needed(mission, u):
 def slots_expected(mission, u, data):
     """Flying slots until the quota of UAV ``u`` is filled, as far as data are there for it.
 
-    A UAV collects some ``MEAN_RATE`` data units in a slot. Once the residual data are collected,
-    it may count on ``SLOTS_PER_PACKET`` communication slots for each data unit that arrives.
+    A UAV collects some ``MEAN_RATE`` data units in a slot, and is no more often in range of a node
+    than chance would have it. Once the residual data are collected, it may count on
+    ``SLOTS_PER_PACKET`` communication slots for each data unit that arrives.
 
     Args:
         mission: ``MISSION`` record.
@@ -58,6 +60,8 @@ def slots_expected(mission, u, data):
         data: Residual data of all nodes together [data units].
     """
     needed = slots_needed(mission, u)
+    if has_range(mission):  # slots out of range do not count
+        needed = int(math.ceil(needed / mission.covered))
     if data >= MEAN_RATE * needed * mission.active:
         return needed
     served = data / (MEAN_RATE * mission.active)

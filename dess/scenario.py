@@ -27,7 +27,7 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 
 from dess.errors import InputError, check_type, listed, one_of, shown, validated
-from dess.files.reading import Shipped
+from dess.files.reading import Shipped, parse_toml
 from dess.sea.chart import (
     FAR,
     MOST_CHARTED,
@@ -553,8 +553,15 @@ def draft_scenario(name_or_path: str | Path, /, **overrides: Any) -> ScenarioSpa
     return _load(name_or_path, overrides, DRAFT)
 
 
-def _load(name_or_path: str | Path, overrides: dict[str, Any], context: str = "") -> ScenarioSpace:
-    where, read = _read(name_or_path)
+def parsed_scenario(text: str, path: Path) -> ScenarioSpace:
+    """The scenario that ``load_scenario`` would load if a file had this text."""
+    return _load(path, {}, found=(str(path), parse_toml(text, str(path))))
+
+
+def _load(
+    name_or_path: str | Path, overrides: dict[str, Any], context: str = "", found: Any = None
+) -> ScenarioSpace:
+    where, read = found or _read(name_or_path)
     read.pop("description", None)
     values = merged(read, overrides)
     if named := unread(read) | unread(values):
@@ -724,7 +731,12 @@ def _unfit(c: Constants) -> Iterator[str]:
     """The rates, the pads and the initial data fit to the nodes and the zones."""
     count, (low, high) = len(c.nodes), c.initial_data
     if c.data_sheet.is_on:
-        c.data_sheet.require("data_rate")
+        if c.data_sheet.data_rate is None:
+            yield f"data_sheet.data_rate: is missing; allowed: {DataSheet.form_of('data_rate')}"
+        full = c.data_sheet.fields()["charge_complete"]
+        for name in ("flying_time", "charge_complete"):
+            if np.max(c.value(name)) > full:
+                yield f"{name}: {c.value(name)} is more than the reserve leaves; allowed: {full}"
     if c.quota == 0 and not c.landing:
         yield "quota: 0 needs landing; allowed: 1..1000000, or landing = true"
     for name in ("names", "arrivals.rates", "arrivals.initial", "arrivals.merged"):
@@ -738,6 +750,8 @@ def _unfit(c: Constants) -> Iterator[str]:
         name, cells = f"zones.{number - 1}.pads" if number else "pads", width * height
         if pads > cells:
             yield f"{name}: {pads} is more than the zone has cells; allowed: 1..{cells}"
+    if 0 < c.radio.range <= c.altitude:
+        yield f"radio.range: {c.radio.range:g} m is too short; allowed: above {c.altitude:g} m"
     if c.failures.pad_rate > 0 and c.charging_pads > MOST_PADS:
         yield f"pads: {c.charging_pads} are too many to fail; allowed: {MOST_PADS} at most"
     if not 0 <= low <= high <= MOST_DATA:

@@ -30,7 +30,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 import dess
-from dess.code.libraries import needs
+from dess.code.libraries import MissingLibraryError, needs
 from dess.code.sources import path_of
 from dess.errors import InputError, one_of, shown
 from dess.files.reading import Missing, paths_in, read_text
@@ -342,7 +342,10 @@ def about(name: str) -> About:
     policy, folder = load(TypedByUser(name)), folder_of(name)
     described = read_description(folder) if folder else None
     requires = described.layout.model_dump() if described and described.layout else {}
-    scenarios = {name: load_scenario(name).model_dump(mode="json") for name in scenario_names()}
+    scenarios = {}
+    for known in scenario_names():
+        with suppress(MissingLibraryError):  # pint, which a data sheet needs
+            scenarios[known] = load_scenario(known).model_dump(mode="json")
     trained_on = described.training.scenario if described and described.layout else ""
     return About(
         name=name,

@@ -158,6 +158,7 @@ def failures(draw: st.DrawFn) -> dict[str, Any]:
 @st.composite
 def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
     """Spaces whose sections beyond the paper are on or off, those that both engines have."""
+    strengths = st.just(0.0) | _numbers(0.0, 10.0)
     sections = {
         "age": {
             "measured": draw(st.booleans()),
@@ -170,10 +171,17 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
         },
         "failures": draw(st.just({}) | failures()),
         "wind": {
-            "strength": draw(st.just(0.0) | _numbers(0.0, 10.0)),
+            "strength": draw(strengths),
             "direction": draw(_numbers(0.0, 360.0)),
+            "moves": draw(st.just((0.0,) * 4) | st.tuples(*[strengths] * 4)),
             "gusts": draw(st.just(0.0) | _numbers(0.0, 10.0)),
             "seed": draw(st.integers(0, 2**32 - 1)),
+        },
+        "charge_rate": draw(st.integers(1, 25) | _numbers(0.2, 20.0)),
+        "radio": {
+            "anchor": draw(st.just(0.0) | _numbers(10.0, 3000.0)),
+            "range": draw(st.just(0.0) | _numbers(201.0, 3000.0)),
+            "max_rate": draw(st.just(0.0) | _numbers(0.1, 5.0)),
         },
         "fleet": draw(st.lists(_uav_types, max_size=3)),
         "landing": draw(st.booleans()),

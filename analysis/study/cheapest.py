@@ -18,7 +18,7 @@ from dess.analysis.study.selection import Chosen, Selection, based_on, check_beg
 from dess.analysis.study.stopping import MOST, Line, Samples, StrictTable, of_its_kind
 from dess.errors import shown
 from dess.scenario import Integer, Number, ScenarioSpace
-from dess.sections.data_sheet import measured
+from dess.sections.data_sheet import quantity_of
 
 # A price; the sums of all missions that may be planned are still finite.
 Price = Annotated[float, Field(ge=0, le=10**12, allow_inf_nan=False)]
@@ -376,7 +376,7 @@ class Cheapest(StrictTable):
         """
         given = self.requirements[metric]
         if isinstance(given, str):
-            return measured(given, f"requirements.{metric}", "s") / 3600
+            return quantity_of(given, f"requirements.{metric}", "s") / 3600
         return float(given)
 
     def check_age(self, spaces: Sequence[ScenarioSpace]) -> None:

@@ -118,7 +118,7 @@ def battery_errors(log: Log) -> np.ndarray:
     before = uavs["battery"].shift().fillna(table["uav"].map(_first_battery(s)))
     flown = (before - s.flight_cost * (1 + _surcharges(s, table))).clip(lower=0)
     flown = flown.where(~table["grounded"], before)
-    right = (table["battery"] == flown).where(~charging, _charges_rightly(s, table, before))
+    right = (table["battery"] == flown).where(~charging, _charges_rightly(log, before))
     right &= ~charging | ((_zone_of(s, table) >= 0) & ~table["moved"])
     level = np.select([before >= s.charge_complete, before <= s.charge_start], [0, 1], np.nan)
     latch = pd.Series(level).groupby(table["uav"]).ffill() == 1
@@ -152,14 +152,21 @@ def _surcharges(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
     return np.where(table["moved"], field[action, y, x], 0)
 
 
-def _charges_rightly(scenario: Scenario, table: pd.DataFrame, before: pd.Series) -> pd.Series:
+def _charges_rightly(log: Log, before: pd.Series) -> pd.Series:
     """Whether a UAV that charges gains what it can, or all in its zone gain the shared power."""
-    s, charging, place = scenario, table["charging"], [table["slot"], _zone_of(scenario, table)]
-    wanted = (s.charge_complete - before).clip(upper=s.charge_rate).where(charging, 0)
+    s, table = log.scenario, log.uav_slots
+    charging, place = table["charging"], [table["slot"], _zone_of(s, table)]
+    starts = log.events.loc[log.events["event"] == "charge_start", ["uav", "time"]]
+    begins = pd.MultiIndex.from_frame(table[["uav", "slot"]]).isin(
+        [*starts.itertuples(index=False)]
+    )
+    charge = pd.Series(begins).groupby(table["uav"]).cumsum()
+    k = charging.groupby([table["uav"], charge]).cumsum()  # the slots of the present charge
+    added = np.floor(k * s.charge_rate) - np.floor((k - 1) * s.charge_rate)
+    wanted = (s.charge_complete - before).clip(upper=added).where(charging, 0)
     gain = (table["battery"] - before).where(charging, 0)
-    power = s.charging.power or s.charging_pads * s.charge_rate
     of_all = gain.groupby(place).transform("sum")
-    shared = wanted.groupby(place).transform("sum").clip(upper=power)
+    shared = wanted.groupby(place).transform("sum").clip(upper=s.charging.power or np.inf)
     return gain.between(0, wanted) & (of_all == shared)
 
 

@@ -32,15 +32,16 @@ def distance(scenario: World, dx: Any, dy: Any) -> Any:
 
 
 def mean_snr(scenario: World, distance: Any) -> Any:
-    """Mean SNR [dB] at a distance [m] (eq. 10)."""
-    edge = np.hypot(*scenario.size) / 2 * scenario.cell_size
+    """Mean SNR [dB] at a distance [m] (eq. 10) that is in range."""
+    edge = scenario.radio.anchor or np.hypot(*scenario.size) / 2 * scenario.cell_size
     return scenario.edge_snr - 10 * scenario.path_loss_exponent * np.log10(distance / edge)
 
 
 def rate(scenario: World, snr: Any) -> Any:
     """Data units per communication slot at an SNR [dB] (eq. 9)."""
     length = scenario.slot_length / scenario.communication_slots
-    return length * np.log1p(10 ** (np.asarray(snr) / 10)) / np.log(2)
+    efficiency = np.log1p(10 ** (np.asarray(snr) / 10)) / np.log(2)
+    return length * np.minimum(efficiency, scenario.radio.max_rate or np.inf)
 
 
 def snr_of(scenario: World, rate: Any) -> Any:

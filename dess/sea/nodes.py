@@ -18,7 +18,7 @@ from dess.errors import InputError, listed
 from dess.sea import places
 from dess.sea.chart import Cell
 from dess.sea.places import Place, Projection, Size
-from dess.sections.data_sheet import measured
+from dess.sections.data_sheet import quantity_of
 
 MAX_NODES, MAX_GRID = 1024, 256  # as of a scenario
 # What columns are called that are used without being asked for, whatever the case.
@@ -80,11 +80,7 @@ class NodesFound(NamedTuple):
         return Projection.about(self.spots, size, cell_size) if self.is_geographic else None
 
     def fields(
-        self,
-        size: Size,
-        projection: Projection | None,
-        closed: np.ndarray,
-        has_sheet: bool = False,
+        self, size: Size, projection: Projection | None, closed: Any, has_sheet: bool = False
     ) -> dict[str, Any]:
         """The fields of a scenario that these nodes have on a grid, those of ``arrivals`` dotted.
 
@@ -139,7 +135,7 @@ class NodesFound(NamedTuple):
         if all(text is None for text in texts):
             return []
         where = [f"{self.path}: {row.where}: {column or known[0]}" for row in self.rows]
-        read = partial(measured, unit=unit) if unit else places.number_of
+        read = partial(quantity_of, unit=unit) if unit else places.number_of
         values = [*map(read, (str(text or "") for text in texts), where)]
         sums = [sum(values[number] for number in group) for group in groups]
         return [f"{total!r} {unit}" for total in sums] if unit else sums

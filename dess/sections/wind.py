@@ -12,10 +12,10 @@ Without wind and slow UAVs there is no table.
 
 import math
 from functools import lru_cache
-from typing import Annotated, Self
+from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
@@ -25,6 +25,7 @@ from dess.sections.section import Integer, Number, Section, for_sections
 MOST = 10  # the largest surcharge of a move in the mean wind [%]
 
 Moves = tuple[float, float, float, float]
+Push = Annotated[Number, Field(ge=0, le=MOST)]
 
 
 class Wind(Section):
@@ -46,29 +47,16 @@ class Wind(Section):
         0.0, ge=0, le=MOST, description="standard deviation of the wind from cell to cell [%]"
     )
     seed: Integer = Field(0, ge=0, le=2**32 - 1, description="seed of the field of wind")
-    moves: tuple[Annotated[Number, Field(ge=0, le=MOST)], ...] = Field(
-        (),
-        description="battery that a move costs more in the mean wind [%], in the place of strength "
-        "and direction: [north, east, south, west]",
+    moves: tuple[Push, Push, Push, Push] = Field(
+        (0.0, 0.0, 0.0, 0.0),
+        description="battery that moves cost more beside this [%]: [north, east, south, west]",
     )
-
-    @model_validator(mode="after")
-    def _is_consistent(self) -> Self:
-        if len(self.moves) not in (0, 4) or (self.moves and self.strength):
-            raise ValueError(
-                f"moves: {[*self.moves]} does not fit; allowed: [north, east, south, west], "
-                "without strength"
-            )
-        return self
 
     def pushes(self) -> Moves:
         """What the mean wind takes of moves to the north, east, south and west [% per cell]."""
-        if self.moves:
-            north, east, south, west = self.moves
-            return north, east, south, west
-        towards = math.radians(self.direction)
+        towards, (north, east, south, west) = math.radians(self.direction), self.moves
         x, y = -self.strength * math.sin(towards), self.strength * math.cos(towards)
-        return y, -x, -y, x
+        return y + north, -x + east, -y + south, x + west
 
 
 def moves_in(wind: float, direction: float, cruise: float) -> Moves:

@@ -5,7 +5,7 @@ import io
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -102,6 +102,39 @@ def say(text: object, stream: TextIO | None = None) -> None:
     """Print text on stdout or another stream, with escapes for all control characters."""
     lines = str(text).expandtabs().split("\n")
     print("\n".join(map(printable, lines)), file=stream or sys.stdout, flush=True)
+
+
+def answers(
+    given: Mapping[str, str],
+    questions: Mapping[str, tuple[str, str | None]],
+    check: Callable[[str, str], None],
+) -> dict[str, str]:
+    """An answer to every question: what is given, or asked for, a line each, or the default.
+
+    Args:
+        given: Answers by name.
+        questions: By name, what they mean and their default, None without one.
+        check: Refuses an answer with an ``InputError``; then it is asked for again.
+
+    Raises:
+        InputError: If a given answer is refused; without a terminal, if one is missing.
+    """
+    for name, answer in given.items():
+        check(name, answer)
+    found, asked = dict(given), [name for name in questions if name not in given]
+    missing = [name for name in asked if questions[name][1] is None]
+    if missing and not sys.stdin.isatty():
+        allowed = f"--set {missing[0]}=..., or a terminal, where it is asked"
+        raise InputError(f"{', '.join(missing)}: missing; allowed: {allowed}")
+    while asked:
+        name, (meaning, default) = asked[0], questions[asked[0]]
+        answer = input(f"{name}: {meaning}? ").strip() if sys.stdin.isatty() else ""
+        try:
+            check(name, answer or default or "")
+            found[asked.pop(0)] = answer or default or ""
+        except InputError as error:
+            say(error, sys.stderr)
+    return found
 
 
 @contextmanager

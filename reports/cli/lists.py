@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from dess.errors import cut
+from dess.errors import InputError, cut
+from dess.files.writing import fill
 from dess.reports.cli import console, options
 from dess.reports.cli.options import JsonOption, SetOption, command, load_space
 from dess.reports.cli.simulate import FIGURES, save_figure
@@ -95,10 +96,13 @@ def show_scenario(
     space, description = load_space(name, settings), scenario_description(name)
     if as_json:
         rows = [field._asdict() for field in fields(space)]
-        print(json.dumps({"scenario": name, "description": description, "fields": rows}, indent=2))
+        shown = {"scenario": name, "description": description, "fields": rows}
+        units = {"units": space.units._asdict()} if space.units else {}
+        print(json.dumps(shown | units, indent=2))
         return
-    if description:
-        console.say(description)
+    for text in (description, space.units):
+        if text:
+            console.say(text)
     if everything:
         for f in fields(space):
             default = f"default {_value(f.default)}" if f.default is not None else "no default"
@@ -106,7 +110,8 @@ def show_scenario(
             console.say(f"    {f.meaning}; {default}; allowed: {f.allowed}")
         return
     heads = ["field", "value", "unit", "meaning"]
-    rows_ = [[f.name, cut(_value(f.value), 20), f.unit, f.meaning] for f in fields(space)]
+    known = [f for f in fields(space) if f.value is not None or not f.name.startswith("data_sheet")]
+    rows_ = [[f.name, cut(_value(f.value), 20), f.unit, f.meaning] for f in known]
     columns = [*zip(*rows_, strict=True)][:-1]
     rest = console.WIDTH - sum(max(map(len, column)) + 2 for column in columns)
     lines = [
@@ -115,6 +120,36 @@ def show_scenario(
         for number, line in enumerate(wrap(row[3], rest))
     ]
     console.print_table(heads, lines, left=len(heads))
+
+
+@command(scenarios, "new")
+def new_scenario(
+    path: Annotated[Path, typer.Argument(metavar="FILE.toml")],
+    nodes: Annotated[Path, typer.Option(metavar="FILE")],
+    answers: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE")] = None,
+) -> None:
+    """Write a scenario with a data sheet, and draw its sea; asks for what is missing.
+
+    Args:
+        path: The file to write; the picture of the sea is written beside it.
+        nodes: The sensor nodes: a CSV or GeoJSON file in the folder of the scenario.
+        answers: An answer, such as endurance="35 min"; repeatable.
+    """
+    from dess.analysis.figures.missions import sea_figure
+    from dess.scenario import parsed_scenario
+    from dess.sea import new
+
+    console.check_ending("FILE.toml", path, (".toml",), "a scenario")
+    if path.exists():
+        raise InputError(f"{path}: exists; allowed: the name of a new file")
+    parts = (answer.partition("=") for answer in answers or [])
+    given = {key.strip(): value.strip() for key, _, value in parts}
+    text = new.new_scenario(nodes, console.answers(given, new.questions(nodes), new.check))
+    space, picture = parsed_scenario(text, path), path.with_suffix(".png")
+    with console.outputs([path, picture]) as [file, drawing]:
+        fill(file, text)
+        save_figure(sea_figure(space), drawing, "png")
+    console.say(f"{path}, {picture}: {space.units}")
 
 
 @studies.callback()

@@ -186,7 +186,7 @@ def _check_word(name: str, word: str, option: str = SET) -> None:
 
     field = _field(name, option)
     words, kind = choices_of(field), kind_of(field)
-    if word in words:
+    if word in words or kind == "text in quotes":
         return
     if words:
         raise InputError(f"{option}: {name}: {shown(word)} is unknown{one_of(word, words)}")

@@ -102,7 +102,7 @@ def test_the_answer_has_every_requirement_in_its_unit(searched):
 
 REFUSED = {
     "50": 'requirements.age: 50; allowed: a time, such as "6 h"',
-    "3 km": "requirements.age: '3 km' is not a time",
+    "3 km": "requirements.age: '3 km' has a unit of another kind",
     "2 h": "less than the horizon of 2 h",
 }
 

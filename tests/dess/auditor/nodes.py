@@ -6,7 +6,7 @@ from typing import Any
 
 from tests.dess.auditor.log import Log
 from tests.dess.auditor.packets import Ages, Packets
-from tests.dess.auditor.uavs import LARGEST_DEVIATE, Fleet
+from tests.dess.auditor.uavs import LARGEST_DEVIATE, Fleet, Uav
 
 
 class Nodes:
@@ -33,6 +33,7 @@ class Nodes:
         low, high = constants["initial_data"]
         own = [(data, data) for data in arrivals.get("initial", ())]
         self.ranges = own or [(low * n, high * n) for n in merged]
+        self.radio = constants.get("radio", {"range": 0.0, "max_rate": 0.0, "anchor": 0.0})
         is_continuous = arrivals["process"] == "continuous"
         self.packets = Packets(log, arrivals, self.cells) if is_continuous else None
 
@@ -68,21 +69,31 @@ class Nodes:
             self._packets_arrive(self.packets, time)
         for i, u in enumerate(self.fleet.uavs):
             serves = u.flies and not self.fleet.stands(u)
-            if serves and any(data > 0 for data in self.residual):
+            if serves and self._in_range(u, n):
                 served.append((i, self._serve(i, n, time)))
         if self.packets is not None:
             self._deliver(self.packets, served)
         return sum(row.value for _, row in served)
 
+    def _place(self, u: Uav, n: int) -> tuple[float, float]:
+        m, slots = self.c["communication_slots"], u.slots_per_cell
+        share = ((slots - 1 - u.slots_left) * m + n) / (slots * m)  # of its move, behind it
+        return u.from_x + (u.x - u.from_x) * share, u.from_y + (u.y - u.from_y) * share
+
+    def _in_range(self, u: Uav, n: int) -> list[int]:
+        """The nodes with data that a UAV can serve in a communication slot."""
+        place, reach = self._place(u, n), self.radio["range"] or math.inf
+        far = (self._distance(*place, k) for k in range(len(self.cells)))
+        return [k for k, d in enumerate(far) if d <= reach and self.residual[k] > 0]
+
     def _serve(self, i: int, n: int, time: float) -> Any:
         u, m, log = self.fleet.uavs[i], self.c["communication_slots"], self.log
-        slots = u.slots_per_cell
-        share = ((slots - 1 - u.slots_left) * m + n) / (slots * m)  # of its move, behind it
-        x, y = u.from_x + (u.x - u.from_x) * share, u.from_y + (u.y - u.from_y) * share
+        x, y = self._place(u, n)
         k, value = log.next_row.node, log.next_row.value
         row = self.fleet.take("communication", time, i, x=x, y=y, node=k, value=value)
-        self._check_snr(row)
-        rate = self.c["slot_length"] / m * math.log1p(10 ** (row.snr / 10)) / math.log(2)
+        self._check_snr(row, self._in_range(u, n))
+        efficiency = math.log1p(10 ** (row.snr / 10)) / math.log(2)
+        rate = self.c["slot_length"] / m * min(efficiency, self.radio["max_rate"] or math.inf)
         amount = min(rate * u.rate, self.residual[k])
         log.require(math.isclose(value, amount, rel_tol=1e-9), "its SNR has another rate")
         self.residual[k] -= value
@@ -95,18 +106,22 @@ class Nodes:
             self.fleet.take("quota_filled", time, i, value=u.communications)
         return row
 
-    def _check_snr(self, row: Any) -> None:
-        """The node must have data and may have the highest SNR of all, given their shadowing."""
+    def _check_snr(self, row: Any, nodes: list[int]) -> None:
+        """The node must be one of these, and may have the highest SNR, given their shadowing."""
         reach = LARGEST_DEVIATE * math.sqrt(self.c["shadowing_variance"]) + 1e-9
-        mean = {k: self._mean_snr(row, k) for k, data in enumerate(self.residual) if data > 0}
-        self.log.require(row.node in mean, "a node without data")
+        mean = {k: self._mean_snr(row, k) for k in nodes}
+        self.log.require(row.node in mean, "a node without data, or out of range")
         self.log.require(abs(row.snr - mean[row.node]) <= reach, "an SNR that its node cannot have")
         self.log.require(row.snr >= max(mean.values()) - reach, "another node has a higher SNR")
 
-    def _mean_snr(self, row: Any, k: int) -> float:
+    def _distance(self, from_x: float, from_y: float, k: int) -> float:
         c, (x, y) = self.c, self.cells[k]
+        return math.hypot(c["cell_size"] * math.hypot(from_x - x, from_y - y), c["altitude"])
+
+    def _mean_snr(self, row: Any, k: int) -> float:
+        c, distance = self.c, self._distance(row.x, row.y, k)
         edge = math.hypot(c["grid"], c.get("rows") or c["grid"]) / 2 * c["cell_size"]
-        distance = math.hypot(c["cell_size"] * math.hypot(row.x - x, row.y - y), c["altitude"])
+        edge = self.radio["anchor"] or edge
         return c["edge_snr"] - 10 * c["path_loss_exponent"] * math.log10(distance / edge)
 
     def _deliver(self, packets: Packets, served: list[tuple[int, Any]]) -> None:

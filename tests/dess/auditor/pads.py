@@ -1,5 +1,6 @@
 """The charging pads: requests, the queue, grants, and the power that the pads share."""
 
+import math
 from collections.abc import Mapping
 from itertools import accumulate, pairwise, starmap
 from typing import Any
@@ -44,6 +45,7 @@ class Pads:
             free = [pad for pad in pads if pad not in self.out | held]
             for i, pad in zip(self._in_order(zone, "waits"), free, strict=False):
                 self.fleet.uavs[i].charging, self.fleet.uavs[i].pad = True, pad
+                self.fleet.uavs[i].charge_slots = 0
                 self.fleet.take("charge_start", self.log.slot, i)
 
     def ask(self, i: int) -> None:
@@ -68,11 +70,13 @@ class Pads:
 
     def charge(self) -> None:
         """Charge the UAVs on the pads."""
-        for zone, pads in enumerate(self.zones):
-            left = self.power or len(pads) * self.c["charge_rate"]
+        for zone in range(len(self.zones)):
+            left = self.power or math.inf
             for i in self._in_order(zone, "charging"):
-                u = self.fleet.uavs[i]
-                gain = min(self.c["charge_rate"], self.complete - u.battery, left)
+                u, rate = self.fleet.uavs[i], self.c["charge_rate"]
+                u.charge_slots += 1
+                added = math.floor(u.charge_slots * rate) - math.floor((u.charge_slots - 1) * rate)
+                gain = min(added, self.complete - u.battery, left)
                 u.battery += gain
                 left -= gain
                 u.slots_charging += 1

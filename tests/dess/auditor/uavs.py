@@ -14,7 +14,7 @@ HOVER = 4
 LARGEST_DEVIATE = 6.34  # of a gust, and of the shadowing, in standard deviations
 # Counters of a UAV, and the slots that its move takes after the present one.
 _ZEROS = ("communications", "slots_flying", "slots_charging", "slots_waiting", "slots_grounded")
-_ZEROS += ("collected", "reward", "slots_left")
+_ZEROS += ("collected", "reward", "slots_left", "charge_slots")
 
 
 class Uav(SimpleNamespace):
@@ -64,7 +64,9 @@ class Fleet:
         self.open = {*product(*map(range, size))} - {(x, y) for x, y in constants.get("no_fly", ())}
         wind = constants.get("wind", {"strength": 0.0, "direction": 0.0, "gusts": 0.0})
         comes_from, strength = math.radians(wind["direction"]), wind["strength"]
-        self.push = -strength * math.sin(comes_from), strength * math.cos(comes_from)
+        x, y = -strength * math.sin(comes_from), strength * math.cos(comes_from)
+        moves, pushes = wind.get("moves", (0.0,) * 4), (y, -x, -y, x)
+        self.pushes = {s: a + b for s, a, b in zip(STEPS, moves, pushes, strict=False)}
         self.gusts = LARGEST_DEVIATE * wind["gusts"]
         # The surcharges that have been seen: the field does not change in a mission.
         self.seen: dict[tuple[int, ...], int] = {}
@@ -191,7 +193,7 @@ class Fleet:
 
     def _check_wind(self, u: Uav, step: tuple[int, int]) -> None:
         """The wind may cost what the log has, and always the same."""
-        against = -(self.push[0] * step[0] + self.push[1] * step[1])
+        against = self.pushes[step]
         least = math.floor(max(against - self.gusts + 1e-9, 0.0))
         most = math.ceil(max(against + self.gusts - 1e-9, 0.0)) if self.c["flight_cost"] else 0
         extra = u.battery - u.logged_battery
@@ -202,7 +204,8 @@ class Fleet:
         opposite = self.seen.get((*u.cell, -step[0], -step[1]), 0)
         self.log.require(min(least, most) <= extra <= most, "the wind cannot cost that")
         self.log.require(extra == known, "the wind has changed")
-        self.log.require(extra == 0 or opposite == 0, "wind from both sides")
+        across = any(self.c.get("wind", {}).get("moves", ()))  # a wind from the side costs both
+        self.log.require(extra == 0 or opposite == 0 or across, "wind from both sides")
 
     def take_moves(self) -> None:
         """Take the rows of the moves, which must be as they have been decided."""
