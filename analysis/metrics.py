@@ -1,11 +1,12 @@
 """The metrics of missions: what they are called, measured in, and how they are written."""
 
-from collections.abc import Callable, Container
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 from dess.analysis import numbers
 from dess.record import OPERATIONS
+from dess.sections.data_sheet import Units, printed
 
 Kind = Literal["outcome", "share", "number", "cost"]
 
@@ -23,6 +24,7 @@ class Metric:
             mean of a ``number`` and of a ``cost`` has Student's interval.
         less_is_better: Whether a lower value is better.
         in_percent: Whether it is written in percent, and its differences in percentage points.
+        told: The unit in which it is told where there is a data sheet; empty if in the same.
     """
 
     column: str
@@ -31,6 +33,13 @@ class Metric:
     kind: Kind = "number"
     less_is_better: bool = False
     in_percent: bool = False
+    told: str = ""
+
+    @property
+    def in_units(self) -> "Metric":
+        """The metric as it is told with a data sheet, which has a column of its own."""
+        column = f"{self.column}_{self.told}" if self.told else self.column
+        return replace(self, column=column, unit=self.told or self.unit, told="")
 
     @property
     def label(self) -> str:
@@ -45,7 +54,12 @@ class Metric:
     @property
     def head(self) -> str:
         """The name above a column in the terminal."""
-        return self.within if self.in_percent else self.label
+        return self.within if self.in_percent or self.is_told else self.label
+
+    @property
+    def is_told(self) -> bool:
+        """Whether it is in a unit of a data sheet, which is written behind every value."""
+        return self.unit in _SIZES
 
     @property
     def is_outcome(self) -> bool:
@@ -65,19 +79,29 @@ class Metric:
     @property
     def write(self) -> Callable[[float], str]:
         """Writes a value."""
-        return numbers.percent if self.in_percent else numbers.quantity
+        return self._with_unit(numbers.percent if self.in_percent else numbers.quantity)
 
     @property
     def written(self) -> Callable[[float, float, float], str]:
         """Writes an estimate and the ends of its interval."""
         if self.kind == "cost":
             return numbers.amounts
-        return numbers.interval if self.in_percent else numbers.quantities
+        return self._with_unit(numbers.interval if self.in_percent else numbers.quantities)
+
+    @property
+    def amount(self) -> Callable[[float], str]:
+        """Writes a value that somebody asks for, with its unit."""
+        if self.in_percent:
+            return numbers.level
+        return lambda value: f"{numbers.quantity(value)} {self.unit}".rstrip()
 
     @property
     def change(self) -> Callable[[float, float, float], str]:
         """Writes a difference and the ends of its interval."""
-        return numbers.points if self.in_percent else numbers.quantities
+        return self._with_unit(numbers.points if self.in_percent else numbers.quantities)
+
+    def _with_unit(self, write: Callable[..., str]) -> Callable[..., str]:
+        return (lambda *ends: f"{write(*ends)} {self.unit}") if self.is_told else write
 
 
 SUCCESS, RATIO, HOME = "success", "collection_ratio", "home"
@@ -86,7 +110,8 @@ AGE, COST = "age", "cost"  # a cost have the missions of a study with prices
 # Of a study with bounds: the bound, and the bound minus the product.
 BOUND, GAP = "upper_bound", "optimality_gap"
 
-_SLOTS = "mission slots"
+_SLOTS, _DATA = "mission slots", "data units"
+_SIZES = {"min": 60.0, "h": 3600.0, "MB": 8e6, "km": 1000.0}  # [s], [bit], [m]
 # The paper's metrics, in its order (Section VI-A). It calls them successful communication,
 # collection ratio, and collection ratio and communication; the last is here the product of each
 # mission.
@@ -102,28 +127,48 @@ _OTHERS = (
     Metric(GAP, "Optimality gap", less_is_better=True),
     Metric(COST, "Cost", kind="cost", less_is_better=True),
 )
+
+
+def _time(column: str, name: str, told: str = "h") -> Metric:
+    """A time of which less is better."""
+    return Metric(column, name, _SLOTS, less_is_better=True, told=told)
+
+
 # Those of ``OPERATIONS``, which only extended scenarios measure.
 _MEASURED = (
-    Metric(AGE, "Age of information", _SLOTS, less_is_better=True),
-    Metric("peak_age", "Peak age of information", _SLOTS, less_is_better=True),
-    Metric("age_p99", "99th percentile of the age", _SLOTS, less_is_better=True),
-    Metric("latency", "Latency", _SLOTS, less_is_better=True),
-    Metric("latency_p99", "99th percentile of the latency", _SLOTS, less_is_better=True),
+    _time(AGE, "Age of information"),
+    _time("peak_age", "Peak age of information"),
+    _time("age_p99", "99th percentile of the age"),
+    _time("latency", "Latency"),
+    _time("latency_p99", "99th percentile of the latency"),
     Metric("generated", "Packets generated"),
     Metric("delivered", "Packets delivered"),
     Metric("lost_packets", "Packets lost", less_is_better=True),
-    Metric("lost", "Data lost", "data units", less_is_better=True),
+    Metric("lost", "Data lost", _DATA, less_is_better=True, told="MB"),
     Metric("queue", "UAVs waiting for a pad", less_is_better=True),
-    Metric("waiting", "Waiting time for a pad", _SLOTS, less_is_better=True),
+    _time("waiting", "Waiting time for a pad", "min"),
     Metric("pad_requests", "Requests for a pad"),
     Metric("utilisation", "Utilisation of the pads", kind="share"),
     Metric("failures", "Failures of UAVs", less_is_better=True),
-    Metric("slots_grounded", "Time under repair", _SLOTS, less_is_better=True),
+    _time("slots_grounded", "Time under repair"),
 )
+# What records have in slots and data units; there is a metric of each where it is told in units.
+_RECORDED = (
+    _time("slots", "Length of the mission"),
+    _time("uav_slots", "UAV-hours"),
+    Metric("collected", "Data collected", _DATA, told="MB"),
+    Metric("collected_per_uav", "Data collected per UAV", _DATA, told="MB"),
+    Metric("residual", "Data left", _DATA, less_is_better=True, told="MB"),
+    _time("charging_per_uav", "Charging per UAV", "min"),
+    _time("waiting_per_uav", "Waiting per UAV", "min"),
+)
+_IN_UNITS = {metric.in_units.column: metric.in_units for metric in _MEASURED}
 _KNOWN = {metric.column: metric for metric in (*_PAPER, *_OTHERS, *_MEASURED)}
+_KNOWN |= _IN_UNITS | {metric.in_units.column: metric.in_units for metric in _RECORDED}
 
 METRICS = {metric.column: metric.name for metric in _PAPER}  # the paper's metrics, with their names
 MEASURES = {metric.column: metric for metric in _MEASURED}
+EITHER = MEASURES | _IN_UNITS  # as they are measured, and as they are told
 ALWAYS = (*METRICS, REWARD)  # the metrics of every mission
 # Short names of metrics on the command line.
 ALIASES = {"ratio": RATIO, "product": PRODUCT}
@@ -137,9 +182,40 @@ def metric_of(column: str) -> Metric:
     return _KNOWN.get(column) or Metric(column, column.replace("_", " ").capitalize())
 
 
+def told(column: str, missions: Container[str]) -> str:
+    """The column in which a table of missions tells a metric: in units if there is a data sheet."""
+    in_units = metric_of(column).in_units.column
+    return in_units if in_units in missions else column
+
+
+def in_units(missions: Mapping[str, Any], units: Units) -> dict[str, Any]:
+    """The columns of missions that are told in units, of missions with a data sheet.
+
+    Args:
+        missions: The columns of the missions, as records have them.
+        units: What a slot and a data unit are, numbers or an array of one for each mission.
+    """
+    known = [m for m in (*_MEASURED, *_RECORDED) if m.told and m.column in missions]
+    return {m.in_units.column: missions[m.column] * size_of(m.told, units) for m in known}
+
+
+def size_of(unit: str, units: Units) -> float:
+    """A slot, a data unit or a cell in a unit of time, data or length."""
+    of = {"MB": units.data, "km": units.cell}.get(unit, units.slot)
+    return of / _SIZES[unit]
+
+
+def lasting(slots: int, units: Units | None) -> str:
+    """The length of a mission, as ``215 mission slots`` or ``1.25 h``."""
+    return printed(slots * units.slot, "s") if units else f"{slots} mission slots"
+
+
 def measured_in(missions: Container[str]) -> list[str]:
-    """The metrics of extended scenarios that a table of missions, or a row of it, has."""
-    return [name for name in OPERATIONS.names or () if name in missions]
+    """The metrics of extended scenarios that a table of missions, or a row of it, has.
+
+    Those that are told in units come in the place of those in slots and data units.
+    """
+    return [told(name, missions) for name in OPERATIONS.names or () if name in missions]
 
 
 def metrics_in(missions: Container[str]) -> list[str]:

@@ -103,6 +103,7 @@ _OTHERS = (  # that studies vary
     Field("failures.pad_rate", "Failure rate of a pad", "Pad failures", "per mission slot"),
     Field("failures.node_rate", "Failure rate of a node", "Node failures", "per mission slot"),
     Field("wind.strength", "Wind", "Wind", "% battery per move"),
+    Field("data_sheet.mtbf", "Mean time between failures", "Failures"),
 )
 _KNOWN = {field.key: field for field in (*_PAPER, *_OTHERS)}
 PARAMETERS = {field.key: field for field in _PAPER}
@@ -115,8 +116,13 @@ DECISIONS = (
 
 
 def parameter(field: str) -> Field:
-    """The field of this key; one that nothing is known of is named after it."""
-    return _KNOWN.get(field) or Field(field, field, field)
+    """The field of this key; one that nothing is known of is named after it.
+
+    A value of a data sheet has its unit.
+    """
+    words = field.removeprefix("data_sheet.").replace("_", " ").capitalize()
+    name = words if field.startswith("data_sheet.") else field
+    return _KNOWN.get(field) or Field(field, name, name)
 
 
 class Declared(NamedTuple):
@@ -203,7 +209,7 @@ def value_text(value: object) -> str:
         return joint.join(map(value_text, value)) or "none"
     if isinstance(value, bool | np.bool_):
         return "yes" if value else "no"
-    return value if isinstance(value, str) else f"{value:g}"
+    return value if isinstance(value, str) else "none" if value is None else f"{value:g}"
 
 
 def _tex(text: str) -> str:

@@ -20,6 +20,7 @@ from benchmarks import learning_curves
 from dess import load_scenario, policies
 from dess.analysis import load_study, numbers
 from dess.analysis.paper import values
+from dess.channel import world_of
 from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
 from dess.reports import cli
 from dess.reports.cli import commands, options
@@ -328,6 +329,26 @@ def test_the_table_by_fleet_is_what_its_commands_print(capsys: pytest.CaptureFix
     for column, arguments in enumerate(by_fleet):
         for row in evaluated(arguments, capsys):
             assert printed[row["policy"]][column] == shown(row[METRICS[2]])
+
+
+def test_the_sampling_of_ends_errs_as_the_page_says() -> None:
+    page = PAGES["docs/concepts/left-out.md"]
+    for name, numbers_of in table(page, "communication slots m").items():
+        slots = int(name.split(",")[0]) if name[0].isdigit() else 4096
+        space = load_scenario("paper", communication_slots=slots)
+        rates = np.log2(1 + 10 ** (world_of(space).mean_snr[0, : slots + 1] / 10)) / slots
+        onto, leaving = rates[:-1].sum(), rates[1:].sum()
+        if name == "the integral":
+            onto = leaving = (onto + leaving) / 2  # the trapezoidal rule
+        found = [[onto], [leaving], [onto - leaving]]
+        assert np.round(found, 2).tolist() == numbers_of
+
+
+def test_the_limits_of_the_radio_are_those_of_the_page() -> None:
+    page, high, low = " ".join(PAGES["docs/concepts/left-out.md"].split()), 10.0, 1.0
+    turns = [4 * high * low / (299_792_458 / frequency) for frequency in (2.4e9, 868e6)]
+    assert f"this is {turns[0]:.0f} m; at 868 MHz it is {turns[1]:.0f} m" in page
+    assert f"{4.12 * (high**0.5 + low**0.5):.1f} km for 10 m and 1 m" in page
 
 
 def test_the_table_of_what_learning_needs_is_that_of_the_shipped_curves() -> None:

@@ -21,7 +21,7 @@ from pandas.api.types import is_numeric_dtype
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers.settings import edge, ends, points, ranked
-from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of
+from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of, told
 from dess.analysis.names import DECISIONS, parameter
 from dess.analysis.results.tables import Results, once
 from dess.analysis.stats.verdict import membership, on_front
@@ -55,9 +55,9 @@ def priced(results: Results) -> pd.DataFrame:
     """
     _prices(results)
     table = ranked(results, COST).drop(columns=["rank", "tied"])
-    conditions, fleets = _conditions(results), _fleets(results)
+    conditions, words = _conditions(results), fleets(results)
     table.insert(0, "condition", [conditions[point] for point in table["point"]])
-    table.insert(1, "fleet", [fleets[point] for point in table["point"]])
+    table.insert(1, "fleet", [words[point] for point in table["point"]])
     order = {"kind": "stable", "key": lambda texts: texts.map(conditions.index)}
     return table.sort_values("condition", ignore_index=True, **order)
 
@@ -84,7 +84,7 @@ def front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
 
     Args:
         results: The study.
-        metric: A column of the missions; more is better.
+        metric: A metric of the paper, or a required one.
 
     Returns:
         The rows of ``priced`` with two more columns. ``on_front`` tells whether the setting is on
@@ -94,14 +94,15 @@ def front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
     Raises:
         InputError: If the study has no prices, or there is no such metric.
     """
-    if metric not in METRICS:
+    if metric not in {**METRICS, **required(results)}:
         raise InputError(f"metric: {metric!r} is unknown{one_of(metric, METRICS)}")
+    sign = -1 if metric_of(metric).less_is_better else 1
     generator = np.random.default_rng(results.store.manifest.seed)
     tables = []
     for _, rows in priced(results).groupby("condition", sort=False):
         costs, values = (_samples(results, rows, name) for name in (COST, metric))
-        estimates = on_front(rows[COST].to_numpy(), rows[metric].to_numpy())
-        share = membership(costs, values, metric == SUCCESS, generator)
+        estimates = on_front(rows[COST].to_numpy(), sign * rows[metric].to_numpy())
+        share = membership(costs, sign * values, metric == SUCCESS, generator)
         tables.append(rows.assign(on_front=estimates, probability=share))
     return pd.concat(tables, ignore_index=True)
 
@@ -240,12 +241,12 @@ def selections(results: Results) -> pd.DataFrame:
         conditions), ``setting`` (the fleet in words), ``missions`` of the policy, ``left`` (number
         of settings that may be as good), ``guaranteed`` and ``guarantee``.
     """
-    conditions, fleets = [*dict.fromkeys(_conditions(results)), EVERYWHERE], _fleets(results)
+    conditions, words = [*dict.fromkeys(_conditions(results)), EVERYWHERE], fleets(results)
     rows = []
     for policy in results.policies:
         choice = _choice(results, policy)
         for condition, answer in zip(conditions, choice.answers, strict=False):
-            fleet = fleets[answer.points[0]] if answer.points else "none"
+            fleet = words[answer.points[0]] if answer.points else "none"
             point = answer.points[0] if answer.points and answer.condition is not None else None
             found = (policy, condition, point, fleet, choice.missions, len(answer.left))
             rows.append((*found, answer.settled, choice.guarantee))
@@ -269,7 +270,7 @@ def _answer(rows: pd.DataFrame, wanted: Mapping[Any, float], currency: str, trus
         text = f"the cheapest setting that meets the requirements is {found}."
         which = "next cheaper"
     else:
-        leads = pd.DataFrame({metric: rows[metric] - least for metric, least in wanted.items()})
+        leads = pd.DataFrame({m: lead(rows[m], m, least) for m, least in wanted.items()})
         cheaper = rows.loc[leads.min(axis=1).nlargest(1).index]
         text, which = "no setting is known to meet the requirements.", "closest"
     text += trust
@@ -283,9 +284,12 @@ def _trust(results: Results, choice: CheapestChoice, answer: Answer, policies: i
     rule, text = results.store.manifest.selection, ""
     assert isinstance(rule, Cheapest)
     if answer.points:
+        horizon = results.store.manifest.settings[answer.points[0]].horizon
         least = [
-            f"{METRICS[metric].lower()} of at least {numbers.level(q - rule.tolerance)}"
-            for metric, q in rule.requirements.items()
+            f"{of.within} of at most {of.amount(q + rule.tolerance * horizon)}"
+            if of.less_is_better
+            else f"{of.within} of at least {of.amount(q - rule.tolerance)}"
+            for of, q in ((metric_of(metric), q) for metric, q in required(results).items())
         ]
         where = " under every condition" * (answer.condition is None)
         sure = numbers.level(rule.shown(policies))
@@ -323,10 +327,9 @@ def _ends(results: Results, point: int) -> dict[str, str]:
 def _told(row: pd.Series, wanted: Mapping[Any, float], currency: str) -> str:
     """A setting, its cost, and its metrics with the requirements, in words."""
     metrics = [
-        f"{METRICS[metric].lower()} "
-        f"{numbers.interval(*row[[metric, f'{metric}_low', f'{metric}_high']])} "
-        f"({numbers.level(least)} required)"
-        for metric, least in wanted.items()
+        f"{of.within} {of.written(*row[[of.column, f'{of.column}_low', f'{of.column}_high']])} "
+        f"({of.amount(least)} required)"
+        for of, least in ((metric_of(metric), least) for metric, least in wanted.items())
     ]
     text = f"**{row['fleet']}** for {numbers.money(row[COST], currency)}"
     return f"{text} with {numbers.words(metrics)}" if metrics else text
@@ -360,7 +363,7 @@ def _samples(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:
 
 
 @once
-def _fleets(results: Results) -> list[str]:
+def fleets(results: Results) -> list[str]:
     """The fleet of every design point in words: all that has a price or varies."""
     prices, table, fleets = _prices(results), points(results), []
     for point, others in enumerate(_words(results, True)):
@@ -398,10 +401,20 @@ CERTAIN = 0.01  # settings with a lower probability of being on a front are not 
 
 
 def required(results: Results) -> Mapping[str, float]:
-    """The requirements of a study that selects the cheapest setting; empty for any other one."""
+    """The requirements of a study that selects the cheapest setting; empty for any other one.
+
+    Returns:
+        For each column of the missions its least mean, or the largest if less is better.
+    """
     rule = results.store.manifest.selection
-    given = rule.requirements if isinstance(rule, Cheapest) else {}
-    return {str(metric): least for metric, least in given.items()}
+    if not isinstance(rule, Cheapest):
+        return {}
+    return {told(m, results.missions): rule.amount(m) for m in rule.requirements}
+
+
+def lead(values: Any, metric: str, required: float) -> Any:
+    """By how much values are better than required, as a share of it if less is better."""
+    return 1 - values / required if metric_of(metric).less_is_better else values - required
 
 
 def fronts_of(results: Results) -> dict[str, pd.DataFrame]:

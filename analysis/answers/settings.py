@@ -17,7 +17,7 @@ from pandas.api.types import is_numeric_dtype
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.metrics import COST, METRICS, PRODUCT, metric_of, metrics_in
+from dess.analysis.metrics import COST, METRICS, PRODUCT, metric_of, metrics_in, told
 from dess.analysis.names import parameter, value_text
 from dess.analysis.results.tables import Results, once
 from dess.analysis.stats.differences import column_tests, with_adjusted
@@ -91,10 +91,11 @@ def ranking_metric(results: Results, metric: str | None = None) -> str:
     Raises:
         InputError: If there is no such metric.
     """
-    if metric is not None:
-        check_metric(results, metric)
-        return metric
-    return (results.manifest["study"]["selection"] or {}).get("metric", PRODUCT)
+    if metric is None:
+        metric = (results.manifest["study"]["selection"] or {}).get("metric", PRODUCT)
+    metric = told(metric, results.missions)
+    check_metric(results, metric)
+    return metric
 
 
 def answer(results: Results, table: pd.DataFrame, metric: str) -> str:

@@ -26,7 +26,7 @@ from dess.analysis.execution.effort import BASELINE as ANY_POLICY
 from dess.analysis.execution.effort import Planned, check_run, plan_study, policies_for
 from dess.analysis.execution.jobs import Progress
 from dess.analysis.execution.runner import Round, run_study
-from dess.analysis.metrics import ALIASES, METRICS
+from dess.analysis.metrics import AGE, ALIASES, METRICS
 from dess.analysis.names import SWEEP, SWEEPS
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.provenance import engine_code, team_of
@@ -172,7 +172,7 @@ def sweep_question(
     missions: int = 300,
     seed: int = 0,
     prices: Mapping[str, Any] | None = None,
-    requirements: Mapping[str, float] | None = None,
+    requirements: Mapping[str, float | str] | None = None,
     name: str | None = None,
     folder: str | Path = "results",
 ) -> Question:
@@ -194,7 +194,8 @@ def sweep_question(
         "name": "sweep" if name is None else name,
         "description": SWEEP,
         "scenario": str(scenario),
-        "set": {field: values[field][0] for field in values if field not in swept},
+        "set": {field: values[field][0] for field in values if field not in swept}
+        | ({"age.measured": True} if AGE in (requirements or ()) else {}),
         "design": {"kind": "grid", "values": swept},
         "policies": typed([policies] if isinstance(policies, str) else policies or [ANY_POLICY]),
         "seed": seed,
@@ -216,7 +217,7 @@ def sweep_question(
     return Question(study, Path(folder) / SWEEPS / name)
 
 
-def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) -> Cheapest:
+def _cheapest(requirements: Mapping[str, float | str], missions: int, study: Study) -> Cheapest:
     """The rule that searches for the cheapest setting that meets the requirements."""
     prices = study.costs
     if not prices:
@@ -224,8 +225,8 @@ def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) ->
     least = {}
     for metric, share in requirements.items():
         full = ALIASES.get(metric, metric)
-        if full not in METRICS:
-            allowed = one_of(metric, [*METRICS, *ALIASES])
+        if full not in (*METRICS, AGE):
+            allowed = one_of(metric, [*METRICS, *ALIASES, AGE])
             raise InputError(f"requirements: {metric!r} is unknown{allowed}")
         least[full] = share
     spaces = study.scenarios
@@ -243,7 +244,9 @@ def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) ->
         "check": missions,
     }
     try:
-        return Cheapest.model_validate(rule)
+        found = Cheapest.model_validate(rule)
+        found.check_age(spaces)
+        return found
     except ValidationError as error:
         raise InputError(validation_line(error, "sweep: selection: cheapest", Cheapest)) from None
 

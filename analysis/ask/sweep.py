@@ -116,7 +116,7 @@ def sweep(
     folder: str | Path = "results",
     workers: int = 1,
     prices: Mapping[str, Any] | None = None,
-    requirements: Mapping[str, float] | None = None,
+    requirements: Mapping[str, float | str] | None = None,
     name: str | None = None,
     progress: bool | Progress = True,
     yes: bool = False,
@@ -139,8 +139,9 @@ def sweep(
         workers: Number of processes. Two or more take seconds to start; they help in long runs.
         prices: Fields of ``dess.analysis.study.cheapest.Costs``, such as ``{"uav": 20_000}``.
         requirements: For each required metric its lowest acceptable mean, such as ``{"success":
-            0.99}``. With requirements, as many missions are simulated as the search for the
-            cheapest setting that meets them needs.
+            0.99}``; for ``age`` its highest, such as ``{"age": "6 h"}`` with a data sheet. With
+            requirements, as many missions are simulated as the search for the cheapest setting
+            that meets them needs.
         name: Name of the sweep. Without one, it is made of the fields and a hash.
         progress: Whether to show a progress bar, or a function that is called with the number of
             missions done since its last call.

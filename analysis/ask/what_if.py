@@ -16,7 +16,17 @@ from dess.analysis.answers import summary
 from dess.analysis.answers.missions import estimate
 from dess.analysis.ask.question import RANGES, Question, in_words, plain, what_if_question
 from dess.analysis.execution.jobs import Progress
-from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
+from dess.analysis.metrics import (
+    METRICS,
+    PRODUCT,
+    RATIO,
+    SUCCESS,
+    in_units,
+    lasting,
+    measured_in,
+    metric_of,
+    told,
+)
 from dess.analysis.names import parameter
 from dess.analysis.results.resimulate import resimulate
 from dess.analysis.results.tables import Results, once
@@ -60,12 +70,14 @@ def missions_of(results: Results) -> pd.DataFrame:
     uavs = results.uavs.assign(depleted=100 * (results.uavs["end"] == "battery"))
     sums = uavs.groupby(_MISSION)[["slots_charging", "slots_waiting", "depleted"]].sum()
     missions = results.missions.join(sums, on=_MISSION)
-    fillable = [name for name in _NOTHING if name in measured(results)]
-    return missions.fillna(dict.fromkeys(fillable, 0.0)).assign(
+    units = results.store.manifest.units_at(missions["point"].to_numpy())
+    fillable = [name for name in _NOTHING if name in missions]
+    found = missions.fillna(dict.fromkeys(fillable, 0.0)).assign(
         collected_per_uav=missions["collected"] / missions["uavs"],
         charging_per_uav=missions["slots_charging"] / missions["uavs"],
         waiting_per_uav=missions["slots_waiting"] / missions["uavs"],
     )
+    return found.assign(**in_units(found, units)) if units else found
 
 
 def measured(results: Results) -> list[str]:
@@ -92,7 +104,7 @@ def answers(results: Results) -> pd.DataFrame:
         mean of this side.
     """
     missions = missions_of(results)
-    metrics = [*METRICS, *measured(results), *MEASURES]
+    metrics = [*METRICS, *measured(results), *(told(name, missions) for name in MEASURES)]
     tables = []
     for policy, rows in missions.groupby("policy", sort=False):
         table = compare(rows, BASELINE, metrics, correction=None, of="point")
@@ -418,7 +430,7 @@ class Example:
         caption = (
             f"{SIDES[point].capitalize()} ({', '.join(self.answer.sides[point])}): collection "
             f"ratio {numbers.percent(mission.record.collection_ratio)}, {fate}. "
-            f"{mission.record.slots} mission slots. n = 1."
+            f"{lasting(mission.record.slots, mission.scenario.units)}. n = 1."
         )
         return figure, "Map of the mission; battery, residual data and charging", caption
 

@@ -11,12 +11,14 @@ import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from dess.analysis.figures import style
+from dess.analysis.metrics import size_of
 from dess.analysis.names import value_text
 from dess.analysis.results import event_log
 from dess.scenario import Scenario, ScenarioSpace
@@ -78,10 +80,11 @@ def chart(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
         ax.add_patch(Rectangle((x - 0.5, y - 0.5), width, height, facecolor=style.ZONE,
                                edgecolor=style.ZONE_EDGE, zorder=1))  # fmt: skip
     ax.set(aspect="equal", xlim=(-0.5, columns - 0.5), ylim=(rows - 0.5, -0.5))
-    ax.set_ylabel("y, south [cells]")
-    ax.set_xlabel(f"x, east [cells of {scenario.cell_size:g} m]")
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(MaxNLocator(integer=True, nbins=8))
+    ax.set_ylabel(f"y, south [{_unit(ax.yaxis, 'km', 'cells', scenario)}]")
+    cells = f"cells of {scenario.cell_size:g} m"
+    ax.set_xlabel(f"x, east [{_unit(ax.xaxis, 'km', cells, scenario)}]")
 
 
 def battery(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
@@ -99,7 +102,7 @@ def battery(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     if scenario.uavs <= 6:  # more do not fit beside the title
         ax.legend(loc="lower right", bbox_to_anchor=(1.02, 0.97), ncols=6, handlelength=2.2,
                   handletextpad=0.5, columnspacing=1.1)  # fmt: skip
-    _time_axis(events, ax)
+    _time_axis(events, scenario, ax)
 
 
 def residual(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
@@ -109,17 +112,20 @@ def residual(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     ax.stackplot(data.index, data.to_numpy().T, colors=colours, alpha=0.75, linewidth=0)
     total = data.sum(axis=1)
     ax.plot(total.index, total, color=style.INK, linewidth=1.6, label="all nodes")
-    _margin_note(f"{total.iloc[-1]:.0f} left", total.iloc[-1], ax)
-    ax.set(title="Residual data, a band per node", ylabel="data units", ylim=(0, None))
-    _time_axis(events, ax)
+    size = size_of("MB", scenario.units) if scenario.units else 1
+    _margin_note(f"{total.iloc[-1] * size:.0f} left", total.iloc[-1], ax)
+    ax.set(title="Residual data, a band per node", ylim=(0, None))
+    ax.set_ylabel(_unit(ax.yaxis, "MB", "data units", scenario, 5))
+    _time_axis(events, scenario, ax)
 
 
 def age(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     """The mean age of information of all nodes [slots] over time."""
     curve = event_log.mean_age(events)
     ax.plot(curve["time"], curve["age"], color=style.INK, linewidth=1.2, gid="age")
-    ax.set(title="Mean age of the nodes", ylabel="slots", ylim=(0, None))
-    _time_axis(events, ax)
+    ax.set(title="Mean age of the nodes", ylim=(0, None))
+    ax.set_ylabel(_unit(ax.yaxis, "h", "slots", scenario, 5))
+    _time_axis(events, scenario, ax)
 
 
 def occupancy(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
@@ -141,7 +147,7 @@ def occupancy(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     ax.set(title=f"Charging zone, {pads} pad{'s' if pads > 1 else ''}{hatched}", ylabel="UAVs")
     ax.set_ylim(0, scenario.uavs + 0.3)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=4))
-    _time_axis(events, ax)
+    _time_axis(events, scenario, ax)
 
 
 def curves(scenario: Scenario) -> dict[Callable[[event_log.Events, Scenario, Axes], None], float]:
@@ -163,7 +169,7 @@ def mission_figure(events: event_log.Events, scenario: Scenario) -> Figure:
         for panel, ax in zip(panels, axes[1:], strict=True):
             panel(events, scenario, ax)
             ax.set_xlabel("")
-        axes[-1].set_xlabel("time [mission slots]")
+        _time_axis(events, scenario, axes[-1])
     return figure
 
 
@@ -254,7 +260,18 @@ def _margin_note(text: str, level: float, ax: Axes) -> None:
     note.set_in_layout(False)  # so that all maps of a gallery have the same size
 
 
-def _time_axis(events: event_log.Events, ax: Axes) -> None:
-    ax.set(xlim=(0, event_log.duration(events)), xlabel="time [mission slots]")
+def _time_axis(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
+    ax.set(xlim=(0, event_log.duration(events)))
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=8))
+    ax.set_xlabel(f"time [{_unit(ax.xaxis, 'h', 'mission slots', scenario)}]")
     style.grid_of("y", ax)
+
+
+def _unit(
+    axis: Axis, unit: str, of_model: str, scenario: Scenario | ScenarioSpace, nbins: int = 8
+) -> str:
+    """The unit of an axis; with a data sheet, its ticks are in that unit."""
+    if not scenario.units:
+        return of_model
+    style.in_size(axis, size_of(unit, scenario.units), nbins)
+    return unit

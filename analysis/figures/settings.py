@@ -527,8 +527,10 @@ def costs(table: pd.DataFrame, metric: str, currency: str, required: float | Non
             ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             ax.xaxis.set_minor_locator(NullLocator())
             ax.xaxis.set_major_formatter("{x:,g}")
-        style.in_units(ax.yaxis, "%")
-        ax.set(xlabel=f"cost [{currency}]", ylabel=metric_of(metric).within)
+        of = metric_of(metric)
+        style.in_units(ax.yaxis, of.axis)
+        ylabel = of.within if of.in_percent else of.label
+        ax.set(xlabel=f"cost [{currency}]", ylabel=ylabel)
     return figure
 
 
@@ -545,9 +547,13 @@ def deciding(results: Results) -> Drawing:
     rows = rows[rows["policy"] == priced.best_policy(results)].assign(on_front=rows["selected"])
     rows["probability"] = 0.4 + 0.6 * (rows["verdict"] == priced.MET)
     parts = [(m, part) for m in least for _, part in rows.groupby("condition", sort=False)]
-    cheapest = [min(part[COST][part[m] >= least[m]], default=inf) for m, part in parts]
+    cheapest = [
+        min(part[COST][priced.lead(part[m], m, least[m]) >= 0], default=inf) for m, part in parts
+    ]
     metric, part = parts[cheapest.index(max(cheapest))]
-    wanted = numbers.words([f"{metric_of(m).within} {numbers.level(q)}" for m, q in least.items()])
+    wanted = numbers.words(
+        [f"{metric_of(m).within} {metric_of(m).amount(q)}" for m, q in least.items()]
+    )
     marks = f"Large, dark marks are shown to meet all requirements ({wanted}); faint ones are not."
     return _costs(results, part, metric, marks)
 

@@ -218,6 +218,24 @@ def in_units(axis: Axis, unit: str, nbins: int = 6) -> None:
     axis.set_major_formatter(PercentFormatter(1) if unit == "%" else numbers[unit])
 
 
+class _Sized(MaxNLocator):
+    """Ticks at round values in a unit of which the axis has ``size`` in 1."""
+
+    def __init__(self, size: float, nbins: int):
+        super().__init__(nbins=nbins, steps=[1, 2, 3, 4, 5, 6, 10])
+        self._size = size
+
+    def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+        told = super().tick_values(vmin * self._size, vmax * self._size)
+        return [tick / self._size for tick in told]
+
+
+def in_size(axis: Axis, size: float, nbins: int = 8) -> None:
+    """Ticks in a unit of which the axis has ``size`` in 1."""
+    axis.set_major_locator(_Sized(size, nbins))
+    axis.set_major_formatter(lambda value, _: f"{value * size:,.6g}")
+
+
 def note_at_right(text: str, level: float, ax: Axes, size: float = 9) -> Any:
     """A note in the right margin, at a level of the y axis."""
     return ax.annotate(text, (1, level), xycoords=("axes fraction", "data"), xytext=(4, 0),

@@ -8,6 +8,7 @@ from hashlib import sha256
 from pathlib import Path, PurePath
 from typing import Annotated, Any, NamedTuple, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 import dess
@@ -18,6 +19,7 @@ from dess.analysis.study.design import DesignPoint
 from dess.analysis.study.study import CHECK, Study, StudyData
 from dess.files.documents import Sha256
 from dess.scenario import SEA, ScenarioSpace, load_scenario
+from dess.sections.data_sheet import Units
 
 SCHEMA_VERSION = 3
 PROGRESS = {"missions", "selected", "complete"}  # what a run changes in its manifest
@@ -206,6 +208,11 @@ class Manifest(provenance.Origin):
     def selection(self) -> AnySelection | None:
         """The rule by which the study selects design points; None if it selects none."""
         return self.study.selection
+
+    def units_at(self, points: np.ndarray) -> Units | None:
+        """What a slot, a cell and a data unit are at (n,) design points; None without sheets."""
+        units = [space.units for space in self.scenarios]
+        return Units(*np.array(units)[points].T) if all(units) else None
 
     @cached_property
     def settings(self) -> list[Setting]:

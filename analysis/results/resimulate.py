@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from dess import InputError, simulate
 from dess.analysis import numbers
-from dess.analysis.metrics import HOME, measured_in
+from dess.analysis.metrics import HOME, MEASURES, lasting
 from dess.analysis.results.event_log import causes
 from dess.analysis.results.provenance import Origin
 from dess.analysis.results.tables import Results
@@ -94,7 +94,7 @@ class Mission:
         return (
             f"{self.policy} in mission {self.replication}, a single one (n = 1): "
             f"{self.causes or f'All UAVs {self.scenario.aim}.'} "
-            f"{self.collected} in {self.record.slots} mission slots."
+            f"{self.collected} in {lasting(self.record.slots, self.scenario.units)}."
         )
 
 
@@ -143,7 +143,8 @@ def recorded(results: Results, policy: str, point: int, replication: int) -> dic
     missions, checks, uavs = (_rows(table, mission).to_dict("records") for table in tables)
     if missions or checks:
         row = (missions or checks)[0]
-        return _by_field(row, uavs) | {m: row[m] for m in measured_in(row) if not isnan(row[m])}
+        measured = (name for name in MEASURES if name in row and not isnan(row[name]))
+        return _by_field(row, uavs) | {name: row[name] for name in measured}
     raise InputError(
         f"{results.store.folder}: no mission of {policy}, point {point}, replication "
         f"{replication}; allowed: a mission of the study"

@@ -24,6 +24,7 @@ import pyarrow as pa
 
 from dess import InputError
 from dess.analysis.bound import Bound
+from dess.analysis.metrics import in_units
 from dess.analysis.results import chunks as files
 from dess.analysis.results import parquet
 from dess.analysis.results.chunks import (
@@ -323,7 +324,8 @@ class Store:
     def missions(self, parts: Sequence[Part]) -> pd.DataFrame:
         """The missions of some parts, with their ``point``, in the order of the parts.
 
-        If the study has prices, the missions have a ``cost``.
+        If the study has prices, the missions have a ``cost``; with a data sheet, what they
+        measure is there in units as well (``metrics.in_units``).
 
         Raises:
             InputError: If some are missing or damaged.
@@ -332,6 +334,8 @@ class Store:
         if costs := self.manifest.costs:
             cost = costs.parts(self.manifest.scenarios, missions, self.uavs(parts))
             missions["cost"] = sum(cost.values())
+        if units := self.manifest.units_at(missions["point"].to_numpy()):
+            missions = missions.assign(**in_units(missions, units))
         return missions
 
     def uavs(self, parts: Sequence[Part]) -> pd.DataFrame:

@@ -13,7 +13,7 @@ import pandas as pd
 
 from dess import InputError
 from dess.analysis.bound import Bound
-from dess.analysis.metrics import BOUND, GAP, PRODUCT, measured_in
+from dess.analysis.metrics import BOUND, EITHER, GAP, PRODUCT
 from dess.analysis.names import SWEEP, SWEEPS
 from dess.analysis.results.chunks import bound_parts, check_parts, parts_of
 from dess.analysis.results.manifest import Cell, Manifest
@@ -108,8 +108,9 @@ class Results:
             fields that the design sets and that are not in the record, and the fields of
             ``MISSION_RECORD``, then those of ``OPERATIONS`` that were measured, with nan where a
             mission lacks one. Rows are in the order of the policies in the study, then of point
-            and replication. If the study has prices, ``cost`` comes next. If it has bounds, the
-            last columns are ``upper_bound``, and ``optimality_gap``: the bound minus the product.
+            and replication. If the study has prices, ``cost`` comes next; with a data sheet, times
+            and data follow in units, such as ``age_h``. If it has bounds, the last columns are
+            ``upper_bound``, and ``optimality_gap``: the bound minus the product.
         uavs: One row per UAV of each mission: ``policy``, ``point``, ``replication``, ``uav`` and
             the fields of ``UAV_RECORD``, with ``end`` as a name.
         checks: Further missions, in rows as above, of the design points that were selected; the
@@ -293,7 +294,7 @@ def _of_policies(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 def _labelled(manifest: Manifest, missions: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """The missions of all policies, with the fields that the design sets and no record has."""
     table = _of_policies(missions)
-    table = table.drop(columns=[m for m in measured_in(table) if table[m].isna().all()])
+    table = table.drop(columns=[m for m in EITHER if m in table and table[m].isna().all()])
     for position, (name, values) in enumerate(_swept(manifest).items(), 2):
         table.insert(position, name, table["point"].map(dict(enumerate(values))))
     return table

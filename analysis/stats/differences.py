@@ -10,7 +10,7 @@ import scipy
 from scipy.special import stdtr, stdtrit
 
 from dess import InputError
-from dess.analysis.metrics import ALWAYS, MEASURES, REWARD, metric_of
+from dess.analysis.metrics import ALWAYS, EITHER, REWARD, metric_of
 from dess.analysis.stats.intervals import (
     LEVEL,
     Interval,
@@ -43,7 +43,7 @@ def metrics_by_treatment(
         raise InputError(f"by: {of} is what is compared; allowed: other columns")
     for metric in metrics:
         values = pd.to_numeric(missions[metric], errors="coerce")
-        values = values[missions[metric].notna()] if metric in MEASURES else values
+        values = values[missions[metric].notna()] if metric in EITHER else values
         if odd := int(len(values) - np.isfinite(values).sum()):
             raise InputError(f"{metric}: no number in {odd} missions; allowed: finite numbers")
     keys = list(dict.fromkeys([*by, *(k for k in _MISSION if k in missions and k != of)]))

@@ -11,10 +11,14 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.special import stdtrit
 
+from dess import InputError
+from dess.analysis.metrics import AGE, size_of, told
 from dess.analysis.names import DECISIONS
 from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, needed
 from dess.analysis.study.stopping import MOST, Line, Samples, StrictTable, of_its_kind
+from dess.errors import shown
 from dess.scenario import Integer, Number, ScenarioSpace
+from dess.sections.data_sheet import quantity_of
 
 # A price; the sums of all missions that may be planned are still finite.
 Price = Annotated[float, Field(ge=0, le=10**12, allow_inf_nan=False)]
@@ -29,7 +33,7 @@ class Costs(StrictTable):
     ``missions`` planned for the fleet.
 
     Raises:
-        pydantic.ValidationError: If a price is below 0, or hours are without ``slot_seconds``.
+        pydantic.ValidationError: If a price is below 0.
     """
 
     currency: Line = Field("EUR", min_length=1, max_length=16, description="name of the currency")
@@ -43,14 +47,25 @@ class Costs(StrictTable):
         None,
         ge=0.001,
         le=1_000_000,
-        description="length of a mission slot [s]; needed for the price of an hour",
+        description="length of a mission slot [s]; needed for the price of an hour, unless there "
+        "is a data sheet",
     )
 
-    @model_validator(mode="after")
-    def _hours_have_a_length(self) -> Self:
-        if self.hour and self.slot_seconds is None:
-            raise ValueError("slot_seconds: is missing; allowed: with hour, the seconds of a slot")
-        return self
+    def check(self, spaces: Sequence[ScenarioSpace]) -> None:
+        """Check that the length of a slot is known where hours have a price.
+
+        Raises:
+            InputError: If it is not, or is given although it follows from a data sheet.
+        """
+        follows = all(space.units for space in spaces)
+        if self.hour and self.slot_seconds is None and not follows:
+            raise InputError(
+                "costs.slot_seconds: is missing; allowed: with hour, the seconds of a slot"
+            )
+        if self.slot_seconds is not None and any(space.units for space in spaces):
+            raise InputError(
+                "costs.slot_seconds: follows from the data sheet; allowed: without this field"
+            )
 
     def parts(
         self, spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any], uavs: Mapping[str, Any]
@@ -71,7 +86,8 @@ class Costs(StrictTable):
         pads, rates = np.array([(space.charging_pads, space.charge_rate) for space in spaces]).T
         slots = np.bincount(mission, np.asarray(uavs["slots_charging"]), len(fleet))
         lost = np.bincount(mission, np.asarray(uavs["end"]) == "battery", len(fleet))
-        hours = np.asarray(missions["slots"]) * (self.slot_seconds or 0.0) / 3600
+        seconds = [space.units.slot if space.units else self.slot_seconds or 0 for space in spaces]
+        hours = np.asarray(missions["slots"]) * np.array(seconds)[points] / 3600
         return {
             "purchase": self.uav * fleet + self.pad * pads[points],
             "charging": self.missions * self.charge * slots * rates[points] / 100,
@@ -242,7 +258,7 @@ def grouped(values: Iterable[Mapping[str, Any]], decisions: bool) -> dict[str, l
 # How much longer a search may take for which it is estimated: times its missions, and missions.
 FURTHER, MOST_FURTHER = 64, 10_000_000
 
-Share = Literal["success", "collection_ratio", "collection_ratio_and_communication"]
+Required = Literal["success", "collection_ratio", "collection_ratio_and_communication", "age"]
 
 
 class Setting(NamedTuple):
@@ -251,15 +267,33 @@ class Setting(NamedTuple):
     Attributes:
         values: The fields that the design sets.
         loss: The cost over all missions if every mission lost all UAVs, in the currency.
+        horizon: The largest age that data can have [h with a data sheet, otherwise slots].
     """
 
     values: Mapping[str, Any]
     loss: float
+    horizon: float = 1.0
 
     @classmethod
     def of(cls, values: Mapping[str, Any], space: ScenarioSpace, costs: Costs) -> Self:
         """The setting of a design point."""
-        return cls(values, costs.missions * costs.lost_uav * space.uavs[1])
+        return cls(values, costs.missions * costs.lost_uav * space.uavs[1], horizon_of(space))
+
+
+def horizon_of(space: ScenarioSpace) -> float:
+    """The largest age that data can have [h with a data sheet, otherwise slots]."""
+    return space.max_slots * (size_of("h", space.units) if space.units else 1)
+
+
+def as_share(metric: str, value: Any, horizon: float) -> Any:
+    """Values of a metric as shares of which more is better: an age as what is left of the horizon.
+
+    Args:
+        metric: What is required.
+        value: A value, or an array of values.
+        horizon: The largest age.
+    """
+    return 1 - value / horizon if metric == AGE else value
 
 
 @dataclass(frozen=True)
@@ -295,12 +329,16 @@ class Cheapest(StrictTable):
     """
 
     procedure: Literal["cheapest"]
-    requirements: dict[Share, Number] = Field(min_length=1, description="metric -> its least mean")
+    requirements: dict[Required, Number | Line] = Field(
+        min_length=1,
+        description="metric -> its least mean; of age the largest, with a data sheet in a unit",
+    )
     tolerance: Number = Field(
         0.005,
         ge=1e-6,
         le=0.5,
-        description="half-width of the zone in which either verdict is acceptable",
+        description="half-width of the zone in which either verdict is acceptable; of age a share "
+        "of the horizon",
     )
     indifference: Number = Field(
         ge=1e-9, le=10**15, description="the least saving that matters, in the currency"
@@ -321,13 +359,45 @@ class Cheapest(StrictTable):
     @model_validator(mode="after")
     def _are_shares(self) -> Self:
         for metric, least in self.requirements.items():
-            if not self.tolerance < least < 1 - self.tolerance:
+            share = 0.0 if isinstance(least, str) else least
+            if metric != AGE and not self.tolerance < share < 1 - self.tolerance:
                 raise ValueError(
-                    f"requirements.{metric}: {least:g} is out of range; allowed: between "
+                    f"requirements.{metric}: {least} is out of range; allowed: between "
                     f"{self.tolerance:g} and {1 - self.tolerance:g}, which keeps the tolerance "
                     "away from 0 and 1"
                 )
         return self
+
+    def amount(self, metric: Required) -> float:
+        """What is required of a metric; of age in hours if it has a unit, otherwise in slots.
+
+        Raises:
+            InputError: If it has another unit than one of time.
+        """
+        given = self.requirements[metric]
+        if isinstance(given, str):
+            return quantity_of(given, f"requirements.{metric}", "s") / 3600
+        return float(given)
+
+    def check_age(self, spaces: Sequence[ScenarioSpace]) -> None:
+        """Check that the required age has a unit where there is a data sheet, and can be missed.
+
+        Raises:
+            InputError: If it has none, or is out of range, or a scenario does not measure it.
+        """
+        for space in spaces if AGE in self.requirements else ():
+            given, horizon = self.requirements["age"], horizon_of(space)
+            if isinstance(given, str) != bool(space.units):
+                allowed = 'a time, such as "6 h"' if space.units else "a number of mission slots"
+                raise InputError(f"requirements.age: {shown(given)}; allowed: {allowed}")
+            if not space.age.measured:
+                raise InputError("requirements.age: is not measured; allowed: age.measured = true")
+            if not self.tolerance < self.amount("age") / horizon < 1 - self.tolerance:
+                unit = "h" if space.units else "mission slots"
+                raise InputError(
+                    f"requirements.age: {shown(given)} is out of range; allowed: more than 0, and "
+                    f"less than the horizon of {horizon:g} {unit}"
+                )
 
     def wanted(self, samples: Samples, settings: Sequence[Setting]) -> list[int]:
         """The number of missions that every design point needs.
@@ -374,7 +444,8 @@ class Cheapest(StrictTable):
         """
         if not search.done or all(question.settled for question in search.questions):
             return None
-        endless, names = self.model_copy(update={"budget": MOST}), ["cost", *self.requirements]
+        endless = self.model_copy(update={"budget": MOST})
+        names = ["cost", *(told(metric, search.samples[0]) for metric in self.requirements)]
         points = [*zip(search.samples, search.counts, strict=True)]
         times = 2
         while times <= FURTHER and times * search.counts.sum() <= MOST_FURTHER:
@@ -388,9 +459,7 @@ class Cheapest(StrictTable):
     def _guarantee(self, search: "_Search") -> str:
         if not search.done:
             return "none yet: the procedure needs more missions"
-        low, high = (
-            _in_words(self.requirements, shift) for shift in (-self.tolerance, self.tolerance)
-        )
+        low, high = (self._in_words(shift) for shift in (-self.tolerance, self.tolerance))
         words = (
             f"with probability at least {self.confidence:g}, all of this holds: a setting that was "
             f"found to meet the requirements has {low}; one that was found to miss them does not "
@@ -400,6 +469,16 @@ class Cheapest(StrictTable):
         if all(question.answer.settled for question in search.questions):
             return words
         return f"{words}; the budget of {self.budget} missions ended before all was decided"
+
+    def _in_words(self, shift: float) -> str:
+        """The requirements in words, such as ``a mean success of at least 0.985``."""
+        means = [
+            f"{metric.replace('_', ' ')} of at least {given + shift:g}"
+            if not isinstance(given, str) and metric != AGE
+            else f"{metric} of at most {given} {'-' if shift > 0 else '+'} {abs(shift):g} horizons"
+            for metric, given in self.requirements.items()
+        ]
+        return f"a mean {' and a mean '.join(means)}"
 
 
 # The kinds of selection that a study may use.
@@ -430,8 +509,11 @@ class _Search:
         self._error = (1 - rule.confidence) / 2
         each = self._error / (len(samples) * len(rule.requirements))
         self._tests = [
-            {m: MeanTest(q, rule.tolerance, each) for m, q in rule.requirements.items()}
-            for _ in samples
+            {
+                m: MeanTest(as_share(m, rule.amount(m), s.horizon), rule.tolerance, each)
+                for m in rule.requirements
+            }
+            for s in settings
         ]
         self._pairs = max(sum(question.pairs for question in self.questions), 1)
         self._seen = 0  # missions taken into account, at each point that a question still needs
@@ -481,16 +563,9 @@ class _Search:
             if self.verdicts[point] != "open":
                 continue
             for metric, test in self._tests[point].items():
-                test.observe(np.asarray(self.samples[point][metric][self._seen : stage], float))
+                values = self.samples[point][told(metric, self.samples[point])][self._seen : stage]
+                horizon = self.settings[point].horizon
+                test.observe(as_share(metric, np.asarray(values, float), horizon))
             found = {test.verdict for test in self._tests[point].values()}
             self.verdicts[point] = min(found, key=["missed", "open", "met"].index)
         self._seen = stage
-
-
-def _in_words(requirements: Mapping[Share, float], shift: float) -> str:
-    """The requirements in words, such as ``a mean success of at least 0.985``."""
-    means = [
-        f"{metric.replace('_', ' ')} of at least {least + shift:g}"
-        for metric, least in requirements.items()
-    ]
-    return f"a mean {' and a mean '.join(means)}"

@@ -20,7 +20,7 @@ from pydantic import (
 
 from dess import InputError
 from dess.analysis.bound import check_scenario
-from dess.analysis.metrics import BOUND, COST, GAP, HOME, metrics_in
+from dess.analysis.metrics import BOUND, COST, GAP, HOME, metric_of, metrics_in
 from dess.analysis.study.cheapest import AnySelection, Cheapest, Costs
 from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
 from dess.analysis.study.selection import Selection
@@ -197,6 +197,8 @@ class Study(StudyData):
     def metrics(self) -> list[str]:
         """The metrics that missions of the study have, be it only at some design points."""
         measured = {HOME, *(name for space in self.scenarios for name in measures_of(space))}
+        if all(space.units for space in self.scenarios):
+            measured |= {metric_of(name).in_units.column for name in measured}
         of_bounds = {BOUND, GAP} if self.bounds else set()
         return [*metrics_in(measured | of_bounds), *([COST] if self.costs else [])]
 
@@ -216,6 +218,8 @@ class Study(StudyData):
             raise ValueError(
                 "costs: are missing; allowed: a table of prices, for the selection of the cheapest"
             )
+        if self.costs:
+            self.costs.check(self.scenarios)
         if isinstance(self.design, Saltelli) and (self.rule or self.missions != 1):
             raise ValueError(
                 "missions: every point of a saltelli design is one mission; allowed: missions = 1"
@@ -227,6 +231,9 @@ class Study(StudyData):
             key, asked = "precision.targets", {*self.precision.targets}
         elif isinstance(self.selection, Selection):
             key, asked = "selection.metric", {self.selection.metric}
+        elif isinstance(self.selection, Cheapest):
+            self.selection.check_age(self.scenarios)
+            return
         else:
             return
         for space in self.scenarios:

@@ -99,6 +99,14 @@ def _number(text: str, unit: str, units: str) -> float:
     return float(given.to(unit).magnitude)
 
 
+def times(text: str, factor: float) -> str:
+    """A quantity, or the first of two, times a factor: ``5 m/s from SW`` as ``10 m/s from SW``."""
+    amount, *others = re.split(r"(?= from | at )", " ".join(text.split()), maxsplit=1)
+    found = _NUMBER.fullmatch(amount)
+    assert found
+    return f"{float(found[1]) * factor:g} {found[2]}{''.join(others)}"
+
+
 def _refuse(value: object, problem: str, units: str) -> NoReturn:
     raise InputError(f"{shown(value)} {problem}; allowed: {_form(units)}")
 

@@ -83,16 +83,18 @@ def sweep(
         price: A price: uav, pad, charge, hour or lost_uav; also currency, missions (planned for
             the fleet) and slot_seconds; repeatable.
         require: Search for the cheapest setting whose mean of a metric (success, ratio,
-            product) is at least this; repeatable. It may be half a point below; the answer says
-            what is guaranteed.
+            product) is at least this, or of age at most: "6 h" with a data sheet, otherwise
+            mission slots; repeatable. It may be half a point below; the answer says what is
+            guaranteed.
         name: Name of the sweep.  [default: its fields and a hash]
         results: Folder in which the results are stored, as sweeps/NAME.
         out: Folder of the page.
         dry_run: Only print the plan and the range of its time.
     """
+    from dess.analysis.ask import around
     from dess.analysis.ask.question import sweep_question
     from dess.analysis.ask.sweep import Sweep
-    from dess.analysis.metrics import ALIASES, PRODUCT
+    from dess.analysis.metrics import ALIASES, PRODUCT, told
 
     question = sweep_question(
         all_values(settings or []),
@@ -101,16 +103,21 @@ def sweep(
         missions,
         seed,
         all_settings(map(_with_quotes, price or []), "--price", PRICE),
-        all_settings(require or [], "--require", SHARE),
+        all_settings(map(_with_quotes, require or []), "--require", SHARE),
         name,
         results,
     )
-    ranking = ALIASES.get(metric or PRODUCT, metric or PRODUCT)
-    if ranking not in (measured := question.study.metrics):
+    measured = question.study.metrics
+    ranking = told(ALIASES.get(metric or PRODUCT, metric or PRODUCT), measured)
+    if ranking not in measured:
         allowed = one_of(metric, [*ALIASES, *measured])
         raise InputError(f"--metric: {shown(metric)} is not measured{allowed}")
-    found = _run(question, f"{PREFIX}{question.study.name}", out, workers, dry_run, yes)
+    page = f"{PREFIX}{question.study.name}"
+    found = _run(question, page, out, workers, dry_run, yes)
     answer, parameters = Sweep(question, found), {"metric": ranking} if metric else {}
+    changes = around.around(found) if question.study.selection else None
+    if changes:
+        _run(changes, page, out, workers, dry_run, yes)
 
     def render(progress: "Progress") -> Path:
         from dess.reports.pages.render import render_study
@@ -239,9 +246,12 @@ def _print_settings(answer: "Sweep", ranking: str) -> None:
     import pandas as pd
 
     from dess.analysis import numbers
+    from dess.analysis.answers import costs
     from dess.analysis.answers.settings import varied
+    from dess.analysis.ask import around
     from dess.analysis.metrics import COST, PRODUCT, SUCCESS, metric_of
     from dess.analysis.names import value_text
+    from dess.reports.cli.tables import print_frame
 
     study = answer.question.study
     table, fields, prices = answer.table(ranking), [*varied(answer.results)], study.costs
@@ -249,7 +259,7 @@ def _print_settings(answer: "Sweep", ranking: str) -> None:
     cells = pd.DataFrame({"rank": top["rank"], "": np.where(top["tied"], "≈", "")})
     cells["policy"] = top["policy"]
     cells[fields] = top[fields].map(value_text)
-    required = getattr(study.selection, "requirements", {})
+    required = costs.required(answer.results)
     shown = dict.fromkeys([ranking, SUCCESS, *required, PRODUCT])
     for name in [name for name in shown if name != COST]:
         metric = metric_of(name)
@@ -263,6 +273,11 @@ def _print_settings(answer: "Sweep", ranking: str) -> None:
     console.say(
         f"{len(table):,} settings{first}; ≈: the {what} may be as good as that of the first"
     )
+    if required and around.is_known(answer.results):
+        changes = around.known(answer.results)
+        cells = around.table(changes, required).cells
+        print_frame("What if", cells.set_index("What if"))
+        console.say(around.sentence(changes, required))
 
 
 def _print_measures(answer: "WhatIf") -> None:
@@ -274,7 +289,8 @@ def _print_measures(answer: "WhatIf") -> None:
 
 
 def _with_quotes(text: str) -> str:
-    """The name of a currency in TOML syntax."""
+    """The name of a currency, or a time with its unit, in TOML syntax."""
     key, _, value = text.partition("=")
-    quoted = key.strip() != "currency" or value.strip().startswith(("'", '"'))
+    is_text = key.strip() == "currency" or (key.strip() == "age" and value.strip(" .0123456789"))
+    quoted = not is_text or value.strip().startswith(("'", '"'))
     return text if quoted else f"{key}={json.dumps(value)}"

@@ -214,6 +214,7 @@ class _Mission:
 
     @property
     def outcome(self) -> str:
+        from dess.analysis.metrics import lasting
         from dess.analysis.numbers import percent
         from dess.analysis.results.event_log import causes
 
@@ -221,7 +222,8 @@ class _Mission:
         ended = sum(end in ("quota", "landed") for end in ends)
         outcome = (
             f"{percent(self.record.collection_ratio)} of the data collected in "
-            f"{self.record.slots} mission slots; {ended} of {len(ends)} UAVs {self.scenario.aim}."
+            f"{lasting(self.record.slots, self.scenario.units)}; {ended} of {len(ends)} UAVs "
+            f"{self.scenario.aim}."
         )
         return " ".join([outcome, *(f"{c}." for c in causes(self.log, self.scenario))])
 
@@ -286,7 +288,7 @@ def _write_page(mission: _Mission, path: Path) -> None:
 
 
 def _print_mission(mission: _Mission) -> None:
-    from dess.analysis.metrics import MEASURES
+    from dess.analysis.metrics import in_units, measured_in, metric_of
     from dess.analysis.results.event_log import causes, residual_data
 
     record = mission.record
@@ -294,7 +296,10 @@ def _print_mission(mission: _Mission) -> None:
     rows = [[name, f"{metrics[name].item():g}"] for name in metrics.dtype.names or ()]
     console.print_table(["", "mission"], rows)
     if measured := record.measured:
-        rows = [[MEASURES[name].label, f"{value:g}"] for name, value in measured.items()]
+        if units := mission.scenario.units:
+            measured = measured | in_units(measured, units)
+        told = [(metric_of(name).label, measured[name]) for name in measured_in(measured)]
+        rows = [[label, f"{value:g}"] for label, value in told]
         console.print_table(["", "beyond the paper"], rows)
     uavs = record.uav_rows()
     rows = [[str(number), *map(str, row.values())] for number, row in enumerate(uavs)]

@@ -167,6 +167,7 @@ def show(
     """
     from dess.analysis import numbers
     from dess.analysis.answers import summary
+    from dess.analysis.metrics import told
     from dess.reports.cli import tables as printed
 
     if as_csv and as_json:
@@ -177,6 +178,7 @@ def show(
         raise InputError(
             f"--policy: {policy!r} is not in the study{one_of(policy, results.policies)}"
         )
+    targets = {told(metric, results.missions): end for metric, end in targets.items()}
     means = summary.meeting(summary.means(results), targets)
     means = summary.with_verdicts(results, means)
     if as_csv:

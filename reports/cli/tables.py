@@ -8,7 +8,7 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.answers import costs, diff, optimality, summary
 from dess.analysis.answers.settings import in_words, setting_of
-from dess.analysis.metrics import MEASURES, METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
+from dess.analysis.metrics import EITHER, METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
 from dess.analysis.paper import values
 from dess.analysis.results.tables import Results
 from dess.analysis.tables import compared, counts
@@ -125,7 +125,7 @@ def _print_means(means: pd.DataFrame, title: str, printed: Mapping[str, float]) 
     if printed:
         cells.loc["paper"] = [numbers.percent(printed[metric]) for metric in METRICS]
     print_frame(title, cells)
-    measured = means[means["metric"].isin(MEASURES)]
+    measured = means[means["metric"].isin(EITHER)]
     if not measured.empty:
         cells = numbers.wide(measured, "metric", "policy", numbers.quantities).fillna("")
         print_frame(title, cells.rename(index=lambda metric: metric_of(metric).label))
@@ -167,9 +167,9 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
         targets: Metric -> the least mean.
     """
     asked = [
-        f"{metric_of(metric).within} of {end:g} or "
-        + ("less" if metric_of(metric).less_is_better else "more")
-        for metric, end in targets.items()
+        f"{of.within} of {end:g}{f' {of.unit}' * of.is_told} or "
+        + ("less" if of.less_is_better else "more")
+        for of, end in ((metric_of(metric), end) for metric, end in targets.items())
     ]
     product = means[means["metric"] == PRODUCT].set_index(["policy", "point"])
     count = f"{len(product):,} of {len(results.store.manifest.points) * len(results.policies):,}"

@@ -31,6 +31,8 @@ yes = False  # True if the sweep may take more than an hour
 from dess import load_scenario
 from dess.analysis import sweep
 from dess.analysis.answers import costs
+from dess.analysis.ask import around
+from dess.analysis.ask.assumptions import assumptions
 from dess.analysis.figures import settings as figures
 from dess.analysis.figures.missions import mission_figure, sea_figure
 from dess.analysis.names import placing
@@ -49,6 +51,9 @@ html.answer(costs.answer(answer.results), costs.cheapest_fleet(answer.results))
 
 # %%
 html.lead(*figures.deciding(answer.results))
+
+# %%
+html.rendered("assumptions.html", lines=assumptions(answer.results)) if sea.units else None
 
 # %% [markdown]
 # ## Why
@@ -69,6 +74,12 @@ html.gallery(
         (map_of_mission, "Map of a mission", f"A mission of {policy}, replication 0 (n = 1)."),
     ]
 )
+
+# %%
+if asked := around.around(answer.results):
+    changes, least = asked.ask(workers, yes=yes), costs.required(answer.results)
+    line = html.say("{line}", line=around.sentence(changes, least))
+    html.show(line, around.table(changes, least))
 
 # %% [markdown]
 # ## How far to trust it
@@ -102,6 +113,9 @@ html.show(costs.judged_table(answer.results))
 
 # %%
 html.say("{lines}", lines=html.commands([answer.question.command]))
+
+# %%
+html.rendered("left_out.html") if sea.units else None
 
 # %% [markdown]
 # ## How this page was made

@@ -51,6 +51,11 @@ html.answer(summary.of_variance(study, by))
 # %%
 html.lead(*(figures.deciding(study) if costs.required(study) else figures.leading(study, by)))
 
+# %% tags=["if-sheet"]
+from dess.analysis.ask.assumptions import assumptions
+
+html.rendered("assumptions.html", lines=assumptions(study))
+
 # %% [markdown] tags=["if-cheapest"]
 # ## Why
 #
@@ -59,6 +64,18 @@ html.lead(*(figures.deciding(study) if costs.required(study) else figures.leadin
 
 # %% tags=["if-cheapest"]
 html.show(html.say("{answers}", answers=page.reasons(study)), costs.judged_table(study))
+
+# %% [markdown] tags=["if-around"]
+# ## What if
+#
+# One more UAV or pad, and twice the wind, the failures and the data: requirements are *kept* or
+# *broken* if the whole interval of a mean says so.
+
+# %% tags=["if-around"]
+from dess.analysis.ask import around
+
+changes, least = around.known(study), costs.required(study)
+html.show(html.say("{line}", line=around.sentence(changes, least)), around.table(changes, least))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## How far to trust it
@@ -187,6 +204,9 @@ html.show(
     summary.worst_table(study, worst),
     html.say("{commands}", commands=page.commands(study, worst)),
 )
+
+# %% tags=["if-sheet"]
+html.rendered("left_out.html")
 
 # %% [markdown]
 # ## How this page was made

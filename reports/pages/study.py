@@ -10,6 +10,7 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers import costs, settings, summary
+from dess.analysis.ask import around
 from dess.analysis.names import parameter, value_text
 from dess.analysis.results.tables import Results, load_results
 from dess.analysis.study.cheapest import Cheapest
@@ -188,4 +189,7 @@ def parts(results: Results) -> dict[str, bool]:
         "if-cheapest": is_search,
         "if-precision": study["precision"] is not None,
         "if-costs": study["costs"] is not None,
+        # A scenario in units, and what changes a little around the cheapest fleet.
+        "if-sheet": all(space.units for space in manifest.scenarios),
+        "if-around": is_search and around.is_known(results),
     }

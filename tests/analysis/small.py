@@ -22,6 +22,16 @@ SCENARIO: dict[str, Any] = {
     "charge_complete": [40, 60],
     "quota": 60,
 }
+# A data sheet for the small scenario, in the place of what follows from it.
+SHEET: dict[str, Any] = {
+    **{"flying_time": 80, "charge_start": 30, "charge_complete": 80, "quota": 0},
+    "age": {"measured": True},
+    "data_sheet": {
+        **{"endurance": "35 min", "cruise": "15 m/s", "charging": "40 min", "horizon": "2 h"},
+        **{"data_rate": "3 MB/h", "backlog": "2 MB", "wind": "4 m/s from SW"},
+        **{"bandwidth": "125 kHz", "snr": "12 dB at 2 km", "range": "2 km"},
+    },
+}
 
 
 def write_scenario(folder: Path, **changes: Any) -> Path:

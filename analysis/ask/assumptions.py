@@ -1,0 +1,51 @@
+"""What an answer assumes, in ten lines for the one who pays."""
+
+from dess.analysis import numbers
+from dess.analysis.answers import costs
+from dess.analysis.names import value_text
+from dess.analysis.results.tables import Results
+from dess.sections.data_sheet import printed
+
+
+def assumptions(results: Results) -> list[str]:
+    """What a success, a slot and a cell are, who flies, and the data, radio, wind and failures.
+
+    Args:
+        results: A study of a scenario with a data sheet. Where its design varies a field, the line
+            says so.
+    """
+    space, units = results.scenario(), results.scenario().units
+    assert units
+    sheet, nodes = space.data_sheet, numbers.counted(len(space.nodes), "node")
+    varied = {f.removeprefix("data_sheet.") for f in results.store.manifest.values[0]}
+    wide, high = (printed(cells * units.cell, "m") for cells in space.size)
+    quota = "" if space.quota == 0 else " with its quota filled"
+
+    def given(field: str, otherwise: str) -> str:
+        """A field of the sheet in words."""
+        value = "as asked" if field in varied else getattr(sheet, field)
+        return otherwise if not value else value if isinstance(value, str) else "a list of them"
+
+    failures = f"a UAV fails every {given('mtbf', '')} of flying on average, and is repaired in "
+    return [
+        f"Success: at the end of a mission every UAV has landed{quota}.",
+        f"A slot is {printed(units.slot, 's')}, a hundredth of the endurance of "
+        f"{given('endurance', '')}; once a slot every UAV moves by a cell, hovers or charges.",
+        f"A cell is {printed(units.cell, 'm')} wide, the way of a slot at {given('cruise', '')}. "
+        f"The sea is {wide} x {high}.",
+        f"Who flies: the policy {costs.best_policy(results)}, which knows the data left at every "
+        f"node; UAVs fly {value_text(space.altitude)} m high.",
+        f"A battery charges from empty to full in {given('charging', '')}; of it, "
+        f"{given('reserve', 'nothing')} is kept in reserve.",
+        f"Data: {given('data_rate', '')} at each of {nodes}, {given('backlog', 'none')} at the "
+        "start.",
+        f"Radio: an SNR of {given('snr', 'a link budget')}, path loss exponent "
+        f"{value_text(space.path_loss_exponent)}; range {given('range', 'without end')}; "
+        f"{given('bandwidth', '')} with at most {given('max_rate', 'any bit/s/Hz')}.",
+        f"Wind: {given('wind', 'none')}, the same everywhere and always.",
+        f"Failures: {failures}{given('repair', 'no time: it is lost')}."
+        if sheet.mtbf or "mtbf" in varied
+        else "Failures: none.",
+        f"A mission takes {given('horizon', printed(space.max_slots * units.slot, 's'))}; means "
+        "are over random missions, with 95 % intervals.",
+    ]

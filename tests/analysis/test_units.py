@@ -1,0 +1,152 @@
+"""What is told in units with a data sheet is what the model has in slots and data units."""
+
+import numpy as np
+import pytest
+
+from dess import InputError
+from dess.analysis import run_study
+from dess.analysis.answers import costs, settings
+from dess.analysis.ask import around
+from dess.analysis.ask.assumptions import assumptions
+from dess.analysis.ask.question import sweep_question, what_if_question
+from dess.analysis.ask.what_if import WhatIf
+from dess.analysis.metrics import AGE, metric_of, told
+from dess.analysis.study.cheapest import Cheapest, Setting
+from tests.analysis.small import SHEET, small_study, write_scenario
+
+PRICES = {"uav": 20_000, "pad": 5_000, "hour": 36}
+SLOT, UNIT = 21.0, 21.0 * 125e3  # of SHEET: [s] and [bit]
+
+
+@pytest.fixture(scope="module")
+def searched(tmp_path_factory):
+    """A search for the cheapest fleet with a data sheet."""
+    folder = tmp_path_factory.mktemp("searched")
+    question = sweep_question(
+        {"uavs": (1, 2), "pads": (1, 2)},
+        write_scenario(folder, **SHEET),
+        ["greedy"],
+        20,
+        prices=PRICES,
+        requirements={"success": 0.6, "ratio": 0.3, "age": "50 min"},
+        folder=folder,
+    )
+    return question.ask()
+
+
+def test_values_in_units_are_those_of_the_model_times_the_unit(searched):
+    missions = searched.missions
+    hours, megabytes = SLOT / 3600, UNIT / 8e6
+    sizes = {"age": ("age_h", hours), "slots": ("slots_h", hours)}
+    sizes |= {"uav_slots": ("uav_slots_h", hours), "collected": ("collected_MB", megabytes)}
+    for column, (in_units, size) in sizes.items():
+        assert told(column, missions) == in_units
+        np.testing.assert_allclose(missions[in_units], missions[column] * size, rtol=1e-12)
+    assert searched.checks["age_h"].notna().all()
+
+
+def test_the_price_of_an_hour_takes_the_slot_of_the_sheet(searched):
+    hours = costs.parts(searched)["hours"]
+    means = searched.missions.groupby("point", sort=False)["slots"].mean()
+    np.testing.assert_allclose(hours, 36 * means.to_numpy() * SLOT / 3600)
+
+
+def test_settings_have_the_same_ranks_in_units(searched):
+    rows = settings.ranked(searched, "age_h")
+    means = searched.missions.groupby("point")[AGE].mean()
+    assert rows["point"].tolist() == means.sort_values(kind="stable").index.tolist()
+    ends = rows[["age_h", "age_h_low", "age_h_high"]].iloc[0]
+    assert settings.answer(searched, rows, "age_h").count(metric_of("age_h").written(*ends)) == 1
+    assert " h, n = " in settings.answer(searched, rows, "age_h")
+
+
+def test_without_a_sheet_nothing_is_told_in_units(tmp_path):
+    study = small_study(tmp_path, set={"age.measured": True})
+    missions = run_study(study, tmp_path / "out").missions
+    assert told(AGE, missions) == AGE
+    assert not [name for name in missions if name.endswith(("_h", "_min", "_MB"))]
+
+
+def test_lengths_and_data_of_a_question_are_in_units(tmp_path):
+    scenario = write_scenario(tmp_path, **SHEET)
+    longer = {"data_sheet.endurance": "70 min"}  # a slot is twice as long
+    question = what_if_question(longer, None, scenario, ["greedy"], 3, folder=tmp_path)
+    answer = WhatIf(question, question.ask(), "greedy")
+    table = answer.table().set_index("metric")
+    assert table.loc["slots_h", ["before", "after"]].tolist() == pytest.approx([2, 2], rel=0.02)
+    rows = answer.measures("greedy")["Mean per mission"].tolist()
+    assert {"Length of the mission [h]", "Data collected [MB]"} <= {*rows}
+    assert not [row for row in rows if "lots" in row]
+
+
+def rule(**requirements):
+    found = {"procedure": "cheapest", "indifference": 1.0, "requirements": requirements}
+    return Cheapest.model_validate(found | {"budget": 4000, "first": 500})
+
+
+@pytest.mark.parametrize("column", ["age", "age_h"])
+@pytest.mark.parametrize(("age", "verdict"), [(5.0, "met"), (7.0, "missed"), (6.0, "open")])
+def test_an_age_is_required_to_be_at_most(column, age, verdict):
+    asked = rule(age="6 h" if column == "age_h" else 6)
+    samples = [{column: np.full(4000, age), "cost": np.ones(4000)}]
+    choice = asked.choice(samples, [Setting({}, 0.0, horizon=24.0)])
+    assert choice.verdicts == (verdict,)
+    assert "age of at most 6" in choice.guarantee
+
+
+def test_the_answer_has_every_requirement_in_its_unit(searched):
+    text = " ".join(costs.sentences(searched))
+    assert " h (0.8333 h required)" in text
+    assert "age of information of at most 0.8433 h" in text  # half a percent of two hours more
+
+
+REFUSED = {
+    "50": 'requirements.age: 50; allowed: a time, such as "6 h"',
+    "3 km": "requirements.age: '3 km' has a unit of another kind",
+    "2 h": "less than the horizon of 2 h",
+}
+
+
+@pytest.mark.parametrize("given", REFUSED)
+def test_an_age_that_cannot_be_required_is_refused(given, tmp_path):
+    scenario, age = write_scenario(tmp_path, **SHEET), 50 if given == "50" else given
+    with pytest.raises(InputError, match=REFUSED[given]):
+        sweep_question({"uavs": (1, 2)}, scenario, prices=PRICES, requirements={"age": age})
+
+
+def test_without_a_sheet_an_age_is_a_number_of_slots(tmp_path):
+    with pytest.raises(InputError, match="'6 h'; allowed: a number of mission slots"):
+        scenario, prices = write_scenario(tmp_path), {"uav": 1}
+        sweep_question({"uavs": (1, 2)}, scenario, prices=prices, requirements={"age": "6 h"})
+
+
+def test_the_fleet_is_asked_about_with_one_more_and_in_harder_conditions(searched):
+    assert not around.is_known(searched)
+    question = around.around(searched, 10)
+    first, *rows = question.study.design.rows
+    changes = [{k: v for k, v in row.items() if first.get(k) != v} for row in rows]
+    assert changes == [
+        {"uavs": first["uavs"] + 1},
+        {"pads": first["pads"] + 1},
+        {"data_sheet.wind": "8 m/s from SW"},
+        {"data_sheet.mtbf": "100 h"},
+        {"data_sheet.data_rate": "6 MB/h"},
+    ]
+    found = question.ask()
+    assert around.is_known(searched)
+    least = costs.required(searched)
+    table = around.table(found, least)
+    assert table.cells["What if"][5] == "data rate 6 MB/h"
+    data = table.data
+    for row in data.itertuples():
+        is_kept = row.success_low >= 0.6 and row.collection_ratio_low >= 0.3
+        assert (row.requirements == "kept") == (is_kept and row.age_h_high <= 50 / 60)
+    worst = data["words"][data["lead"][2:].idxmin()]
+    assert worst in around.sentence(found, least)
+
+
+def test_ten_lines_say_what_is_assumed(searched):
+    lines = assumptions(searched)
+    assert len(lines) == 10
+    assert lines[1].startswith("A slot is 21 s, a hundredth of the endurance of 35 min")
+    assert lines[2].startswith("A cell is 315 m wide, the way of a slot at 15 m/s.")
