@@ -50,9 +50,9 @@ def slots_needed(mission, u):
 def slots_expected(mission, u, data):
     """Flying slots until the quota of UAV ``u`` is filled, as far as data are there for it.
 
-    A UAV collects some ``MEAN_RATE`` data units in a slot, and is no more often in range of a node
-    than chance would have it. Once the residual data are collected, it may count on
-    ``SLOTS_PER_PACKET`` communication slots for each data unit that arrives.
+    A UAV collects some ``MEAN_RATE`` data units in a slot. Once the residual data are collected,
+    it may count on ``SLOTS_PER_PACKET`` communication slots for each data unit that arrives. Where
+    slots out of range do not count, it cannot tell, and expects to fly to the end.
 
     Args:
         mission: ``MISSION`` record.
@@ -60,8 +60,8 @@ def slots_expected(mission, u, data):
         data: Residual data of all nodes together [data units].
     """
     needed = slots_needed(mission, u)
-    if has_range(mission):  # slots out of range do not count
-        needed = int(math.ceil(needed / mission.covered))
+    if has_range(mission):
+        return mission.max_slots
     if data >= MEAN_RATE * needed * mission.active:
         return needed
     served = data / (MEAN_RATE * mission.active)
@@ -290,7 +290,7 @@ def _chooses_first(mission, uavs, i, chart, memory, reach):
 def _will_charge(mission, u):
     """Whether a UAV in the air cannot fill its quota with its battery, or has to land."""
     needs = u.battery < mission.flight_cost * slots_needed(mission, u)
-    return flies(u) and (needs or lands(mission))
+    return flies(u) and (needs or lands(mission) or has_range(mission))
 
 
 @inlined

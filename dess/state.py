@@ -15,7 +15,7 @@ from dess import streams
 from dess.code.kernels import kernel
 from dess.errors import InputError, check_type
 from dess.scenario import MOST_ZONES, SAMPLED, AnyScenario, Scenario, ScenarioSpace, loaded
-from dess.sections import fleet, radio, wind
+from dess.sections import fleet, wind
 from dess.sections.failures import MOST_PADS
 
 NORTH, EAST, SOUTH, WEST, HOVER = range(5)
@@ -61,8 +61,7 @@ MISSION = np.dtype(
         ("node_data_lost", np.int64),
         # Channel.
         *fields(np.float64, "communication_slot_length shadowing_deviation"),
-        # The radio, 0 without: its largest rate, and the share of cells in range of a node.
-        *fields(np.float64, "max_rate covered"),
+        *fields(np.float64, "range max_rate"),  # of the radio [m], [bit/s/Hz]; 0 for none
         # Wind: what its mean takes of moves and its deviation from cell to cell [% of battery per
         # cell], and the largest surcharge of a move [%], 0 without wind.
         *fields(np.float64, "wind_north wind_east wind_south wind_west wind_gusts"),
@@ -198,8 +197,7 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         "shadowing_deviation": np.sqrt(scenario.shadowing_variance),
         **{"continuous": scenario.needs_events, "age_measured": slotted_age},
         "charge_gain": scenario.charge_rate if scenario.charge_rate % 1 > 0 else 0.0,
-        "max_rate": scenario.radio.max_rate,
-        "covered": radio.covered(scenario) if scenario.radio.range > 0 else 0.0,
+        **{"range": scenario.radio.range, "max_rate": scenario.radio.max_rate},
         "age_reward": scenario.age.reward,
         **({"arrival_rate": np.mean(scenario.node_rates)} if own_rates else {}),
         **wind.constants(scenario.wind, scenario.size),

@@ -74,6 +74,9 @@ MISSED = {
     "study export trial --crate trial.zip": ("dess study needs ", "reports"),
     "simulate --figure mission.png": ("dess simulate needs matplotlib", "reports"),
     "report ./trial": ("dess report needs ", "reports"),
+    "scenarios show jade-bight": (
+        *("scenario jade-bight: data_sheet.endurance: a data sheet needs pint", "units"),
+    ),
     "scenarios show lane.toml": ("no_fly with lines, touched or buffer needs shapely", "geo"),
 }
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dess.errors import InputError, one_of, shown
+from dess.errors import InputError, one_of, shown, validated
 from dess.sea.nodes import MAX_GRID, RATES, NodesFile, NodesFound
 from dess.sea.places import Projection
 from dess.sections.data_sheet import DataSheet, printed
@@ -79,7 +79,7 @@ def new_scenario(nodes: Path, answers: Mapping[str, str]) -> str:
         InputError: If the sea is too large for the UAVs.
     """
     sheet = {name: answers[name] for name in DataSheet.model_fields if answers.get(name)}
-    cell = DataSheet.model_validate(sheet).units.cell
+    cell = validated(DataSheet, sheet, "data_sheet").units.cell
     found, (x, y) = _read(nodes), _place(answers["base"])
     side = math.ceil(math.sqrt(2 * int(answers["uavs"])))
     spots, zone = np.vstack([found.spots, [x, y]]), f"[{x:.0f}, {y:.0f}, {side}, {side}]"

@@ -1,11 +1,7 @@
 """The radio as data sheets have it: an SNR at a distance, a range, and a largest rate."""
 
-from typing import Any
-
-import numpy as np
 from pydantic import Field
 
-from dess.sea.chart import NO_FLY
 from dess.sections.section import Number, Section, for_sections
 
 
@@ -36,14 +32,4 @@ def has_max_rate(mission):
 @for_sections
 def has_range(mission):
     """Whether there are places without service."""
-    return mission.covered > 0.0
-
-
-def covered(scenario: Any) -> float:
-    """The share of the open cells of a scenario from which a node is in range."""
-    cells = np.argwhere(scenario.chart.zones.T != NO_FLY)
-    reach = scenario.radio.range**2 - scenario.altitude**2
-    is_near = np.zeros(len(cells), bool)
-    for node in scenario.nodes:
-        is_near |= ((cells - node) ** 2).sum(1) * scenario.cell_size**2 <= reach
-    return float(is_near.mean())
+    return mission.range > 0.0

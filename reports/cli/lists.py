@@ -110,8 +110,7 @@ def show_scenario(
             console.say(f"    {f.meaning}; {default}; allowed: {f.allowed}")
         return
     heads = ["field", "value", "unit", "meaning"]
-    known = [f for f in fields(space) if f.value is not None or not f.name.startswith("data_sheet")]
-    rows_ = [[f.name, cut(_value(f.value), 20), f.unit, f.meaning] for f in known]
+    rows_ = [[f.name, cut(_value(f.value), 20), f.unit, f.meaning] for f in fields(space)]
     columns = [*zip(*rows_, strict=True)][:-1]
     rest = console.WIDTH - sum(max(map(len, column)) + 2 for column in columns)
     lines = [
