@@ -32,7 +32,6 @@ from dess.analysis.figures.style import node_colours, uav_colours
 from dess.analysis.results import event_log
 from dess.reports.pages.html import Part, figures, template
 from dess.scenario import Scenario
-from dess.sections.data_sheet import printed
 
 TRAIL = 12  # number of last moves that are drawn behind a UAV
 
@@ -83,11 +82,9 @@ class Playback:
         pads = self.scenario.charging_pads
         queue = f", {waiting} waiting" if waiting else ""
         used = f"{charging} of {pads} pad{'s' * (pads != 1)} in use{queue}"
-        left, units = self.residual[slot].sum(), self.scenario.units
-        if units:
-            passed, end = (printed(of * units.slot, "s") for of in (slot, self.end))
-            return f"{passed} of {end} · {printed(left * units.data, 'bit')} left · {used}"
-        return f"slot {slot} of {self.end} · {left:.1f} data units left · {used}"
+        return (
+            f"slot {slot} of {self.end} · {self.residual[slot].sum():.1f} data units left · {used}"
+        )
 
     @property
     def data(self) -> dict[str, Any]:

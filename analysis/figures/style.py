@@ -218,22 +218,12 @@ def in_units(axis: Axis, unit: str, nbins: int = 6) -> None:
     axis.set_major_formatter(PercentFormatter(1) if unit == "%" else numbers[unit])
 
 
-class _Sized(MaxNLocator):
-    """Ticks at round values in a unit of which the axis has ``size`` in 1."""
-
-    def __init__(self, size: float, nbins: int):
-        super().__init__(nbins=nbins, steps=[1, 2, 3, 4, 5, 6, 10])
-        self._size = size
-
-    def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
-        told = super().tick_values(vmin * self._size, vmax * self._size)
-        return [tick / self._size for tick in told]
-
-
 def in_size(axis: Axis, size: float, nbins: int = 8) -> None:
-    """Ticks in a unit of which the axis has ``size`` in 1."""
-    axis.set_major_locator(_Sized(size, nbins))
-    axis.set_major_formatter(lambda value, _: f"{value * size:,.6g}")
+    """Ticks at round values of a unit of which the axis, with its limits, has ``size`` in 1."""
+    low, high = sorted(axis.get_view_interval())
+    values = MaxNLocator(nbins, steps=[1, 2, 5, 10]).tick_values(low * size, high * size)
+    shown = [value for value in values if low * size <= value <= high * size]
+    axis.set_ticks([value / size for value in shown], [f"{value:,.6g}" for value in shown])
 
 
 def note_at_right(text: str, level: float, ax: Axes, size: float = 9) -> Any:

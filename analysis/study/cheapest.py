@@ -57,15 +57,11 @@ class Costs(StrictTable):
         Raises:
             InputError: If it is not, or is given although it follows from a data sheet.
         """
-        follows = all(space.units for space in spaces)
+        follows, where = any(space.units for space in spaces), "costs.slot_seconds"
+        if follows and self.slot_seconds is not None:
+            raise InputError(f"{where}: follows from the data sheet; allowed: without this field")
         if self.hour and self.slot_seconds is None and not follows:
-            raise InputError(
-                "costs.slot_seconds: is missing; allowed: with hour, the seconds of a slot"
-            )
-        if self.slot_seconds is not None and any(space.units for space in spaces):
-            raise InputError(
-                "costs.slot_seconds: follows from the data sheet; allowed: without this field"
-            )
+            raise InputError(f"{where}: is missing; allowed: with hour, the seconds of a slot")
 
     def parts(
         self, spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any], uavs: Mapping[str, Any]
@@ -385,19 +381,16 @@ class Cheapest(StrictTable):
         Raises:
             InputError: If it has none, or is out of range, or a scenario does not measure it.
         """
+        where = f"requirements.{AGE}"
         for space in spaces if AGE in self.requirements else ():
             given, horizon = self.requirements["age"], horizon_of(space)
-            if isinstance(given, str) != bool(space.units):
-                allowed = 'a time, such as "6 h"' if space.units else "a number of mission slots"
-                raise InputError(f"requirements.age: {shown(given)}; allowed: {allowed}")
+            share, has_unit = self.amount("age") / horizon, isinstance(given, str)
+            if not self.tolerance < share < 1 - self.tolerance or has_unit != bool(space.units):
+                form = 'a time such as "6 h"' if space.units else "mission slots"
+                allowed = f"{form} in the horizon of {horizon:g}{' h' * bool(space.units)}"
+                raise InputError(f"{where}: {shown(given)} does not fit; allowed: {allowed}")
             if not space.age.measured:
-                raise InputError("requirements.age: is not measured; allowed: age.measured = true")
-            if not self.tolerance < self.amount("age") / horizon < 1 - self.tolerance:
-                unit = "h" if space.units else "mission slots"
-                raise InputError(
-                    f"requirements.age: {shown(given)} is out of range; allowed: more than 0, and "
-                    f"less than the horizon of {horizon:g} {unit}"
-                )
+                raise InputError(f"{where}: is not measured; allowed: age.measured = true")
 
     def wanted(self, samples: Samples, settings: Sequence[Setting]) -> list[int]:
         """The number of missions that every design point needs.

@@ -274,10 +274,7 @@ def _print_settings(answer: "Sweep", ranking: str) -> None:
         f"{len(table):,} settings{first}; ≈: the {what} may be as good as that of the first"
     )
     if required and around.is_known(answer.results):
-        changes = around.known(answer.results)
-        cells = around.table(changes, required).cells
-        print_frame("What if", cells.set_index("What if"))
-        console.say(around.sentence(changes, required))
+        print_frame("What if", around.table(answer.results).cells.set_index("What if"))
 
 
 def _print_measures(answer: "WhatIf") -> None:

@@ -77,9 +77,8 @@ html.gallery(
 
 # %%
 if asked := around.around(answer.results):
-    changes, least = asked.ask(workers, yes=yes), costs.required(answer.results)
-    line = html.say("{line}", line=around.sentence(changes, least))
-    html.show(line, around.table(changes, least))
+    asked.ask(workers, yes=yes)
+    html.show(around.table(answer.results))
 
 # %% [markdown]
 # ## How far to trust it
