@@ -16,6 +16,8 @@ def main() -> int:
             file=sys.stderr,
         )
         return 2
+    # The products of learned policies are small: threads of NumPy would only wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Found by its name: this floor must not import the floors above it.
     return import_module("dess.reports.cli").main()
 
