@@ -18,6 +18,8 @@ def main() -> int:
         )
         return 2
     gc.set_threshold(50_000, 20, 50)  # what a command imports stays: to search it takes a tenth
+    # The products of learned policies are small: threads of NumPy would only wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Found by its name: this floor must not import the floors above it.
     return import_module("dess.reports.cli").main()
 
