@@ -326,6 +326,6 @@ class DataSheet(Section):
         cruise = self.number("cruise")
         most = math.floor(100 * largest_wind(direction, cruise)) / 100
         if speed > most:
-            problem = f"cannot be flown against at {self.cruise}"
+            problem = f"is too strong for {self.cruise}"
             self._refuse("wind", problem, f"{most:g} m/s at most")
         return moves_in(speed, direction, cruise)

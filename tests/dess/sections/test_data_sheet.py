@@ -131,7 +131,7 @@ def test_nodes_of_a_file_have_their_own_rates_in_units(tmp_path) -> None:
         ({"endurance": None}, {}, "endurance: is missing; allowed: flying time"),
         ({"data_rate": None}, {}, "data_sheet.data_rate: is missing; allowed: new data"),
         ({"data_rate": ["3 MB/h"] * 2}, {}, "arrivals.rates: there are 2; allowed: 25"),
-        ({"wind": "14.5 m/s from SW"}, {}, "cannot be flown against at 15 m/s; allowed: 14 m/s"),
+        ({"wind": "14.5 m/s from SW"}, {}, "is too strong for 15 m/s; allowed: 14 m/s"),
         ({"wind": "14 m/s"}, {}, "is not a speed and where it comes from"),
         ({"horizon": "60 d"}, {}, "is 246,857 slots of 21 s; allowed: 24.31 d at most"),
         ({"charging": "10 s"}, {}, "is less than a slot of 21 s; allowed: 21 s or more"),
