@@ -690,7 +690,9 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     # that lead nearest to the parking cell, and those after which it is reached if the margin and
     # the slots for a pad are spent.
     clear = nearest = in_time = 0
-    least = 1_000_000  # battery [%] that lacks on the way to the parking cell
+    least = fewest = (
+        1_000_000  # battery [%] that lacks on the way to the parking cell; that is needed
+    )
     levels = contests(mission, uavs, i)
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
@@ -704,6 +706,10 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         if charge:
             needed = battery_home(mission, uavs, i, chart, planned, x, y, home, reach)
             needed += 1 if reach is None else _cost(mission, u, chart, action, x, y)
+            # The cheapest way in wind may lead through a parked teammate, so a move must do as well.
+            if lands(mission) and reach is not None and home.cells > 0:
+                needed = max(needed, fewest + 1) if action == HOVER else needed
+                fewest = min(fewest, needed)
             # One slot is the charging slot itself; the battery must not be depleted before it.
             late = max(needed + 1 + reserve - slots_left(mission, u), 0)
         bit = 1 << action
