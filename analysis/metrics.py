@@ -163,6 +163,7 @@ _RECORDED = (
     _time("waiting_per_uav", "Waiting per UAV", "min"),
 )
 _IN_UNITS = {metric.in_units.column: metric.in_units for metric in _MEASURED}
+_TOLD = {metric.column: metric.in_units.column for metric in (*_MEASURED, *_RECORDED)}
 _KNOWN = {metric.column: metric for metric in (*_PAPER, *_OTHERS, *_MEASURED)}
 _KNOWN |= _IN_UNITS | {metric.in_units.column: metric.in_units for metric in _RECORDED}
 
@@ -184,8 +185,7 @@ def metric_of(column: str) -> Metric:
 
 def told(column: str, missions: Container[str]) -> str:
     """The column in which a table of missions tells a metric: in units if there is a data sheet."""
-    in_units = metric_of(column).in_units.column
-    return in_units if in_units in missions else column
+    return of if (of := _TOLD.get(column, column)) in missions else column
 
 
 def in_units(missions: Mapping[str, Any], units: Units) -> dict[str, Any]:

@@ -706,7 +706,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         if charge:
             needed = battery_home(mission, uavs, i, chart, planned, x, y, home, reach)
             needed += 1 if reach is None else _cost(mission, u, chart, action, x, y)
-            # The cheapest way in wind may lead through a parked teammate, so a move must do as well.
+            # The cheapest way in wind may lead through a parked teammate; a move must do as well.
             if lands(mission) and reach is not None and home.cells > 0:
                 needed = max(needed, fewest + 1) if action == HOVER else needed
                 fewest = min(fewest, needed)

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 from scipy.special import stdtrit
 
 from dess import InputError
@@ -17,7 +17,7 @@ from dess.analysis.names import DECISIONS
 from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, needed
 from dess.analysis.study.stopping import MOST, Line, Samples, StrictTable, of_its_kind
 from dess.errors import shown
-from dess.scenario import Integer, Number, ScenarioSpace
+from dess.scenario import Integer, Number, ScenarioSpace, is_number
 from dess.sections.data_sheet import quantity_of
 
 # A price; the sums of all missions that may be planned are still finite.
@@ -352,13 +352,22 @@ class Cheapest(StrictTable):
         300, ge=0, le=MOST, description="further, independent missions of every selected point"
     )
 
+    @field_validator("requirements", mode="before")
+    @classmethod
+    def _are_amounts(cls, given: Any) -> Any:
+        for metric, amount in given.items() if isinstance(given, dict) else ():
+            if not is_number(amount) and not (metric == AGE and isinstance(amount, str)):
+                form = 'a number, or of age a time such as "6 h"'
+                raise InputError(f"{metric} is {shown(amount)}; allowed: {form}")
+        return given
+
     @model_validator(mode="after")
     def _are_shares(self) -> Self:
         for metric, least in self.requirements.items():
             share = 0.0 if isinstance(least, str) else least
             if metric != AGE and not self.tolerance < share < 1 - self.tolerance:
                 raise ValueError(
-                    f"requirements.{metric}: {least} is out of range; allowed: between "
+                    f"requirements.{metric}: {share:g} is out of range; allowed: between "
                     f"{self.tolerance:g} and {1 - self.tolerance:g}, which keeps the tolerance "
                     "away from 0 and 1"
                 )

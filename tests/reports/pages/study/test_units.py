@@ -1,0 +1,42 @@
+"""The page of a sea with a data sheet: for the one who pays, on one sheet of paper."""
+
+from itertools import pairwise
+
+from dess.analysis.ask import around
+from dess.analysis.ask.question import sweep_question
+from dess.reports.pages.render import render_study
+from tests.analysis.small import SHEET, write_scenario
+from tests.reports.small import words_of
+
+A4 = 182, 269  # less the margins [mm]
+PIXEL = 25.4 / 96  # [mm]
+
+
+def test_the_answer_the_figure_and_what_is_assumed_are_one_sheet_of_paper(tmp_path, visit):
+    question = sweep_question(
+        {"uavs": (1, 2)},
+        write_scenario(tmp_path, **SHEET),
+        ["greedy"],
+        10,
+        prices={"uav": 20_000},
+        requirements={"success": 0.6, "age": "50 min"},
+        folder=tmp_path / "results",
+    )
+    found = question.ask()
+    around.around(found, 5).ask()
+    path = render_study(question.out, tmp_path / "reports")
+    text = words_of(path.read_text("utf-8"))
+    told = ["What is assumed", "Why", "What if", "What the model leaves out", "How this page"]
+    assert all(text.index(one) < text.index(other) for one, other in pairwise(told))
+    for words in ("A slot is 21 s", "A cell is 315 m", "mean time between failures 100 h"):
+        assert words in text
+    assert "slots" not in text.split("How this page was made")[0].replace("communication slots", "")
+    page = visit(path, round(A4[0] / PIXEL)).page
+    page.emulate_media(media="print")
+    tops = [page.locator(name).bounding_box() for name in ("h1", "figure.lead", ".assumptions")]
+    assert [box["y"] for box in tops] == sorted(box["y"] for box in tops)
+    assert (tops[-1]["y"] + tops[-1]["height"]) * PIXEL < A4[1]
+    box = page.locator(".assumptions")
+    assert box.evaluate("box => getComputedStyle(box).breakAfter") == "page"
+    link = box.locator("a").get_attribute("href")
+    assert page.locator(f"h2{link}").count() == 1
