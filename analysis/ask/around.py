@@ -1,6 +1,6 @@
 """What-ifs around a cheapest fleet: one more UAV or pad, and what breaks its requirements first.
 
-question = around(results)  # of a search for the cheapest setting, with a data sheet
+question = around(results, "my-sea.toml")  # of a search for the cheapest setting, with a data sheet
 question.ask()
 table(results)
 """
@@ -27,13 +27,14 @@ FACTOR = 2  # harder conditions have twice the wind, the failures and the data
 WIND, HOURS = 0.5, 100  # without any: the wind as a share of the cruising speed; between failures
 
 
-def around(results: Results, missions: int = 300) -> Question | None:
+def around(results: Results, scenario: str, missions: int = 300) -> Question | None:
     """The question of what changes if the cheapest fleet or its conditions change a little.
 
     A fleet for several conditions is asked about under the last of them.
 
     Args:
         results: A study that searches for the cheapest setting.
+        scenario: The scenario of the study, with the path of its file.
         missions: Number of missions of every change.
 
     Returns:
@@ -49,7 +50,7 @@ def around(results: Results, missions: int = 300) -> Question | None:
     changes = []
     for change in _changes(results.scenario(points[-1])):
         try:
-            load_scenario(manifest.study.scenario, **fixed | values | change)
+            load_scenario(scenario, **fixed | values | change)
         except InputError:  # such as a wind that UAVs cannot fly against
             continue
         changes.append(change)
@@ -58,6 +59,7 @@ def around(results: Results, missions: int = 300) -> Question | None:
     data = manifest.study.model_dump(mode="json", exclude_none=True, exclude={"selection"})
     data |= {
         "name": _place(results).name,
+        "scenario": scenario,
         "description": "a fleet, and what changes if it or its conditions change a little",
         "set": {field: value for field, value in fixed.items() if field not in varied},
         "design": {"kind": "table", "rows": [start, *(start | change for change in changes)]},

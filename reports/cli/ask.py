@@ -115,7 +115,7 @@ def sweep(
     page = f"{PREFIX}{question.study.name}"
     found = _run(question, page, out, workers, dry_run, yes)
     answer, parameters = Sweep(question, found), {"metric": ranking} if metric else {}
-    changes = around.around(found) if question.study.selection else None
+    changes = around.around(found, question.study.scenario) if question.study.selection else None
     if changes:
         _run(changes, page, out, workers, dry_run, yes)
 

@@ -76,7 +76,7 @@ html.gallery(
 )
 
 # %%
-if asked := around.around(answer.results):
+if asked := around.around(answer.results, scenario):
     asked.ask(workers, yes=yes)
     html.show(around.table(answer.results))
 

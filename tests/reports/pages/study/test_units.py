@@ -23,7 +23,7 @@ def test_the_answer_the_figure_and_what_is_assumed_are_one_sheet_of_paper(tmp_pa
         folder=tmp_path / "results",
     )
     found = question.ask()
-    around.around(found, 5).ask()
+    around.around(found, question.study.scenario, 5).ask()
     path = render_study(question.out, tmp_path / "reports")
     text = words_of(path.read_text("utf-8"))
     told = ["What is assumed", "Why", "What if", "What the model leaves out", "How this page"]
