@@ -74,8 +74,9 @@ def test_every_parameter_of_every_command_is_known():
         if any(word in (parameter.metavar or "") for word in files)
         and not commands.kinds_of(words, parameter)
     }
-    # Those of report are in strategies.reports; what is shown is one of the policies.
-    assert unread - commands.OUTPUTS == {"--results", "--shown"}
+    # Those of report are in strategies.reports; what is shown is one of the policies; and tables of
+    # nodes stand in scenarios, too.
+    assert unread - commands.OUTPUTS == {"--results", "--shown", "--nodes"}
 
 
 def test_a_round_has_every_command_and_every_report():

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from itertools import count
 
 import numpy as np
 import pytest
@@ -69,16 +68,6 @@ def test_the_baseline_stands_beside_it_once() -> None:
     space = load_scenario("bay")
     assert policies_for([space], 1) == (FASTER[0], BASELINE)
     assert policies_for([space], 10**8) == (BASELINE,)
-
-
-def test_without_its_library_a_learned_policy_gives_way(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    space = load_scenario("bay", uavs=5)
-    missions = next(n for n in count(1000, 1000) if policies_for([space], n)[0] == "any")
-    monkeypatch.setattr(effort, "missing", lambda extra, what: f"{what} needs {extra}")
-    assert policies_for([space], missions) == ("planner-short", BASELINE)
-    assert "policy any needs learning; planner-short answers" in caplog.text
 
 
 PAPER = load_scenario("paper")

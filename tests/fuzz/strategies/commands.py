@@ -26,6 +26,7 @@ ENDINGS = {  # of files that an option writes
     "--animation": (".gif", ".html"),
     "--crate": (".zip",),
     "--path": (".geojson", ".csv"),
+    "scenarios new path": (".toml",),
 }
 OUTPUTS = {"--out", *ENDINGS}
 # The kinds of inputs that a parameter reads: that of a command, or of all that have it. Those of
@@ -68,6 +69,7 @@ BASE: dict[str, dict[str, str | None]] = {
     "verify": {"verify path": RESULTS, "--missions": "2"},
     "policies show": {"policies show name": POLICY},
     "scenarios show": {"scenarios show name": SEA},
+    "scenarios new": {"scenarios new path": "../in/new.toml", "--nodes": "../in/bay.csv"},
     "studies show": {"studies show name": f"../in/{ready.STUDY}"},
     "study run": {"study run names": f"../in/{ready.STUDY}", "--out": "../out/a"},
     "study show": {"study show folder": RESULTS},
@@ -101,6 +103,7 @@ PLAIN: dict[str, tuple[str, ...]] = {
     "--license": ("MIT",),
     "--name": ("a",),
     "--page": (PAGE,),
+    "--figures": ("svg", "png,pdf"),
     "--scheduler": ("there",),  # an address without an answer takes long: see dear.py
     "report names": (*NAMES, RESULTS),
     "policies show name": ("greedy", POLICY),

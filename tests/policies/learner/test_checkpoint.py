@@ -132,11 +132,12 @@ def _forgeries(file: Path) -> Iterator[tuple[str, np.ndarray | None]]:
 
 
 def test_a_checkpoint_has_no_bytes_of_undefined_memory(training):
-    uavs = np.frombuffer(b"\xff" * UAV.itemsize * 2, UAV).copy()
-    for name in uavs.dtype.names:
-        uavs[name] = 0
-    assert uavs.tobytes().strip(b"\0")  # what lies between the fields
-    assert not trained.bytes_of(uavs).any()
+    padded = np.dtype([("flag", np.bool_), ("value", np.float64)], align=True)
+    records = np.frombuffer(bytearray(b"\xff" * padded.itemsize * 2), padded)
+    for name in padded.names:
+        records[name] = 0
+    assert records.tobytes().strip(b"\0")  # what lies between the fields
+    assert not trained.bytes_of(records).any()
 
 
 def test_an_index_that_the_scenario_has_not_is_refused(training, file):
