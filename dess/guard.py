@@ -690,9 +690,8 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     # that lead nearest to the parking cell, and those after which it is reached if the margin and
     # the slots for a pad are spent.
     clear = nearest = in_time = 0
-    least = fewest = (
-        1_000_000  # battery [%] that lacks on the way to the parking cell; that is needed
-    )
+    least = 1_000_000  # battery [%] that lacks on the way to the parking cell
+    fewest = 1_000_000  # battery [%] that a move and the way from there need
     levels = contests(mission, uavs, i)
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
