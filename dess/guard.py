@@ -204,7 +204,8 @@ def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
         if closed_x >= 0 and not (closed_x == to_x and closed_y == to_y):
             closed[count] = closed_y * width + closed_x
             count += 1
-    around = length_around(chart.zones, closed[:count], x, y, to_x, to_y)
+    zones, ways, rows = chart.zones, chart.ways, chart.rows
+    around = length_around(zones, ways, rows, closed[:count], x, y, to_x, to_y)
     if ends_soon(mission, uavs[i]):
         return around
     lacking = mission.charge_complete - mission.charge_start

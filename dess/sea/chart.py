@@ -170,32 +170,61 @@ def _spread(zones, sources, lengths, nearest):
 
 
 @kernel
-def length_around(zones, closed, x, y, to_x, to_y):
+def length_around(zones, ways, rows, closed, x, y, to_x, to_y):
     """The cells on the shortest way between two cells that avoids closed cells, or ``FAR``.
 
+    This is A*. The way without closed cells is a lower bound, which each step from a cell keeps or
+    misses by two cells. So the next cell is the last of ``near`` while there is one, and few cells
+    beside the way are looked at.
+
     Args:
-        zones: (H, W) as in ``Chart``.
+        zones, ways, rows: As in ``Chart``.
         closed: (N,) the numbers of cells that the way must not enter, counted row by row.
         x, y: Where the way begins.
         to_x, to_y: Where it ends.
     """
     height, width = zones.shape
-    queue, lengths = np.empty(zones.size, np.int64), np.full(zones.size, FAR, np.int16)
+    lengths = np.full(zones.size, FAR, np.int16)
     lengths[closed] = -1
-    start, end = y * width + x, to_y * width + to_x
-    queue[0], lengths[start] = start, 0
-    first, last = 0, 1
-    while first < last and lengths[end] == FAR:
-        cell = queue[first]
-        first += 1
+    near, far = np.empty(zones.size, np.int64), np.empty(zones.size, np.int64)
+    near[0], nears, fars = y * width + x, 1, 0
+    lengths[near[0]] = 0
+    bound = _at_least(ways, rows, width, x, y, to_x, to_y)
+    while nears + fars > 0:
+        if nears == 0:
+            near, far, nears, fars, bound = far, near, fars, 0, bound + 2
+        nears -= 1
+        x, y = near[nears] % width, near[nears] // width
+        length = lengths[near[nears]]
+        left = _at_least(ways, rows, width, x, y, to_x, to_y)
+        if left == 0:
+            return np.int64(length)
+        if length + left < bound:
+            continue  # a shorter way to this cell has been found since it was put there
         for step_x, step_y in ((0, -1), (1, 0), (0, 1), (-1, 0)):
-            x, y = cell % width + step_x, cell // width + step_y
-            if 0 <= x < width and 0 <= y < height and zones[y, x] != NO_FLY:
-                to = y * width + x
-                if lengths[to] == FAR:
-                    queue[last], lengths[to] = to, lengths[cell] + 1
-                    last += 1
-    return np.int64(lengths[end])
+            next_x, next_y = x + step_x, y + step_y
+            if not (0 <= next_x < width and 0 <= next_y < height):
+                continue
+            to = next_y * width + next_x
+            if zones[next_y, next_x] == NO_FLY or length + 1 >= lengths[to]:
+                continue
+            lengths[to] = length + 1
+            if _at_least(ways, rows, width, next_x, next_y, to_x, to_y) < left:
+                near[nears] = to
+                nears += 1
+            else:
+                far[fars] = to
+                fars += 1
+    return np.int64(FAR)
+
+
+@inlined
+def _at_least(ways, rows, width, x, y, to_x, to_y):
+    """The cells on the way between two cells or, on a large grid, a lower bound of them."""
+    if ways is None or (rows is not None and rows[to_y * width + to_x] < 0):
+        return abs(x - to_x) + abs(y - to_y)
+    to = to_y * width + to_x
+    return np.int64(ways[to if rows is None else rows[to], y * width + x])
 
 
 @inlined
@@ -235,4 +264,5 @@ def _distance_on_large_grid(ways, rows, zones, cell, to):
         return np.int64(ways[rows[cell], to])
     width = zones.shape[1]
     none = np.empty(0, np.int64)
-    return length_around(zones, none, cell % width, cell // width, to % width, to // width)
+    x, y, to_x, to_y = cell % width, cell // width, to % width, to // width
+    return length_around(zones, ways, rows, none, x, y, to_x, to_y)
