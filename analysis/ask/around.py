@@ -14,9 +14,11 @@ import numpy as np
 from dess import InputError
 from dess.analysis.answers import costs
 from dess.analysis.ask.question import LONGEST, Question
+from dess.analysis.metrics import metric_of
 from dess.analysis.names import parameter
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.tables import Results, load_results
+from dess.analysis.stats.differences import compare
 from dess.analysis.study.study import study_from
 from dess.analysis.tables import INTERVALS, Table, counts
 from dess.policies.registry import is_path
@@ -27,7 +29,7 @@ FACTOR = 2  # harder conditions have twice the wind, the failures and the data
 WIND, HOURS = 0.5, 100  # without any: the wind as a share of the cruising speed; between failures
 
 
-def around(results: Results, scenario: str, missions: int = 300) -> Question | None:
+def around(results: Results, scenario: str, missions: int = 100) -> Question | None:
     """The question of what changes if the cheapest fleet or its conditions change a little.
 
     A fleet for several conditions is asked about under the last of them.
@@ -101,11 +103,9 @@ def table(results: Results) -> Table:
     """
     found, required = load_results(_place(results)), costs.required(results)
     start, *rows = [point.values for point in found.store.manifest.points]
-    words = ["the fleet: " + costs.fleets(found)[0]]
-    for row in rows:
-        ((field, value),) = [(f, v) for f, v in row.items() if v != start.get(f)]
-        name, is_list = parameter(field), isinstance(value, list | tuple)
-        words.append(f"{name.within} doubled" if is_list else name.words(value))
+    changes = [{f: v for f, v in row.items() if v != start.get(f)} for row in rows]
+    words = ["the fleet: " + costs.fleets(found)[0], *map(_in_words, changes)]
+    refused = [change for change in _changes(found.scenario(0)) if change not in changes]
     data = costs.priced(found)
     ends = ("_low", "", "_high")  # in this order or, where less is better, in the other one
     leads = [[costs.lead(data[m + end], m, q) for end in ends] for m, q in required.items()]
@@ -115,9 +115,23 @@ def table(results: Results) -> Table:
     data = data.iloc[np.lexsort((data["lead"], data["point"] > 0))].reset_index(drop=True)
     cells = costs.cells(data.assign(condition="", fleet=data["change"]), required)
     cells = cells.drop(columns="Policy").rename(columns={"Fleet": "What if"})
+    differences = compare(found.missions, 0, [*required], correction=None, of="point")
+    differences = differences.set_index(["metric", "point"])[["difference", "low", "high"]]
+    for of in map(metric_of, required):
+        told = [of.change(*row) for row in differences.loc[of.column].loc[data["point"][1:]].values]
+        place = cells.columns.get_loc(of.name) + 1
+        cells.insert(place, f"Change of {of.within}", ["", *told])
     cells["Requirements"], cells["Missions"] = data["kept"], counts(data["n"])
     caption = (
-        f"The fleet, one more of it, and harder conditions: means with {INTERVALS}; requirements "
-        "are kept or broken if the whole intervals say so"
+        f"The fleet, one more of it, and harder conditions: means, and changes on the same missions, "
+        f"with {INTERVALS}; requirements are kept or broken if the whole intervals say so"
     )
+    if refused:
+        caption += f". Refused by the scenario: {'; '.join(map(_in_words, refused))}"
     return Table(cells, caption, data)
+
+
+def _in_words(change: dict[str, Any]) -> str:
+    ((field, value),) = change.items()
+    name, is_list = parameter(field), isinstance(value, list | tuple)
+    return f"{name.within} doubled" if is_list else name.words(value)

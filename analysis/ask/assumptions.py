@@ -20,6 +20,7 @@ def assumptions(results: Results) -> list[str]:
     varied = {f.removeprefix("data_sheet.") for f in results.store.manifest.values[0]}
     wide, high = (printed(cells * units.cell, "m") for cells in space.size)
     quota = "" if space.quota == 0 else " with its quota filled"
+    listed = "what the file of the nodes says"
 
     def given(field: str, otherwise: str) -> str:
         """A field of the sheet in words."""
@@ -37,8 +38,8 @@ def assumptions(results: Results) -> list[str]:
         f"node; UAVs fly {value_text(space.altitude)} m high.",
         f"A battery charges from empty to full in {given('charging', '')}; of it, "
         f"{given('reserve', 'nothing')} is kept in reserve.",
-        f"Data: {given('data_rate', '')} at each of {nodes}, {given('backlog', 'none')} at the "
-        "start.",
+        f"Data: {given('data_rate', listed)} at each of {nodes}, "
+        f"{given('backlog', listed if space.arrivals.initial else 'none')} at the start.",
         f"Radio: an SNR of {given('snr', 'a link budget')}, path loss exponent "
         f"{value_text(space.path_loss_exponent)}; range {given('range', 'without end')}; "
         f"{given('bandwidth', '')} with at most {given('max_rate', 'any bit/s/Hz')}.",

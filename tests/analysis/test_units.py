@@ -133,7 +133,7 @@ def test_the_fleet_is_asked_about_with_one_more_and_in_harder_conditions(searche
         {"data_sheet.mtbf": "100 h"},
         {"data_sheet.data_rate": "6 MB/h"},
     ]
-    question.ask()
+    found = question.ask()
     assert around.is_known(searched)
     cells, _, data = around.table(searched)
     assert cells["What if"][0].startswith("the fleet: ")
@@ -142,6 +142,10 @@ def test_the_fleet_is_asked_about_with_one_more_and_in_harder_conditions(searche
         is_kept = row.success_low >= 0.6 and row.collection_ratio_low >= 0.3
         assert (row.kept == "kept") == (is_kept and row.age_h_high <= 50 / 60)
     assert data["point"][0] == 0
+    for metric, name in (("success", "success"), ("age_h", "age of information")):
+        means = found.missions.groupby("point")[metric].mean()[data["point"]].to_numpy()
+        told = [metric_of(metric).change(mean - means[0], 0, 0).split()[0] for mean in means[1:]]
+        assert [text.split()[0] for text in cells[f"Change of {name}"][1:]] == told
     assert data["lead"][1:].is_monotonic_increasing
 
 
