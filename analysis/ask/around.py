@@ -123,8 +123,8 @@ def table(results: Results) -> Table:
         cells.insert(place, f"Change of {of.within}", ["", *told])
     cells["Requirements"], cells["Missions"] = data["kept"], counts(data["n"])
     caption = (
-        f"The fleet, one more of it, and harder conditions: means, and changes on the same missions, "
-        f"with {INTERVALS}; requirements are kept or broken if the whole intervals say so"
+        "The fleet, one more of it, and harder conditions: means, and changes on the same "
+        f"missions, with {INTERVALS}; requirements are kept or broken if whole intervals say so"
     )
     if refused:
         caption += f". Refused by the scenario: {'; '.join(map(_in_words, refused))}"
