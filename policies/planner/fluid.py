@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
-from dess.guard import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
+from dess.guard.battery import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
 from dess.sea.chart import distance, in_zone, is_open
 from dess.sections.charging import gain
 from dess.sections.failures import working_pads
