@@ -33,9 +33,10 @@ import dess
 from dess.code.libraries import MissingLibraryError
 from dess.code.sources import path_of
 from dess.errors import InputError, one_of, shown
+from dess.fields import SAMPLED
 from dess.files.reading import Missing, paths_in, read_text
 from dess.policies.learner.config import CHECKPOINT, CONFIG, ranges_of, read_description
-from dess.scenario import SAMPLED, ScenarioSpace, load_scenario, scenario_names
+from dess.scenario import ScenarioSpace, load_scenario, scenario_names
 from dess.view import View
 
 

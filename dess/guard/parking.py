@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
+from dess.fields import MOST_ZONES
 from dess.guard.battery import will_charge
 from dess.guard.ways import battery_of_way, is_crowded, is_parked, path_length
-from dess.scenario import MOST_ZONES
 from dess.sea.chart import distance
 from dess.sections.charging import slots_to_charge
 from dess.sections.failures import working_pads
