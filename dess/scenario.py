@@ -118,9 +118,6 @@ class Constants(Fields):
         """
         if field not in self.numeric:
             raise InputError(f"field: {field!r} is not a number{one_of(field, self.numeric)}")
-        return self._limits(field)
-
-    def _limits(self, field: str) -> tuple[float, float]:
         between = {
             "uavs": (1, min(self.zone_cells, MOST_UAVS)),
             "pads": (1, self.zone_cells),
@@ -293,7 +290,7 @@ def _out_of_range(c: Constants) -> Iterator[str]:
     values = {name: getattr(c, name) for name in SAMPLED}
     ends = {name: (of, of) if is_number(of) else of for name, of in values.items()}
     for name, (low, high) in ends.items():
-        least, most = c._limits(name)
+        least, most = c.limits(name)
         if not least <= low <= high <= most:
             given = low if low == high else [low, high]
             reason = f" (cells of the zone, at most {MOST_UAVS})" if name == "uavs" else ""
