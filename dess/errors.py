@@ -117,6 +117,16 @@ def one_of(name: object, names: Iterable[str], also: str = "") -> str:
     return f"{meant}; allowed: {allowed or 'none'}"
 
 
+def check_known(name: str, value: object, known: Iterable[str], also: str = "") -> None:
+    """Refuse a value that is none of some names; ``also`` is as for ``one_of``.
+
+    Raises:
+        InputError: If it is another one.
+    """
+    if value not in (names := [*known]):
+        raise InputError(f"{name}: {shown(value)} is unknown{one_of(value, names, also)}")
+
+
 def validated(
     model: "type[BaseModel]", values: dict[str, Any], where: str, context: str = ""
 ) -> Any:

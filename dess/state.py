@@ -14,7 +14,8 @@ import numpy as np
 from dess import streams
 from dess.code.kernels import kernel
 from dess.errors import InputError, check_type
-from dess.scenario import MOST_ZONES, SAMPLED, AnyScenario, Scenario, ScenarioSpace, loaded
+from dess.fields import MOST_ZONES, SAMPLED
+from dess.scenario import AnyScenario, Scenario, ScenarioSpace, loaded
 from dess.sections import fleet, wind
 from dess.sections.failures import MOST_PADS
 

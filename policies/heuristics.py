@@ -9,8 +9,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from dess import guard, streams
+from dess import streams
 from dess.code.kernels import inlined, kernel
+from dess.guard.battery import margin, must_charge, slots_left, slots_needed
+from dess.guard.moves import contest, contests, guard, safe_moves
+from dess.guard.parking import parking_cell, parking_memory, stays
+from dess.guard.ways import path_length, round_trip
 from dess.rules import data_left
 from dess.sea.chart import distance, spread
 from dess.sections.landing import flies
@@ -40,9 +44,7 @@ class Random:
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
-        return _choose(
-            view.state.missions, view.state.uavs, guard.guard(view), view.mission, view.uav
-        )
+        return _choose(view.state.missions, view.state.uavs, guard(view), view.mission, view.uav)
 
 
 class RandomUnguarded:
@@ -115,10 +117,10 @@ def _choose(missions, uavs, allowed, rows_mission, rows_uav):
     actions = np.empty(len(rows_mission), np.int64)
     for row in range(len(rows_mission)):
         i, mission, team = rows_uav[row], missions[rows_mission[row]], uavs[rows_mission[row]]
-        levels = guard.contests(mission, team, i)
+        levels = contests(mission, team, i)
         moves = count = 0
         for action in range(4):
-            if allowed[row, action] and guard.contest(levels, action) == 0:
+            if allowed[row, action] and contest(levels, action) == 0:
                 moves |= 1 << action
                 count += 1
         actions[row] = HOVER
@@ -139,7 +141,7 @@ def _decide(
     kind, missions, uavs, residual, sensors, nodes, circuit, chart, reach, rows_mission, rows_uav
 ):  # fmt: skip
     actions = np.empty(len(rows_mission), np.int64)
-    memory = guard.parking_memory(chart, uavs.shape[1])
+    memory = parking_memory(chart, uavs.shape[1])
     last, left = -1, 0.0
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
@@ -156,11 +158,11 @@ def _decide(
 def _action(kind, mission, team, i, data, left, sensors, nodes, circuit, chart, reach, memory):
     """The action of UAV ``i``; ``left`` are all data, ``memory`` is that of its parking cell."""
     u = team[i]
-    charge = guard.must_charge(mission, u, left)
-    home = guard.stays(u)
+    charge = must_charge(mission, u, left)
+    home = stays(u)
     if charge:
-        home = guard.parking_cell(mission, team, i, chart, memory, reach)
-    safe = guard.safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
+        home = parking_cell(mission, team, i, chart, memory, reach)
+    safe = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
     goal_x, goal_y = home.x, home.y
     node = _goal(kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach)
     if node >= 0:
@@ -172,14 +174,14 @@ def _action(kind, mission, team, i, data, left, sensors, nodes, circuit, chart, 
 def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
     """The safe action that brings UAV ``i`` nearest to its goal; contested cells cost more."""
     u = team[i]
-    levels = guard.contests(mission, team, i)
+    levels = contests(mission, team, i)
     best, least = HOVER, 1e18
     for action in range(5):
         if not safe >> action & 1:
             continue
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-        cost = guard.path_length(mission, team, i, chart, None, x, y, goal_x, goal_y)
-        cost += _CONTEST_COST[guard.contest(levels, action)]
+        cost = path_length(mission, team, i, chart, None, x, y, goal_x, goal_y)
+        cost += _CONTEST_COST[contest(levels, action)]
         if cost < least:
             best, least = action, cost
     return best
@@ -191,9 +193,9 @@ def _goal(
 ):  # fmt: skip
     """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
     u = team[i]
-    spare = guard.slots_needed(mission, u)
+    spare = slots_needed(mission, u)
     if charge:
-        spare = guard.slots_left(mission, u) - 1 - guard.margin(mission, u) - home.wait
+        spare = slots_left(mission, u) - 1 - margin(mission, u) - home.wait
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best, node = 0.0, -1
     for k in range(mission.nodes):
@@ -203,7 +205,7 @@ def _goal(
         slots = _slots(u, chart, x, y)
         spent = slots
         if charge:
-            spent = guard.round_trip(mission, u, chart, x, y, home, reach)
+            spent = round_trip(mission, u, chart, x, y, home, reach)
         if spent > spare:
             continue
         if kind == _NEAREST:

@@ -33,9 +33,10 @@ import dess
 from dess.code.libraries import MissingLibraryError
 from dess.code.sources import path_of
 from dess.errors import InputError, one_of, shown
+from dess.fields import SAMPLED
 from dess.files.reading import Missing, paths_in, read_text
 from dess.policies.learner.config import CHECKPOINT, CONFIG, ranges_of, read_description
-from dess.scenario import SAMPLED, ScenarioSpace, load_scenario, scenario_names
+from dess.scenario import ScenarioSpace, load_scenario, scenario_names
 from dess.view import View
 
 
@@ -66,25 +67,22 @@ class Policy(Protocol):
 
 GROUP = "dess.policies"
 
-# Name -> (module and class, description).
+# The classes of ``dess.policies.heuristics`` and of ``dess.policies.planner``, and what they do.
 HEURISTICS = {
-    "random": ("dess.policies.heuristics:Random", "a random safe move, clear of teammates"),
+    "random": ("Random", "a random safe move, clear of teammates"),
     "random-unguarded": (
-        "dess.policies.heuristics:RandomUnguarded",
+        "RandomUnguarded",
         "the same without the return guard: it shows what the guard is worth",
     ),
-    "nearest": ("dess.policies.heuristics:Nearest", "the nearest node with enough data"),
-    "greedy": ("dess.policies.heuristics:Greedy", "the best residual data for the distance"),
-    "tour": (
-        "dess.policies.heuristics:Tour",
-        "a fixed circuit through the nodes, split among the UAVs",
-    ),
-    "age": ("dess.policies.heuristics:Age", "the stalest data for the distance"),
+    "nearest": ("Nearest", "the nearest node with enough data"),
+    "greedy": ("Greedy", "the best residual data for the distance"),
+    "tour": ("Tour", "a fixed circuit through the nodes, split among the UAVs"),
+    "age": ("Age", "the stalest data for the distance"),
 }
 PLANNERS = {
-    "planner": ("dess.policies.planner:Planner", "a plan for the whole team, kept up to date"),
-    "planner-short": ("dess.policies.planner:ShortPlanner", "the same with a fifth of the search"),
-    "planner-long": ("dess.policies.planner:LongPlanner", "the same with a longer search"),
+    "planner": ("Planner", "a plan for the whole team, kept up to date"),
+    "planner-short": ("ShortPlanner", "the same with a fifth of the search"),
+    "planner-long": ("LongPlanner", "the same with a longer search"),
 }
 SHIPPED = HEURISTICS | PLANNERS
 
@@ -144,7 +142,8 @@ def load(name: str | Path) -> Policy:
     """
     is_typed, name = isinstance(name, TypedByUser), str(name)
     if name in SHIPPED:
-        return _made(name, SHIPPED[name][0], lambda: _class_of(*SHIPPED[name][0].split(":")))
+        module = f"dess.policies.{'planner' if name in PLANNERS else 'heuristics'}"
+        return _made(name, module, lambda: _class_of(module, SHIPPED[name][0]))
     if folder := folder_of(name):
         from dess.policies.learner.trained import load_policy  # imports numba
 
@@ -162,11 +161,10 @@ def load(name: str | Path) -> Policy:
         if not os.path.isfile(path):  # False for a name that no file can have
             raise InputError(f"policy: {path}: no such file; allowed: FILE.py:CLASS")
         return _made(kind, str(path), lambda: _class_of(_importable(path), kind))
-    outside = _outside()
-    if name not in outside:
-        _check_untrained(Path(name))
-        raise InputError(f"policy: {shown(name)} is unknown{one_of(name, names(), _OTHERS)}")
-    return _made(name, outside[name].value, outside[name].load)
+    if point := _outside().get(name):
+        return _made(name, point.value, point.load)
+    _check_untrained(Path(name))
+    raise InputError(f"policy: {shown(name)} is unknown{one_of(name, names(), _OTHERS)}")
 
 
 def folder_of(name: str) -> Path | None:

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from dess import guard, rules
+from dess import rules
 from dess.channel import empty_scratch
 from dess.code.kernels import kernel
+from dess.guard import battery, moves, parking, ways
 from dess.policies import heuristics
 from dess.sea.chart import FAR, distance, is_open
 from dess.state import SENSOR, STEP_X, STEP_Y
@@ -50,12 +51,12 @@ def advance(
 
 @kernel
 def must_charge(mission, u, data):
-    return guard.must_charge(mission, u, data)
+    return battery.must_charge(mission, u, data)
 
 
 @kernel
 def path(mission, uavs, i, chart, x, y):
-    return guard.path_length(mission, uavs, i, chart, None, uavs[i].x, uavs[i].y, x, y)
+    return ways.path_length(mission, uavs, i, chart, None, uavs[i].x, uavs[i].y, x, y)
 
 
 @kernel
@@ -70,14 +71,14 @@ def distances(chart, x, y, to):
 
 @kernel
 def parking_cell(mission, uavs, i, chart, reach=None):
-    memory = guard.parking_memory(chart, len(uavs))
-    return guard.parking_cell(mission, uavs, i, chart, memory, reach)
+    memory = parking.parking_memory(chart, len(uavs))
+    return parking.parking_cell(mission, uavs, i, chart, memory, reach)
 
 
 @kernel
 def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):
     """The node that a heuristic chooses, and the way there."""
-    charge = guard.must_charge(mission, uavs[i], rules.data_left(mission, residual))
+    charge = battery.must_charge(mission, uavs[i], rules.data_left(mission, residual))
     home = parking_cell(mission, uavs, i, chart, reach)
     node = heuristics._goal(
         kind, mission, uavs, i, residual, sensors, nodes, np.zeros(0, np.int64), chart, charge,
@@ -91,5 +92,5 @@ def step_cost(mission, uavs, i, chart, action, x, y):
     """What a heuristic counts for an action of a UAV that flies to a cell."""
     u = uavs[i]
     after = u.x + STEP_X[action], u.y + STEP_Y[action]
-    way = guard.path_length(mission, uavs, i, chart, None, after[0], after[1], x, y)
-    return way, guard.contest(guard.contests(mission, uavs, i), action)
+    way = ways.path_length(mission, uavs, i, chart, None, after[0], after[1], x, y)
+    return way, moves.contest(moves.contests(mission, uavs, i), action)

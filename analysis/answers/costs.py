@@ -28,7 +28,7 @@ from dess.analysis.stats.verdict import membership, on_front
 from dess.analysis.study.cheapest import PARTS, Answer, Cheapest, CheapestChoice, Costs
 from dess.analysis.tables import CHECKED, INTERVALS, MOST_ROWS, Table, counts
 from dess.errors import one_of
-from dess.scenario import ZONE_PADS
+from dess.fields import ZONE_PADS
 
 MISSED, OPEN, MET = "missed", "open", "met"  # the most serious first
 VERDICTS = {MET: "shown", OPEN: "not shown", MISSED: "refuted"}  # the words used in tables

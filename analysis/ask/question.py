@@ -35,10 +35,11 @@ from dess.analysis.study.cheapest import Cheapest, Costs
 from dess.analysis.study.design import MAX_SIZE, Grid, Table
 from dess.analysis.study.study import Study, study_from
 from dess.errors import one_of, validation_line
+from dess.fields import SAMPLED, dotted, fields_of
 from dess.files.reading import paths_in
 from dess.files.writing import write_file
 from dess.policies.registry import typed
-from dess.scenario import SAMPLED, ScenarioSpace, dotted, fields_of, is_scenario_name, load_scenario
+from dess.scenario import ScenarioSpace, is_scenario_name, load_scenario
 
 WHAT_IF = "what-if"
 RANGES = (*SAMPLED, "initial_data")  # fields that hold [low, high]

@@ -22,11 +22,11 @@ from pydantic import Field, TypeAdapter
 from dess import InputError
 from dess.analysis.bound import Bound
 from dess.analysis.results.chunks import Chunk, name_of, short_hash
+from dess.fields import MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS
 from dess.files.reading import paths_in, read_bytes
 from dess.files.tables import LIMIT, check_size, parquet_of
 from dess.files.writing import write_file
 from dess.record import EVENT_COLUMNS, EVENT_NAMES, MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
-from dess.scenario import MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS
 from dess.state import END_NAMES
 from dess.streams import MAX_REPLICATION
 

@@ -18,12 +18,13 @@ from dess.analysis.results.event_log import causes
 from dess.analysis.results.provenance import Origin
 from dess.analysis.results.tables import Results
 from dess.analysis.study.stopping import Text
+from dess.fields import SAMPLED
 from dess.files.documents import Document
 from dess.files.reading import paths_in, read_bytes
 from dess.files.tables import LIMIT
 from dess.policies.registry import TRAINED, Policy, load_team
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
-from dess.scenario import SAMPLED, Scenario, ScenarioSpace
+from dess.scenario import Scenario, ScenarioSpace
 from dess.state import END_NAMES, sample_scenario
 
 

@@ -22,8 +22,9 @@ from dess.analysis.results.store import Place, Store
 from dess.analysis.study.cheapest import Cheapest, CheapestChoice
 from dess.analysis.study.selection import Choice, Selection
 from dess.errors import one_of
+from dess.fields import dotted
 from dess.record import MISSION_RECORD
-from dess.scenario import SEA, ScenarioSpace, dotted, is_scenario_name, load_scenario
+from dess.scenario import SEA, ScenarioSpace, is_scenario_name, load_scenario
 
 
 def of_folder(folder: str | Path, manifest: Manifest, cell: Cell, replication: int) -> str:

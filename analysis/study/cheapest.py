@@ -17,8 +17,10 @@ from dess.analysis.names import DECISIONS
 from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, needed
 from dess.analysis.study.stopping import MOST, Line, Samples, StrictTable, of_its_kind
 from dess.errors import shown
-from dess.scenario import Integer, Number, ScenarioSpace, is_number
+from dess.fields import is_number
+from dess.scenario import ScenarioSpace
 from dess.sections.data_sheet import quantity_of
+from dess.sections.section import Integer, Number
 
 # A price; the sums of all missions that may be planned are still finite.
 Price = Annotated[float, Field(ge=0, le=10**12, allow_inf_nan=False)]

@@ -20,9 +20,10 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from dess import InputError
 from dess.analysis.study.stopping import StrictTable, of_its_kind
 from dess.errors import shown
-from dess.scenario import SEA, Integer, Scenario, dotted, fields_of
+from dess.fields import dotted, fields_of
+from dess.scenario import SEA, Scenario
 from dess.sea.families import seas_of
-from dess.sections.section import tuples
+from dess.sections.section import Integer, tuples
 from dess.streams import MAX_REPLICATION, MAX_SEED
 
 # The factor of a Saltelli design that is not a field of the scenario: the replication.

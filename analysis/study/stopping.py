@@ -20,8 +20,7 @@ from dess import InputError
 from dess.analysis.metrics import ALWAYS, MEASURES, metric_of
 from dess.analysis.stats.intervals import LEVEL, bounded_ends
 from dess.errors import listed, one_of, shown, validation_line
-from dess.scenario import Integer, Number
-from dess.sections.section import plain
+from dess.sections.section import Integer, Number, plain
 
 _METRICS = [*ALWAYS, *MEASURES]
 

@@ -27,21 +27,19 @@ from dess.analysis.study.selection import Selection
 from dess.analysis.study.stopping import MOST, Precision, StrictTable, Text
 from dess.batch import check_slotted
 from dess.errors import cut, listed, one_of, validation_line
+from dess.fields import dotted, merged
 from dess.files.reading import Shipped
 from dess.policies.registry import load_team, typed
 from dess.record import measures_of
 from dess.scenario import (
     SEA,
-    Integer,
     ScenarioSpace,
-    dotted,
     is_scenario_name,
     load_scenario,
-    merged,
     scenario_at,
     validated,
 )
-from dess.sections.section import plain, tuples
+from dess.sections.section import Integer, plain, tuples
 from dess.streams import MAX_SEED
 
 Engine = Literal["batch", "events"]

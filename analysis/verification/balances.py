@@ -20,8 +20,9 @@ from dess.analysis.verification.checks import (
     Check,
 )
 from dess.analysis.verification.measurements import CrossCheck, Log, longest
+from dess.fields import SAMPLED
 from dess.files.reading import paths_in
-from dess.scenario import SAMPLED, Scenario
+from dess.scenario import Scenario
 from dess.sections.fleet import type_of
 from dess.sections.wind import surcharges
 from dess.state import EAST, NORTH, SOUTH, WEST

@@ -26,7 +26,8 @@ from dess.analysis.verification.checks import (
     uniform_fit,
 )
 from dess.analysis.verification.measurements import Log
-from dess.scenario import SAMPLED, ScenarioSpace
+from dess.fields import SAMPLED
+from dess.scenario import ScenarioSpace
 from dess.sections.fleet import type_of
 
 _FEWEST = 30  # with this many values or more, their sum is taken as normal

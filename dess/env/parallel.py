@@ -17,8 +17,7 @@ from pettingzoo import ParallelEnv
 
 from dess.env.render import Window, draw
 from dess.env.stepper import OUTCOME, MissionStepper, checked_actions
-from dess.errors import InputError, one_of
-from dess.errors import shown as quoted
+from dess.errors import InputError, check_known
 from dess.observations.components import Components, component_bounds
 from dess.observations.observer import Observer, rows_of
 from dess.record import MissionRecord
@@ -90,8 +89,7 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         """
         given = {"render_mode": render_mode or _MODES[0], "mask": mask, "ended": ended}
         for name, value in given.items():
-            if value not in (known := _CHOICES[name]):
-                raise InputError(f"{name}: {quoted(value)} is unknown{one_of(value, known)}")
+            check_known(name, value, _CHOICES[name])
         self.render_mode = render_mode
         self._mask_in_info, self._stay = mask == "info", ended == "stay"
         self._stepper = MissionStepper(scenario, 1, seed)

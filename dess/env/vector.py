@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from dess.env.stepper import OUTCOME, MissionStepper, Seeds, checked_actions
-from dess.errors import InputError, one_of
+from dess.errors import InputError, check_known
 from dess.observations.observer import Observation, Observer, rows_of
 from dess.record import Records
 from dess.scenario import AnyScenario
@@ -118,8 +118,8 @@ class HarvestVectorEnv(VectorEnv):
             InputError: If a seed or the replication is out of range, there are not N seeds, or
                 there is another option.
         """
-        for name in {*(options or ())} - {"replication"}:
-            raise InputError(f"options: {name!r} is unknown{one_of(name, ['replication'])}")
+        for name in options or ():
+            check_known("options", name, ["replication"])
         self._stepper.start(seed, options)
         self._waiting = np.zeros(self.missions, np.bool_)  # over before the slot, with NextStep
         observations = self._observe(self.state.uavs["active"])
@@ -143,8 +143,8 @@ class HarvestVectorEnv(VectorEnv):
             raise InputError("step: no mission is in progress; allowed: reset() first")
         checked = checked_actions(actions, (self.num_envs,))
         outcome = self._stepper.step(checked.reshape(self.state.uavs.shape))
-        info = self._outcome(outcome)
-        terminated, truncated = np.zeros(self.num_envs, np.bool_), np.zeros(self.num_envs, np.bool_)
+        info: dict[str, Any] = {name: outcome.ravel()[name].copy() for name in _INFOS}
+        terminated, truncated = np.zeros((2, self.num_envs), np.bool_)
         shown = outcome["acted"]
         if np.count_nonzero(self.state.missions["active"]) < self.missions:
             terminated, truncated, shown = self._turn(outcome, info)
@@ -165,11 +165,6 @@ class HarvestVectorEnv(VectorEnv):
     def _observe(self, shown: np.ndarray) -> Observation:
         observations, self._mask = self._observer.observe_all(self.state, shown)
         return observations
-
-    def _outcome(self, outcome: np.ndarray) -> dict[str, Any]:
-        """The outcome of a slot, by row."""
-        rows = outcome.ravel()
-        return {name: rows[name].copy() for name in _INFOS}
 
     def _turn(
         self, outcome: np.ndarray, info: dict[str, Any]

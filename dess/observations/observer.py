@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 
 from dess.channel import world_of
-from dess.errors import InputError, one_of, shown
+from dess.errors import check_known
 from dess.observations.components import Components, component_bounds
 from dess.observations.maps import Maps
 from dess.observations.sets import Sets, sea_of
@@ -65,8 +65,7 @@ class Observer:
         Raises:
             InputError: If there is no such kind, or it does not fit the scenario.
         """
-        if kind not in KINDS:
-            raise InputError(f"observation: {shown(kind)} is unknown{one_of(kind, KINDS)}")
+        check_known("observation", kind, KINDS)
         self.kind, self.guarded, self._chart = kind, guarded, scenario.chart
         self._encoder: Any = Components(scenario) if kind == "state" else encoder_of(kind, scenario)
         boxes = [spaces.Box(-np.inf, np.inf, shape) for shape in self._encoder.shapes]

@@ -18,7 +18,7 @@ from dess.channel import World
 from dess.code.kernels import exp, inlined, kernel, log10
 from dess.observations import states as column
 from dess.observations.states import CompactStates
-from dess.sea.chart import NO_FLY, Chart, spread
+from dess.sea.chart import Chart, is_open, spread
 from dess.state import HOVER, STEP_X, STEP_Y
 
 OWN, NODE, MATE, ZONE, ACTION = 30, 24, 17, 11, 14
@@ -191,9 +191,8 @@ class Sets:
 
 @kernel
 def _encode(states, rows_mission, rows_uav, sea, tables, out):
-    zones, cells = sea.chart.zones, sea.nodes
-    count, (rows, columns) = len(cells), zones.shape
-    places, is_open = np.empty(5, np.int64), np.empty(5, np.bool_)
+    count, columns = len(sea.nodes), sea.chart.zones.shape[1]
+    places, opens = np.empty(5, np.int64), np.empty(5, np.bool_)
     data, units = np.empty(count, np.float32), np.float32(1.0) / sea.unit
     memory = (
         np.empty((7, count), np.float32),
@@ -208,10 +207,8 @@ def _encode(states, rows_mission, rows_uav, sea, tables, out):
         x, y = np.int64(team[i, column.X]), np.int64(team[i, column.Y])
         for action in range(5):
             to_x, to_y = x + STEP_X[action], y + STEP_Y[action]
-            is_open[action] = (
-                0 <= to_x < columns and 0 <= to_y < rows and zones[to_y, to_x] != NO_FLY
-            )
-            places[action] = to_y * columns + to_x if is_open[action] else y * columns + x
+            opens[action] = is_open(sea.chart, to_x, to_y)
+            places[action] = to_y * columns + to_x if opens[action] else y * columns + x
         total = np.float32(0.0)
         for k in range(count):
             data[k] = residual[k] * units
@@ -219,7 +216,7 @@ def _encode(states, rows_mission, rows_uav, sea, tables, out):
         mean = total / np.float32(count)
         _own(mission, team, i, sea, mean, total, out[0][row])
         _nodes(team, i, data, sea, tables, places, mean, memory, out[2][row], out[3][row])
-        _actions(team, i, data, sea, tables, places, is_open, mean, memory[2], out[1][row])
+        _actions(team, i, data, sea, tables, places, opens, mean, memory[2], out[1][row])
         _mates(team, i, columns, tables, out[4][row], out[5][row])
         _zones(team, i, sea, tables, places, columns, out[6][row], out[7][row])
 
@@ -228,22 +225,18 @@ def _encode(states, rows_mission, rows_uav, sea, tables, out):
 def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
     """Write the nodes; leave the sums of data times nearness, by move and of all, in memory."""
     me, cells, columns, count = team[i], sea.nodes, sea.chart.zones.shape[1], len(data)
-    (free, crowd, near_0, near_1, near_2, beyond_1, beyond_2), least, sums = memory
+    by_node, least, sums = memory
+    free, crowd, near_0, near_1, near_2, beyond_1, beyond_2 = by_node
     here = tables.ways[places[HOVER]]
     x, y = np.int64(me[column.X]), np.int64(me[column.Y])
     least[:] = 1000
-    crowd[:] = 0.0
+    by_node[1:] = 0.0
     for j in range(len(team)):
         if j != i and team[j, column.ACTIVE] and not team[j, column.CHARGING]:
             there = tables.ways[team[j, column.Y] * columns + team[j, column.X]]
             for k in range(count):
                 least[k] = min(least[k], there[k])
                 crowd[k] += tables.near[there[k], 1]
-    near_0[:] = 0.0
-    near_1[:] = 0.0
-    near_2[:] = 0.0
-    beyond_1[:] = 0.0
-    beyond_2[:] = 0.0
     for k in range(count):
         mine = tables.near[here[k], 1] + np.float32(1e-9)
         crowd[k] = mine / (mine + crowd[k])
@@ -257,17 +250,17 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
                 near_2[k] += own * around[2, k]
                 beyond_1[k] += full * around[1, k]
                 beyond_2[k] += full * around[2, k]
-    needed, own_home = np.int64(me[column.NEEDED]), np.int64(tables.home[places[HOVER]])
-    must_charge, battery = me[column.MUST_CHARGE] > 0, np.int64(me[column.BATTERY])
+    needed, battery = np.int64(me[column.NEEDED]), np.int64(me[column.BATTERY])
+    own_home = np.int64(tables.home[places[HOVER]])
+    must_charge = me[column.MUST_CHARGE] > 0
     per_slot, per_mean = np.float32(1.0) / (needed + 1), np.float32(0.4) / (mean + np.float32(0.01))
     sums[:] = 0.0
     for k in range(count):
         line, way, units = lines[k], np.int64(here[k]), data[k]
         home = np.int64(tables.node_home[k])
-        lead, spare = (
-            np.int64(least[k]) - way,
-            (battery - 1 - home if must_charge else needed) - way,
-        )
+        lead, spare = np.int64(least[k]) - way, needed - way
+        if must_charge:
+            spare = battery - 1 - home - way
         dx, dy = cells[k, 0] - x, cells[k, 1] - y
         near = tables.near[way]
         line[0] = 1.0
@@ -278,22 +271,19 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
         line[5] = near[0]
         line[6] = near[1]
         line[7] = near[2]
-        line[8] = np.float32(min(max(lead, -10), 10)) * np.float32(0.1)
-        line[9] = np.float32(min(max(lead, -2), 2)) * np.float32(0.5)
+        line[8] = _share(lead, 10)
+        line[9] = _share(lead, 2)
         line[10] = crowd[k]
         line[11] = np.float32(min(home, 60)) * np.float32(1 / 30)
-        line[12] = np.float32(min(max(spare, -20), 20)) * np.float32(0.05)
-        line[13] = np.float32(min(max(spare, -4), 4)) * np.float32(0.25)
-        line[14] = near_0[k]
-        line[15] = near_1[k]
-        line[16] = near_2[k]
-        line[17] = beyond_1[k]
-        line[18] = beyond_2[k]
+        line[12] = _share(spare, 20)
+        line[13] = _share(spare, 4)
+        for part in range(5):
+            line[14 + part] = by_node[2 + part, k]
         line[19] = min(np.float32(way) * per_slot, np.float32(3.0))
         line[20] = line[1] * near[1]
         line[21] = min(_rate(sea.rates, dx * dx + dy * dy), np.float32(2.0))
         line[22] = np.float32(min(abs(dx), abs(dy))) * tables.shares[way]
-        line[23] = np.float32(min(max(home - own_home, -20), 20)) * np.float32(0.05)
+        line[23] = _share(home - own_home, 20)
         for move in range(4):
             nearer = np.float32(tables.ways[places[move], k] < here[k])
             moves[move, k] = nearer
@@ -309,6 +299,12 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
         if length > 0:
             east, south = dx * tables.parts[length], dy * tables.parts[length]
             moves[4, k], moves[5, k], moves[6, k], moves[7, k] = -south, east, south, -east
+
+
+@inlined
+def _share(number, most):
+    """A number as a share of the most that counts, within -1..1."""
+    return np.float32(min(max(number, -most), most)) * np.float32(1.0 / most)
 
 
 @inlined
@@ -330,16 +326,11 @@ def _own(mission, team, i, sea, mean, total, line):
             needs += team[j, column.NEEDED]
             if j != i and team[j, column.MUST_CHARGE]:
                 others += 1
-    battery, needed, home = (
-        np.int64(me[column.BATTERY]),
-        np.int64(me[column.NEEDED]),
-        np.int64(me[column.HOME]),
-    )
-    start, complete = (
-        np.int64(mission[column.CHARGE_START]),
-        np.int64(mission[column.CHARGE_COMPLETE]),
-    )
-    slack = battery - 1 - home
+    battery, needed = np.int64(me[column.BATTERY]), np.int64(me[column.NEEDED])
+    home = np.int64(me[column.HOME])
+    start = np.int64(mission[column.CHARGE_START])
+    complete = np.int64(mission[column.CHARGE_COMPLETE])
+    slack, slots = battery - 1 - home, np.float32(max(needs, 1))
     line[0] = battery / 100.0
     line[1] = min(needed, 300) / 100.0
     line[2] = me[column.LATCH]
@@ -357,12 +348,12 @@ def _own(mission, team, i, sea, mean, total, line):
     line[14] = min(active - 1, 8) / 4.0
     line[15] = active == 1
     line[16] = min(mean, np.float32(4.0))
-    line[17] = min(total / np.float32(max(needs, 1)) * np.float32(2.5), np.float32(5.0))
+    line[17] = min(total / slots * np.float32(2.5), np.float32(5.0))
     line[18] = np.log(np.float32(len(sea.nodes))) / np.float32(4.0)
     line[19] = others / np.float32(4.0)
     line[20] = min(len(sea.pads), 4) / 4.0
     line[21] = min(max(start - home, -20), 40) / 40.0
-    line[22] = min(len(sea.nodes) / np.float32(max(needs, 1)), np.float32(3.0))
+    line[22] = min(len(sea.nodes) / slots, np.float32(3.0))
     line[23] = min(needed, 40) / 40.0
     for number in range(5):
         line[24 + number] = sea.constants[number]
@@ -380,26 +371,29 @@ def _mates(team, i, columns, tables, lines, moves):
         number += 1
         if not mate[column.ACTIVE]:
             continue
-        dx, dy = np.int64(mate[column.X]) - me[column.X], np.int64(mate[column.Y]) - me[column.Y]
+        dx = np.int64(mate[column.X]) - me[column.X]
+        dy = np.int64(mate[column.Y]) - me[column.Y]
         way = abs(dx) + abs(dy)
-        slack = np.int64(mate[column.BATTERY]) - 1 - mate[column.HOME]
+        battery, needed = np.int64(mate[column.BATTERY]), np.int64(mate[column.NEEDED])
+        home = np.int64(mate[column.HOME])
+        slack = battery - 1 - home
         line[0] = 1.0
         line[1] = min(way, 60) / 30.0
         line[2] = way <= 1
         line[3] = way <= 2
         line[4] = tables.near[min(way, _FARTHEST), 1]
         line[5] = tables.near[min(way, _FARTHEST), 2]
-        line[6] = mate[column.BATTERY] / 100.0
-        line[7] = min(np.int64(mate[column.NEEDED]), 300) / 100.0
+        line[6] = battery / 100.0
+        line[7] = min(needed, 300) / 100.0
         line[8] = mate[column.CHARGING]
         line[9] = mate[column.MUST_CHARGE]
         line[10] = mate[column.LATCH]
-        line[11] = mate[column.HOME] / 30.0
+        line[11] = home / 30.0
         line[12] = min(slack, 50) / 50.0
-        line[13] = (np.int64(mate[column.BATTERY]) - me[column.BATTERY]) / 50.0
-        line[14] = mate[column.BATTERY] < me[column.BATTERY]
-        line[15] = (np.int64(mate[column.NEEDED]) - me[column.NEEDED]) / 50.0
-        line[16] = mate[column.HOME] == 0
+        line[13] = (battery - me[column.BATTERY]) / 50.0
+        line[14] = battery < me[column.BATTERY]
+        line[15] = (needed - me[column.NEEDED]) / 50.0
+        line[16] = home == 0
         to = moves[:, number - 1]
         to[0], to[1], to[2], to[3] = dy < 0, dx > 0, dy > 0, dx < 0
         to[8] = 1.0
@@ -420,14 +414,12 @@ def _zones(team, i, sea, tables, places, columns, lines, moves):
         for j in range(len(team)):
             mate = team[j]
             if j != i and mate[column.ACTIVE]:
-                ways = tables.zone_ways[mate[column.Y] * columns + mate[column.X]]
+                place = mate[column.Y] * columns + mate[column.X]
+                ways = tables.zone_ways[place]
                 if ways[zone] == 0:
                     charging += mate[column.CHARGING]
                     waiting += mate[column.LATCH] and not mate[column.CHARGING]
-                coming += (
-                    mate[column.MUST_CHARGE]
-                    and ways[zone] == tables.home[mate[column.Y] * columns + mate[column.X]]
-                )
+                coming += mate[column.MUST_CHARGE] and ways[zone] == tables.home[place]
         slack = np.int64(me[column.BATTERY]) - 1 - way
         line[0] = 1.0
         line[1] = min(way, 60) / 30.0
@@ -446,7 +438,7 @@ def _zones(team, i, sea, tables, places, columns, lines, moves):
 
 
 @inlined
-def _actions(team, i, data, sea, tables, places, is_open, mean, sums, lines):
+def _actions(team, i, data, sea, tables, places, opens, mean, sums, lines):
     """Write per action what is known of the cell it leads to."""
     me, cells, columns = team[i], sea.nodes, sea.chart.zones.shape[1]
     for action in range(5):
@@ -454,7 +446,7 @@ def _actions(team, i, data, sea, tables, places, is_open, mean, sums, lines):
         x, y = place % columns, place // columns
         line[0] = action == HOVER
         line[1] = me[column.MASK] >> action & 1
-        line[2] = is_open[action]
+        line[2] = opens[action]
         line[3] = sea.chart.zones[y, x] >= 0
         for j in range(len(team)):
             if j != i and team[j, column.ACTIVE]:
@@ -464,7 +456,7 @@ def _actions(team, i, data, sea, tables, places, is_open, mean, sums, lines):
         for s in range(3):
             # What a move comes nearer to, it is nearer to by one cell; from all else it is farther.
             more, less = np.float32(1.0), np.float32(1.0)
-            if action != HOVER and is_open[action]:
+            if action != HOVER and opens[action]:
                 more, less = _FACTORS[0, s], _FACTORS[1, s]
             for part in range(2):
                 nearer, all_ = sums[action, 4 * part + s], sums[HOVER, 4 * part + s]

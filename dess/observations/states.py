@@ -12,9 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess import guard
 from dess.code.kernels import kernel
 from dess.errors import InputError
+from dess.guard.battery import must_charge, slots_needed
+from dess.guard.moves import safe_moves
+from dess.guard.parking import parking_cell, parking_memory
+from dess.guard.ways import battery_home
 from dess.rules import data_left, legal_moves, may_act
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import Chart, zones_of
@@ -117,7 +120,7 @@ def compact_states(state: State, chart: Chart, guarded: bool) -> CompactStates:
 
 @kernel
 def _fill(missions, uavs, residual, guarded, chart, reach, out_missions, out_uavs, out_residual):
-    memory = guard.parking_memory(chart, uavs.shape[1])
+    memory = parking_memory(chart, uavs.shape[1])
     for b in range(len(missions)):
         mission, team = missions[b], uavs[b]
         out_missions[b, CHARGE_START] = mission.charge_start
@@ -127,19 +130,19 @@ def _fill(missions, uavs, residual, guarded, chart, reach, out_missions, out_uav
         for i in range(mission.uavs):
             u, row = team[i], out_uavs[b, i]
             row[X], row[Y], row[BATTERY] = u.x, u.y, u.battery
-            row[NEEDED] = min(max(guard.slots_needed(mission, u), 0), _MOST)
+            row[NEEDED] = min(max(slots_needed(mission, u), 0), _MOST)
             row[ACTIVE], row[LATCH], row[CHARGING] = u.active, u.latch, u.charging
             row[MASK] = 1 << HOVER
             if not u.active:
                 continue
-            row[MUST_CHARGE] = guard.must_charge(mission, u, data)
-            home = guard.parking_cell(mission, team, i, chart, memory, reach)
-            battery = guard.battery_home(mission, team, i, chart, None, u.x, u.y, home, reach)
+            row[MUST_CHARGE] = must_charge(mission, u, data)
+            home = parking_cell(mission, team, i, chart, memory, reach)
+            battery = battery_home(mission, team, i, chart, None, u.x, u.y, home, reach)
             row[HOME] = min(battery, _MOST)
             if may_act(u):
                 if guarded:
                     charge = row[MUST_CHARGE] != 0
-                    row[MASK] = guard.safe_moves(
+                    row[MASK] = safe_moves(
                         mission, team, i, chart, charge, home, memory.planned, reach
                     )
                 else:

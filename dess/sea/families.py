@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from dess import streams
-from dess.errors import InputError, one_of, shown
+from dess.errors import InputError, check_known, one_of, shown
 from dess.sea.chart import FAR, OPEN, Cell, Rectangle, parking_of, spread, zones_of
 
 T = TypeVar("T")
@@ -169,8 +169,7 @@ def seas_of(name: str) -> list[str]:
     Raises:
         InputError: If there is no such set.
     """
-    if name not in SETS:
-        raise InputError(f"set of seas: {shown(name)} is unknown{one_of(name, SETS)}")
+    check_known("set of seas", name, SETS)
     return [f"{family}:{seed}" for family in FAMILIES for seed in SETS[name]]
 
 

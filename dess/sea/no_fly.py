@@ -29,6 +29,7 @@ from dess.sections.section import Number
 
 # The letters of maps, those of the MAPF benchmark among them: trees and water are closed.
 CLOSED, FREE = "#@OTW", ".GS"
+_MAPF = CLOSED[1:] + FREE
 
 
 class NoFlyFile(places.Source):
@@ -90,9 +91,7 @@ def _of_text(path: Path, size: Size, _: Projection | None, source: NoFlyFile) ->
         raise InputError(f"{path}: has {len(rows):,} lines; {allowed}")
     for number, line in rows:
         if unknown := line.strip(CLOSED + FREE):
-            letters = (
-                f"# for a no-fly cell, . for an open one, or the MAPF letters {CLOSED[1:]}{FREE}"
-            )
+            letters = "# for a no-fly cell, . for an open one, or the MAPF letters " + _MAPF
             raise InputError(f"{path}: line {number}: has {shown(unknown[0])}; allowed: {letters}")
         if len(line) != size[0]:
             raise InputError(f"{path}: line {number}: has {len(line):,} cells; {allowed}")

@@ -149,11 +149,9 @@ class NodesFound(NamedTuple):
         beyond = [number for number, cell in enumerate(own) if not places.is_on_grid(cell, size)]
         if beyond:
             names = listed(f"{self._title(number)} at {[*own[number]]}" for number in beyond)
-            line = (
-                f"{'is' if len(beyond) == 1 else 'are'} off the grid of {size[0]} x {size[1]} cells"
-            )
-            enough = _enough(own, size, self.is_geographic)
-            raise InputError(f"{self.path}: {names} {line}; allowed: {enough}")
+            verb, enough = "are" if beyond[1:] else "is", _enough(own, size, self.is_geographic)
+            line = f"{names} {verb} off the grid of {size[0]} x {size[1]} cells"
+            raise InputError(f"{self.path}: {line}; allowed: {enough}")
 
     def _refuse_shared(self, groups: dict[Cell, list[int]], projection: Projection | None) -> None:
         """Say which nodes share cells, and what would part them."""

@@ -200,9 +200,8 @@ def read_table(path: Path) -> Places:
         raise InputError(f"{path}: has columns {there}; allowed: x and y, or lon and lat")
     is_geographic, places = found == [GEOGRAPHIC], []
     for line, texts in rows:
-        values = dict.fromkeys(columns, "") | dict(
-            zip(columns, map(str.strip, texts), strict=False)
-        )
+        filled = zip(columns, map(str.strip, texts), strict=False)
+        values = dict.fromkeys(columns, "") | dict(filled)
         numbers = [
             _number(values[axes[axis][0]], f"{path}: {line}: {axis}", most, is_geographic)
             for axis, most in zip(found[0], LIMITS[found[0]], strict=True)

@@ -45,6 +45,7 @@ _PRINTED = {
     "m": {"m": 1.0, "km": 1000.0},
     "bit": {"bit": 1.0, "B": 8.0, "kB": 8e3, "MB": 8e6, "GB": 8e9},
 }
+_NEEDED = ("endurance", "cruise", "charging", "bandwidth")
 _LINK_BUDGET = ("tx_power", "noise_figure", "frequency")
 
 # The fields that a scenario with a sheet may set otherwise.
@@ -215,11 +216,8 @@ class DataSheet(Section):
             has_budget = any(getattr(self, name) for name in _LINK_BUDGET)
             if has_budget and self.snr:
                 raise InputError("snr: follows from tx_power; allowed: one of both")
-            needed = [
-                *(_LINK_BUDGET if has_budget else ["snr"]),
-                *(["mtbf"] if self.repair else []),
-            ]
-            for name in ("endurance", "cruise", "charging", "bandwidth", *needed):
+            needed = (*_NEEDED, *(_LINK_BUDGET if has_budget else ("snr",)))
+            for name in (*needed, "mtbf") if self.repair else needed:
                 if getattr(self, name) is None:
                     raise InputError(f"{name}: is missing; allowed: {self.form_of(name)}")
             self.fields()
@@ -289,19 +287,20 @@ class DataSheet(Section):
     def _data(self) -> dict[str, Any]:
         """New data and initial data [data units]."""
         found: dict[str, Any] = {"initial_data": (0.0, 0.0)}
-        for name, size, field in (
-            ("data_rate", self.number("bandwidth"), "arrival_rate"),
-            ("backlog", self.units.data, "initial_data"),
-        ):
-            given = getattr(self, name) or ()
-            texts = (given,) if isinstance(given, str) else given
-            values = [measured(text, self.extra(name)["units"])[0] / size for text in texts]
-            if values:
-                mean = sum(values) / len(values)
-                found[field] = (mean, mean) if name == "backlog" else mean
-                own = "arrivals.initial" if name == "backlog" else "arrivals.rates"
-                found[own] = () if isinstance(given, str) else tuple(values)
+        if self.data_rate:
+            mean, own = self._of_nodes("data_rate", self.number("bandwidth"))
+            found |= {"arrival_rate": mean, "arrivals.rates": own}
+        if self.backlog:
+            mean, own = self._of_nodes("backlog", self.units.data)
+            found |= {"initial_data": (mean, mean), "arrivals.initial": own}
         return found
+
+    def _of_nodes(self, name: str, size: float) -> tuple[float, tuple[float, ...]]:
+        """The mean of a field of the nodes in units of a size, and each if they are listed."""
+        given, units = getattr(self, name), self.extra(name)["units"]
+        texts = (given,) if isinstance(given, str) else given
+        values = tuple(measured(text, units)[0] / size for text in texts)
+        return sum(values) / len(values), () if isinstance(given, str) else values
 
     def _radio(self) -> dict[str, Any]:
         """The SNR at a distance, the range and the largest rate."""

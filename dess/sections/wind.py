@@ -147,11 +147,7 @@ def _fill(north, east, south, west, gusts, seed, table):
 
 
 # The fields of ``MISSION`` that describe the wind, in the order in which ``surcharges`` takes them.
-FIELDS = (
-    *(f"wind_{move}" for move in ("north", "east", "south", "west")),
-    "wind_gusts",
-    "wind_seed",
-)
+FIELDS = tuple(f"wind_{name}" for name in ("north", "east", "south", "west", "gusts", "seed"))
 
 
 def constants(wind: Wind, size: tuple[int, int]) -> dict[str, float]:
@@ -176,27 +172,9 @@ def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
     """
     if "is_plain" in (missions.dtype.names or ()):  # neither wind nor slow UAVs
         return None
-    mission = missions[0]
-    if mission["wind_most"] == 0 and mission["slowest"] == 1:
+    if missions[0]["wind_most"] == 0 and missions[0]["slowest"] == 1:
         return None
-    sea = (chart.zones.shape, chart.zones.tobytes(), chart.parking.tobytes())
-    return _table(*sea, *(mission[field].item() for field in ("slowest", *FIELDS)))
-
-
-@lru_cache(maxsize=16)
-def _table(shape: tuple[int, int], zones: bytes, parking: bytes, slowest: int, *wind) -> np.ndarray:
-    cells, (rows, columns) = np.frombuffer(zones, np.int8).reshape(shape), shape
-    homes = np.frombuffer(parking, np.int64).reshape(-1, 2)
-    if len(homes) * slowest * cells.size > _MOST_ENTRIES:
-        return np.zeros((0, 0, 0, 0), np.int16)
-    table = np.full((len(homes), slowest, *shape), FAR, np.int16)
-    extras = surcharges((columns, rows), *wind)
-    for c, (x, y) in enumerate(homes):
-        for s in range(slowest):
-            table[c, s, y, x] = 0
-            _relax(cells, extras, s + 1, table[c, s])
-    table.flags.writeable = False
-    return table
+    return _table(missions, chart, len(chart.parking))
 
 
 def ways_home(missions: np.ndarray, chart: Chart) -> np.ndarray:
@@ -206,19 +184,29 @@ def ways_home(missions: np.ndarray, chart: Chart) -> np.ndarray:
         missions: (B,) ``MISSION`` records of one batch, which share wind and fleet.
         chart: Their chart.
     """
+    return _table(missions, chart, 1)[0]
+
+
+def _table(missions: np.ndarray, chart: Chart, groups: int) -> np.ndarray:
+    """(G, S, H, W) battery [%] to the nearest of each of G groups of parking cells."""
     sea = (chart.zones.shape, chart.zones.tobytes(), chart.parking.tobytes())
-    return _ways_home(*sea, *(missions[0][field].item() for field in ("slowest", *FIELDS)))
+    return _filled(*sea, groups, *(missions[0][field].item() for field in ("slowest", *FIELDS)))
 
 
 @lru_cache(maxsize=16)
-def _ways_home(
-    shape: tuple[int, int], zones: bytes, parking: bytes, slowest: int, *wind
+def _filled(
+    shape: tuple[int, int], zones: bytes, parking: bytes, groups: int, slowest: int, *wind
 ) -> np.ndarray:
-    cells, homes = np.frombuffer(zones, np.int8).reshape(shape), np.frombuffer(parking, np.int64)
-    table = np.full((slowest, *shape), FAR, np.int16)
-    table[:, homes[1::2], homes[::2]] = 0
-    for s in range(slowest):
-        _relax(cells, surcharges(shape[::-1], *wind), s + 1, table[s])
+    cells = np.frombuffer(zones, np.int8).reshape(shape)
+    if groups * slowest * cells.size > _MOST_ENTRIES:
+        return np.zeros((0, 0, 0, 0), np.int16)
+    table = np.full((groups, slowest, *shape), FAR, np.int16)
+    extras = surcharges(shape[::-1], *wind)
+    for group, homes in enumerate(np.frombuffer(parking, np.int64).reshape(groups, -1, 2)):
+        table[group, :, homes[:, 1], homes[:, 0]] = 0
+        for s in range(slowest):
+            _relax(cells, extras, s + 1, table[group, s])
+    table.flags.writeable = False
     return table
 
 

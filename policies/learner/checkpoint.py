@@ -15,6 +15,7 @@ import torch
 from pydantic import Field, create_model
 
 from dess.errors import InputError
+from dess.fields import SAMPLED
 from dess.files.documents import Document, Sha256
 from dess.files.reading import parse_json
 from dess.observations import states as column
@@ -33,7 +34,7 @@ from dess.policies.learner.trained import (
 )
 from dess.policies.learner.training import METRICS, Training
 from dess.record import MISSION_RECORD
-from dess.scenario import SAMPLED, ScenarioSpace
+from dess.scenario import ScenarioSpace
 from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, types_of
 
 FORMAT = 2

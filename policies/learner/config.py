@@ -20,11 +20,10 @@ from pydantic import (
     ConfigDict,
     Field,
     StrictBool,
-    ValidationError,
     model_validator,
 )
 
-from dess.errors import InputError, shown, validation_line
+from dess.errors import InputError, shown, validated
 from dess.files.documents import Document, Sha256
 from dess.files.reading import Shipped
 from dess.scenario import ScenarioSpace, load_scenario
@@ -326,10 +325,7 @@ def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
             f"{where}: {key} is a field of the scenario; allowed: "
             f"--set {key}={json.dumps(values[key])}, or {key} in the table [set]"
         )
-    try:
-        return TrainingConfig.model_validate(values)
-    except ValidationError as error:
-        raise InputError(validation_line(error, where, TrainingConfig)) from None
+    return validated(TrainingConfig, values, where)
 
 
 def learner_of(config: TrainingConfig) -> str:

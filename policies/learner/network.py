@@ -18,6 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from dess.code.kernels import kernel
+from dess.policies import network as acting
 from dess.policies.learner.config import TrainingConfig
 from dess.policies.network import ACTIONS, DENSE, KERNEL_SIZE, KERNELS
 
@@ -61,14 +62,12 @@ class PaperNetwork(nn.Module):
             precision: Of the hidden layers, float32 or bfloat16.
         """
         super().__init__()
-        local, far, own = shapes
+        local, far, _ = shapes
         self.precision = precision
         self.local = _convolutions(local[0])
         self.far = _convolutions(far[0])
-        width = sum(
-            KERNELS * _convolved(rows) * _convolved(columns) for _, rows, columns in shapes[:2]
-        )
-        self.hidden = _dense([width + own[0], *DENSE])
+        _, width = acting.PaperNetwork.layers(shapes)["hidden.0"]
+        self.hidden = _dense([width, *DENSE])
         self.values = nn.Linear(DENSE[-1], ACTIONS)
 
     def forward(self, local: Tensor, far: Tensor, own: Tensor) -> Tensor:
@@ -296,11 +295,6 @@ def _hidden_precision(
 def _convolutions(channels: int) -> nn.Sequential:
     first = nn.Conv2d(channels, KERNELS, KERNEL_SIZE)
     return nn.Sequential(first, nn.ReLU(), nn.Conv2d(KERNELS, KERNELS, KERNEL_SIZE), nn.ReLU())
-
-
-def _convolved(width: int) -> int:
-    """The width of a map after two convolutions without padding."""
-    return width - 2 * (KERNEL_SIZE - 1)
 
 
 def _dense(sizes: Sequence[int]) -> nn.Sequential:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
-from dess.guard import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
+from dess.guard.battery import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
 from dess.sea.chart import distance, in_zone, is_open
 from dess.sections.charging import gain
 from dess.sections.failures import working_pads
@@ -263,7 +263,8 @@ def fly(mission, rates, plan, source, first, flight, slots, lag=math.inf):
             if v.next > v.last_charge and not lands(mission):
                 penalty += _unplanned(mission, v, active, data_left)
             penalty += _act(mission, rates, waypoints, team, i, t, active)
-            if _may_charge(rates.chart, v) and _has_pad(mission, rates.chart, team, v):
+            asks = v.latch != 0 and v.action == HOVER and in_zone(rates.chart, v.x, v.y)
+            if asks and _has_pad(mission, rates.chart, team, v):
                 penalty += _begin_to_charge(mission, v, t, active)
             elif _stands(mission, rates.chart, v):
                 v.battery += mission.flight_cost
@@ -430,11 +431,6 @@ def _blocks(chart, v, other, has_moved):
 
 
 @inlined
-def _may_charge(chart, v):
-    return v.latch != 0 and v.action == HOVER and in_zone(chart, v.x, v.y)
-
-
-@inlined
 def _has_pad(mission, chart, team, v):
     """Whether the zone in which a UAV is has a free pad."""
     zone, taken = chart.zones[v.y, v.x], 0
@@ -456,7 +452,8 @@ def _begin_to_charge(mission, v, t, active):
 def _settle(mission, chart, v):
     """End the slot of a UAV, and return the penalty if its battery is depleted."""
     penalty = 0.0
-    if v.counted >= v.quota and (not lands(mission) or _has_landed(mission, chart, v)):
+    has_landed = _has_filled(v) and _stands(mission, chart, v)
+    if has_landed or (v.counted >= v.quota and not lands(mission)):
         v.active = v.charging = 0
     elif v.battery <= 0:
         lacking = (v.quota - v.counted) / mission.communication_slots
@@ -481,11 +478,6 @@ def _stands(mission, chart, v):
 @inlined
 def _has_filled(v):
     return v.quota > 0 and v.counted >= v.quota
-
-
-@inlined
-def _has_landed(mission, chart, v):
-    return _has_filled(v) and _stands(mission, chart, v)
 
 
 @inlined

@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
-from dess.guard import guard, must_charge
+from dess.guard import guard
+from dess.guard.battery import must_charge
 from dess.policies.heuristics import step_towards
 from dess.policies.planner import fluid
 from dess.policies.planner.rates import rates_of

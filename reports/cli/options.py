@@ -50,7 +50,8 @@ def configs(start: str) -> list[str]:
 
 def fields(start: str) -> list[str]:
     """Fields of a scenario, as ``--set`` takes them."""
-    from dess.scenario import ScenarioSpace, fields_of
+    from dess.fields import fields_of
+    from dess.scenario import ScenarioSpace
 
     return [f"{name}=" for name in _beginning(fields_of(ScenarioSpace), start)]
 
@@ -167,7 +168,8 @@ def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, An
 
 def _field(name: str, option: str = SET) -> "FieldInfo":
     """The field of a scenario; ``InputError`` if there is none."""
-    from dess.scenario import ScenarioSpace, fields_of
+    from dess.fields import fields_of
+    from dess.scenario import ScenarioSpace
 
     fields = fields_of(ScenarioSpace)
     if name not in fields:

@@ -9,14 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dess import InputError, streams
+from dess.fields import SAMPLED
 from dess.files.reading import parse_toml
-from dess.scenario import (
-    SAMPLED,
-    ScenarioSpace,
-    load_scenario,
-    scenario_description,
-    scenario_names,
-)
+from dess.scenario import ScenarioSpace, load_scenario, scenario_description, scenario_names
 from dess.sea.chart import spread
 from dess.sections.age import MOST_TEETH
 from dess.state import check_seed, sample_scenario, spaces_of

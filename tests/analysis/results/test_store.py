@@ -118,9 +118,9 @@ def _simulated_by_other_code(out, *modules):
 
 
 def test_other_code_is_refused_by_its_modules(out, tmp_path):
-    _simulated_by_other_code(out, "dess.rules", "dess.guard")
+    _simulated_by_other_code(out, "dess.rules", "dess.guard.moves")
     before = files_of(out)
-    line = "made by other code of dess.guard, dess.rules; allowed: .*, or --accept-code"
+    line = "made by other code of dess.guard.moves, dess.rules; allowed: .*, or --accept-code"
     with pytest.raises(InputError, match=line):
         run_study(small_study(tmp_path), out)
     assert files_of(out) == before

@@ -16,8 +16,9 @@ from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess.analysis.verification import balances, draws, measurements
 from dess.analysis.verification.checks import ALPHA, Check, judge, poisson_fit, uniform_fit
 from dess.analysis.verification.measurements import CrossCheck, Log
+from dess.fields import SAMPLED
 from dess.mission import simulate
-from dess.scenario import SAMPLED, ScenarioSpace
+from dess.scenario import ScenarioSpace
 from dess.state import sample_scenario
 from tests.drawn import extended_spaces, policies, replications, seeds
 

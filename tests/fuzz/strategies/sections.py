@@ -2,7 +2,8 @@
 
 from hypothesis import strategies as st
 
-from dess.scenario import SECTIONS, ScenarioSpace, fields_of
+from dess.fields import SECTIONS, fields_of
+from dess.scenario import ScenarioSpace
 from tests.fuzz.strategies.values import texts, toml_values
 
 FIELDS = (*fields_of(ScenarioSpace), *SECTIONS)

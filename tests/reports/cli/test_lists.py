@@ -12,9 +12,10 @@ import dess as dess_package
 from dess import ScenarioSpace, load_scenario
 from dess.analysis import load_study
 from dess.analysis.names import fields as fields_in
+from dess.fields import fields_of
 from dess.policies.registry import SHIPPED, trained_names
 from dess.reports.cli.commands import app
-from dess.scenario import fields_of, scenario_families, scenario_names
+from dess.scenario import scenario_families, scenario_names
 from tests.analysis.small import environment
 
 
