@@ -554,7 +554,7 @@ def selections(results: Results) -> pd.DataFrame:
         the ends of the values at which the point lies. Empty if the study selects nothing. For a
         study that selects the cheapest setting, the rows of ``costs.selections``.
     """
-    if isinstance(results.store.manifest.selection, Cheapest):
+    if isinstance(results.store.manifest.study.selection, Cheapest):
         return costs.selections(results)
     words, rows = in_words(results), []
     for policy in results.policies:

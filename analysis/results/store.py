@@ -331,7 +331,7 @@ class Store:
             InputError: If some are missing or damaged.
         """
         missions = self._rows("missions", parts)
-        if costs := self.manifest.costs:
+        if costs := self.manifest.study.costs:
             cost = costs.parts(self.manifest.scenarios, missions, self.uavs(parts))
             missions["cost"] = sum(cost.values())
         if units := self.manifest.units_at(missions["point"].to_numpy()):

@@ -202,7 +202,7 @@ class Results:
     def _chosen(self, policy: str, kind: type) -> Any:
         """What a rule of this kind has selected for a policy; None if the study has another."""
         self.check_policy(policy)
-        manifest, rule = self.store.manifest, self.store.manifest.selection
+        manifest, rule = self.store.manifest, self.store.manifest.study.selection
         if not rule or not isinstance(rule, kind):
             return None
         parts = parts_of(manifest, self.policies.index(policy))

@@ -240,7 +240,7 @@ def _tables(
         "comparisons": summary.comparisons(results),
         "learned_against_heuristic": summary.learned_against_heuristic(results),
         "sensitivities": summary.sensitivities(results),
-        "costs": costs.front(results) if results.store.manifest.costs else pd.DataFrame(),
+        "costs": costs.front(results) if results.store.manifest.study.costs else pd.DataFrame(),
         "selected": summary.selections(results),
         "gaps": optimality.by_fleet(results),
         "checks": summary.checks(results),

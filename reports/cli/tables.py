@@ -31,7 +31,7 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         selected = summary.selections(results)
         _print_selections(selected)
         is_search = "condition" in selected
-        if is_search and results.store.manifest.costs:
+        if is_search and results.store.manifest.study.costs:
             for text in costs.sentences(results):
                 console.say(f" {text.translate(str.maketrans('', '', '*`'))}")
         if len(results.checks):

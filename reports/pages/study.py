@@ -54,7 +54,7 @@ def notes(results: Results) -> html.Marked:
 
 def page_title(results: Results) -> str:
     """The question that a study answers."""
-    if isinstance(results.store.manifest.selection, Cheapest):
+    if isinstance(results.store.manifest.study.selection, Cheapest):
         question = "Which fleet is the cheapest for {}?"
     elif results.design == "saltelli":
         question = "Which parameters matter for {}?"
@@ -159,7 +159,7 @@ def parts(results: Results) -> dict[str, bool]:
     several, fields = len(manifest.points) > 1, len(settings.varied(results))
     kind = results.design  # a design that varies one field at most is a grid
     kind = kind if kind in ("saltelli", "latin-hypercube") or fields > 1 else "grid"
-    is_ranked, is_search = kind != "saltelli", isinstance(manifest.selection, Cheapest)
+    is_ranked, is_search = kind != "saltelli", isinstance(manifest.study.selection, Cheapest)
     is_scan = kind == "grid" or (kind == "table" and fields <= 2)
     return {
         # Several design points whose missions share their replications: settings to rank.
@@ -185,7 +185,7 @@ def parts(results: Results) -> dict[str, bool]:
         "if-policies": not summary.comparisons(results).empty,
         "if-learned": not summary.learned_against_heuristic(results).empty,
         # Tables of the study.
-        "if-selection": isinstance(manifest.selection, Selection),
+        "if-selection": isinstance(manifest.study.selection, Selection),
         "if-cheapest": is_search,
         "if-precision": study["precision"] is not None,
         "if-costs": study["costs"] is not None,
