@@ -178,7 +178,7 @@ def origins(found: Diff) -> list[str]:
     """In what the origins of the two results differ, with a line for each part."""
     a, b = found.a.store.manifest, found.b.store.manifest
     modules = sorted({*differing(a.code, b.code), *differing(b.code, a.code)})
-    teams = {(row.policy_a, row.policy_b): None for row in _policies(found).itertuples()}
+    teams = found.missions[["policy_a", "policy_b"]].drop_duplicates().itertuples(index=False)
     weights_a, weights_b = ({t.policy: t.weights for t in m.policies} for m in (a, b))
     changed = [" and ".join({p: None, q: None}) for p, q in teams if weights_a[p] != weights_b[q]]
     names = [n for n in {**a.libraries, **b.libraries} if a.libraries.get(n) != b.libraries.get(n)]
@@ -205,11 +205,6 @@ def at_hand(results: Results) -> str:
     except InputError as error:
         changes = [str(error)]
     return "; ".join(changes) or "made by the code, weights and libraries that are here"
-
-
-def _policies(found: Diff) -> pd.DataFrame:
-    """The pairs of policies that are compared."""
-    return found.missions[["policy_a", "policy_b"]].drop_duplicates()
 
 
 def _seeds(a: Results, b: Results) -> list[int]:

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtri
 
-from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers import costs
 from dess.analysis.answers.settings import edge, ends, in_words
@@ -53,8 +52,7 @@ def sensitivity(
 
     Args:
         design: The design of the missions.
-        missions: The missions of one policy, a row per design point in order: columns ``point``,
-            ``replication`` and the metrics.
+        missions: The missions of one policy, a row per design point in order, with the metrics.
         metrics: Columns to analyse.
 
     Returns:
@@ -65,16 +63,7 @@ def sensitivity(
         they are too wide, because the design covers the space more evenly than the resamples.
         Estimates are not limited to [0, 1]; that of a small index may be negative. If a metric has
         the same value in all missions of A and B, its indices are nan.
-
-    Raises:
-        InputError: If the missions are not one per point of the design, in order.
     """
-    expected = [(number, point.replication) for number, point in enumerate(design.points)]
-    if [*missions[["point", "replication"]].itertuples(index=False, name=None)] != expected:
-        raise InputError(
-            f"missions: {len(missions)} that are not those of the design; "
-            f"allowed: one for each of its {len(expected)} points, in order, of one policy"
-        )
     tables = {metric: _indices(design, missions[metric].to_numpy(float)) for metric in metrics}
     return pd.concat(tables, names=["metric"]).reset_index("metric").reset_index(drop=True)
 

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess import InputError
 from dess.analysis.answers import summary
 from dess.analysis.answers.summary import sensitivity
 from dess.analysis.metrics import PRODUCT
@@ -89,22 +88,6 @@ def test_a_metric_without_variance_has_no_shares():
         table = sensitivity(design, missions, ["always", "tenth", "elsewhere", "y"])
     assert table.loc[table["metric"] != "y", INDICES].isna().all(axis=None)
     assert table.loc[table["metric"] == "y", INDICES].notna().all(axis=None)
-
-
-WRONG = {
-    "two policies": lambda missions: pd.concat([missions, missions]),
-    "another order": lambda missions: missions.iloc[::-1],
-    "another design": lambda missions: missions.assign(replication=missions["replication"] + 1),
-}
-
-
-@pytest.mark.parametrize("wrong", WRONG)
-def test_missions_must_be_those_of_the_design(wrong):
-    design = unit(1, base=4)
-    missions = WRONG[wrong](evaluated(design, y=lambda x, e: x + e))
-    with pytest.raises(InputError, match="one for each of its 16 points") as error:
-        sensitivity(design, missions, ["y"])
-    assert "\n" not in str(error.value)
 
 
 def test_indices_depend_on_nothing_else():
