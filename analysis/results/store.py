@@ -189,15 +189,12 @@ class Store:
 
     def _examine(self, kind: str, team: int, name: str, tables: Sequence[pa.Table]) -> None:
         """Keep the tables of a chunk, or count its files as damaged, if they are no records."""
-        try:
-            rows = parquet.parts_in(tables[0])
-            parquet.check(tables, rows)
-        except ValueError:
-            for folder, _ in self._places(kind, team):
-                paths = parquet.files_in(folder)
-                self.damaged += [path for path in paths if parquet.content_hash(path) == name]
-        else:
+        if parquet.are_of(tables, rows := parquet.parts_in(tables[0])):
             self._enter(kind, rows, tables)
+            return
+        for folder, _ in self._places(kind, team):
+            paths = parquet.files_in(folder)
+            self.damaged += [path for path in paths if parquet.content_hash(path) == name]
 
     def _enter(self, kind: str, rows: Sequence[parquet.Row], tables: Sequence[pa.Table]) -> None:
         self._stacked.clear()
