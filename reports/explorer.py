@@ -43,7 +43,7 @@ class Grid:
         self._places = pd.DataFrame(places).sort_values([*places])
         settings = math.prod(map(len, self.values.values()))
         if len(places) < 2 or not len(table) == len(table.drop_duplicates()) == settings:
-            study = results.manifest["study"]["name"]
+            study = results.study.name
             raise InputError(
                 f"explorer: {study} is not a full grid of two fields or more; "
                 'allowed: a study with kind = "grid"'
@@ -106,7 +106,8 @@ def explorer(results: Results) -> HTML:
         (row.metric, row.policy): f"{numbers.interval(row.mean, row.low, row.high)}, n = {row.n:,}"
         for row in grid.at_start().itertuples()
     }
-    columns, fields = ["mean", "low", "high", "n"], [*map(names.parameter, grid.values)]
+    columns = ["mean", "low", "high", "n"]
+    fields = [names.parameter(field) for field in grid.values]
     data = {
         "sliders": [
             {

@@ -281,7 +281,7 @@ def _answer(rows: pd.DataFrame, wanted: Mapping[Any, float], currency: str, trus
 
 def _trust(results: Results, choice: CheapestChoice, answer: Answer, policies: int) -> str:
     """What is guaranteed about an answer, what would settle it, and at which ends it lies."""
-    rule, text = results.store.manifest.study.selection, ""
+    rule, text = results.study.selection, ""
     assert isinstance(rule, Cheapest)
     if answer.points:
         horizon = results.store.manifest.settings[answer.points[0]].horizon
@@ -336,7 +336,7 @@ def _told(row: pd.Series, wanted: Mapping[Any, float], currency: str) -> str:
 
 
 def _prices(results: Results) -> Costs:
-    prices = results.store.manifest.study.costs
+    prices = results.study.costs
     if prices is None:
         raise InputError(
             f"{results.store.folder}: the study has no prices; allowed: one with a table [costs]"
@@ -400,7 +400,7 @@ def required(results: Results) -> Mapping[str, float]:
     Returns:
         For each column of the missions its least mean, or the largest if less is better.
     """
-    rule = results.store.manifest.study.selection
+    rule = results.study.selection
     if not isinstance(rule, Cheapest):
         return {}
     return {told(m, results.missions): rule.amount(m) for m in rule.requirements}

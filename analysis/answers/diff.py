@@ -281,7 +281,7 @@ def _alone(
     known = others[keys].drop_duplicates()
     found = missions[keys].merge(known, how="left", indicator="found")["found"]
     rows = missions[found.to_numpy() != "both"]
-    scenario = f"the scenario of study {results.manifest['study']['name']}"
+    scenario = f"the scenario of study {results.study.name}"
     words = pd.Series([setting or scenario for setting in in_words(results)])
     points, no_policy = rows["point"].map(words), ~rows["team"].isin(others["team"])
     no_point = ~rows["scenario"].isin(others["scenario"])

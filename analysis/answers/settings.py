@@ -97,7 +97,7 @@ def ranking_metric(results: Results, metric: str | None = None) -> str:
         InputError: If there is no such metric.
     """
     if metric is None:
-        metric = (results.manifest["study"]["selection"] or {}).get("metric", PRODUCT)
+        metric = getattr(results.study.selection, "metric", PRODUCT)
     metric = told(metric, results.missions)
     check_metric(results, metric)
     return metric

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtri
 
+from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers import costs
 from dess.analysis.answers.settings import edge, ends, in_words
@@ -63,7 +64,13 @@ def sensitivity(
         they are too wide, because the design covers the space more evenly than the resamples.
         Estimates are not limited to [0, 1]; that of a small index may be negative. If a metric has
         the same value in all missions of A and B, its indices are nan.
+
+    Raises:
+        InputError: If there is not one mission of every point of the design.
     """
+    if len(missions) != design.count:
+        allowed = f"allowed: one for each of its {design.count} design points"
+        raise InputError(f"missions: {len(missions)} are not those of the design; {allowed}")
     tables = {metric: _indices(design, missions[metric].to_numpy(float)) for metric in metrics}
     return pd.concat(tables, names=["metric"]).reset_index("metric").reset_index(drop=True)
 
@@ -522,7 +529,7 @@ def sensitivities(results: Results) -> pd.DataFrame:
         A row per policy, metric and parameter: ``policy``, and the columns of
         ``answers.summary``. Empty if the design is not of the kind ``saltelli``.
     """
-    design = results.store.manifest.study.design
+    design = results.study.design
     if not isinstance(design, Saltelli):
         return pd.DataFrame()
     missions = results.missions.groupby("policy", sort=False)
@@ -543,7 +550,7 @@ def selections(results: Results) -> pd.DataFrame:
         the ends of the values at which the point lies. Empty if the study selects nothing. For a
         study that selects the cheapest setting, the rows of ``costs.selections``.
     """
-    if isinstance(results.store.manifest.study.selection, Cheapest):
+    if isinstance(results.study.selection, Cheapest):
         return costs.selections(results)
     words, rows = in_words(results), []
     for policy in results.policies:

@@ -269,16 +269,14 @@ class Store:
             self.keep("missions", chunk, _tables_of(chunk, frames))
         for part in parts:
             merged[part.cell.key].append(part.replications)
+        gone = {
+            name
+            for name, of_file in held.items()
+            if not any(gaps(range(start, stop), merged[key]) for key, start, stop in of_file)
+        }
         for folder, _ in self._places("missions", chunks[0].team):
             for path in parquet.files_in(folder):
-                of_file = held.get(name := parquet.content_hash(path), [])
-                if (
-                    name not in names
-                    and of_file
-                    and not any(
-                        gaps(range(start, stop), merged[key]) for key, start, stop in of_file
-                    )
-                ):
+                if parquet.content_hash(path) in gone - names:
                     delete(path)
         self._scan()
 

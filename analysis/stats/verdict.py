@@ -138,12 +138,11 @@ def membership(
         weights = generator.standard_exponential((size, values.shape[1]))
         # Not matrix products: their last bits would depend on the number of threads.
         total, cost, value = (np.einsum("bn,kn->bk", weights, of) for of in (mask, excess, known))
-        more = (
-            generator.standard_gamma(0.5, (2, size, len(values))) if share else np.zeros((2, 1, 1))
-        )
-        count += on_front(base + cost / total, (value + more[0]) / (total + more.sum(axis=0))).sum(
-            axis=0
-        )
+        more = np.zeros((2, 1, 1))
+        if share:
+            more = generator.standard_gamma(0.5, (2, size, len(values)))
+        means = (value + more[0]) / (total + more.sum(axis=0))
+        count += on_front(base + cost / total, means).sum(axis=0)
     return count / draws
 
 

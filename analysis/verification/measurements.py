@@ -84,7 +84,7 @@ class Log(Mission):
 
 def logs_of(results: Results) -> list[Log]:
     """The missions of the first design point whose logs a study has stored."""
-    logged = range(results.store.manifest.study.logged)
+    logged = range(results.study.logged)
     return [Log.of(results, policy, 0, n) for policy in results.policies for n in logged]
 
 

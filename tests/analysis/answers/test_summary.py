@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dess import InputError
 from dess.analysis.answers import summary
 from dess.analysis.answers.summary import sensitivity
 from dess.analysis.metrics import PRODUCT
@@ -88,6 +89,13 @@ def test_a_metric_without_variance_has_no_shares():
         table = sensitivity(design, missions, ["always", "tenth", "elsewhere", "y"])
     assert table.loc[table["metric"] != "y", INDICES].isna().all(axis=None)
     assert table.loc[table["metric"] == "y", INDICES].notna().all(axis=None)
+
+
+def test_there_is_one_mission_of_every_point_of_the_design():
+    design = unit(1, base=4)
+    missions = evaluated(design, y=lambda x, e: x + e)
+    with pytest.raises(InputError, match="32 are not .* one for each of its 16 design points$"):
+        sensitivity(design, pd.concat([missions, missions]), ["y"])
 
 
 def test_indices_depend_on_nothing_else():
