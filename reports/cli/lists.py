@@ -11,7 +11,7 @@ from dess.errors import InputError, cut
 from dess.files.writing import fill
 from dess.reports.cli import console, options
 from dess.reports.cli.options import JsonOption, SetOption, command, load_space
-from dess.reports.cli.simulate import FIGURES
+from dess.reports.cli.simulate import FIGURES, save_figure
 
 policies = typer.Typer(invoke_without_command=True, help="List the policies, or show one.")
 scenarios = typer.Typer(
@@ -92,7 +92,7 @@ def show_scenario(
 
         with console.outputs([figure]) as [temporary]:
             sea = draft_scenario(name, **dict(map(options.setting, settings or [])))
-            sea_figure(sea).savefig(temporary, format=figure.suffix[1:])
+            save_figure(sea_figure(sea), temporary, figure.suffix[1:])
     space, description = load_space(name, settings), scenario_description(name)
     if as_json:
         rows = [field._asdict() for field in fields(space)]
@@ -147,7 +147,7 @@ def new_scenario(
     space, picture = parsed_scenario(text, path), path.with_suffix(".png")
     with console.outputs([path, picture]) as [file, drawing]:
         fill(file, text)
-        sea_figure(space).savefig(drawing, format="png")
+        save_figure(sea_figure(space), drawing, "png")
     console.say(f"{path}, {picture}: {space.units}")
 
 

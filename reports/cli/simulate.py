@@ -15,6 +15,7 @@ from dess.reports.cli.console import YesOption
 
 if TYPE_CHECKING:
     import numpy as np
+    from matplotlib.figure import Figure
 
     from dess.policies.registry import Policy
     from dess.record import MissionRecord
@@ -248,7 +249,12 @@ def _write_log(mission: _Mission, path: Path, kind: str) -> None:
 def _draw(mission: _Mission, path: Path, kind: str) -> None:
     from dess.analysis.figures.missions import mission_figure
 
-    mission_figure(mission.log, mission.scenario).savefig(path, format=kind)
+    save_figure(mission_figure(mission.log, mission.scenario), path, kind)
+
+
+def save_figure(figure: "Figure", path: Path, kind: str) -> None:
+    """Write a figure into a temporary file; ``kind`` is the ending of its final name."""
+    figure.savefig(path, format=kind)
 
 
 def _animate(mission: _Mission, path: Path, kind: str) -> None:
