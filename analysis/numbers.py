@@ -149,7 +149,7 @@ def csv(frame: pd.DataFrame, form: str | None = None) -> str:
 def wide(
     table: pd.DataFrame,
     index: str | list[str],
-    columns: str | list[str] = "metric",
+    columns: str = "metric",
     write: Callable[[float, float, float], str] = interval,
 ) -> pd.DataFrame:
     """Turn a long table of estimates into a wide table of text.
@@ -159,13 +159,10 @@ def wide(
     Args:
         table: One row per estimate, with ``mean``, ``low``, ``high`` and the columns named below.
         index: Columns whose values name a row of the result.
-        columns: Columns whose values name a column of the result.
+        columns: The column whose values name a column of the result.
         write: Writes a mean and the ends of its interval as text.
     """
     text = [write(*ends) for ends in table[["mean", "low", "high"]].to_numpy(float)]
-    rows = [index] if isinstance(index, str) else [*index]
-    heads = [columns] if isinstance(columns, str) else [*columns]
-    cells = table.assign(text=text).set_index([*rows, *heads])["text"].unstack(heads)
-    order = table.drop_duplicates(rows).set_index(rows).index
-    cells = cells.loc[order, table.drop_duplicates(heads).set_index(heads).index]
-    return cells.rename_axis(columns=[None] * len(heads))
+    cells = table.assign(text=text).pivot(index=index, columns=columns, values="text")
+    order = table.drop_duplicates(index).set_index(index).index
+    return cells.loc[order, table[columns].unique()].rename_axis(columns=None)

@@ -9,9 +9,7 @@ middle setting.
 
 import json
 import math
-from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
 
 import pandas as pd
 from IPython.display import HTML
@@ -25,34 +23,12 @@ from dess.analysis.results.tables import Results
 from dess.reports.pages.html import rendered
 
 
-class Slider(NamedTuple):
-    """A field of the grid, and its values in their order."""
-
-    field: str
-    values: Sequence[Any]
-
-    @property
-    def start(self) -> int:
-        """The position of the middle value, which is shown first."""
-        return len(self.values) // 2
-
-    @property
-    def parameter(self) -> names.Field:
-        """The name of the field and its unit."""
-        return names.parameter(self.field)
-
-    @property
-    def texts(self) -> list[str]:
-        """The values as text."""
-        return [names.value_text(value) for value in self.values]
-
-
 class Grid:
     """The means of a study whose design points are all combinations of some values.
 
     Attributes:
         results: The results of the study.
-        sliders: The fields with two values or more.
+        values: The fields with two values or more, and their values in their order.
     """
 
     def __init__(self, results: Results):
@@ -61,14 +37,13 @@ class Grid:
         Raises:
             InputError: If the study is not a full grid of two fields or more.
         """
-        self.results = results
-        self.sliders = [Slider(field, values) for field, values in varied(results).items()]
+        self.results, self.values = results, varied(results)
         table = points(results)
-        places = {s.field: table[s.field].map(s.values.index) for s in self.sliders}
+        places = {field: table[field].map(of.index) for field, of in self.values.items()}
         self._places = pd.DataFrame(places).sort_values([*places])
-        settings = math.prod(len(slider.values) for slider in self.sliders)
+        settings = math.prod(map(len, self.values.values()))
         if len(places) < 2 or not len(table) == len(table.drop_duplicates()) == settings:
-            study = results.manifest["study"]["name"]
+            study = results.study.name
             raise InputError(
                 f"explorer: {study} is not a full grid of two fields or more; "
                 'allowed: a study with kind = "grid"'
@@ -77,7 +52,7 @@ class Grid:
     @property
     def start(self) -> int:
         """The design point in the middle of all sliders."""
-        middle = [slider.start for slider in self.sliders]
+        middle = [len(values) // 2 for values in self.values.values()]
         return int(self._places.index[(self._places == middle).all(axis=1)][0])
 
     @cached_property
@@ -132,15 +107,16 @@ def explorer(results: Results) -> HTML:
         for row in grid.at_start().itertuples()
     }
     columns = ["mean", "low", "high", "n"]
+    fields = [names.parameter(field) for field in grid.values]
     data = {
         "sliders": [
             {
-                "name": slider.parameter.plain,
-                "unit": slider.parameter.unit,
-                "values": slider.texts,
-                "settings": grid.settings(slider.field),
+                "name": field.plain,
+                "unit": field.unit,
+                "values": [names.value_text(value) for value in grid.values[field.key]],
+                "settings": grid.settings(field.key),
             }
-            for slider in grid.sliders
+            for field in fields
         ],
         # Of each estimate in the order of the means: the mean and the ends of its interval, in
         # tenths of a percent, and the number of missions.
@@ -148,7 +124,7 @@ def explorer(results: Results) -> HTML:
             [*map(_tenths, ends), n] for *ends, n in grid.means[columns].itertuples(index=False)
         ],
     }
-    shown = {"sliders": grid.sliders, "policies": looks, "metrics": metrics.METRICS, "texts": texts}
+    shown = {"fields": fields, "policies": looks, "metrics": metrics.METRICS, "texts": texts}
     return rendered("explorer.html", data=data, **shown)
 
 

@@ -125,8 +125,8 @@ def duels(results: Results, pair: Pair) -> pd.DataFrame:
         InputError: If the study has several design points.
     """
     if (points := len(results.store.manifest.points)) > 1:
-        name = results.store.manifest.study.name
-        raise InputError(f"study {name}: {points} design points; allowed: one for all missions")
+        many = f"study {results.study.name}: {points} design points"
+        raise InputError(f"{many}; allowed: one for all missions")
     table = results.missions.assign(
         initial_data=results.missions["initial"] / len(results.scenario().nodes)
     )

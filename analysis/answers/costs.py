@@ -20,7 +20,7 @@ from pandas.api.types import is_numeric_dtype
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.answers.settings import edge, ends, points, ranked
+from dess.analysis.answers.settings import edge, ends, points, ranked, words_of
 from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of, told
 from dess.analysis.names import DECISIONS, parameter
 from dess.analysis.results.tables import Results, once
@@ -281,7 +281,7 @@ def _answer(rows: pd.DataFrame, wanted: Mapping[Any, float], currency: str, trus
 
 def _trust(results: Results, choice: CheapestChoice, answer: Answer, policies: int) -> str:
     """What is guaranteed about an answer, what would settle it, and at which ends it lies."""
-    rule, text = results.store.manifest.selection, ""
+    rule, text = results.study.selection, ""
     assert isinstance(rule, Cheapest)
     if answer.points:
         horizon = results.store.manifest.settings[answer.points[0]].horizon
@@ -336,7 +336,7 @@ def _told(row: pd.Series, wanted: Mapping[Any, float], currency: str) -> str:
 
 
 def _prices(results: Results) -> Costs:
-    prices = results.store.manifest.costs
+    prices = results.study.costs
     if prices is None:
         raise InputError(
             f"{results.store.folder}: the study has no prices; allowed: one with a table [costs]"
@@ -386,15 +386,9 @@ def _conditions(results: Results) -> list[str]:
 
 def _words(results: Results, decisions: bool) -> list[list[str]]:
     """The fields of every design point that are decided on, or the rest; none of ``COUNTED``."""
-    rows = points(results).to_dict("records")
-    return [
-        [
-            parameter(str(f)).words(v)
-            for f, v in r.items()
-            if (f in DECISIONS) == decisions and f not in COUNTED
-        ]
-        for r in rows
-    ]
+    table = points(results)
+    shown = [f for f in table if (f in DECISIONS) == decisions and f not in COUNTED]
+    return words_of(table[shown])
 
 
 CERTAIN = 0.01  # settings with a lower probability of being on a front are not in the table
@@ -406,7 +400,7 @@ def required(results: Results) -> Mapping[str, float]:
     Returns:
         For each column of the missions its least mean, or the largest if less is better.
     """
-    rule = results.store.manifest.selection
+    rule = results.study.selection
     if not isinstance(rule, Cheapest):
         return {}
     return {told(m, results.missions): rule.amount(m) for m in rule.requirements}

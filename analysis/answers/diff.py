@@ -178,7 +178,7 @@ def origins(found: Diff) -> list[str]:
     """In what the origins of the two results differ, with a line for each part."""
     a, b = found.a.store.manifest, found.b.store.manifest
     modules = sorted({*differing(a.code, b.code), *differing(b.code, a.code)})
-    teams = {(row.policy_a, row.policy_b): None for row in _policies(found).itertuples()}
+    teams = found.missions[["policy_a", "policy_b"]].drop_duplicates().itertuples(index=False)
     weights_a, weights_b = ({t.policy: t.weights for t in m.policies} for m in (a, b))
     changed = [" and ".join({p: None, q: None}) for p, q in teams if weights_a[p] != weights_b[q]]
     names = [n for n in {**a.libraries, **b.libraries} if a.libraries.get(n) != b.libraries.get(n)]
@@ -205,11 +205,6 @@ def at_hand(results: Results) -> str:
     except InputError as error:
         changes = [str(error)]
     return "; ".join(changes) or "made by the code, weights and libraries that are here"
-
-
-def _policies(found: Diff) -> pd.DataFrame:
-    """The pairs of policies that are compared."""
-    return found.missions[["policy_a", "policy_b"]].drop_duplicates()
 
 
 def _seeds(a: Results, b: Results) -> list[int]:
@@ -286,7 +281,7 @@ def _alone(
     known = others[keys].drop_duplicates()
     found = missions[keys].merge(known, how="left", indicator="found")["found"]
     rows = missions[found.to_numpy() != "both"]
-    scenario = f"the scenario of study {results.manifest['study']['name']}"
+    scenario = f"the scenario of study {results.study.name}"
     words = pd.Series([setting or scenario for setting in in_words(results)])
     points, no_policy = rows["point"].map(words), ~rows["team"].isin(others["team"])
     no_point = ~rows["scenario"].isin(others["scenario"])

@@ -553,7 +553,7 @@ def marl_eval_data(results: Results, metrics: Sequence[str] = (*METRICS,)) -> di
     Raises:
         InputError: As for ``rliable_scores``.
     """
-    study = results.store.manifest.study.name
+    study = results.study.name
     scores = {metric: rliable_scores(results, metric) for metric in metrics}
     runs = {name: range(len(rows)) for name, rows in scores[metrics[0]].items()}
 

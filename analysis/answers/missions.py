@@ -176,13 +176,13 @@ def collected(events: Events, uavs: int, nodes: int) -> np.ndarray:
 
 def held(events: Events, nodes: int) -> np.ndarray:
     """The (K,) data of every node in the whole mission: initial and arrived [data units]."""
-    return _of_nodes(events, ["mission_start", "arrival"], nodes)
+    return of_nodes(events, ["mission_start", "arrival"], nodes)
 
 
 def left_behind(events: Events, nodes: int) -> np.ndarray:
     """For each of the K nodes, whether less than ``LEFT_BEHIND`` of its data was collected."""
     return np.asarray(
-        _of_nodes(events, ["communication"], nodes) < LEFT_BEHIND * held(events, nodes)
+        of_nodes(events, ["communication"], nodes) < LEFT_BEHIND * held(events, nodes)
     )
 
 
@@ -246,8 +246,8 @@ def _directions(nodes: np.ndarray) -> np.ndarray:
     return np.column_stack([np.cos(between), np.sin(between)])
 
 
-def _of_nodes(events: Events, names: Sequence[str], nodes: int) -> np.ndarray:
-    """The sum of the values of these events at every node, (K,)."""
+def of_nodes(events: Events, names: Sequence[str], nodes: int) -> np.ndarray:
+    """The sum of the values of these events at each of the K nodes, (K,)."""
     log = pd.DataFrame(events)
     at_nodes = log[log["event"].isin(names) & (log["node"] >= 0)]
     return np.bincount(at_nodes["node"].to_numpy(int), at_nodes["value"], minlength=nodes)

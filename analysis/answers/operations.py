@@ -256,7 +256,7 @@ def queues(results: Results, policy: str, points: Iterable[int]) -> pd.DataFrame
     tables = []
     for point in points:
         first = results.cell(policy, point).first
-        logged = range(first, first + max(results.manifest["study"]["logged"], 1))
+        logged = range(first, first + max(results.study.logged, 1))
         of_missions = [pd.Series(waiting(results.events(policy, point, n))) for n in logged]
         counts = pd.concat(of_missions, axis=1).fillna(0)
         ends = dict(zip(("low", "high"), counts.quantile(BAND, axis=1).to_numpy(), strict=True))

@@ -253,7 +253,7 @@ def prices(results: Results, replication: int) -> Drawing:
 def _logged(results: Results, policy: str) -> range:
     """The replications whose event logs are kept."""
     first = results.cell(policy, 0).first
-    return range(first, first + results.manifest["study"]["logged"])
+    return range(first, first + results.study.logged)
 
 
 def _logs(results: Results, policy: str) -> list[pd.DataFrame]:

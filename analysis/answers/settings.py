@@ -63,8 +63,13 @@ def points(results: Results) -> pd.DataFrame:
 
 def in_words(results: Results) -> list[str]:
     """Every design point in words, as ``3 UAVs, arrival rate 0.02``; empty if nothing varies."""
-    rows = points(results).to_dict("records")
-    return [", ".join(parameter(str(f)).words(v) for f, v in row.items()) for row in rows]
+    return [", ".join(words) for words in words_of(points(results))]
+
+
+def words_of(table: pd.DataFrame) -> list[list[str]]:
+    """The values of every row of some columns of ``points`` in words, each with its field."""
+    rows = table.to_dict("records")
+    return [[parameter(str(f)).words(v) for f, v in row.items()] for row in rows]
 
 
 def setting_of(results: Results, policy: str, point: int) -> str:
@@ -92,7 +97,7 @@ def ranking_metric(results: Results, metric: str | None = None) -> str:
         InputError: If there is no such metric.
     """
     if metric is None:
-        metric = (results.manifest["study"]["selection"] or {}).get("metric", PRODUCT)
+        metric = getattr(results.study.selection, "metric", PRODUCT)
     metric = told(metric, results.missions)
     check_metric(results, metric)
     return metric

@@ -53,8 +53,7 @@ def sensitivity(
 
     Args:
         design: The design of the missions.
-        missions: The missions of one policy, a row per design point in order: columns ``point``,
-            ``replication`` and the metrics.
+        missions: The missions of one policy, a row per design point in order, with the metrics.
         metrics: Columns to analyse.
 
     Returns:
@@ -67,14 +66,11 @@ def sensitivity(
         the same value in all missions of A and B, its indices are nan.
 
     Raises:
-        InputError: If the missions are not one per point of the design, in order.
+        InputError: If there is not one mission of every point of the design.
     """
-    expected = [(number, point.replication) for number, point in enumerate(design.points)]
-    if [*missions[["point", "replication"]].itertuples(index=False, name=None)] != expected:
-        raise InputError(
-            f"missions: {len(missions)} that are not those of the design; "
-            f"allowed: one for each of its {len(expected)} points, in order, of one policy"
-        )
+    if len(missions) != design.count:
+        allowed = f"allowed: one for each of its {design.count} design points"
+        raise InputError(f"missions: {len(missions)} are not those of the design; {allowed}")
     tables = {metric: _indices(design, missions[metric].to_numpy(float)) for metric in metrics}
     return pd.concat(tables, names=["metric"]).reset_index("metric").reset_index(drop=True)
 
@@ -533,7 +529,7 @@ def sensitivities(results: Results) -> pd.DataFrame:
         A row per policy, metric and parameter: ``policy``, and the columns of
         ``answers.summary``. Empty if the design is not of the kind ``saltelli``.
     """
-    design = results.store.manifest.study.design
+    design = results.study.design
     if not isinstance(design, Saltelli):
         return pd.DataFrame()
     missions = results.missions.groupby("policy", sort=False)
@@ -554,7 +550,7 @@ def selections(results: Results) -> pd.DataFrame:
         the ends of the values at which the point lies. Empty if the study selects nothing. For a
         study that selects the cheapest setting, the rows of ``costs.selections``.
     """
-    if isinstance(results.store.manifest.selection, Cheapest):
+    if isinstance(results.study.selection, Cheapest):
         return costs.selections(results)
     words, rows = in_words(results), []
     for policy in results.policies:

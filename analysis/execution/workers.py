@@ -19,7 +19,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from dess import InputError
-from dess.analysis.execution import live_and_die_with
+from dess.analysis.execution import live_and_die_with, variable
 from dess.analysis.execution.jobs import Job, Problem, Progress, attempt, first_failing
 from dess.analysis.results.provenance import Member, engine_code
 from dess.code.libraries import needs
@@ -147,21 +147,13 @@ def _blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
-@contextmanager
-def _quiet() -> Iterator[None]:
+def _quiet() -> AbstractContextManager[None]:
     """A process of joblib that starts here does not warn of what a killed run left and it removed.
 
     The warnings would follow the last line of a command, and a user need not do anything.
     """
-    before = os.environ.get("PYTHONWARNINGS")
-    ignored = "ignore:resource_tracker:UserWarning"
-    os.environ["PYTHONWARNINGS"] = f"{before},{ignored}" if before else ignored
-    try:
-        yield
-    finally:
-        del os.environ["PYTHONWARNINGS"]
-        if before is not None:
-            os.environ["PYTHONWARNINGS"] = before
+    ignored = os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker:UserWarning"
+    return variable("PYTHONWARNINGS", ",".join(filter(None, ignored)))
 
 
 def _in_turn(job: Job, progress: Progress | None) -> Any:

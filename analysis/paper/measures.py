@@ -87,7 +87,7 @@ class EvidenceOfPolicy:
     @property
     def study(self) -> str:
         """The name of the study."""
-        return str(self.results.manifest["study"]["name"])
+        return self.results.study.name
 
     @cached_property
     def effects(self) -> pd.DataFrame:
@@ -100,7 +100,7 @@ class EvidenceOfPolicy:
         For a study that selects a setting, these are the missions that check it, which were not
         used for the selection.
         """
-        selects = self.results.manifest["study"]["selection"] is not None
+        selects = self.results.study.selection is not None
         missions = self.results.checks if selects else self.results.missions
         chosen = missions["policy"] == self.policy
         if uavs is not None:
@@ -121,16 +121,14 @@ class EvidenceOfPolicy:
 
     def logs(self, uavs: int) -> list[tuple[pd.DataFrame, np.ndarray]]:
         """The stored event logs of missions with a number of UAVs, each with the (K, 2) nodes."""
-        missions, logged = self.missions(uavs), self.results.manifest["study"]["logged"]
+        missions, logged = self.missions(uavs), self.results.study.logged
         missions = missions[missions["replication"] < logged]
         if missions.empty:
             raise MissingError(f"the study {self.study} stores no event logs")
+        which, results = missions[["point", "replication"]].itertuples(index=False), self.results
         return [
-            (
-                self.results.events(self.policy, point, replication),
-                np.array(self.results.scenario(point).nodes),
-            )
-            for point, replication in missions[["point", "replication"]].itertuples(index=False)
+            (results.events(self.policy, point, n), np.array(results.scenario(point).nodes))
+            for point, n in which
         ]
 
 

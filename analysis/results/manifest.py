@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 import dess
 from dess import InputError
 from dess.analysis.results import provenance
-from dess.analysis.study.cheapest import AnySelection, Costs, Setting
+from dess.analysis.study.cheapest import Setting
 from dess.analysis.study.design import DesignPoint
 from dess.analysis.study.study import CHECK, Study, StudyData
 from dess.files.documents import Sha256
@@ -199,16 +199,6 @@ class Manifest(provenance.Origin):
         content = _canonical([keys, self.missions, self.selected, accepted, *bounds])
         return sha256(content.encode()).hexdigest()[:16]
 
-    @property
-    def costs(self) -> Costs | None:
-        """The prices of the study, if it has any."""
-        return self.study.costs
-
-    @property
-    def selection(self) -> AnySelection | None:
-        """The rule by which the study selects design points; None if it selects none."""
-        return self.study.selection
-
     def units_at(self, points: np.ndarray) -> Units | None:
         """What a slot, a cell and a data unit are at (n,) design points; None without sheets."""
         units = [space.units for space in self.scenarios]
@@ -217,10 +207,10 @@ class Manifest(provenance.Origin):
     @cached_property
     def settings(self) -> list[Setting]:
         """The design points, for the search for the cheapest setting; none without prices."""
-        if not self.costs:
+        if not (costs := self.study.costs):
             return []
         points = zip(self.values, self.scenarios, strict=True)
-        return [Setting.of(values, space, self.costs) for values, space in points]
+        return [Setting.of(values, space, costs) for values, space in points]
 
     @cached_property
     def values(self) -> list[dict[str, Any]]:

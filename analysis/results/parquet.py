@@ -152,35 +152,31 @@ def _table(columns: Columns, schema: pa.Schema, chunk: Chunk) -> pa.Table:
     return pa.table(arrays, schema=schema.with_metadata({PARTS: json.dumps(chunk.rows)}))
 
 
-def check(tables: Sequence[pa.Table], rows: Sequence[Row]) -> None:
-    """Check that every table has the missions of some parts, in their order, with all UAVs.
+def are_of(tables: Sequence[pa.Table], rows: Sequence[Row]) -> bool:
+    """Whether every table has the missions of some parts, in their order, with all UAVs.
 
     What a record says of its mission is not checked: ``dess verify`` simulates missions again.
 
     Args:
         tables: The records of missions and those of their UAVs, or the bounds of missions.
         rows: The key, start and stop of every part, in the order of the records.
-
-    Raises:
-        ValueError: If the records are those of other missions.
     """
     keys, starts, stops = zip(*rows, strict=True)
     lengths = np.subtract(stops, starts)
     missions, *others = tables
     if lengths.sum() != len(missions):  # before memory is taken for them
-        raise ValueError("the records are not as many as the requested missions")
+        return False
     cells = np.repeat(np.array(keys, object), lengths)
     replications = np.concatenate([*map(np.arange, starts, stops)])
-    if not _are_of(missions, cells, replications):
-        raise ValueError("the records are not those of the requested missions")
-    for uavs in others:
-        fleet = missions["uavs"].to_numpy()
-        first = np.repeat(np.cumsum(fleet) - fleet, fleet)
-        if len(uavs) != len(first) or not (
-            np.array_equal(uavs["uav"], np.arange(len(first)) - first)
-            and _are_of(uavs, np.repeat(cells, fleet), np.repeat(replications, fleet))
-        ):
-            raise ValueError("the records are not those of all UAVs")
+    if not others:
+        return _are_of(missions, cells, replications)
+    fleet, (uavs,) = missions["uavs"].to_numpy(), others
+    first = np.repeat(np.cumsum(fleet) - fleet, fleet)
+    return (
+        _are_of(missions, cells, replications)
+        and np.array_equal(uavs["uav"], np.arange(len(first)) - first)
+        and _are_of(uavs, np.repeat(cells, fleet), np.repeat(replications, fleet))
+    )
 
 
 def _are_of(table: pa.Table, cells: np.ndarray, replications: np.ndarray) -> bool:
@@ -263,49 +259,32 @@ def read(path: Path, kind: str = "events") -> pa.Table | None:
         check_size(path, file.metadata)
         table = file.read(use_threads=False)
         for name in words:
-            table = table.set_column(*_spelled(table, name))
-        if not any(map(table.schema.equals, schemas)):
-            return None
-        _check_values(table)
+            known = {*WORDS[name]}
+            if any({*chunk.dictionary.to_pylist()} - known for chunk in table[name].chunks):
+                return None
+            place = table.column_names.index(name)
+            table = table.set_column(place, name, table[name].cast(pa.string()))
+        is_known = any(map(table.schema.equals, schemas)) and _are_valid(table)
     except InputError:
         raise
     except (OSError, KeyError, ValueError, pa.ArrowException):  # what pyarrow raises
         return None
-    return table
+    return table if is_known else None
 
 
-def _spelled(table: pa.Table, name: str) -> tuple[int, str, pa.ChunkedArray]:
-    """The place, name and words of a column of words.
-
-    Raises:
-        ValueError: If there are other words.
-    """
-    column = table[name]
-    for chunk in column.chunks:
-        if not {*chunk.dictionary.to_pylist()} <= {*WORDS[name]}:
-            raise ValueError(f"{name}: has other words")
-    return table.column_names.index(name), name, column.cast(pa.string())
-
-
-def _check_values(table: pa.Table) -> None:
-    """Check that no value is missing, all numbers are finite, and no index is out of range.
-
-    Raises:
-        ValueError: If one is.
-    """
+def _are_valid(table: pa.Table) -> bool:
+    """Whether no value is missing, all numbers are finite, and no index is out of range."""
     for name, column in zip(table.column_names, table.columns, strict=True):
         if column.null_count:
-            raise ValueError(f"{name}: a value is missing")
+            return False
         if limits := _limits(name, column.type):
             (low, high), values = limits, column.to_numpy()
             if not ((values >= low) & (values <= high)).all():
-                raise ValueError(f"{name}: a value is not finite, or out of range")
-    if "cuts" in table.column_names:
+                return False
+    if "cuts" in table.column_names:  # there are prices for every cut, as many of each
         cuts, prices = (list_value_length(table[name]).to_numpy() for name in ("cuts", "prices"))
-        if (cuts == 0).any() or (prices % cuts).any():
-            raise ValueError("prices: are not as many for every cut")
-    if "event" in table.column_names and "mission_end" not in table["event"].to_pylist():
-        raise ValueError("event: the log has no end of the mission")
+        return bool((cuts > 0).all() and not (prices % cuts).any())
+    return "event" not in table.column_names or "mission_end" in table["event"].to_pylist()
 
 
 def _limits(name: str, kind: pa.DataType) -> tuple[float, float] | None:

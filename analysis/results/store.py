@@ -189,15 +189,12 @@ class Store:
 
     def _examine(self, kind: str, team: int, name: str, tables: Sequence[pa.Table]) -> None:
         """Keep the tables of a chunk, or count its files as damaged, if they are no records."""
-        try:
-            rows = parquet.parts_in(tables[0])
-            parquet.check(tables, rows)
-        except ValueError:
-            for folder, _ in self._places(kind, team):
-                paths = parquet.files_in(folder)
-                self.damaged += [path for path in paths if parquet.content_hash(path) == name]
-        else:
+        if parquet.are_of(tables, rows := parquet.parts_in(tables[0])):
             self._enter(kind, rows, tables)
+            return
+        for folder, _ in self._places(kind, team):
+            paths = parquet.files_in(folder)
+            self.damaged += [path for path in paths if parquet.content_hash(path) == name]
 
     def _enter(self, kind: str, rows: Sequence[parquet.Row], tables: Sequence[pa.Table]) -> None:
         self._stacked.clear()
@@ -272,16 +269,14 @@ class Store:
             self.keep("missions", chunk, _tables_of(chunk, frames))
         for part in parts:
             merged[part.cell.key].append(part.replications)
+        gone = {
+            name
+            for name, of_file in held.items()
+            if not any(gaps(range(start, stop), merged[key]) for key, start, stop in of_file)
+        }
         for folder, _ in self._places("missions", chunks[0].team):
             for path in parquet.files_in(folder):
-                of_file = held.get(name := parquet.content_hash(path), [])
-                if (
-                    name not in names
-                    and of_file
-                    and not any(
-                        gaps(range(start, stop), merged[key]) for key, start, stop in of_file
-                    )
-                ):
+                if parquet.content_hash(path) in gone - names:
                     delete(path)
         self._scan()
 
@@ -331,7 +326,7 @@ class Store:
             InputError: If some are missing or damaged.
         """
         missions = self._rows("missions", parts)
-        if costs := self.manifest.costs:
+        if costs := self.manifest.study.costs:
             cost = costs.parts(self.manifest.scenarios, missions, self.uavs(parts))
             missions["cost"] = sum(cost.values())
         if units := self.manifest.units_at(missions["point"].to_numpy()):

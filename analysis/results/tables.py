@@ -21,6 +21,7 @@ from dess.analysis.results.provenance import Origin
 from dess.analysis.results.store import Place, Store
 from dess.analysis.study.cheapest import Cheapest, CheapestChoice
 from dess.analysis.study.selection import Choice, Selection
+from dess.analysis.study.study import StudyData
 from dess.errors import one_of
 from dess.fields import dotted
 from dess.record import MISSION_RECORD
@@ -133,6 +134,11 @@ class Results:
         """The manifest of the results, as plain data."""
         return self.store.manifest.data
 
+    @property
+    def study(self) -> StudyData:
+        """The study, with the name of its scenario in place of a path."""
+        return self.store.manifest.study
+
     @cached_property
     def policies(self) -> list[str]:
         """The teams, as the study names them."""
@@ -141,8 +147,7 @@ class Results:
     @property
     def design(self) -> str:
         """The kind of the design; the scenario alone is a grid."""
-        design = self.store.manifest.study.design
-        return design.kind if design else "grid"
+        return self.study.design.kind if self.study.design else "grid"
 
     def scenario(self, point: int = 0) -> ScenarioSpace:
         """The scenario of a design point."""
@@ -155,7 +160,7 @@ class Results:
             InputError: If it has not been stored.
         """
         cell = self.cell(policy, point)
-        logged = self.store.manifest.study.logged
+        logged = self.study.logged
         log = self.store.load_log(cell, replication) if replication in range(logged) else None
         if log is None:
             raise InputError(
@@ -170,9 +175,8 @@ class Results:
 
         Pages name no other one, so that they do not depend on where the results are.
         """
-        study = self.store.manifest.study
-        within = f"{SWEEPS}/" if study.description == SWEEP else ""
-        return f"results/{within}{study.name}"
+        within = f"{SWEEPS}/" if self.study.description == SWEEP else ""
+        return f"results/{within}{self.study.name}"
 
     def command(
         self, policy: str, point: int, replication: int, folder: str | Path | None = None
@@ -203,7 +207,7 @@ class Results:
     def _chosen(self, policy: str, kind: type) -> Any:
         """What a rule of this kind has selected for a policy; None if the study has another."""
         self.check_policy(policy)
-        manifest, rule = self.store.manifest, self.store.manifest.selection
+        manifest, rule = self.store.manifest, self.study.selection
         if not rule or not isinstance(rule, kind):
             return None
         parts = parts_of(manifest, self.policies.index(policy))

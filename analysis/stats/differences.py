@@ -294,13 +294,7 @@ def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str = "")
           all differences are 0.
         - A single pair of a metric without bounds has no interval: its ends are nan, and p is 1.
         - If A or B is constant, their correlation is 0. If both are, the variance reduction is 0.
-
-    Raises:
-        ValueError: If the samples are empty or differ in length.
     """
-    a, b = np.asarray(a, float), np.asarray(b, float)
-    if a.shape != b.shape or not a.size:
-        raise ValueError(f"paired: {a.size} and {b.size} values; allowed: as many, at least one")
     mean, p = difference_test(a, b, metric, level)
     differences = differences_of(a, b)
     of_a, of_b, of_differences = map(_variance, (a, b, differences))

@@ -98,16 +98,11 @@ def quantile_interval(
     end, that end is infinite, because no observation limits the quantile on that side.
 
     Args:
-        values: (n,) values.
+        values: (n,) values, one or more.
         share: Share of the missions below the quantile, in (0, 1).
         level: Confidence level.
-
-    Raises:
-        ValueError: If there are no values, or no such quantile.
     """
     sample = np.asarray(values, float)
-    if not sample.size:
-        raise ValueError("quantile_interval: no values")
     low, high = scipy.stats.quantile_test(sample, p=share).confidence_interval(level)
     ends = (-np.inf if np.isnan(low) else float(low), np.inf if np.isnan(high) else float(high))
     return Interval(float(np.quantile(sample, share)), *ends)

@@ -105,14 +105,8 @@ class Moments(NamedTuple):
 
     @classmethod
     def of(cls, values: Sequence[float] | np.ndarray) -> Self:
-        """The moments of values.
-
-        Raises:
-            ValueError: If there are no values.
-        """
+        """The moments of values, of which there is one or more."""
         sample = np.asarray(values, float)
-        if not sample.size:
-            raise ValueError("moments: no values")
         total = float(sample.sum())
         squares = float(((sample - total / sample.size) ** 2).sum())
         return cls(sample.size, total, squares, float(sample.min()), float(sample.max()))
@@ -186,13 +180,7 @@ class Moments(NamedTuple):
 
 
 def wilson(successes: int, n: int, level: float = LEVEL) -> Interval:
-    """Share of successes with its Wilson score interval, which holds near 0 and 1 as well.
-
-    Raises:
-        ValueError: If there are no trials.
-    """
-    if n < 1:
-        raise ValueError("wilson: no trials")
+    """Share of successes with its Wilson score interval, which holds near 0 and 1 as well."""
     share, z = successes / n, ndtri(0.5 + 0.5 * level)
     width = 2 * (n + z**2)
     centre = (2 * n * share + z**2) / width
@@ -202,11 +190,7 @@ def wilson(successes: int, n: int, level: float = LEVEL) -> Interval:
 
 
 def bounded_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) -> Interval:
-    """Mean of values from 0 to 1 with its interval, see ``stats.bounded.bounded_ends``.
-
-    Raises:
-        ValueError: If there are no values.
-    """
+    """Mean of values from 0 to 1 with its interval, see ``bounded_ends``."""
     return Moments.of(values).bounded(level)
 
 
@@ -216,9 +200,6 @@ def mean_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) ->
     It is fit for skewed metrics from some 30 values on. The mean of values from 0 to 1 has the
     ``bounded_interval``. Equal values give a degenerate interval (low = mean = high). The ends of
     a single value are nan, because it says nothing about the spread.
-
-    Raises:
-        ValueError: If there are no values.
     """
     return Moments.of(values).student(level)
 
@@ -230,9 +211,6 @@ def interval_of(
 
     Wilson's interval for outcomes of ``success``, the ``bounded_interval`` for the collection ratio
     and the product, and Student's t for all others.
-
-    Raises:
-        ValueError: If there are no values.
     """
     return Moments.of(values).interval(metric, level)
 

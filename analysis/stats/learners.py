@@ -75,13 +75,8 @@ def crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
         training only (Student's t over the missions); the interval for a new training and the
         deviations of training and rest are nan (unknown). With a single mission, all is nan but the
         difference and p, which is 1.
-
-    Raises:
-        ValueError: If there are no values.
     """
     d = np.asarray(differences, float)
-    if d.ndim != 2 or not d.size:
-        raise ValueError("crossed: no values; allowed: trainings x missions")
     trainings, missions = d.shape
     of_missions, p = t_test(d.mean(axis=0), level)  # for these trainings alone
     mean = of_missions.mean

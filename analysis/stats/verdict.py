@@ -9,14 +9,12 @@ A part of a claim is shown (True), refuted (False) or open (None), by a complete
 several alternatives, some may be the best, and some are on the front of two metrics.
 """
 
-from typing import Protocol
-
 import numpy as np
 import pandas as pd
 from scipy.special import stdtrit
 
 from dess.analysis.metrics import metric_of
-from dess.analysis.stats.intervals import LEVEL, rare_differences
+from dess.analysis.stats.intervals import LEVEL, Interval, rare_differences
 
 ABOVE, INCONCLUSIVE, BELOW = POSITIONS = ("above", "inconclusive", "below")
 MARKS = {ABOVE: "▲", INCONCLUSIVE: "≈", BELOW: "▼"}  # in tables
@@ -25,20 +23,12 @@ HOLDS, IN_PART, REFUTED = "holds", "holds in part", "does not hold"
 Part = bool | None
 
 
-class Ends(Protocol):
-    """The ends of an interval: an ``Interval``, or a row of a table of estimates."""
-
-    @property
-    def low(self) -> float:
-        """Its lower end."""
-
-    @property
-    def high(self) -> float:
-        """Its upper end."""
-
-
-def position(interval: Ends, reference: float = 0.0) -> str:
+def position(interval: Interval, reference: float = 0.0) -> str:
     """Whether a complete interval is above a reference, below it, or contains it.
+
+    Args:
+        interval: The interval, or a row of a table of estimates, with ``low`` and ``high``.
+        reference: The reference.
 
     Returns:
         ``ABOVE``, ``BELOW`` or ``INCONCLUSIVE``; also ``INCONCLUSIVE`` if an end is nan.
@@ -60,7 +50,7 @@ def position_by_test(difference: float, p: float, level: float = LEVEL) -> str:
     return BELOW if significant and difference < 0 else INCONCLUSIVE
 
 
-def above(interval: Ends, bound: float = 0.0) -> Part:
+def above(interval: Interval, bound: float = 0.0) -> Part:
     """Whether something is above a bound."""
     return {ABOVE: True, BELOW: False}.get(position(interval, bound))
 
@@ -148,12 +138,11 @@ def membership(
         weights = generator.standard_exponential((size, values.shape[1]))
         # Not matrix products: their last bits would depend on the number of threads.
         total, cost, value = (np.einsum("bn,kn->bk", weights, of) for of in (mask, excess, known))
-        more = (
-            generator.standard_gamma(0.5, (2, size, len(values))) if share else np.zeros((2, 1, 1))
-        )
-        count += on_front(base + cost / total, (value + more[0]) / (total + more.sum(axis=0))).sum(
-            axis=0
-        )
+        more = np.zeros((2, 1, 1))
+        if share:
+            more = generator.standard_gamma(0.5, (2, size, len(values)))
+        means = (value + more[0]) / (total + more.sum(axis=0))
+        count += on_front(base + cost / total, means).sum(axis=0)
     return count / draws
 
 

@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 
 from dess import InputError, simulate, simulate_batch
-from dess.analysis.answers.missions import FOLDER
+from dess.analysis.answers.missions import FOLDER, of_nodes
 from dess.analysis.results import event_log
 from dess.analysis.results.resimulate import Mission, difference, recorded
 from dess.analysis.results.tables import Results
@@ -48,12 +48,12 @@ class Log(Mission):
     @cached_property
     def initial(self) -> np.ndarray:
         """(K,) data of every node at the start [data units]."""
-        return self._of_nodes("mission_start")
+        return of_nodes(self.events, ["mission_start"], len(self.scenario.nodes))
 
     @cached_property
     def left(self) -> np.ndarray:
         """(K,) data of every node at the end [data units]."""
-        return self._of_nodes("mission_end")
+        return of_nodes(self.events, ["mission_end"], len(self.scenario.nodes))
 
     @cached_property
     def first_cell(self) -> np.ndarray:
@@ -81,14 +81,10 @@ class Log(Mission):
         flows[flowing + 1, nodes] = (sign * self.events["value"]).to_numpy()[flowing]
         return flows.cumsum(0)[:-1]
 
-    def _of_nodes(self, event: str) -> np.ndarray:
-        rows = self.events[(self.events["event"] == event) & (self.events["node"] >= 0)]
-        return rows.sort_values("node")["value"].to_numpy()
-
 
 def logs_of(results: Results) -> list[Log]:
     """The missions of the first design point whose logs a study has stored."""
-    logged = range(results.store.manifest.study.logged)
+    logged = range(results.study.logged)
     return [Log.of(results, policy, 0, n) for policy in results.policies for n in logged]
 
 

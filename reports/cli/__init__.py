@@ -4,11 +4,10 @@
 imports the simulator, pandas or torch when it runs.
 """
 
-import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 
+from dess.analysis.execution import variable
 from dess.reports.interrupts import EXIT_CODE, LINE, Interrupts
 
 
@@ -22,7 +21,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0 done, 2 bad input, 130 interrupted, 1 anything else.
     """
     words = sys.argv[1:] if arguments is None else [*arguments]
-    with _safe_path(), Interrupts(is_last=arguments is None) as interrupts:
+    # Workers import nothing from the working directory, which may be a results folder.
+    safe = variable("PYTHONSAFEPATH", "1")
+    with safe, Interrupts(is_last=arguments is None) as interrupts:
         try:  # the imports take a while, in which a signal may come
             from dess.reports.cli import console
             from dess.reports.cli.commands import app
@@ -46,21 +47,6 @@ def _check_text(words: Sequence[str]) -> None:
     for word in words:
         if not is_text(word):
             raise InputError(f"{shown(word)}: is not text in UTF-8; allowed: another name")
-
-
-@contextmanager
-def _safe_path() -> Iterator[None]:
-    """Let workers import nothing from the working directory, which may be a results folder."""
-    name = "PYTHONSAFEPATH"
-    before = os.environ.get(name)
-    os.environ[name] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[name]
-        else:
-            os.environ[name] = before
 
 
 def _failed(error: BaseException, words: Sequence[str], is_interrupted: bool) -> int:

@@ -240,7 +240,7 @@ def _tables(
         "comparisons": summary.comparisons(results),
         "learned_against_heuristic": summary.learned_against_heuristic(results),
         "sensitivities": summary.sensitivities(results),
-        "costs": costs.front(results) if results.store.manifest.costs else pd.DataFrame(),
+        "costs": costs.front(results) if results.study.costs else pd.DataFrame(),
         "selected": summary.selections(results),
         "gaps": optimality.by_fleet(results),
         "checks": summary.checks(results),
@@ -258,7 +258,7 @@ def _document(
     for row in placed:
         row |= {field: value for field, value in values[row["point"]].items() if field not in row}
     about = {
-        "study": results.manifest["study"]["name"],
+        "study": results.study.name,
         "accepted": results.manifest["accepted"],
     }
     return about | ({"targets": targets} if targets else {}) | rows
@@ -266,9 +266,9 @@ def _document(
 
 def _with_values(results: "Results", means: "pd.DataFrame") -> "pd.DataFrame":
     """Means with a column per field that the design sets; a list of values is JSON."""
-    table = means.copy()
-    for place, field in enumerate(results.store.manifest.values[0], 2):
-        column = [of_point[field] for of_point in results.store.manifest.values]
+    table, values = means.copy(), results.store.manifest.values
+    for place, field in enumerate(values[0], 2):
+        column = [of_point[field] for of_point in values]
         texts = [json.dumps(v) if isinstance(v, list | bool) else v for v in column]
         table.insert(place, field, table["point"].map(dict(enumerate(texts))))
     return table

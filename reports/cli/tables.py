@@ -22,20 +22,20 @@ MANY_POINTS = 40  # more design points are not listed
 
 def print_summary(results: Results, folder: Path, short: bool) -> None:
     """Print the means at the only design point, or the selected points and their check."""
-    study = results.manifest["study"]
-    console.say(f"{folder}: {len(results.missions):,} missions of study {study['name']}")
+    study = results.study
+    console.say(f"{folder}: {len(results.missions):,} missions of study {study.name}")
     for change in results.store.manifest.accepted:
         console.say(f" accepted: {change.text}")
-    printed = values.PRINTED.get(study["name"], {})
-    if study["selection"]:
+    printed = values.PRINTED.get(study.name, {})
+    if study.selection:
         selected = summary.selections(results)
         _print_selections(selected)
         is_search = "condition" in selected
-        if is_search and results.store.manifest.costs:
+        if is_search and study.costs:
             for text in costs.sentences(results):
                 console.say(f" {text.translate(str.maketrans('', '', '*`'))}")
         if len(results.checks):
-            means, checks = summary.checks(results), study["selection"]["check"]
+            means, checks = summary.checks(results), study.selection.check
             if is_search:
                 pairs = means[["policy", "point"]].itertuples(index=False)
                 means = means.assign(policy=[setting_of(results, *pair) for pair in pairs])

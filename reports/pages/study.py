@@ -54,7 +54,7 @@ def notes(results: Results) -> html.Marked:
 
 def page_title(results: Results) -> str:
     """The question that a study answers."""
-    if isinstance(results.store.manifest.selection, Cheapest):
+    if isinstance(results.study.selection, Cheapest):
         question = "Which fleet is the cheapest for {}?"
     elif results.design == "saltelli":
         question = "Which parameters matter for {}?"
@@ -62,7 +62,7 @@ def page_title(results: Results) -> str:
         question = f"Which {numbers.words(fields)} for {{}}?" if len(fields) < 4 else _BEST
     else:
         question = "Which policy for {}?"
-    return question.format(results.manifest["study"]["scenario"])
+    return question.format(results.study.scenario)
 
 
 def guarantees(results: Results) -> html.Marked:
@@ -139,27 +139,27 @@ def report_of(folder: Path, values: Mapping[str, Any] = MappingProxyType({})) ->
     results = load_results(folder)
     settings.ranking_metric(results, values.get("metric"))
     settings.baseline(results, values.get("baseline", 0))
-    study, original = results.manifest["study"], notebook.parsed(NOTEBOOK)
+    study, original = results.study, notebook.parsed(NOTEBOOK)
     kept = parts(results)
     original.cells = [
         cell for cell in original.cells if all(kept.get(tag, True) for tag in tags_of(cell))
     ]
     points = len(results.store.manifest.points)
-    where = f"{points:,} design points" if points > 1 else f"the scenario {study['scenario']}"
-    description = study["description"] or f"{numbers.words(results.policies)} at {where}."
+    where = f"{points:,} design points" if points > 1 else f"the scenario {study.scenario}"
+    description = study.description or f"{numbers.words(results.policies)} at {where}."
     title = page_title(results)
     original.cells[0].source = f"# {html.text(title)}\n\n{html.text(description)}"
-    report = notebook.report_of(f"{PREFIX}{study['name']}", original)
+    report = notebook.report_of(f"{PREFIX}{study.name}", original)
     return replace(report, title=title, description=" ".join(description.split()))
 
 
 def parts(results: Results) -> dict[str, bool]:
     """For each tag, whether the page of a study has the cells of the notebook with this tag."""
-    manifest, study = results.store.manifest, results.manifest["study"]
+    manifest, study = results.store.manifest, results.study
     several, fields = len(manifest.points) > 1, len(settings.varied(results))
     kind = results.design  # a design that varies one field at most is a grid
     kind = kind if kind in ("saltelli", "latin-hypercube") or fields > 1 else "grid"
-    is_ranked, is_search = kind != "saltelli", isinstance(manifest.selection, Cheapest)
+    is_ranked, is_search = kind != "saltelli", isinstance(study.selection, Cheapest)
     is_scan = kind == "grid" or (kind == "table" and fields <= 2)
     return {
         # Several design points whose missions share their replications: settings to rank.
@@ -185,10 +185,10 @@ def parts(results: Results) -> dict[str, bool]:
         "if-policies": not summary.comparisons(results).empty,
         "if-learned": not summary.learned_against_heuristic(results).empty,
         # Tables of the study.
-        "if-selection": isinstance(manifest.selection, Selection),
+        "if-selection": isinstance(study.selection, Selection),
         "if-cheapest": is_search,
-        "if-precision": study["precision"] is not None,
-        "if-costs": study["costs"] is not None,
+        "if-precision": study.precision is not None,
+        "if-costs": study.costs is not None,
         # A scenario in units, and what changes a little around the cheapest fleet.
         "if-sheet": all(space.units for space in manifest.scenarios),
         "if-around": is_search and around.is_known(results),

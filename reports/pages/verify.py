@@ -228,7 +228,7 @@ def _check_bounds(results: Results, sampling: _Sampling) -> Check:
                 f"the bound of point {point}, replication {replication} is {stored.ratio}, and "
                 f"{bound.ratio} when computed again"
             )
-    return Check(f"{results.manifest['study']['name']}, bounds", len(drawn), lines)
+    return Check(f"{results.study.name}, bounds", len(drawn), lines)
 
 
 def _as_stored(log: pd.DataFrame, stored: pa.Table) -> pd.DataFrame:

@@ -90,12 +90,6 @@ def test_shares_without_spread_have_an_interval(a, b):
     assert result.p == min(1, 2 * 0.5 ** sum(np.not_equal(a, b)))
 
 
-@pytest.mark.parametrize(("a", "b"), [([], []), ([1.0, 2.0], [1.0])])
-def test_samples_that_are_no_pairs_are_refused(a, b):
-    with pytest.raises(ValueError, match="paired: "):
-        of_lists(a, b)
-
-
 def compared(missions=STUDY, baseline="tour", metrics=(METRIC,), **arguments):
     return compare(missions, baseline, metrics, **arguments)
 

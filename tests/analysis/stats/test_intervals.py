@@ -12,7 +12,6 @@ from dess.analysis.execution.evaluation import Asked, evaluate, means
 from dess.analysis.metrics import PRODUCT, RATIO, REWARD, SUCCESS
 from dess.analysis.stats import intervals
 from dess.analysis.stats.differences import compare
-from dess.analysis.stats.distribution import quantile_interval
 from dess.analysis.stats.intervals import (
     bootstrap_interval,
     bounded_interval,
@@ -141,15 +140,6 @@ def test_wilson_and_student_by_hand(found, expected):
 def test_values_that_hardly_differ_have_an_interval_without_a_warning():
     with np.errstate(invalid="raise"):
         assert mean_interval([0.0, 5e-324]) == (0.0, 0.0, 0.0)
-
-
-@pytest.mark.parametrize(
-    "estimate",
-    [lambda: wilson(0, 0), lambda: mean_interval([]), lambda: quantile_interval([], 0.5)],
-)
-def test_without_values_there_is_no_estimate(estimate):
-    with pytest.raises(ValueError, match="no "):
-        estimate()
 
 
 MISSIONS = pd.DataFrame(
