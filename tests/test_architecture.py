@@ -139,7 +139,7 @@ def test_imports_only_go_downwards(floor):
     assert not climbing
 
 
-def test_three_modules_of_the_ground_import_by_name_what_may_be_above() -> None:
+def test_three_modules_of_the_ground_import_by_name_what_may_be_above():
     """The attributes of the package, its command, and the policies that a user names."""
     importing = {
         name

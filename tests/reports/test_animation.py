@@ -1,7 +1,6 @@
 """An animation shows the state of a mission after every slot, in few bytes, always the same."""
 
 import subprocess
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,12 +15,11 @@ from dess import policies
 from dess.analysis.figures import style
 from dess.analysis.results.event_log import residual_data, uav_slots
 from dess.reports.player import GIF, LAST_SECONDS, MP4, SLOTS_PER_SECOND, Film, write_animation
-from dess.scenario import Scenario
 from dess.state import sample_scenario
 
 
 @pytest.fixture(scope="module")
-def mission() -> tuple[pd.DataFrame, Scenario]:
+def mission():
     """Three UAVs that wait for one pad; the battery of one is depleted before the others end."""
     space = dess.load_scenario("fig4", uavs=3, pads=1, zone=[26, 2, 4, 1])
     record = dess.simulate(space, policies.load("greedy"), 1, 0, events=True)
@@ -29,7 +27,7 @@ def mission() -> tuple[pd.DataFrame, Scenario]:
     return pd.DataFrame(record.events.columns()), sample_scenario(space, 1, 0)
 
 
-def test_a_film_draws_what_the_player_shows(mission: tuple[pd.DataFrame, Scenario]) -> None:
+def test_a_film_draws_what_the_player_shows(mission):
     log, scenario = mission
     slots, residual = uav_slots(log), residual_data(log).clip(lower=0)
     with style.look():
@@ -50,9 +48,7 @@ def test_a_film_draws_what_the_player_shows(mission: tuple[pd.DataFrame, Scenari
     assert not np.array_equal(pictures[0], pictures[1])
 
 
-def test_a_gif_has_a_frame_per_slot_and_holds_the_last(
-    mission: tuple[pd.DataFrame, Scenario], tmp_path: Path
-) -> None:
+def test_a_gif_has_a_frame_per_slot_and_holds_the_last(mission, tmp_path):
     for name in "ab":
         write_animation(*mission, tmp_path / name, GIF, "greedy")
     content = (tmp_path / "a").read_bytes()
@@ -69,9 +65,7 @@ def test_a_gif_has_a_frame_per_slot_and_holds_the_last(
 
 
 @pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason="no ffmpeg on this machine")
-def test_a_video_has_a_frame_per_slot(
-    mission: tuple[pd.DataFrame, Scenario], tmp_path: Path
-) -> None:
+def test_a_video_has_a_frame_per_slot(mission, tmp_path):
     write_animation(*mission, tmp_path / "mission", MP4)
     program = [FFMpegWriter.bin_path(), "-i", str(tmp_path / "mission"), "-f", "null", "-"]
     told = subprocess.run(program, capture_output=True, text=True, check=True).stderr

@@ -143,7 +143,7 @@ def test_sensitivities_are_bars_with_intervals(indices):
     assert ax.get_ylim() == (2.5, -0.5)  # the first on top
 
 
-def test_the_front_goes_through_policies_that_are_not_dominated() -> None:
+def test_the_front_goes_through_policies_that_are_not_dominated():
     table = pd.DataFrame(
         {"policy": ["a", "b", "c"], "seconds": [1e-5, 1e-4, 1e-3], "mean": [0.5, 0.4, 0.9]}
         | {"low": 0.3, "high": 0.95, "on_front": [True, False, True]}

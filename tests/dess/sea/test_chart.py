@@ -10,7 +10,7 @@ from tests.drawn import reached, spaces
 
 
 @given(spaces())
-def test_ways_lead_around_no_fly_cells_and_home_to_the_nearest_zone(space: ScenarioSpace) -> None:
+def test_ways_lead_around_no_fly_cells_and_home_to_the_nearest_zone(space):
     chart, parking = space.chart, parking_of(space.rectangles)
     ways = [reached(cell, *space.size, {*space.no_fly}) for cell in parking]
     for x, y in np.ndindex(space.size):
@@ -25,6 +25,6 @@ def test_ways_lead_around_no_fly_cells_and_home_to_the_nearest_zone(space: Scena
     assert all(map(np.array_equal, again, chart))
 
 
-def test_a_zone_may_have_more_cells_than_a_short_integer_counts() -> None:
+def test_a_zone_may_have_more_cells_than_a_short_integer_counts():
     chart = ScenarioSpace.of(grid=200, zone=[0, 0, 200, 200], nodes=[[0, 0]]).chart
     assert (chart.nearest.ravel() == np.arange(40_000)).all()

@@ -3,8 +3,6 @@
 All checks of a command come before its first mission.
 """
 
-from pathlib import Path
-
 import pytest
 
 from dess.analysis.execution import evaluation, runner
@@ -105,7 +103,7 @@ BAD = {
 
 
 @pytest.fixture
-def broken(dess, tmp_path: Path) -> None:
+def broken(dess, tmp_path):
     """A folder with what outputs and studies trip over."""
     (tmp_path / "loop").symlink_to("loop")
     for name in ("linked", "taken/index.html", "pictures.png"):
