@@ -20,7 +20,7 @@ from dess.analysis.results.event_log import (
     residual_data,
     uav_slots,
 )
-from dess.reports.player import AGE_READING, TRAIL, library, player, reading
+from dess.reports.player import AGE_READING, library, player, reading
 from dess.state import sample_scenario
 
 # One UAV; three in a queue for one pad, of which one has its battery depleted long before the
@@ -125,14 +125,6 @@ def test_ages_are_shown_where_the_scenario_measures_them(case):
         return
     assert np.allclose(shown["ages"], ages(log), atol=0.0051, rtol=0)
     assert np.allclose(shown["meanAge"], mean_age(log), atol=0.0051, rtol=0)
-
-
-def test_the_cases_cover_waiting_charging_and_short_missions(queue):
-    slots, shown = uav_slots(queue.log), data_in(player(*queue, "queue").data)
-    ends = slots.groupby("uav")["slot"].max()
-    assert slots["waiting"].any() and slots["charging"].any() and ends.nunique() > 1
-    assert {*shown["filled"]} == {True, False}
-    assert duration(simulated(**CASES["short"]).log) < TRAIL
 
 
 def test_the_same_log_gives_the_same_bytes(mission):

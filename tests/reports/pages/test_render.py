@@ -116,6 +116,7 @@ raise ArithmeticError("no such number")
 # %%
 "the cell after"
 """
+FORMATS = ("svg", "pdf", "png")
 TINY = {"mission": MISSION, "scorecard": SCORECARD}
 # What Python, IPython, Jupyter and the libraries would import or run in a working directory.
 MODULES = ("pandas", "sitecustomize", "matplotlib", "joblib", "typer")
@@ -179,9 +180,10 @@ def files(trap, notebooks, out, progress, tmp_path_factory):
         patch.delenv("PYTHONSAFEPATH", raising=False)
         patch.chdir(trap)
         note = lambda *step: progress.append(step)  # noqa: E731
-        assert render([], ".", out, note, notebooks=notebooks) == out / "index.html"
+        index = render([], ".", out, note, notebooks=notebooks, formats=FORMATS)
+        assert index == out / "index.html"
     assert not list(home.glob(".ipython")) + list(home.glob(".jupyter")) + list(home.glob(".local"))
-    return {path.name: path.read_text("utf-8") for path in out.iterdir()}
+    return {path.name: path.read_text("utf-8") for path in out.glob("*.*")}
 
 
 def another_environment(results: Path, out: Path, folder: Path, patch: pytest.MonkeyPatch) -> Path:
@@ -231,25 +233,14 @@ def test_progress_counts_the_cells(progress):
 def test_the_same_results_give_the_same_bytes(
     files, results, notebooks, out, tmp_path, monkeypatch
 ):
-    """One page is rendered again, the index shows it beside the page of the earlier call."""
+    """With figures as files a current page is rendered again; the index shows the other one."""
     folder = another_environment(results, out, tmp_path, monkeypatch)
-    (folder / "mission.html").unlink()
-    render(["mission"], tmp_path / results.name, folder, notebooks=notebooks)
-    for name, text in files.items():
-        assert (folder / name).read_text("utf-8") == text, name
-
-
-def test_figures_are_files_on_request(files, results, notebooks, out, tmp_path, monkeypatch):
-    """Beside a page that is the same, rendered again though it is current; always the same."""
-    folder = another_environment(results, out, tmp_path, monkeypatch)
-    asked = ["mission"], tmp_path / results.name, folder, None, {}, notebooks, ("svg", "pdf", "png")
-    made = []
-    for _ in range(2):
-        render(*asked)
-        made.append({p.name: p.read_bytes() for p in (folder / "mission-figures").iterdir()})
-    assert made[0] == made[1]
+    made = {p.name: p.read_bytes() for p in (folder / "mission-figures").iterdir()}
     begins = {"figure-1.svg": b"<?xml", "figure-1.pdf": b"%PDF", "figure-1.png": b"\x89PNG"}
-    assert {name: content[: len(begins[name])] for name, content in made[0].items()} == begins
+    assert {name: content[: len(begins[name])] for name, content in made.items()} == begins
+    shutil.rmtree(folder / "mission-figures")
+    render(["mission"], tmp_path / results.name, folder, notebooks=notebooks, formats=FORMATS)
+    assert {p.name: p.read_bytes() for p in (folder / "mission-figures").iterdir()} == made
     for name, text in files.items():
         assert (folder / name).read_text("utf-8") == text, name
 
