@@ -10,13 +10,13 @@ import pytest
 from scipy import stats
 
 from dess import InputError
-from dess.analysis import load_results, marl_eval_data, rliable_scores, run_study
+from dess.analysis import marl_eval_data, rliable_scores
 from dess.analysis.answers import learning
 from dess.analysis.answers.learning import CURVE, CURVES, FINAL, difference, read_curve, read_curves
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess.policies.registry import TRAINED
-from tests.analysis.small import grid, small_study
+from tests.analysis.small import grid
 from tests.policies.learner.tiny import tiny
 
 
@@ -155,12 +155,9 @@ POLICIES, OF_RUNS = ["greedy", "random", "tour"], "collection_ratio"
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
+def results(studied):
     """Three policies at two design points, 21 missions each."""
-    folder = tmp_path_factory.mktemp("runs")
-    design = grid(quota=[30, 60])
-    run_study(small_study(folder, policies=POLICIES, missions=21, design=design), folder / "out")
-    return load_results(folder / "out")
+    return studied(policies=POLICIES, missions=21, design=grid(quota=[30, 60]))
 
 
 def block(results: Results, policy: str, point: int, missions: range) -> float:

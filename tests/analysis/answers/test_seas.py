@@ -6,23 +6,19 @@ import numpy as np
 import pytest
 
 from dess import InputError
-from dess.analysis import load_results, numbers, run_study
+from dess.analysis import numbers
 from dess.analysis.answers import seas
 from dess.analysis.answers.comparison import Cost, Times
 from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
-from tests.analysis.small import small_study
+from tests.analysis.small import grid
 
 SEAS = ("scattered:2", "scattered:5", "coast:2", "dense:2")
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("seas")
-    design = {"kind": "grid", "values": {"scenario": [*SEAS]}}
-    study = small_study(folder, design=design, policies=["greedy", "nearest"], missions=4)
-    run_study(study, folder / "trial")
-    return load_results(folder / "trial")
+def results(studied):
+    return studied(design=grid(scenario=[*SEAS]), policies=["greedy", "nearest"], missions=4)
 
 
 def of_sea(results: Results, policy: str, metric: str = PRODUCT) -> np.ndarray:

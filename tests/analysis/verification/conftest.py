@@ -4,18 +4,15 @@ from typing import Any
 
 import pytest
 
-from dess.analysis import run_study
 from dess.analysis.verification import measurements
-from tests.analysis.small import small_study
 
 # Two groups of communication slots, a queue for one pad, all nodes emptied now and then.
 CHANGES: dict[str, Any] = {"communication_slots": 6, "pads": 1, "initial_data": [0, 2], "quota": 90}
 
 
 @pytest.fixture(scope="session")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("results")
-    return run_study(small_study(folder, logged=8, set=CHANGES), folder / "out")
+def results(studied):
+    return studied(logged=8, set=CHANGES)
 
 
 @pytest.fixture(scope="session")
