@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+import pytest
 import typer
 from click.testing import CliRunner
 
@@ -13,9 +14,9 @@ from dess.analysis.results import parquet
 from dess.record import EVENT_COLUMNS
 from dess.reports.cli.commands import app
 from tests.pins.pinned import pinned
-from tests.reports.cli.conftest import dess, dess_json
+from tests.reports.cli.conftest import dess, dess_json, unrendered
 
-__all__ = ["dess", "dess_json"]  # fixtures
+__all__ = ["dess", "dess_json", "unrendered"]  # fixtures
 
 SWEEP = ["sweep", "--scenario", "small.toml", "--set", "uavs=1,2", "--policy", "greedy,random"]
 WHAT_IF = ["what-if", "--scenario", "small.toml", "--policy", "greedy"]
@@ -65,6 +66,7 @@ def test_python_without_docstrings_has_the_same_help_and_so_has_h():
     assert subprocess.run(command, capture_output=True, text=True).stdout == helps()
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_the_keys_of_every_json_document_are_the_kept_ones(dess, dess_json):
     for folder in ("trial", "again"):
         assert dess("study", "run", "trial.toml", "--out", folder)[0] == 0

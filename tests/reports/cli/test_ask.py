@@ -10,7 +10,6 @@ import pytest
 from dess.analysis import load_results, load_study
 from dess.analysis.ask.question import Question
 from dess.analysis.execution import runner
-from dess.reports.pages import notebook, render
 from tests.analysis.small import files_of
 
 ASKED = ["sweep", "--scenario", "small.toml", "--missions", 6, "--policy", "greedy,random"]
@@ -19,23 +18,6 @@ FIELDS = ["--set", "uavs=1..2", "--set", "quota=20,40"]
 
 WHAT_IF = ["what-if", "--scenario", "small.toml", "--missions", 6, "--set", "uavs=2"]
 WHAT_IF += ["--baseline", "uavs=1", "--policy", "greedy", "--policy", "random"]
-
-
-@pytest.fixture
-def unrendered(monkeypatch):
-    """No page is made, which takes seconds; the parameters of the page of a what-if question."""
-    given = []
-
-    def page_of(folder, out, *_):
-        return Path(out, f"study-{Path(folder).name}.html")
-
-    def note(names, results, out, progress, parameters):
-        notebook.check_parameters([notebook.read(*names)], parameters)
-        given.append(parameters)
-
-    monkeypatch.setattr(render, "render_study", page_of)
-    monkeypatch.setattr(render, "render", note)
-    return given
 
 
 def test_a_line_leads_to_a_page(dess, unrendered, tmp_path):
