@@ -108,13 +108,6 @@ def test_names_stand_for_policies():
     assert simulate("paper", "greedy", 1, 3).metrics.tobytes() != single[0]
 
 
-def test_a_python_file_that_a_user_names_is_a_policy(tmp_path):
-    file = tmp_path / "hovering_of_arguments.py"
-    file.write_text("class Hover:\n    name = 'hover'\n    def act(self, view):\n"
-                    "        return [4] * len(view)\n")  # fmt: skip
-    assert simulate("paper", f"{file}:Hover").collected > 0
-
-
 @pytest.mark.parametrize("wrong", [3, None, Greedy, len, ["greedy", 3], [], "gredy"], ids=str)
 def test_what_is_no_policy_is_refused_in_one_line(wrong):
     takers: list[Callable] = [simulate, simulate_batch, analysis.evaluate]

@@ -17,7 +17,7 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
-from dess import InputError
+from dess import InputError, __version__
 from dess.analysis import run_study
 from dess.reports.cli import main
 from dess.reports.pages import kernels
@@ -280,7 +280,8 @@ def test_processes_of_a_command_import_nothing_of_the_working_directory(trap, mo
 def test_the_command_imports_nothing_of_the_working_directory(trap):
     variables = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
     command = [sys.executable, "-m", "dess", "--version"]
-    subprocess.run(command, cwd=trap, check=True, env=variables)
+    done = subprocess.run(command, cwd=trap, env=variables, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, f"dess {__version__}\n")
     assert not (trap / "hit").exists()
 
 
