@@ -69,22 +69,25 @@ def distances(chart, x, y, to):
     return found
 
 
-@kernel
 def parking_cell(mission, uavs, i, chart, reach=None):
+    # Called by Python, and not compiled into a function of its own, which would take seconds.
     memory = parking.parking_memory(chart, len(uavs))
     return parking.parking_cell(mission, uavs, i, chart, memory, reach)
 
 
-@kernel
 def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):
-    """The node that a heuristic chooses, and the way there."""
-    charge = battery.must_charge(mission, uavs[i], rules.data_left(mission, residual))
+    """The node that a heuristic chooses."""
     home = parking_cell(mission, uavs, i, chart, reach)
-    node = heuristics._goal(
+    return _goal(kind, mission, uavs, i, residual, sensors, nodes, chart, home, reach)
+
+
+@kernel
+def _goal(kind, mission, uavs, i, residual, sensors, nodes, chart, home, reach):
+    charge = battery.must_charge(mission, uavs[i], rules.data_left(mission, residual))
+    return heuristics._goal(
         kind, mission, uavs, i, residual, sensors, nodes, np.zeros(0, np.int64), chart, charge,
         home, reach,
     )  # fmt: skip
-    return node
 
 
 @kernel

@@ -28,13 +28,20 @@ QUICK = (
     *("dess/test_missions.py", "dess/test_rules.py", "dess/sea", "dess/test_streams.py"),
     *("policies/test_registry.py", "analysis/stats", "test_doors.py"),
 )
-# Files that take longest; they come first, so that workers end together.
+# Files that compile most, each what those before it do not: two workers begin with them, so that
+# seldom both compile the same.
+COMPILING = ("reports/cli/study/test_diff.py", "policies/planner/test_policy.py")
+COMPILING += ("analysis/bound/test_optimum.py", "reports/cli/test_evaluate.py")
+COMPILING += ("reports/cli/test_simulate.py", "policies/learner/test_policy.py")
+# Files that take longest; they come next, so that workers end together.
 LONGEST = ("reports", "analysis/execution", "fuzz", "test_architecture.py", "test_docs.py")
 LONGEST += ("test_extras.py",)
 
 os.environ["OMP_NUM_THREADS"] = "1"
 if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:  # by nohup; commands would ignore it, too
     signal.signal(signal.SIGHUP, lambda *_: None)
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # by a shell, for jobs in its background
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("default", max_examples=30, deadline=None, derandomize=True)
 settings.register_profile("verify", max_examples=1000, deadline=None, print_blob=True)
@@ -54,7 +61,14 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: not is_in(item.path, LONGEST))
+    items.sort(key=lambda item: rank_of(item.path))
+
+
+@cache
+def rank_of(path: Path) -> int:
+    """The position of a file among those that come first; all others have the last one."""
+    first = (*COMPILING, *LONGEST)
+    return next((n for n, of in enumerate(first) if is_in(path, (of,))), len(first))
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:

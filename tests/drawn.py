@@ -188,7 +188,12 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
     }
     if (sections | fixed)["landing"] and draw(st.booleans()):
         sections["quota"] = 0
-    return draw(spaces(**(sections | fixed)))
+    values = sections | fixed
+    wind, slots = values["wind"], [of.get("slots_per_cell", 1) for of in values["fleet"]]
+    if max(slots, default=1) == 1 and not any((wind["strength"], *wind["moves"], wind["gusts"])):
+        # For seas with islands, guard and heuristics would be compiled once more.
+        values = PLAIN_SEA | values
+    return draw(spaces(**values))
 
 
 @st.composite

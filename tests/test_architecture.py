@@ -139,7 +139,7 @@ def test_imports_only_go_downwards(floor):
     assert not climbing
 
 
-def test_three_modules_of_the_ground_import_by_name_what_may_be_above() -> None:
+def test_three_modules_of_the_ground_import_by_name_what_may_be_above():
     """The attributes of the package, its command, and the policies that a user names."""
     importing = {
         name
@@ -237,20 +237,6 @@ def test_the_policies_of_a_study_are_replaced_by_the_words_of_a_user_alone():
         if any(keyword.arg in (None, "policies") for keyword in node.keywords)
     }
     assert replacing == {"dess.reports.cli.studies"}
-
-
-WAYS = ("from dess.policies.registry import typed", "from dess.policies.registry import *")
-WAYS += ("from dess.policies import registry\nregistry.typed([])",)
-WAYS += ("from dess.policies import registry as r\nr.typed([])",)
-WAYS += ("import dess.policies.registry\ndess.policies.registry.typed([])",)
-WAYS += ("import dess.policies.registry as r\nr.typed([])",)
-
-
-@pytest.mark.parametrize("source", WAYS)
-def test_every_way_to_take_a_name_is_seen(source):
-    assert _takes(ast.parse(source), "dess.policies.registry", "typed")
-    other = ast.parse(source.replace("typed", "names").replace("*", "names"))
-    assert not _takes(other, "dess.policies.registry", "typed")
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from benchmarks.conftest import RATIOS, losses
 
 
-def test_lost_speed_is_named_with_both_ratios() -> None:
+def test_lost_speed_is_named_with_both_ratios():
     name, recorded = "test_batch_engine_free_policy", RATIOS["test_batch_engine_free_policy"]
     speeds = {"test_floor": 5e6, name: 5e6 / recorded}
     assert losses(speeds) == []
@@ -12,5 +12,5 @@ def test_lost_speed_is_named_with_both_ratios() -> None:
     assert f"{1.4 * recorded:.2f} x the floor's time, recorded are {recorded:.2f} x" in line
 
 
-def test_without_the_floor_nothing_is_compared() -> None:
+def test_without_the_floor_nothing_is_compared():
     assert losses(dict.fromkeys(RATIOS, 1.0)) == []

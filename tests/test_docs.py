@@ -84,7 +84,7 @@ def table(text: str, heading: str) -> dict[str, list[list[float]]]:
 
 
 @pytest.fixture
-def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def outside(tmp_path, monkeypatch):
     """The policy of the how-to page as an installed package; the name of the policy.
 
     The working folder has this policy, and the files that pages give a title.
@@ -113,7 +113,7 @@ def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 # --- commands ---
 
 
-def test_the_readme_opens_with_four_lines_and_the_two_commands() -> None:
+def test_the_readme_opens_with_four_lines_and_the_two_commands():
     set_up = "python3 -m venv .venv && .venv/bin/pip install nox && .venv/bin/nox -s"
     start, sessions = blocks(README, "sh")[:2]
     assert len(start.splitlines()) == 4 and "dess sweep" in start
@@ -122,7 +122,7 @@ def test_the_readme_opens_with_four_lines_and_the_two_commands() -> None:
 
 @pytest.mark.usefixtures("outside")
 @pytest.mark.parametrize("arguments", command_lines("dess"), ids=" ".join)
-def test_commands_are_accepted(arguments: list[str]) -> None:
+def test_commands_are_accepted(arguments):
     if arguments == ["--version"]:
         assert cli.main(arguments) == 0
         return
@@ -140,14 +140,14 @@ def test_commands_are_accepted(arguments: list[str]) -> None:
         assert all(map(load_study, given["names"]))
 
 
-def test_commands_in_the_text_exist() -> None:
+def test_commands_in_the_text_exist():
     found = [c for text in PAGES.values() for c in re.findall(r"`(dess [a-z].*?)`", text)]
     assert found
     for text in found:
         leaf(shlex.split(text)[1:])
 
 
-def test_nox_sessions_exist() -> None:
+def test_nox_sessions_exist():
     defined = re.findall(
         r"^@nox\.session.*\ndef (\w+)", (ROOT / "noxfile.py").read_text("utf-8"), re.M
     )
@@ -157,7 +157,7 @@ def test_nox_sessions_exist() -> None:
 
 @pytest.mark.slow
 @pytest.mark.brief
-def test_the_moving_picture_is_of_the_command_beside_it(tmp_path: Path) -> None:
+def test_the_moving_picture_is_of_the_command_beside_it(tmp_path):
     (text,) = re.findall(r"`dess (simulate .*--animation .*?)`", README)
     *arguments, name = shlex.split(text)
     picture = ROOT / name
@@ -172,7 +172,7 @@ def test_the_moving_picture_is_of_the_command_beside_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_links_lead_somewhere(page: str) -> None:
+def test_links_lead_somewhere(page):
     links = re.findall(r'\]\(([^)\s]+)\)|src="([^"]+)"', PAGES[page])
     for link in filter(None, (a or b for a, b in links)):
         if not link.startswith("https://"):
@@ -182,12 +182,12 @@ def test_links_lead_somewhere(page: str) -> None:
             assert not anchor or anchor in anchors(target), link
 
 
-def test_a_clone_shows_no_placeholder_of_the_site() -> None:
+def test_a_clone_shows_no_placeholder_of_the_site():
     assert re.findall(r"^<!-- \[\[ commands \]\] -->$", ALL, re.M)
     assert not re.findall(r"^\[\[ \w.*\]\]$", ALL, re.M)
 
 
-def test_every_page_is_in_the_site() -> None:
+def test_every_page_is_in_the_site():
     def pages(entry: Any) -> list[str]:
         if isinstance(entry, str):
             return [f"docs/{entry}"]
@@ -202,13 +202,13 @@ def test_every_page_is_in_the_site() -> None:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_tests_that_are_named_exist(page: str) -> None:
+def test_tests_that_are_named_exist(page):
     sources = "".join(path.read_text("utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
     defined = set(re.findall(r"^def (test_\w+)", sources, re.M))
     assert set(re.findall(r"`(test_\w+)`", PAGES[page])) <= defined
 
 
-def test_fields_of_the_scenario_are_named_rightly() -> None:
+def test_fields_of_the_scenario_are_named_rightly():
     fields = {*dess.Scenario.model_fields}
     page = PAGES["docs/concepts/model.md"] + PAGES["docs/concepts/beyond.md"]
     decisions = page.split("## Decisions")[1].split("\n## ")[0]
@@ -220,7 +220,7 @@ def test_fields_of_the_scenario_are_named_rightly() -> None:
     assert fields <= code
 
 
-def test_the_columns_of_records_and_events_are_all_explained() -> None:
+def test_the_columns_of_records_and_events_are_all_explained():
     columns = EventLog().columns()
     pages = ("concepts/model.md", "concepts/beyond.md", "reference/event-log.md")
     text = "".join(PAGES[f"docs/{page}"] for page in pages)
@@ -232,23 +232,18 @@ def test_the_columns_of_records_and_events_are_all_explained() -> None:
 
 
 @pytest.mark.parametrize("source", every("python"))
-def test_snippets_compile(source: str) -> None:
+def test_snippets_compile(source):
     compile(source, "snippet", "exec")
 
 
 @pytest.mark.parametrize("source", [p for p in every("python") if "print(" in p.values[0]])
-def test_snippets_run(
-    source: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_snippets_run(source, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     exec(compile(source, "snippet", "exec"), {})
     assert capsys.readouterr().out
 
 
-def test_the_policy_of_the_how_to_page_collects(outside: str) -> None:
+def test_the_policy_of_the_how_to_page_collects(outside):
     policy, scenario = policies.load(outside), dess.load_scenario("paper")
     assert outside in policies.names()
     missions = dess.simulate_batch(scenario, policy, 7, 50).missions
@@ -276,9 +271,7 @@ def shown(interval: dict[str, float]) -> Any:
 
 
 @pytest.mark.slow
-def test_the_table_of_policies_is_what_its_command_prints(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_table_of_policies_is_what_its_command_prints(capsys):
     printed = table(POLICIES, "policy | success")
     assert printed.pop("paper") == [[pytest.approx(100 * values.TABLE_IV[m])] for m in METRICS]
     (arguments,) = (a for a in command_lines("dess") if {"random-unguarded", "planner"} <= {*a})
@@ -288,7 +281,7 @@ def test_the_table_of_policies_is_what_its_command_prints(
         assert printed[row["policy"]] == [shown(row[m]) for m in METRICS]
 
 
-def test_the_readme_has_the_figures_of_the_table_of_policies() -> None:
+def test_the_readme_has_the_figures_of_the_table_of_policies():
     rows = re.findall(r"^ +\| .*(?:`(\w+)`|the (paper)'s).*?\| (.*) \|$", README, re.M)
     assert [a or b for a, b, _ in rows] == ["greedy", "ddqn", "planner", "paper"]
     for name, other, cells in rows:
@@ -296,9 +289,7 @@ def test_the_readme_has_the_figures_of_the_table_of_policies() -> None:
 
 
 @pytest.mark.slow
-def test_the_readme_says_how_often_uavs_have_the_battery_for_the_way_home(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_readme_says_how_often_uavs_have_the_battery_for_the_way_home(capsys):
     arguments = ["evaluate", "--policy", "greedy", "--policy", "ddqn", "--missions", "1000"]
     rows = evaluated(arguments, capsys)
     for row, policy in zip(rows, ("greedy", "ddqn"), strict=True):
@@ -307,9 +298,7 @@ def test_the_readme_says_how_often_uavs_have_the_battery_for_the_way_home(
 
 
 @pytest.mark.slow
-def test_the_readme_quotes_the_answer_of_its_command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_readme_quotes_the_answer_of_its_command(tmp_path, monkeypatch, capsys):
     (line,) = re.findall(r"^dess (sweep --set .*)$", README, re.M)
     (quoted,) = re.findall(r"\*(\w+: the cheapest .*?)\*", README, re.S)
     monkeypatch.chdir(tmp_path)
@@ -320,7 +309,7 @@ def test_the_readme_quotes_the_answer_of_its_command(
 
 
 @pytest.mark.slow
-def test_the_table_by_fleet_is_what_its_commands_print(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_table_by_fleet_is_what_its_commands_print(capsys):
     printed = table(POLICIES, "policy | I = 1")
     by_fleet = [
         a for a in command_lines("dess") if a[0] == "evaluate" and "tour" in a and "uavs=" in a[2]
@@ -331,7 +320,7 @@ def test_the_table_by_fleet_is_what_its_commands_print(capsys: pytest.CaptureFix
             assert printed[row["policy"]][column] == shown(row[METRICS[2]])
 
 
-def test_the_sampling_of_ends_errs_as_the_page_says() -> None:
+def test_the_sampling_of_ends_errs_as_the_page_says():
     page = PAGES["docs/concepts/left-out.md"]
     for name, numbers_of in table(page, "communication slots m").items():
         slots = int(name.split(",")[0]) if name[0].isdigit() else 64
@@ -344,14 +333,14 @@ def test_the_sampling_of_ends_errs_as_the_page_says() -> None:
         assert np.round(found, 2).tolist() == numbers_of
 
 
-def test_the_limits_of_the_radio_are_those_of_the_page() -> None:
+def test_the_limits_of_the_radio_are_those_of_the_page():
     page, high, low = " ".join(PAGES["docs/concepts/left-out.md"].split()), 10.0, 1.0
     turns = [4 * high * low / (299_792_458 / frequency) for frequency in (2.4e9, 868e6)]
     assert f"this is {turns[0]:.0f} m; at 868 MHz it is {turns[1]:.0f} m" in page
     assert f"{4.12 * (high**0.5 + low**0.5):.1f} km for 10 m and 1 m" in page
 
 
-def test_the_table_of_what_learning_needs_is_that_of_the_shipped_curves() -> None:
+def test_the_table_of_what_learning_needs_is_that_of_the_shipped_curves():
     curves = pd.read_parquet(ROOT / "policies/trained/curves.parquet")
     assert learning_curves.table(curves) in PAGES["docs/concepts/trainings.md"]
     for variant in ("quick", "no transfer"):  # Fig. 3: three training seeds, the same budget

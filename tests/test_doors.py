@@ -3,8 +3,6 @@
 import ast
 from collections.abc import Iterator
 
-import pytest
-
 from tests.test_architecture import SOURCES
 
 DOOR = "dess.files"
@@ -82,18 +80,6 @@ def test_files_are_opened_read_written_and_listed_by_the_door_alone():
         if not name.startswith(DOOR)
     }
     assert {name: found for name, found in past.items() if found} == ALLOWED
-
-
-PAST = ("open(path)", "path.read_text()", "Path(folder).glob('*')", "os.replace(a, b)")
-PAST += ("pd.read_parquet(path)", "pq.ParquetFile(path)", "a.savefig(path)", "json.load(file)")
-THROUGH = ("from dess.files import read_text\nread_text(path)", "text.replace('a', 'b')")
-THROUGH += ("pq.ParquetFile(pa.BufferReader(content))", "a.savefig(buffer, format='svg')")
-
-
-@pytest.mark.parametrize("source", PAST + THROUGH)
-def test_a_way_past_the_door_is_seen(source):
-    past = [what for what, call in called(ast.parse(source)) if not in_memory(call)]
-    assert len(past) == (source in PAST)
 
 
 # What makes data of text. All JSON that is read becomes a model, in ``Document``; other text is

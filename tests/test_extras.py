@@ -81,7 +81,7 @@ MISSED = {
 
 
 @pytest.fixture(scope="module")
-def plain(folder: Path) -> dict[str, tuple[int, str, str]]:
+def plain(folder):
     """What commands answer in an installation without any extra."""
     return runs(folder, set(), *ANSWERED, *MISSED)
 

@@ -36,17 +36,17 @@ OUTCOMES += [("<skipped/>", MISSING), ("absent", MISSING)]
 
 
 @pytest.mark.parametrize(("outcome", "cell"), OUTCOMES)
-def test_a_row_has_the_outcome_of_every_check(outcome: str, cell: str) -> None:
+def test_a_row_has_the_outcome_of_every_check(outcome, cell):
     assert row(suite(outcome), "rllib") == ["`rllib` (`ray`)", "2.60.0", cell]
 
 
-def test_own_pins_are_exact_and_those_of_a_library_with_tests() -> None:
+def test_own_pins_are_exact_and_those_of_a_library_with_tests():
     for path in OWN_PINS:
         assert pins(path)
         assert path.stem in TESTED
 
 
-def test_the_page_has_a_green_row_for_every_library_in_its_pinned_version() -> None:
+def test_the_page_has_a_green_row_for_every_library_in_its_pinned_version():
     text = (ROOT / PAGE).read_text("utf-8").split(BEGIN)[1].split(END)[0]
     rows = [line.strip("| ").split(" | ") for line in text.strip().splitlines()[2:]]
     names = {re.findall(r"`(.+?)`", first)[0].replace("-", "_") for first, *_ in rows}

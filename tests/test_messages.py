@@ -186,9 +186,7 @@ def refusal(model: type[BaseModel], data: Any) -> str:
 @pytest.mark.parametrize(
     ("model", "data"), [pytest.param(*pair, id=pair[0].__name__) for pair in EXAMPLES]
 )
-def test_every_refusal_says_where_what_and_what_is_allowed(
-    model: type[BaseModel], data: dict[str, Any]
-) -> None:
+def test_every_refusal_says_where_what_and_what_is_allowed(model, data):
     assert refusal(model, data) == ""
     lines = [line for odd in changes(data) if (line := refusal(model, odd))]
     assert lines
@@ -198,7 +196,7 @@ def test_every_refusal_says_where_what_and_what_is_allowed(
         assert len(line) < LONGEST
 
 
-def test_every_error_of_input_says_what_is_allowed() -> None:
+def test_every_error_of_input_says_what_is_allowed():
     for path in SOURCES:
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.Call) and ast.unparse(node.func) == "InputError":
@@ -206,12 +204,12 @@ def test_every_error_of_input_says_what_is_allowed() -> None:
                 assert "allowed" in call or {*re.findall(r"\w+", call)} & PASSED_ON, (path, call)
 
 
-def test_every_model_is_among_the_examples() -> None:
+def test_every_model_is_among_the_examples():
     reached = {found for model, _ in EXAMPLES for found in models_in(model)}
     assert {model for model in ours() if not model.__subclasses__()} <= reached
 
 
-def test_the_strictest_limit_of_a_field_is_its_last() -> None:  # the one that pydantic checks
+def test_the_strictest_limit_of_a_field_is_its_last():  # the one that pydantic checks
     for model in ours():
         for field in model.model_fields.values():
             for end, strictest in LIMITS.items():

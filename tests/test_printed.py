@@ -64,12 +64,12 @@ def output_of(step: Step, place: Path, variables: dict[str, str]) -> str:
     return done.stdout
 
 
-def test_the_tutorial_begins_with_an_installation_of_everything() -> None:
+def test_the_tutorial_begins_with_an_installation_of_everything():
     assert re.search(r"pip install .*\.\[all\]", STEPS[TUTORIAL][0].text)
 
 
 @pytest.mark.parametrize("page", [p for p, steps in STEPS.items() if any(s.prints for s in steps)])
-def test_commands_print_what_the_page_says(page: str, installed: Path, tmp_path: Path) -> None:
+def test_commands_print_what_the_page_says(page, installed, tmp_path):
     home, place = tmp_path / "home", tmp_path / "place"
     home.mkdir(), place.mkdir()
     path = os.pathsep.join([str(installed.parent), os.environ["PATH"]])

@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser
 
 from tests.reports.browser import Visit
 from tests.reports.conftest import chromium
@@ -36,7 +35,7 @@ def build(config: Path, out: Path) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def site(tmp_path_factory):
     """The built site."""
     folder = tmp_path_factory.mktemp("site")
     built = build(ROOT / "mkdocs.yml", folder)
@@ -44,7 +43,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_pages_ask_nothing_from_elsewhere_and_fit_the_window(site: Path, chromium: Browser) -> None:
+def test_pages_ask_nothing_from_elsewhere_and_fit_the_window(site, chromium):
     pages = sorted({*site.rglob("*.html")} - {site / "404.html"})  # which only a server shows
     assert len(pages) > 40
     for path in pages:
@@ -58,7 +57,7 @@ def test_pages_ask_nothing_from_elsewhere_and_fit_the_window(site: Path, chromiu
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_the_search_finds_charging_pads(site: Path, chromium: Browser, width: int) -> None:
+def test_the_search_finds_charging_pads(site, chromium, width):
     visit = Visit(chromium, site / "index.html", width)
     visit.page.keyboard.press("f")
     visit.page.keyboard.type("charging pad")
@@ -76,7 +75,7 @@ def test_the_search_finds_charging_pads(site: Path, chromium: Browser, width: in
 @pytest.mark.parametrize(
     "link", ["no-such-page.md", "tutorial.md#no-such-heading", "../no/file.py"]
 )
-def test_a_broken_link_fails_the_build(tmp_path: Path, link: str) -> None:
+def test_a_broken_link_fails_the_build(tmp_path, link):
     for path in ROOT.iterdir():
         if path.name != "docs":
             (tmp_path / path.name).symlink_to(path)

@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -16,7 +15,7 @@ def _small_chunks(monkeypatch):
 
 
 @pytest.fixture(scope="session")
-def studied(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Results]:
+def studied(tmp_path_factory):
     """Runs the small study with some changes, once for all tests; its results."""
     kept: dict[str, Results] = {}
 

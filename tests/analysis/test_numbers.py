@@ -6,13 +6,13 @@ import pytest
 from dess.analysis import numbers
 
 
-def test_shares_are_in_percent_with_a_proper_minus() -> None:
+def test_shares_are_in_percent_with_a_proper_minus():
     assert numbers.percent(0.97312) == "97.3 %"
     assert numbers.interval(0.5, -0.012, 1) == "50.0 % [−1.2, 100.0]"
     assert numbers.percent(-0.0001) == "0.0 %"  # no minus on zero
 
 
-def test_differences_are_in_points_with_a_sign() -> None:
+def test_differences_are_in_points_with_a_sign():
     assert numbers.difference(0.5, 0.426) == "+7.4"
     assert numbers.difference(0.5, 0.521) == "−2.1"
     assert numbers.difference(0.5, 0.50001) == "0.0"
@@ -22,11 +22,11 @@ def test_differences_are_in_points_with_a_sign() -> None:
 @pytest.mark.parametrize(
     ("values", "text"), [([300, 300], "300"), ([1200, 20, 300], "20 to 1,200"), ([7], "7")]
 )
-def test_a_span_is_one_number_where_all_are_alike(values: list[int], text: str) -> None:
+def test_a_span_is_one_number_where_all_are_alike(values, text):
     assert numbers.span(values) == text
 
 
-def test_a_wide_table_keeps_the_order_of_appearance() -> None:
+def test_a_wide_table_keeps_the_order_of_appearance():
     rows = [("tour", 2, "z", 0.2), ("tour", 2, "a", 0.3), ("greedy", 1, "z", 0.4)]
     table = pd.DataFrame(rows, columns=["policy", "uavs", "metric", "mean"])
     estimates = table.assign(low=table["mean"], high=table["mean"])
@@ -41,7 +41,7 @@ def test_a_wide_table_keeps_the_order_of_appearance() -> None:
     ("time", "text"),
     [(2.0, "2 s"), (0.0123456, "12.3 ms"), (3.1e-6, "3.1 µs"), (4.78e-7, "478 ns"), (1e-3, "1 ms")],
 )
-def test_a_time_has_three_digits_in_its_unit(time: float, text: str) -> None:
+def test_a_time_has_three_digits_in_its_unit(time, text):
     assert numbers.seconds(time) == text
 
 
@@ -50,5 +50,5 @@ def test_a_time_has_three_digits_in_its_unit(time: float, text: str) -> None:
     [(0.2, "0 seconds"), (119, "119 seconds"), (120, "2 minutes"), (7200, "2 hours")]
     + [(86400 * 1234, "1,234 days")],
 )
-def test_a_duration_has_one_unit(seconds: float, text: str) -> None:
+def test_a_duration_has_one_unit(seconds, text):
     assert numbers.duration(seconds) == text

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from dess import InputError
-from dess.analysis import run_study
 from dess.analysis.answers import costs, settings
 from dess.analysis.ask import around
 from dess.analysis.ask.assumptions import assumptions
@@ -12,7 +11,7 @@ from dess.analysis.ask.question import sweep_question, what_if_question
 from dess.analysis.ask.what_if import WhatIf
 from dess.analysis.metrics import AGE, metric_of, told
 from dess.analysis.study.cheapest import Cheapest, Setting
-from tests.analysis.small import SHEET, small_study, write_scenario
+from tests.analysis.small import SHEET, write_scenario
 
 PRICES = {"uav": 20_000, "pad": 5_000, "hour": 36}
 SLOT, UNIT = 21.0, 21.0 * 125e3  # of SHEET: [s] and [bit]
@@ -60,9 +59,8 @@ def test_settings_have_the_same_ranks_in_units(searched):
     assert " h, n = " in settings.answer(searched, rows, "age_h")
 
 
-def test_without_a_sheet_nothing_is_told_in_units(tmp_path):
-    study = small_study(tmp_path, set={"age.measured": True})
-    missions = run_study(study, tmp_path / "out").missions
+def test_without_a_sheet_nothing_is_told_in_units(studied):
+    missions = studied(set={"age.measured": True}).missions
     assert told(AGE, missions) == AGE
     assert not [name for name in missions if name.endswith(("_h", "_min", "_MB"))]
 

@@ -36,16 +36,16 @@ PLAIN: list[tuple[dict[str, Any], dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize(("given", "plain"), PLAIN, ids=[str([*of]) for of, _ in PLAIN])
-def test_numbers_of_numpy_and_pandas_are_numbers(given: Any, plain: Any) -> None:
+def test_numbers_of_numpy_and_pandas_are_numbers(given, plain):
     assert load_scenario("paper", **given) == load_scenario("paper", **plain)
 
 
-def test_an_integer_is_not_made_of_a_real_number_of_numpy() -> None:
+def test_an_integer_is_not_made_of_a_real_number_of_numpy():
     with pytest.raises(InputError, match="uavs.0: 3.0 is not an integer; allowed: an integer or"):
         load_scenario("paper", uavs=np.float64(3))
 
 
-def test_questions_and_studies_take_numbers_of_numpy_and_pandas() -> None:
+def test_questions_and_studies_take_numbers_of_numpy_and_pandas():
     policies: Any = ["greedy"]
     plain = sweep_question({"uavs": (1, 2)}, "paper", policies, 4, 3).study
     numbers: Any = np.int64(4), np.int64(3)
@@ -87,20 +87,20 @@ TAKING: dict[str, Callable[[Any], Any]] = {
 
 
 @pytest.mark.parametrize("function", TAKING)
-def test_a_name_or_a_path_stands_for_a_scenario(function: str) -> None:
+def test_a_name_or_a_path_stands_for_a_scenario(function):
     results = [TAKING[function](scenario) for scenario in SCENARIOS.values()]
     assert results == [results[0]] * len(results)
 
 
 @pytest.mark.parametrize("function", TAKING)
 @pytest.mark.parametrize("wrong", [3, {"uavs": 3}, ScenarioSpace, "papr"], ids=str)
-def test_what_is_no_scenario_is_refused_in_one_line(function: str, wrong: Any) -> None:
+def test_what_is_no_scenario_is_refused_in_one_line(function, wrong):
     line = "^(scenario: .* is of type .*|papr: no such scenario.*); allowed: .*paper[^\n]*$"
     with pytest.raises(InputError, match=line):
         TAKING[function](wrong)
 
 
-def test_names_stand_for_policies() -> None:
+def test_names_stand_for_policies():
     teams = [*POLICIES.values()]
     single = [simulate("paper", team, 1, 3).metrics.tobytes() for team in teams]
     many = [simulate_batch("paper", team, 1, 3).missions.tobytes() for team in teams]
@@ -108,15 +108,8 @@ def test_names_stand_for_policies() -> None:
     assert simulate("paper", "greedy", 1, 3).metrics.tobytes() != single[0]
 
 
-def test_a_python_file_that_a_user_names_is_a_policy(tmp_path: Path) -> None:
-    file = tmp_path / "hovering_of_arguments.py"
-    file.write_text("class Hover:\n    name = 'hover'\n    def act(self, view):\n"
-                    "        return [4] * len(view)\n")  # fmt: skip
-    assert simulate("paper", f"{file}:Hover").collected > 0
-
-
 @pytest.mark.parametrize("wrong", [3, None, Greedy, len, ["greedy", 3], [], "gredy"], ids=str)
-def test_what_is_no_policy_is_refused_in_one_line(wrong: Any) -> None:
+def test_what_is_no_policy_is_refused_in_one_line(wrong):
     takers: list[Callable] = [simulate, simulate_batch, analysis.evaluate]
     for taker in takers:
         line = "^policy: .* is (of type|empty|unknown).*; allowed: [^\n]*greedy[^\n]*$"
@@ -125,7 +118,7 @@ def test_what_is_no_policy_is_refused_in_one_line(wrong: Any) -> None:
 
 
 @pytest.mark.parametrize("wrong", ["x", None, 1.5, [0.5], -1, {"a": 1}], ids=str)
-def test_what_is_no_replication_is_refused_in_one_line(wrong: Any) -> None:
+def test_what_is_no_replication_is_refused_in_one_line(wrong):
     with pytest.raises(InputError, match="^replications: [^\n]*; allowed: a number, or integers$"):
         simulate_batch("paper", "greedy", 1, wrong)
 
@@ -151,7 +144,7 @@ class Vandal:
         return np.full(len(view), 4)
 
 
-def test_a_policy_cannot_write_into_what_missions_share() -> None:
+def test_a_policy_cannot_write_into_what_missions_share():
     vandal = Vandal()
     bay = load_scenario("bay", max_slots=3)  # with no-fly cells or zones
     simulate(bay, vandal), simulate_batch(bay, vandal)
@@ -162,7 +155,7 @@ def test_a_policy_cannot_write_into_what_missions_share() -> None:
 
 
 @pytest.mark.parametrize("copied", [deepcopy, lambda env: loads(dumps(env))])
-def test_a_copy_of_an_environment_needs_no_compilation(copied: Callable) -> None:
+def test_a_copy_of_an_environment_needs_no_compilation(copied):
     """To numba, an array that can be written to has another type."""
     env = dess.vector_env("paper", 2, 1, guarded=True)
     env.reset()

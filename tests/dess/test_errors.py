@@ -1,7 +1,6 @@
 """The words of messages: what is allowed, and what may have been meant."""
 
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import pytest
 from IPython.core.interactiveshell import InteractiveShell
@@ -31,7 +30,7 @@ def test_a_close_name_comes_first(name, names, also, end):
     assert one_of(name, names, also) == end
 
 
-def test_bad_input_in_a_notebook_is_a_line(tmp_path: Path, capsys: Any, monkeypatch: Any) -> None:
+def test_bad_input_in_a_notebook_is_a_line(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
     cell = "from dess import InputError; raise InputError('settings: uavs is 5; allowed: 6')"
     InteractiveShell().run_cell(cell)

@@ -48,7 +48,7 @@ def test_a_record_has_what_the_scenario_measures(space, policy, seed, replicatio
     assert known - NOT_ALWAYS <= measured <= known
 
 
-def test_the_way_home_is_the_cheapest_in_battery() -> None:
+def test_the_way_home_is_the_cheapest_in_battery():
     """Dijkstra's algorithm in plain Python, over the surcharges of the wind."""
     wind = {"strength": 0.7, "direction": 70.0, "gusts": 0.5, "seed": 3}
     space = load_scenario("archipelago:2", wind=wind, fleet=[{"slots_per_cell": 2}, {}])
@@ -73,7 +73,7 @@ def test_the_way_home_is_the_cheapest_in_battery() -> None:
 
 
 @pytest.mark.parametrize("battery, home", [(10, 1), (6, 1), (5, 0)])
-def test_a_mission_is_home_if_its_uav_has_the_battery_for_the_way(battery: int, home: int) -> None:
+def test_a_mission_is_home_if_its_uav_has_the_battery_for_the_way(battery, home):
     # Three cells south of its zone the quota of 12 is filled, and three percent are left or not.
     sea = {"grid": 8, "zone": [2, 2, 1, 1], "nodes": [[2, 6]], "initial_data": 1e6, "uavs": 1}
     space = ScenarioSpace.of(**sea, quota=12, flying_time=battery, charge_start=10)

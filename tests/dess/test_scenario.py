@@ -111,13 +111,6 @@ def test_bad_files_are_named(tmp_path):
             load_scenario(path)
 
 
-def test_missing_scenarios_are_refused():
-    with pytest.raises(InputError, match="allowed: bay, biscay-corner, fig1, .* others, or a TOML"):
-        load_scenario("none")
-    with pytest.raises(InputError, match=r"no such scenario \(did you mean paper\?\)"):
-        load_scenario("papper")
-
-
 @pytest.mark.parametrize("values", [(-1, 0), (2**64, 0), (0, -1), (0, 2**32)])
 def test_seeds_off_the_counter_are_refused(values):
     with pytest.raises(InputError, match="out of range; allowed: 0.."):

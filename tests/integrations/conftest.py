@@ -9,7 +9,7 @@ DISTRIBUTIONS = {"cleanrl": "torch", "rllib": "ray"}
 
 
 @pytest.fixture(scope="module", autouse=True)
-def library(request: pytest.FixtureRequest, record_testsuite_property) -> None:
+def library(request, record_testsuite_property):
     """Write the library that a test file is about into the report, with its version."""
     name = request.path.stem.removeprefix("test_").replace("_", "-")
     distribution = DISTRIBUTIONS.get(name, name)

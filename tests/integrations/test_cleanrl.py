@@ -20,7 +20,7 @@ FLEET = ScenarioSpace.of(QUICK, uavs=3)
 MISSIONS, ROWS = 4, 12
 
 
-def test_contract(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_contract(monkeypatch):
     """The loop learns from allowed actions of UAVs that act, and its network is a policy."""
     learned = []
 

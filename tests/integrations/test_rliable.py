@@ -17,7 +17,7 @@ pytest.importorskip("rliable")
 EXAMPLE = Path(__file__).parents[2] / "examples" / "rliable_iqm.py"
 
 
-def test_contract(tmp_path: Path) -> None:
+def test_contract(tmp_path):
     """The example computes its means from the scores of a study, prints them and draws."""
     study = small_study(tmp_path, missions=40, design=grid(quota=[30, 60]))
     results = run_study(study, tmp_path / "out")

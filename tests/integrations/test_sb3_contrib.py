@@ -19,7 +19,7 @@ FLEET = ScenarioSpace.of(uavs=3, flying_time=[5, 30], quota=60, max_slots=25)
 MISSIONS, ROWS = 4, 12
 
 
-def test_contract(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_contract(tmp_path, monkeypatch):
     """Its actions are allowed, UAVs that have ended hover, and the example is a policy."""
     env, waits = sb3.SB3VecEnv(dess.vector_env(FLEET, MISSIONS)), 0
     model = sb3_contrib.MaskablePPO("MlpPolicy", env, n_steps=8, batch_size=8, seed=1)

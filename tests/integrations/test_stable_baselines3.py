@@ -26,7 +26,7 @@ def harvest(scenario=QUICK, **options):
     return sb3.SB3VecEnv(dess.vector_env(scenario, MISSIONS, **options))
 
 
-def test_contract() -> None:
+def test_contract():
     """Steps are those of ``vector_env``, and ends are told as its wrappers expect it."""
     env, plain = harvest(seed=0), dess.vector_env(QUICK, MISSIONS, seed=0)
     generator, copies = np.random.default_rng(1), []
@@ -66,7 +66,7 @@ def test_contract() -> None:
     assert len(rewards) == 24 and max(slots) <= QUICK.max_slots
 
 
-def test_make_vec_env_makes_missions_of_a_lone_uav() -> None:
+def test_make_vec_env_makes_missions_of_a_lone_uav():
     env = env_util.make_vec_env("dess/Paper-v0", 2, seed=1, env_kwargs={"scenario": QUICK})
     model = stable_baselines3.PPO("MlpPolicy", env, n_steps=8, batch_size=8, n_epochs=1).learn(32)
     assert model.num_timesteps == 32

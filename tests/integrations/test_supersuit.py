@@ -38,7 +38,7 @@ def legal(infos: Any, generator: np.random.Generator) -> np.ndarray:
 
 
 @pytest.mark.parametrize("fleet", FLEETS)
-def test_contract(fleet: str) -> None:
+def test_contract(fleet):
     """The UAVs of a copy end together, and stable-baselines3 learns from its rows."""
     env, generator = vectors(fleet), np.random.default_rng(0)
     _, infos = env.reset(seed=1)

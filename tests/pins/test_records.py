@@ -30,7 +30,7 @@ def bytes_of(table: np.ndarray) -> bytes:
 
 
 @pytest.mark.parametrize("team", TEAMS)
-def test_the_records_of_a_policy_are_the_kept_ones(team: str) -> None:
+def test_the_records_of_a_policy_are_the_kept_ones(team):
     hashes = []
     for sea, changes in SEAS.items():
         if team == "ddqn" and sea != "paper":

@@ -1,16 +1,15 @@
 """A browser for the tests of pages."""
 
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import sync_playwright
 
 from tests.reports import browser
 
 
 @pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
+def chromium():
     """A headless Chromium; tests that need it are skipped on machines without one."""
     if browser.CHROMIUM is None:
         pytest.skip("no chromium on this machine to open a page in")
@@ -23,7 +22,7 @@ def chromium() -> Iterator[Browser]:
 
 
 @pytest.fixture
-def visit(chromium: Browser) -> Iterator[Callable[[Path, int], browser.Visit]]:
+def visit(chromium):
     """Opens a file in a window of a width [px]; its tab is closed after the test."""
     visits: list[browser.Visit] = []
 

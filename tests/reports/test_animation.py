@@ -1,7 +1,6 @@
 """An animation shows the state of a mission after every slot, in few bytes, always the same."""
 
 import subprocess
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,22 +15,21 @@ from dess import policies
 from dess.analysis.figures import style
 from dess.analysis.results.event_log import residual_data, uav_slots
 from dess.reports.player import GIF, LAST_SECONDS, MP4, SLOTS_PER_SECOND, Film, write_animation
-from dess.scenario import Scenario
 from dess.state import sample_scenario
 
 
-@pytest.fixture(scope="module")
-def mission() -> tuple[pd.DataFrame, Scenario]:
-    """Three UAVs that wait for one pad; the battery of one is depleted before the others end."""
-    space = dess.load_scenario("fig4", uavs=3, pads=1, zone=[26, 2, 4, 1])
+def mission(**fields: Any) -> tuple[pd.DataFrame, dess.Scenario]:
+    """Three UAVs with one pad, for which they wait unless their quota is filled before."""
+    space = dess.load_scenario("fig4", uavs=3, pads=1, zone=[26, 2, 4, 1], **fields)
     record = dess.simulate(space, policies.load("greedy"), 1, 0, events=True)
     assert record.events is not None
     return pd.DataFrame(record.events.columns()), sample_scenario(space, 1, 0)
 
 
-def test_a_film_draws_what_the_player_shows(mission: tuple[pd.DataFrame, Scenario]) -> None:
-    log, scenario = mission
+def test_a_film_draws_what_the_player_shows():
+    log, scenario = mission()
     slots, residual = uav_slots(log), residual_data(log).clip(lower=0)
+    assert slots["waiting"].any() and slots["charging"].any()
     with style.look():
         film = Film(log, scenario)
         for slot in range(film.end + 1):
@@ -50,11 +48,10 @@ def test_a_film_draws_what_the_player_shows(mission: tuple[pd.DataFrame, Scenari
     assert not np.array_equal(pictures[0], pictures[1])
 
 
-def test_a_gif_has_a_frame_per_slot_and_holds_the_last(
-    mission: tuple[pd.DataFrame, Scenario], tmp_path: Path
-) -> None:
+def test_a_gif_has_a_frame_per_slot_and_holds_the_last(tmp_path):
+    short = mission(quota=80)
     for name in "ab":
-        write_animation(*mission, tmp_path / name, GIF, "greedy")
+        write_animation(*short, tmp_path / name, GIF, "greedy")
     content = (tmp_path / "a").read_bytes()
     assert content == (tmp_path / "b").read_bytes()
     assert len(content) < 1e6
@@ -63,17 +60,16 @@ def test_a_gif_has_a_frame_per_slot_and_holds_the_last(
         for number in range(picture.n_frames):
             picture.seek(number)
             times.append(picture.info["duration"])
-    end = int(mission[0]["time"].max())
+    end = int(short[0]["time"].max())
     assert sum(times) == 1000 * (end + 1) / SLOTS_PER_SECOND + 1000 * LAST_SECONDS
     assert times[-1] > 1000 * LAST_SECONDS
 
 
 @pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason="no ffmpeg on this machine")
-def test_a_video_has_a_frame_per_slot(
-    mission: tuple[pd.DataFrame, Scenario], tmp_path: Path
-) -> None:
-    write_animation(*mission, tmp_path / "mission", MP4)
+def test_a_video_has_a_frame_per_slot(tmp_path):
+    short = mission(quota=80)
+    write_animation(*short, tmp_path / "mission", MP4)
     program = [FFMpegWriter.bin_path(), "-i", str(tmp_path / "mission"), "-f", "null", "-"]
     told = subprocess.run(program, capture_output=True, text=True, check=True).stderr
-    frames = int(mission[0]["time"].max()) + 1 + LAST_SECONDS * SLOTS_PER_SECOND
+    frames = int(short[0]["time"].max()) + 1 + LAST_SECONDS * SLOTS_PER_SECOND
     assert f"frame={frames:5}" in told

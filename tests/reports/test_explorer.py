@@ -1,12 +1,8 @@
 """The explorer shows the means of the grid, wherever its sliders stand, in a real browser."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import pandas as pd
 import pytest
-from playwright.sync_api import Browser, Locator, Page
+from playwright.sync_api import Locator, Page
 
 from dess import InputError
 from dess.analysis import run_study
@@ -15,7 +11,6 @@ from dess.analysis.results.tables import Results
 from dess.analysis.stats.intervals import interval_of
 from dess.reports.explorer import explorer
 from tests.analysis.small import grid, small_study
-from tests.reports.browser import Visit
 
 DESIGN = {"uavs": [1, 2, 3], "charge_complete": [40, 60], "initial_data": [[1, 2], 5]}
 # As the study has them; the page has numbers in ascending order.
@@ -26,14 +21,14 @@ MISSIONS = 12
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("explorer")
     study = small_study(folder, policies=POLICIES, missions=MISSIONS, design=grid(**SHUFFLED))
     return run_study(study, folder / "results")
 
 
 @pytest.fixture(scope="module")
-def document(results: Results, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def document(results, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "page.html"
     head = (
         '<!DOCTYPE html><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
@@ -91,9 +86,7 @@ def check_curve(page: Page, results: Results, places: tuple[int, ...], along: in
     assert heights == pytest.approx([100 - mean for mean in means], abs=0.051)
 
 
-def test_moving_a_slider_shows_the_figures_of_the_grid(
-    visit: Callable[[Path, int], Visit], results: Results, document: Path
-) -> None:
+def test_moving_a_slider_shows_the_figures_of_the_grid(visit, results, document):
     opened = visit(document, 390)
     page, places = opened.page, [*START]
     check(page, results, START)
@@ -118,7 +111,7 @@ def test_moving_a_slider_shows_the_figures_of_the_grid(
     assert opened.requests == [document.as_uri()]
 
 
-def test_policies_are_chosen(visit: Callable[[Path, int], Visit], document: Path) -> None:
+def test_policies_are_chosen(visit, document):
     page = visit(document, 1280).page
     page.get_by_role("checkbox", name="greedy").uncheck()
     for metric in METRICS:
@@ -127,9 +120,7 @@ def test_policies_are_chosen(visit: Callable[[Path, int], Visit], document: Path
     assert page.locator(".curve circle").count() == len(DESIGN["uavs"])
 
 
-def test_without_scripts_one_setting_is_shown(
-    chromium: Browser, results: Results, document: Path
-) -> None:
+def test_without_scripts_one_setting_is_shown(chromium, results, document):
     page = chromium.new_page(java_script_enabled=False)
     page.goto(document.as_uri())
     assert "The sliders need JavaScript" in str(page.locator("noscript").inner_html())
@@ -148,7 +139,7 @@ def test_without_scripts_one_setting_is_shown(
         None,
     ],
 )
-def test_what_is_no_grid_is_refused(design: Any, tmp_path: Path) -> None:
+def test_what_is_no_grid_is_refused(design, tmp_path):
     changes = {"design": design} if design else {}
     study = small_study(tmp_path, policies=["random"], missions=2, **changes)
     results = run_study(study, tmp_path / "results")

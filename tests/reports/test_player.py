@@ -2,8 +2,6 @@
 
 import json
 import re
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,9 +20,8 @@ from dess.analysis.results.event_log import (
     residual_data,
     uav_slots,
 )
-from dess.reports.player import AGE_READING, TRAIL, library, player, reading
+from dess.reports.player import AGE_READING, library, player, reading
 from dess.state import sample_scenario
-from tests.reports.browser import Visit
 
 # One UAV; three in a queue for one pad, of which one has its battery depleted long before the
 # others end; quotas that are filled at once; nothing to serve, in a mission that is truncated.
@@ -49,17 +46,17 @@ def simulated(**fields: Any) -> Logged:
 
 
 @pytest.fixture(scope="module", params=CASES)
-def mission(request: pytest.FixtureRequest) -> Logged:
+def mission(request):
     return simulated(**CASES[request.param])
 
 
 @pytest.fixture(scope="module")
-def queue() -> Logged:
+def queue():
     return simulated(**CASES["queue"])
 
 
 @pytest.fixture(scope="module")
-def shown(mission: Logged) -> dict[str, Any]:
+def shown(mission):
     """What a player gets to show."""
     return data_in(player(*mission, "shown").data)
 
@@ -69,15 +66,13 @@ def data_in(html: str) -> dict[str, Any]:
     return json.JSONDecoder().raw_decode(html, html.index("{", html.index("playMission(")))[0]
 
 
-def test_discs_are_the_residual_data(mission: Logged, shown: dict[str, Any]) -> None:
+def test_discs_are_the_residual_data(mission, shown):
     assert np.allclose(shown["residual"], residual_data(mission.log), atol=0.0051, rtol=0)
     assert shown["nodes"] == [[*node] for node in mission.scenario.nodes]
     assert shown["colours"]["nodes"] == node_colours(len(mission.scenario.nodes))
 
 
-def test_uavs_are_in_their_state_until_their_mission_ends(
-    mission: Logged, shown: dict[str, Any]
-) -> None:
+def test_uavs_are_in_their_state_until_their_mission_ends(mission, shown):
     slots, fleet = uav_slots(mission.log), shown["fleet"]
     for row in slots.itertuples():
         before, after = ({n: fleet[n][t][row.uav] for n in fleet} for t in (row.slot, row.slot + 1))
@@ -96,9 +91,7 @@ def test_uavs_are_in_their_state_until_their_mission_ends(
     assert np.flatnonzero(shown["filled"]).tolist() == sorted(filled)
 
 
-def test_the_status_says_what_is_left_and_who_charges_and_waits(
-    mission: Logged, shown: dict[str, Any]
-) -> None:
+def test_the_status_says_what_is_left_and_who_charges_and_waits(mission, shown):
     slots, left = uav_slots(mission.log), residual_data(mission.log).sum(axis=1)
     assert len(shown["status"]) == duration(mission.log) + 1
     for time, status in enumerate(shown["status"]):
@@ -123,7 +116,7 @@ AGED: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("case", AGED)
-def test_ages_are_shown_where_the_scenario_measures_them(case: str) -> None:
+def test_ages_are_shown_where_the_scenario_measures_them(case):
     log, scenario = simulated(**AGED[case])
     shown = data_in(player(log, scenario, "aged").data)
     assert (AGE_READING in reading(scenario)) == scenario.age.measured
@@ -134,28 +127,20 @@ def test_ages_are_shown_where_the_scenario_measures_them(case: str) -> None:
     assert np.allclose(shown["meanAge"], mean_age(log), atol=0.0051, rtol=0)
 
 
-def test_the_cases_cover_waiting_charging_and_short_missions(queue: Logged) -> None:
-    slots, shown = uav_slots(queue.log), data_in(player(*queue, "queue").data)
-    ends = slots.groupby("uav")["slot"].max()
-    assert slots["waiting"].any() and slots["charging"].any() and ends.nunique() > 1
-    assert {*shown["filled"]} == {True, False}
-    assert duration(simulated(**CASES["short"]).log) < TRAIL
-
-
-def test_the_same_log_gives_the_same_bytes(mission: Logged) -> None:
+def test_the_same_log_gives_the_same_bytes(mission):
     columns = {name: mission.log[name].to_numpy() for name in mission.log}
     again = player(columns, mission.scenario, "one", "title", "caption").data
     assert player(*mission, "one", "title", "caption").data == again
     assert library().data == library().data
 
 
-def test_words_are_shown_as_they_are_and_nothing_outside_is_asked_for(queue: Logged) -> None:
+def test_words_are_shown_as_they_are_and_nothing_outside_is_asked_for(queue):
     html = player(*queue, "one", "<b>I & U</b>", "1 < 2").data
     assert "&lt;b&gt;I &amp; U&lt;/b&gt;" in html and "1 &lt; 2" in html
     assert not re.search(r"https?:|//\w|\b(src|href)=|url\(|@import|\bimport\b", html)
 
 
-def test_a_log_of_another_scenario_is_refused(queue: Logged) -> None:
+def test_a_log_of_another_scenario_is_refused(queue):
     for fields, what in (({"uavs": 2}, "uav"), ({"nodes": ((1, 1),)}, "node")):
         other = queue.scenario.model_copy(update=fields)
         with pytest.raises(InputError, match=f"mission_start has .* rows of a {what}; allowed"):
@@ -169,7 +154,7 @@ def test_a_log_of_another_scenario_is_refused(queue: Logged) -> None:
 
 
 @pytest.fixture(scope="module")
-def document(queue: Logged, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def document(queue, tmp_path_factory):
     """A page with two players."""
     alone = simulated(**CASES["alone"])
     parts = [library(), player(*queue, "first", "I = 3"), player(*alone, "second", "I = 1")]
@@ -180,9 +165,7 @@ def document(queue: Logged, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_mission_is_played_and_paused(
-    visit: Callable[[Path, int], Visit], document: Path, queue: Logged
-) -> None:
+def test_a_mission_is_played_and_paused(visit, document, queue):
     opened, told = visit(document, 390), data_in(player(*queue, "first").data)["status"]
     page = opened.page
     status, button, canvas = (
@@ -214,9 +197,7 @@ def test_a_mission_is_played_and_paused(
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
-def test_a_click_on_a_curve_goes_to_its_slot_and_the_pointer_reads_the_map(
-    visit: Callable[[Path, int], Visit], document: Path, queue: Logged
-) -> None:
+def test_a_click_on_a_curve_goes_to_its_slot_and_the_pointer_reads_the_map(visit, document, queue):
     opened = visit(document, 1200)
     canvas = opened.page.locator("#first canvas")
     box = canvas.bounding_box()

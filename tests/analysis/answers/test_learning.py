@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,13 +10,13 @@ import pytest
 from scipy import stats
 
 from dess import InputError
-from dess.analysis import load_results, marl_eval_data, rliable_scores, run_study
+from dess.analysis import marl_eval_data, rliable_scores
 from dess.analysis.answers import learning
 from dess.analysis.answers.learning import CURVE, CURVES, FINAL, difference, read_curve, read_curves
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess.policies.registry import TRAINED
-from tests.analysis.small import grid, small_study
+from tests.analysis.small import grid
 from tests.policies.learner.tiny import tiny
 
 
@@ -46,7 +45,7 @@ def finals(**products: list[float]) -> pd.DataFrame:
     return table.assign(seed=range(len(table)))
 
 
-def test_intervals_of_shares_end_where_these_do() -> None:
+def test_intervals_of_shares_end_where_these_do():
     table = learning.ablation(finals(base=[1.0, 0.9, 0.2], once=[0.73]), "base")
     base = table.set_index("variant").loc["base"]
     assert (base["low"], base["high"]) == (0.0, 1.0)
@@ -129,7 +128,7 @@ Change = Callable[[pd.DataFrame], Any]
     ("path", "read", "columns"),
     [("curves.parquet", read_curves, CURVES), ("ddqn/training.parquet", read_curve, CURVE)],
 )
-def test_shipped_curves_are_read_as_they_are(path: str, read: Any, columns: Any) -> None:
+def test_shipped_curves_are_read_as_they_are(path, read, columns):
     kept = pd.read_parquet(TRAINED / path)[columns.names]
     pd.testing.assert_frame_equal(read(TRAINED / path), kept, check_dtype=False)
 
@@ -145,7 +144,7 @@ WRONG: dict[str, Change] = {
 
 
 @pytest.mark.parametrize("problem", WRONG)
-def test_curves_of_another_schema_are_a_line(problem: str, tmp_path: Path) -> None:
+def test_curves_of_another_schema_are_a_line(problem, tmp_path):
     path = tmp_path / "curves.parquet"
     WRONG[problem](pd.read_parquet(TRAINED / "curves.parquet")).to_parquet(path)
     with pytest.raises(InputError, match=f"^{path}: {problem}"):
@@ -156,12 +155,9 @@ POLICIES, OF_RUNS = ["greedy", "random", "tour"], "collection_ratio"
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+def results(studied):
     """Three policies at two design points, 21 missions each."""
-    folder = tmp_path_factory.mktemp("runs")
-    design = grid(quota=[30, 60])
-    run_study(small_study(folder, policies=POLICIES, missions=21, design=design), folder / "out")
-    return load_results(folder / "out")
+    return studied(policies=POLICIES, missions=21, design=grid(quota=[30, 60]))
 
 
 def block(results: Results, policy: str, point: int, missions: range) -> float:
@@ -170,7 +166,7 @@ def block(results: Results, policy: str, point: int, missions: range) -> float:
     return float(rows[rows["replication"].isin([*missions])][OF_RUNS].mean())
 
 
-def test_a_run_of_a_policy_without_trainings_is_a_block_of_missions(results: Results) -> None:
+def test_a_run_of_a_policy_without_trainings_is_a_block_of_missions(results):
     scores = rliable_scores(results, OF_RUNS)
     assert [*scores] == POLICIES
     for policy, rows in scores.items():
@@ -180,7 +176,7 @@ def test_a_run_of_a_policy_without_trainings_is_a_block_of_missions(results: Res
             np.testing.assert_allclose(rows[:, point], blocks)
 
 
-def test_a_run_of_a_learner_is_a_training_on_its_own_missions(results, monkeypatch) -> None:
+def test_a_run_of_a_learner_is_a_training_on_its_own_missions(results, monkeypatch):
     monkeypatch.setattr(learning, "learners", lambda _: {"learner": ["random", "tour"]})
     scores = rliable_scores(results, OF_RUNS)
     assert [*scores] == ["learner", "greedy"]
@@ -193,7 +189,7 @@ def test_a_run_of_a_learner_is_a_training_on_its_own_missions(results, monkeypat
         np.testing.assert_allclose(scores[name], expected)
 
 
-def test_marl_eval_has_the_same_scores_at_every_level(results, monkeypatch) -> None:
+def test_marl_eval_has_the_same_scores_at_every_level(results, monkeypatch):
     monkeypatch.setattr(learning, "learners", lambda _: {"a,b": ["random", "tour"]})
     data = json.loads(json.dumps(marl_eval_data(results, ["success", OF_RUNS])))
     scores = rliable_scores(results, OF_RUNS)
@@ -210,7 +206,7 @@ def test_marl_eval_has_the_same_scores_at_every_level(results, monkeypatch) -> N
                 assert [*values] == ["success", OF_RUNS]
 
 
-def test_what_has_no_scores_is_refused(results, studied, monkeypatch) -> None:
+def test_what_has_no_scores_is_refused(results, studied, monkeypatch):
     with pytest.raises(InputError, match="metric: 'sucess' is unknown"):
         rliable_scores(results, "sucess")
     few = studied(missions=9)

@@ -7,13 +7,12 @@ import pandas as pd
 import pytest
 
 from dess import InputError
-from dess.analysis import run_study
 from dess.analysis.answers import main_effects
 from dess.analysis.answers.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
 from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.stats.differences import adjust, paired
 from dess.analysis.stats.intervals import by_replication
-from tests.analysis.small import grid, small_study
+from tests.analysis.small import grid
 
 
 @pytest.fixture(scope="module")
@@ -50,10 +49,10 @@ def test_success_is_compared_where_the_number_of_uavs_is_drawn(results, table):
     assert (pairs["difference"] == 0).all() and (pairs["low"] < 0).all()
 
 
-def test_a_design_of_several_fields_is_refused(tmp_path):
-    study = small_study(tmp_path, design=grid(uavs=[1, 2], quota=[20, 30]), missions=2)
+def test_a_design_of_several_fields_is_refused(studied):
+    several = studied(design=grid(uavs=[1, 2], quota=[20, 30]), missions=2)
     with pytest.raises(InputError, match="point 0: sets uavs, quota; allowed: one field"):
-        main_effects.effects(run_study(study, tmp_path / "out"))
+        main_effects.effects(several)
 
 
 @pytest.mark.parametrize(

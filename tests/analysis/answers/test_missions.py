@@ -1,7 +1,5 @@
 """How a team shares out the nodes, on layouts worked by hand."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,17 +9,16 @@ from hypothesis import strategies as st
 from dess.analysis import run_study
 from dess.analysis.answers import missions
 from dess.analysis.results.resimulate import Mission
-from dess.analysis.results.tables import Results
 from tests.analysis.small import grid, small_study
 
 
 @pytest.fixture(scope="module")
-def results(studied) -> Results:
+def results(studied):
     return studied(design=grid(uavs=[1, 3]), logged=2, missions=6)
 
 
 @pytest.fixture(scope="module")
-def shown(results: Results) -> list[Mission]:
+def shown(results):
     return [Mission.of(results, "greedy", point, 1) for point in (0, 1)]
 
 
@@ -30,7 +27,7 @@ def shown(results: Results) -> list[Mission]:
 WANTED = [("greedy", 1), ("random", 0)]
 
 
-def test_kept_logs_are_those_that_the_study_keeps(results: Results, tmp_path: Path) -> None:
+def test_kept_logs_are_those_that_the_study_keeps(results, tmp_path):
     """They are kept: a second call writes nothing, but in place of a damaged file."""
     assert missions.kept_missions(results, WANTED, tmp_path) == []
     steps: list[tuple[int, int]] = []
@@ -50,9 +47,7 @@ def test_kept_logs_are_those_that_the_study_keeps(results: Results, tmp_path: Pa
     assert max(files).stat().st_mtime_ns == before
 
 
-def test_logs_of_other_results_and_of_other_records_are_not_shown(
-    results: Results, tmp_path: Path
-) -> None:
+def test_logs_of_other_results_and_of_other_records_are_not_shown(results, tmp_path):
     missions.keep_logs(results, WANTED, tmp_path, print)
     other = run_study(small_study(tmp_path, seed=8, missions=2), tmp_path / "other")
     assert missions.kept_missions(other, WANTED[:1], tmp_path) == []
@@ -73,14 +68,14 @@ EVENTS = {
 }
 
 
-def test_what_is_collected_and_held() -> None:
+def test_what_is_collected_and_held():
     """The battery at the start is no data."""
     assert missions.collected(EVENTS, 2, 2).tolist() == [[2.0, 0.0], [1.5, 1.0]]
     assert missions.held(EVENTS, 2).tolist() == [6.0, 5.0]
     assert missions.left_behind(EVENTS, 2).tolist() == [False, True]  # 3.5 of 6, 1 of 5
 
 
-def test_a_mission_is_accounted_for(shown: list[Mission]) -> None:
+def test_a_mission_is_accounted_for(shown):
     """Of three UAVs and three nodes."""
     mission = shown[1]
     data, row = missions.collected(mission.events, 3, 3), mission.record
@@ -88,14 +83,14 @@ def test_a_mission_is_accounted_for(shown: list[Mission]) -> None:
     assert missions.held(mission.events, 3).sum() == pytest.approx(row["initial"] + row["arrived"])
 
 
-def test_the_far_edges_of_the_paper() -> None:
+def test_the_far_edges_of_the_paper():
     far = missions.far_edges(PAPER)
     assert sorted(map(tuple, PAPER[far])) == sorted(
         {(3, y) for y in (6, 11, 16, 21, 26)} | {(x, 26) for x in (3, 8, 13, 18, 23)}
     )
 
 
-def test_division() -> None:
+def test_division():
     assert missions.division(np.array([[3, 0], [0, 5]])) == 1
     assert missions.division(np.array([[3, 5], [3, 5]])) == 0.5
     assert missions.division(np.array([[4, 1], [0, 3]])) == 7 / 8
@@ -114,18 +109,18 @@ def test_division() -> None:
         ([5, 1, 0, 0], [0, 0, 0, 0], 1.0),  # all on one side
     ],
 )
-def test_sectors(first: list[int], second: list[int], share: float) -> None:
+def test_sectors(first, second, share):
     assert missions.sectors(np.array([first, second]), SQUARE) == pytest.approx(share)
     assert missions.sectors(np.array([second, first]), SQUARE) == pytest.approx(share)
 
 
-def test_sectors_of_no_data_and_of_one_node() -> None:
+def test_sectors_of_no_data_and_of_one_node():
     assert np.isnan(missions.sectors(np.zeros((2, 4)), SQUARE))
     assert missions.sectors(np.array([[3.0], [1.0]]), SQUARE[:1]) == 0.75
 
 
 @given(st.floats(0, 2 * np.pi), st.floats(-12, 12))
-def test_any_straight_line_makes_sectors(angle: float, offset: float) -> None:
+def test_any_straight_line_makes_sectors(angle, offset):
     """Whatever way it runs, also beside the rows and columns of the paper's grid."""
     one = (PAPER - (13, 16)) @ (np.cos(angle), np.sin(angle)) < offset
     data = np.array([one, ~one], float)

@@ -6,23 +6,19 @@ import numpy as np
 import pytest
 
 from dess import InputError
-from dess.analysis import load_results, numbers, run_study
+from dess.analysis import numbers
 from dess.analysis.answers import seas
 from dess.analysis.answers.comparison import Cost, Times
 from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
-from tests.analysis.small import small_study
+from tests.analysis.small import grid
 
 SEAS = ("scattered:2", "scattered:5", "coast:2", "dense:2")
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
-    folder = tmp_path_factory.mktemp("seas")
-    design = {"kind": "grid", "values": {"scenario": [*SEAS]}}
-    study = small_study(folder, design=design, policies=["greedy", "nearest"], missions=4)
-    run_study(study, folder / "trial")
-    return load_results(folder / "trial")
+def results(studied):
+    return studied(design=grid(scenario=[*SEAS]), policies=["greedy", "nearest"], missions=4)
 
 
 def of_sea(results: Results, policy: str, metric: str = PRODUCT) -> np.ndarray:
@@ -30,7 +26,7 @@ def of_sea(results: Results, policy: str, metric: str = PRODUCT) -> np.ndarray:
     return np.array([rows.loc[rows["point"] == point, metric].mean() for point in range(len(SEAS))])
 
 
-def test_a_sea_counts_once(results: Results) -> None:
+def test_a_sea_counts_once(results):
     means = of_sea(results, "greedy")
     table = seas.quality(results).set_index("policy")
     assert table.loc["greedy", ["mean", "n"]].tolist() == pytest.approx([means.mean(), 4])
@@ -42,7 +38,7 @@ def test_a_sea_counts_once(results: Results) -> None:
     assert {*seas.quality(results, "uavs")["uavs"]} <= {5, 6}  # seed 2 has five or six
 
 
-def test_gains_and_shares_are_paired_by_sea(results: Results) -> None:
+def test_gains_and_shares_are_paired_by_sea(results):
     greedy, nearest = of_sea(results, "greedy"), of_sea(results, "nearest")
     (gain,) = seas.gains(results, "greedy").to_dict("records")
     assert gain["policy"] == "nearest"
@@ -52,15 +48,13 @@ def test_gains_and_shares_are_paired_by_sea(results: Results) -> None:
     assert share.loc["nearest", "mean"] == pytest.approx(nearest.mean() / greedy.mean())
 
 
-def test_the_worst_seas_come_first(results: Results) -> None:
+def test_the_worst_seas_come_first(results):
     behind = of_sea(results, "nearest") - of_sea(results, "greedy")
     table = seas.worst(results, "nearest", "greedy", count=2)
     assert [*table["Sea"]] == [SEAS[place] for place in np.argsort(behind)[:2]]
 
 
-def test_the_summary_has_shares_of_references_and_of_bounds_below_one(
-    results: Results, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_summary_has_shares_of_references_and_of_bounds_below_one(results, monkeypatch):
     """In a mission whose bound is 100 %, a share of it would say nothing."""
     monkeypatch.setattr(seas, "REFERENCES", ("nearest", "planner"))
     costs = [Cost(policy="greedy", calls=1, median=1, slow=1, batch=2.0)]
@@ -74,7 +68,7 @@ def test_the_summary_has_shares_of_references_and_of_bounds_below_one(
     assert "Of planner" not in table
 
 
-def test_a_study_of_one_sea_is_refused(studied) -> None:
+def test_a_study_of_one_sea_is_refused(studied):
     study = studied(missions=2)
     with pytest.raises(InputError, match="no study of seas"):
         seas.quality(study)

@@ -7,22 +7,18 @@ import pandas as pd
 import pytest
 
 from dess import InputError
-from dess.analysis import compare, run_study
+from dess.analysis import compare
 from dess.analysis.answers import settings
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.stats.intervals import bounded_interval
-from tests.analysis.small import grid, small_study
-
-
-def run(folder, **changes):
-    return run_study(small_study(folder, **changes), folder / "out")
+from tests.analysis.small import grid
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
+def results(studied):
     """A grid of two fields, one of ranges, and a third that is the same everywhere."""
     values = {"uavs": [3, 1, 2], "initial_data": [[5, 7.5], [10, 20]], "quota": [60]}
-    return run(tmp_path_factory.mktemp("grid"), design=grid(**values), missions=12)
+    return studied(design=grid(**values), missions=12)
 
 
 def planted(results, metric):
@@ -36,7 +32,7 @@ def planted(results, metric):
 # --- fields ---
 
 
-def test_long_and_unset_values_are_short_texts(tmp_path):
+def test_long_and_unset_values_are_short_texts(studied):
     rows = [
         {"pads": 2},
         {"zone": [0, 0, 2, 2]},
@@ -44,7 +40,7 @@ def test_long_and_unset_values_are_short_texts(tmp_path):
         {"nodes": [[1, 1], [3, 2]], "forbid_swaps": True},
         {"nodes": [[1, 1], [2, 2]], "initial_data": [4, 4]},
     ]
-    table = settings.points(run(tmp_path, design={"kind": "table", "rows": rows}, missions=2))
+    table = settings.points(studied(design={"kind": "table", "rows": rows}, missions=2))
     assert table["pads"].tolist() == [2, 4, 6, 6, 6]  # without a number, as many as the zone has
     assert table["zone"].tolist() == [
         "3 x 2 at (5, 0)",
@@ -137,9 +133,9 @@ def test_cells_count_the_replications_that_all_their_points_have(results):
     assert table[table["uavs"] == 1]["n"].tolist() == [12, 12]
 
 
-def test_many_numbers_are_cut_into_bins(tmp_path):
+def test_many_numbers_are_cut_into_bins(studied):
     design = {"kind": "latin-hypercube", "size": 20, "ranges": {"arrival_rate": [0.0, 0.1]}}
-    results = run(tmp_path, design=design, missions=3)
+    results = studied(design=design, missions=3)
     effects = settings.main_effects(results, policy="greedy")
     assert effects["position"].tolist() == [*range(settings.BINS)]
     assert effects["points"].tolist() == [4] * settings.BINS
@@ -148,9 +144,9 @@ def test_many_numbers_are_cut_into_bins(tmp_path):
     assert {*effects["n"]} == {3}
 
 
-def test_of_a_saltelli_design_the_independent_missions_count(tmp_path):
+def test_of_a_saltelli_design_the_independent_missions_count(studied):
     design = {"kind": "saltelli", "base": 8, "ranges": {"uavs": [1, 3], "charge_start": [10, 15]}}
-    results = run(tmp_path, design=design, missions=1)
+    results = studied(design=design, missions=1)
     effects = settings.main_effects(results, policy="greedy")
     first_and_last = results.missions.query("policy == 'greedy' and point % 5 in (0, 4)")
     for row in effects[effects["field"] == "uavs"].itertuples():
@@ -193,11 +189,11 @@ def test_what_the_study_has_not_is_refused(results, ask, message):
         ask(results)
 
 
-def test_varied_fields_have_their_values_in_order(results, tmp_path):
+def test_varied_fields_have_their_values_in_order(results, studied):
     assert settings.varied(results) == {"uavs": [1, 2, 3], "initial_data": ["5–7.5", "10–20"]}
     assert settings.points(results).iloc[1].tolist() == [3, "10–20"]
     assert settings.in_words(results)[1] == "3 UAVs, initial data per node 10–20"
-    single = run(tmp_path)
+    single = studied()
     assert settings.varied(single) == {} and settings.main_effects(single).empty
     assert settings.in_words(single) == [""]
     assert settings.setting_of(single, "greedy", 0) == "greedy"

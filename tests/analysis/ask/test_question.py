@@ -136,7 +136,7 @@ def test_a_name_is_of_one_question(asking, tmp_path):
     assert len(load_results(tmp_path / "results" / "sweeps" / "mine").missions) == 36
 
 
-def test_a_search_has_a_policy_for_the_missions_that_it_will_take() -> None:
+def test_a_search_has_a_policy_for_the_missions_that_it_will_take():
     """It takes more of them than the check of its answer, so it gets a faster policy."""
     values = {"uavs": [1, 2, 3, 4, 5], "pads": [1, 2, 3, 4]}
     requirements = {"success": 0.99}

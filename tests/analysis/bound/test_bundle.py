@@ -22,7 +22,7 @@ def minimise(function, slope, start: np.ndarray, most: np.ndarray) -> tuple[np.n
     return points[int(np.argmin(values))], min(values)
 
 
-def test_it_finds_a_kink() -> None:
+def test_it_finds_a_kink():
     goal = np.array([0.3, 0.8, 0.0])
     most = np.array([np.inf, 1.0, 1.0])
     found, least = minimise(
@@ -32,7 +32,7 @@ def test_it_finds_a_kink() -> None:
     assert found == pytest.approx(goal, abs=0.05)
 
 
-def test_it_keeps_within_the_largest_prices() -> None:
+def test_it_keeps_within_the_largest_prices():
     found, _ = minimise(
         lambda x: -x.sum(), lambda x: -np.ones(2), np.zeros(2), np.array([1.0, 2.0])
     )

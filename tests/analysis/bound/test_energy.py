@@ -14,7 +14,7 @@ def scenario(**values: object) -> Scenario:
     return Scenario.of(**{"uavs": 1, "quota": 80, "communication_slots": 4} | values)
 
 
-def test_phases_of_a_case_worked_by_hand() -> None:
+def test_phases_of_a_case_worked_by_hand():
     # 20 flying slots; the battery lasts 12, and 15 after a charge that may begin at slot 2.
     phases = phases_of(scenario(flying_time=12, charge_start=10, charge_complete=15, charge_rate=5))
     # A charge before slot 20 - 15 = 5 does not suffice: one phase for charges at slots 2 to 4.
@@ -26,7 +26,7 @@ def test_phases_of_a_case_worked_by_hand() -> None:
     assert phases.clock[0].tolist() == [*range(20)]
 
 
-def test_without_battery_decrease_there_is_one_phase() -> None:
+def test_without_battery_decrease_there_is_one_phase():
     phases = phases_of(scenario(flight_cost=0, flying_time=10, charge_start=10, charge_complete=35))
     assert phases.deadline.tolist() == [20]
     assert phases.clock[0].tolist() == [f + 3 for f in range(20)]  # 25 % at 10 % per slot
@@ -37,7 +37,7 @@ def test_without_battery_decrease_there_is_one_phase() -> None:
 @pytest.mark.parametrize(
     ("start", "low", "full", "rate"), [(12, 10, 15, 5), (7, 10, 11, 3), (20, 12, 14, 1)]
 )
-def test_no_way_to_charge_takes_longer(start: int, low: int, full: int, rate: int) -> None:
+def test_no_way_to_charge_takes_longer(start, low, full, rate):
     values = {"flying_time": start, "charge_start": low, "charge_complete": full}
     most = most_charging(scenario(**values, charge_rate=rate), 20)
 
@@ -67,9 +67,7 @@ def test_no_way_to_charge_takes_longer(start: int, low: int, full: int, rate: in
 @example(start=10, low=10, charge=8, rate=1, cost=0, slots=5, longest=60)
 @example(start=1, low=10, charge=4, rate=3, cost=1, slots=30, longest=60)
 @example(start=12, low=10, charge=1, rate=1, cost=1, slots=30, longest=33)
-def test_the_phases_allow_all_that_a_battery_allows(
-    start: int, low: int, charge: int, rate: int, cost: int, slots: int, longest: int
-) -> None:
+def test_the_phases_allow_all_that_a_battery_allows(start, low, charge, rate, cost, slots, longest):
     full = low + charge
     values = {"flying_time": start, "charge_start": low, "charge_complete": full}
     phases = phases_of(

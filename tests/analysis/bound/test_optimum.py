@@ -64,20 +64,20 @@ def optimum(space: ScenarioSpace, seed: int) -> float:
     ],
     ids=["two nodes", "many arrivals", "drawn data", "three nodes", "no battery", "far apart"],
 )
-def test_the_bound_is_above_the_optimum_and_near_it(values: dict) -> None:
+def test_the_bound_is_above_the_optimum_and_near_it(values):
     space = small(**values)
     best, bound = optimum(space, 0), upper_bound(space, 0, 0, iterations=30).ratio
     assert best - 1e-12 <= bound <= best + 0.1
     assert bound < 1
 
 
-def test_a_uav_that_only_hovers_over_its_node_is_bounded_exactly() -> None:
+def test_a_uav_that_only_hovers_over_its_node_is_bounded_exactly():
     space = small(grid=2, nodes=((0, 0),), zone=(0, 0, 1, 1), arrival_rate=0.0, edge_snr=-30.0,
                   quota=4, initial_data=50.0)  # fmt: skip
     assert optimum(space, 0) == pytest.approx(upper_bound(space, 0, 0, iterations=10).ratio, 1e-5)
 
 
-def test_the_bound_is_above_the_optimum_where_data_arrive_during_a_charge() -> None:
+def test_the_bound_is_above_the_optimum_where_data_arrive_during_a_charge():
     battery = {"charge_complete": 14, "charge_rate": 2, "max_slots": 12}
     space = small(nodes=((1, 1),), initial_data=1.0, arrival_rate=3.0, **battery)
     assert optimum(space, 0) <= upper_bound(space, 0, 0).ratio
@@ -104,13 +104,13 @@ def shadowed(**values: object) -> ScenarioSpace:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_both_ways_to_the_optimum_agree_without_shadowing(kind: str) -> None:
+def test_both_ways_to_the_optimum_agree_without_shadowing(kind):
     values = {"shadowing_variance": 0.0, "initial_data": 8.0, "arrival_rate": 0.5}
     space = shadowed(edge_snr=-14.0, **values, **KINDS[kind])
     assert TinySea(space, 2, contraction(1)).optimum == pytest.approx(optimum(space, 2), 1e-12)
 
 
-def test_the_optimum_is_reached_where_hovering_is_best() -> None:
+def test_the_optimum_is_reached_where_hovering_is_best():
     """Every replication is the same mission, but for the shadowing."""
     space = shadowed(
         nodes=((1, 1), (0, 1)), edge_snr=0.0, shadowing_variance=100.0, initial_data=1000.0,
@@ -123,7 +123,7 @@ def test_the_optimum_is_reached_where_hovering_is_best() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_bound_is_above_the_optimum_with_shadowing(kind: str) -> None:
+def test_the_bound_is_above_the_optimum_with_shadowing(kind):
     gaps = []
     for edge_snr, variance, data in product((-20.0, -12.0), (4.0, 25.0), (8.0, (0.0, 30.0))):
         space = shadowed(
@@ -138,7 +138,7 @@ def test_the_bound_is_above_the_optimum_with_shadowing(kind: str) -> None:
 
 
 @pytest.mark.parametrize("values", (KINDS | HOVER).values(), ids=KINDS | HOVER)
-def test_the_bound_is_above_the_optimum_where_most_data_arrive_later(values: dict) -> None:
+def test_the_bound_is_above_the_optimum_where_most_data_arrive_later(values):
     for edge_snr in (-20.0, -12.0):
         space = shadowed(edge_snr=edge_snr, initial_data=1.0, arrival_rate=3.0, **values)
         assert TinySea(space, 1, contraction(3)).optimum <= upper_bound(space, 1, 0).ratio

@@ -73,7 +73,7 @@ def shadings(space: dict) -> Iterator[tuple[ScenarioSpace, int]]:
 
 
 @pytest.mark.parametrize("sea", some_slow(SEAS, "two nodes beside the zone"))
-def test_the_bound_is_above_the_optimum_where_uavs_charge(sea: str) -> None:
+def test_the_bound_is_above_the_optimum_where_uavs_charge(sea):
     gaps = {}
     for name, seed in product(CASES, (4, 5)):
         for space, count in shadings(SEAS[sea] | CASES[name]):
@@ -86,7 +86,7 @@ def test_the_bound_is_above_the_optimum_where_uavs_charge(sea: str) -> None:
     assert np.mean(found) <= 0.25
 
 
-def test_the_bound_is_above_the_optimum_where_uavs_share_a_pad() -> None:
+def test_the_bound_is_above_the_optimum_where_uavs_share_a_pad():
     pair = {"uavs": 2, "zone": (1, 1, 2, 1), "nodes": TWO, "pads": 1, "edge_snr": -30.0}
     sea = {"initial_data": 20.0, "arrival_rate": 0.2} | pair
     for end in (5, 3):
@@ -95,14 +95,14 @@ def test_the_bound_is_above_the_optimum_where_uavs_share_a_pad() -> None:
 
 
 @pytest.mark.parametrize("values", FULL_TRIPS)
-def test_a_uav_that_charges_repeatedly_is_bounded_closely(values: dict) -> None:
+def test_a_uav_that_charges_repeatedly_is_bounded_closely(values):
     space = shadowed(**FAR | values, shadowing_variance=0.0)
     sea = TinySea(space, 3, contraction(1))
     assert sea.most_collected <= bound_of_data(space, 3) + 1e-9
     assert sea.optimum - 1e-12 <= upper_bound(space, 3, 0).ratio <= sea.optimum + 0.01
 
 
-def test_an_early_end_is_bounded_closely() -> None:
+def test_an_early_end_is_bounded_closely():
     """Nearly all is collected, so each slot with new data lowers the ratio."""
     values = battery(10, 10, 20, 1, quota=12, max_slots=60)
     space = shadowed(

@@ -60,14 +60,14 @@ def check(space: ScenarioSpace, seed: int, deviates: int) -> float:
 @pytest.mark.parametrize(
     "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))]
 )
-def test_the_bound_is_above_the_optimum_on_drawn_seas(seed: int) -> None:
+def test_the_bound_is_above_the_optimum_on_drawn_seas(seed):
     seas = islice(drawn_seas(seed), 12)
     gaps = [check(space, seed, count) for sea in seas for space, count in shadings(sea)]
     print(f"{np.mean(gaps):.3f} above the optimum on average, {max(gaps):.3f} at most")
     assert np.mean(gaps) <= 0.1
 
 
-def test_the_bound_is_above_the_optimum_where_a_uav_may_charge_under_way() -> None:
+def test_the_bound_is_above_the_optimum_where_a_uav_may_charge_under_way():
     """Its battery does not last for the quota, and it cannot charge before it flies."""
     trip = battery(11, 10, 11, 1, quota=12, max_slots=20)
     plenty = {"initial_data": 300.0, "shadowing_variance": 0.0}
@@ -76,7 +76,7 @@ def test_the_bound_is_above_the_optimum_where_a_uav_may_charge_under_way() -> No
         check(shadowed(**sea | trip | plenty), 3, 1)
 
 
-def test_the_bound_is_above_the_optimum_where_two_uavs_have_two_zones() -> None:
+def test_the_bound_is_above_the_optimum_where_two_uavs_have_two_zones():
     sea = {"grid": 3, "rows": 2, "zone": (0, 0, 1, 2), "zones": [{"cells": (2, 0, 1, 1)}]}
     team = {"uavs": 2, "pads": 1, "nodes": ((1, 0), (2, 1)), "edge_snr": -30.0}
     values = {"initial_data": 20.0, "arrival_rate": 0.2} | battery(1, 10, 11, 10, quota=2)
@@ -98,7 +98,7 @@ def both(**values: object) -> tuple[float, float]:
     return TinySea(space, 3, contraction(1)).most_collected, bound_of_data(space, 3)
 
 
-def test_a_uav_that_charges_in_another_zone_is_bounded_exactly() -> None:
+def test_a_uav_that_charges_in_another_zone_is_bounded_exactly():
     """Its quota takes a charge, and it collects most if it charges at the node."""
     trip = battery(11, 10, 11, 1, quota=12, max_slots=20)
     best, bound = both(**trip, zones=[{"cells": (3, 0, 1, 1)}])
@@ -106,7 +106,7 @@ def test_a_uav_that_charges_in_another_zone_is_bounded_exactly() -> None:
     assert max(both(**trip)) < 0.95 * best
 
 
-def test_a_uav_that_flies_around_no_fly_cells_is_bounded_exactly() -> None:
+def test_a_uav_that_flies_around_no_fly_cells_is_bounded_exactly():
     """A wall with a gap at its southern end: the way to the node is longer by two cells."""
     trip = battery(40, 10, 50, 5, quota=6, max_slots=6)
     (straight, _), (best, bound) = (both(**trip, no_fly=cells) for cells in ((), ((2, 0),)))

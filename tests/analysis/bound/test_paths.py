@@ -10,7 +10,7 @@ from dess.scenario import ScenarioSpace
 from tests.analysis.bound.lone_uav import bound_of_data
 
 
-def test_the_block_before_is_a_neighbour() -> None:
+def test_the_block_before_is_a_neighbour():
     nodes = np.array([[1, 1], [4, 1], [1, 4]])
     blocks = blocks_of(nodes, (6, 6), 4, np.array([0, 2]))
     assert blocks.home[0, 0] == 0
@@ -29,7 +29,7 @@ def paper_like(**values: object) -> ScenarioSpace:
     return load_scenario("paper", uavs=1, **space | battery | values)
 
 
-def test_the_derivatives_are_those_of_the_bound() -> None:
+def test_the_derivatives_are_those_of_the_bound():
     bounds = Bounds(known_of(paper_like(), 4, 0), Detail())
     generator = np.random.default_rng(0)
     prices = generator.uniform(0, 0.4, (2, 9))
@@ -39,7 +39,7 @@ def test_the_derivatives_are_those_of_the_bound() -> None:
     assert change == pytest.approx(2 * (slope * step).sum(), rel=1e-3)
 
 
-def test_every_refinement_lowers_the_bound_at_the_same_prices() -> None:
+def test_every_refinement_lowers_the_bound_at_the_same_prices():
     known = known_of(paper_like(), 4, 0)
     prices = np.full((1, 9), 0.3)
     coarse = Detail(cuts=(), local=(0.0,), levels=(0,))
@@ -49,7 +49,7 @@ def test_every_refinement_lowers_the_bound_at_the_same_prices() -> None:
     assert found[0] > found[1] > found[2]
 
 
-def test_a_uav_can_take_all_that_its_node_has_had() -> None:
+def test_a_uav_can_take_all_that_its_node_has_had():
     """Arrivals in a visit and during a charge, too; ending early has no advantage here."""
     space = paper_like(nodes=((3, 3),), initial_data=1.0, arrival_rate=20.0, edge_snr=45.0)
     known = known_of(space, 4, 0)
@@ -59,7 +59,7 @@ def test_a_uav_can_take_all_that_its_node_has_had() -> None:
     assert bound_of_data(space, 4) == pytest.approx(known.data[last, 0])
 
 
-def test_a_cut_without_a_price_changes_nothing() -> None:
+def test_a_cut_without_a_price_changes_nothing():
     known = known_of(paper_like(), 4, 0)
     prices = np.full((1, 9), 0.3)
     one = Bounds(known, Detail(cuts=())).at(prices)[0]
@@ -67,7 +67,7 @@ def test_a_cut_without_a_price_changes_nothing() -> None:
     assert one == pytest.approx(two, 1e-12)
 
 
-def test_more_iterations_never_raise_the_bound() -> None:
+def test_more_iterations_never_raise_the_bound():
     known = known_of(paper_like(), 4, 0)
     ratios = [improve(known, iterations, Detail()).ratio for iterations in (0, 1, 5, 15)]
     assert ratios[0] == 1

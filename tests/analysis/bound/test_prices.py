@@ -35,7 +35,7 @@ def tiny(**values: object) -> ScenarioSpace:
 )
 def test_no_policy_collects_more_without_shadowing(
     uavs, quota, flying_time, charge, arrival_rate, initial, edge_snr, flight_cost, policy, seed
-) -> None:
+):
     space = tiny(
         uavs=uavs, quota=quota, flying_time=flying_time, charge_start=charge[0],
         charge_complete=sum(charge), arrival_rate=arrival_rate, initial_data=initial,
@@ -45,7 +45,7 @@ def test_no_policy_collects_more_without_shadowing(
     assert ratio - 1e-12 <= upper_bound(space, seed, 0, iterations=3).ratio
 
 
-def test_a_uav_that_comes_back_to_a_node_collects_no_more() -> None:
+def test_a_uav_that_comes_back_to_a_node_collects_no_more():
     """It must charge every few slots, in the block of another node."""
     space = load_scenario(
         "paper", grid=8, nodes=((1, 4), (3, 4)), zone=(1, 4, 1, 1), uavs=1, quota=60,
@@ -66,7 +66,7 @@ def check_means(space: ScenarioSpace, names: Sequence[str], missions: int) -> No
         assert above.mean() <= 4 * above.std(ddof=1) / missions**0.5, name
 
 
-def test_no_policy_has_a_higher_mean_on_a_tiny_sea() -> None:
+def test_no_policy_has_a_higher_mean_on_a_tiny_sea():
     battery = {"flying_time": 8, "charge_start": 10, "charge_complete": 30}
     space = tiny(uavs=(1, 4), quota=40, initial_data=(200.0, 300.0), **battery)
     check_means(space, ["random", "nearest", "greedy", "tour", "planner"], 20)
@@ -74,30 +74,30 @@ def test_no_policy_has_a_higher_mean_on_a_tiny_sea() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("uavs", "quota"), [(1, 440), (2, 160), (3, 100), (4, 80)])
-def test_no_policy_has_a_higher_mean_in_the_paper(uavs: int, quota: int) -> None:
+def test_no_policy_has_a_higher_mean_in_the_paper(uavs, quota):
     """With longer quotas, two or more UAVs have the bound 1."""
     space = load_scenario("paper", uavs=uavs, quota=quota)
     check_means(space, ["greedy", "ddqn", "planner"], 12)
 
 
-def test_the_same_mission_has_the_same_bound() -> None:
+def test_the_same_mission_has_the_same_bound():
     first, second = (upper_bound(tiny(), 5, 2, iterations=4) for _ in range(2))
     assert first.ratio == second.ratio
     assert first.prices.tobytes() == second.prices.tobytes()
 
 
-def test_sections_beyond_the_paper_are_refused() -> None:
+def test_sections_beyond_the_paper_are_refused():
     with pytest.raises(InputError, match="bound: the scenario has sections"):
         upper_bound(tiny(**{"wind.strength": 0.5}), 0, 0)
 
 
-def test_a_mission_that_takes_too_much_memory_is_refused() -> None:
+def test_a_mission_that_takes_too_much_memory_is_refused():
     with pytest.raises(InputError, match=r"takes 5\.\d GiB of memory; allowed: 4 GiB"):
         upper_bound(load_scenario("paper", uavs=1, grid=128), 0, 0)
 
 
 @pytest.mark.parametrize("values", [{}, {"flight_cost": 0}, {"nodes": ((1, 1),)}])
-def test_no_mission_takes_more_memory_than_was_expected(values: dict) -> None:
+def test_no_mission_takes_more_memory_than_was_expected(values):
     battery = {"flying_time": (4, 20), "charge_start": (10, 12), "charge_complete": (14, 30)}
     space = tiny(quota=160, **battery | values)
     most = ceilings_memory(space, Detail())

@@ -26,7 +26,7 @@ def values_of(rates: np.ndarray, worth: list[float], local: list[float]) -> np.n
     return values[0]
 
 
-def test_the_points_are_a_mean_preserving_spread() -> None:
+def test_the_points_are_a_mean_preserving_spread():
     chances = np.diff(spread(POINTS))
     assert chances.min() > 0
     assert chances.sum() == pytest.approx(1)
@@ -37,7 +37,7 @@ def test_the_points_are_a_mean_preserving_spread() -> None:
 
 
 @pytest.mark.parametrize("worth", [[1.0, 1.0], [0.5, 1.0], [0.0, 0.3]])
-def test_a_slot_is_worth_more_than_the_mean_of_the_best_node(worth: list[float]) -> None:
+def test_a_slot_is_worth_more_than_the_mean_of_the_best_node(worth):
     space, rates = world()
     x = 2  # between both nodes
     shadowing = np.random.default_rng(0).normal(0, np.sqrt(2), (200_000, 2))
@@ -48,21 +48,21 @@ def test_a_slot_is_worth_more_than_the_mean_of_the_best_node(worth: list[float])
     assert best.mean() - 4 * best.std() / len(best) ** 0.5 <= value <= 1.01 * best.mean()
 
 
-def test_a_local_price_takes_from_the_home_node_alone() -> None:
+def test_a_local_price_takes_from_the_home_node_alone():
     _, rates = world()
     free, priced = values_of(rates, [1.0, 1.0], [0.0, 1.0])[HOVER, 1, 1]
     assert free > 2 * priced
     assert priced == pytest.approx(values_of(rates, [0.0, 1.0], [0.0])[HOVER, 1, 1, 0])
 
 
-def test_there_and_back_pass_the_same_places() -> None:
+def test_there_and_back_pass_the_same_places():
     _, rates = world()
     values = values_of(rates, [1.0, 1.0], [0.0])[..., 0]
     ends = {x: values[HOVER, x, 1] / 4 for x in (0, 1)}
     assert values[EAST, 1, 1] - ends[1] == pytest.approx(values[WEST, 0, 1] - ends[0])
 
 
-def test_takings_are_what_makes_up_the_worth() -> None:
+def test_takings_are_what_makes_up_the_worth():
     _, rates = world()
     worth, takings = np.array([0.7, 1.0]), np.zeros(2)
     step_takings(2, 1, EAST, worth, np.array(NODES), rates, spread(POINTS), takings)

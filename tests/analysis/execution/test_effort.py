@@ -43,14 +43,14 @@ from tests.analysis.small import environment, files_of, grid, small_study
 FASTER = [*SECONDS]
 
 
-def test_the_policies_exist_and_each_is_faster_than_the_one_before() -> None:
+def test_the_policies_exist_and_each_is_faster_than_the_one_before():
     assert set(FASTER) <= {*names()}
     assert [*SECONDS.values()] == sorted(SECONDS.values(), reverse=True)
     assert {*OF_SMALL_FLEETS} == {*OF_LARGE_FLEETS} == {*SECONDS}
 
 
 @pytest.mark.parametrize("uavs", [1, 5])
-def test_a_larger_question_never_has_a_slower_policy(uavs: int) -> None:
+def test_a_larger_question_never_has_a_slower_policy(uavs):
     space = load_scenario("bay", uavs=uavs)
     sizes = np.geomspace(1, 1e8, 60).astype(int)
     chosen = [policies_for([space], int(missions))[0] for missions in sizes]
@@ -64,7 +64,7 @@ def test_a_larger_question_never_has_a_slower_policy(uavs: int) -> None:
     assert twice == policies_for([space], 300)  # settings count as missions do
 
 
-def test_the_baseline_stands_beside_it_once() -> None:
+def test_the_baseline_stands_beside_it_once():
     space = load_scenario("bay")
     assert policies_for([space], 1) == (FASTER[0], BASELINE)
     assert policies_for([space], 10**8) == (BASELINE,)

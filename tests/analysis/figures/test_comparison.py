@@ -45,7 +45,7 @@ def test_the_spread_is_the_share_of_missions_up_to_a_difference():
     comparison.spread({"ours": pd.Series([0.0, 0.0])}).canvas.draw()
 
 
-def test_a_panel_per_fleet_shows_products_and_the_bound() -> None:
+def test_a_panel_per_fleet_shows_products_and_the_bound():
     fleets = [(uavs, policy) for uavs in (1, 2) for policy in ("one", "two")]
     table = pd.DataFrame(fleets, columns=["uavs", "policy"])
     for metric, least in ((PRODUCT, 0.1), (BOUND, 0.4)):

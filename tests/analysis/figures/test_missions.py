@@ -19,7 +19,7 @@ from dess.state import sample_scenario
 
 
 @pytest.fixture(scope="module")
-def mission() -> tuple[Any, pd.DataFrame, dess.Scenario]:
+def mission():
     """A mission with moves, hovering, charging and a queue for the one pad."""
     unplanned = {"plan_waits": False}
     space = dess.load_scenario("fig4", uavs=3, pads=1, zone=[26, 2, 4, 1], charging=unplanned)
@@ -28,7 +28,7 @@ def mission() -> tuple[Any, pd.DataFrame, dess.Scenario]:
 
 
 @pytest.fixture(scope="module")
-def parts(mission: Any) -> list[Axes]:
+def parts(mission):
     """Map, battery, residual data and occupancy of the mission's figure."""
     _, log, scenario = mission
     return missions.mission_figure(log, scenario).axes
@@ -44,9 +44,7 @@ def colours(artist: Any) -> list[str]:
     return [to_hex(c) for c in artist.get_facecolor()]
 
 
-def test_moves_and_crosses_have_the_colour_of_the_node_that_is_served(
-    mission: Any, parts: Any
-) -> None:
+def test_moves_and_crosses_have_the_colour_of_the_node_that_is_served(mission, parts):
     _, log, scenario = mission
     palette = [*node_colours(len(scenario.nodes)), MUTED]
     of_uavs = [slots for _, slots in uav_slots(log).groupby("uav")]
@@ -62,7 +60,7 @@ def test_moves_and_crosses_have_the_colour_of_the_node_that_is_served(
         assert colours(cross) == [palette[node] for node in hovers["node"]]
 
 
-def test_nodes_zone_and_ends_lie_where_they_are(mission: Any, parts: Any) -> None:
+def test_nodes_zone_and_ends_lie_where_they_are(mission, parts):
     _, log, scenario = mission
     (nodes,) = drawn(parts[0], "nodes")
     assert np.array_equal(nodes.get_offsets(), scenario.nodes)
@@ -79,7 +77,7 @@ def test_nodes_zone_and_ends_lie_where_they_are(mission: Any, parts: Any) -> Non
     assert top < bottom  # y grows south
 
 
-def test_battery_ends_as_recorded(mission: Any, parts: Any) -> None:
+def test_battery_ends_as_recorded(mission, parts):
     record, _, scenario = mission
     lines = {line.get_label(): line for line in parts[1].lines}
     for uav, row in enumerate(record.uav_rows()):
@@ -90,7 +88,7 @@ def test_battery_ends_as_recorded(mission: Any, parts: Any) -> None:
     assert {scenario.charge_start, scenario.charge_complete} <= levels
 
 
-def test_residual_data_ends_as_recorded(mission: Any, parts: Any) -> None:
+def test_residual_data_ends_as_recorded(mission, parts):
     record, _, scenario = mission
     (total,) = parts[2].lines
     assert total.get_ydata()[0] == pytest.approx(record.initial)
@@ -98,7 +96,7 @@ def test_residual_data_ends_as_recorded(mission: Any, parts: Any) -> None:
     assert [colours(band)[0] for band in parts[2].collections] == node_colours(len(scenario.nodes))
 
 
-def test_occupancy_counts_charging_and_waiting_uavs(mission: Any, parts: Any) -> None:
+def test_occupancy_counts_charging_and_waiting_uavs(mission, parts):
     record, log, scenario = mission
     (steps,) = (line for line in parts[3].lines if line.get_gid() == "occupancy")
     waiting = record.uavs["slots_waiting"].sum()

@@ -8,12 +8,11 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from dess import InputError
-from dess.analysis import run_study
 from dess.analysis.answers import settings
 from dess.analysis.figures import settings as figures
 from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.study.design import NOISE
-from tests.analysis.small import grid, small_study
+from tests.analysis.small import grid
 
 
 @pytest.fixture(scope="module")
@@ -85,10 +84,10 @@ def test_of_costs_the_lowest_cell_is_marked(results):
     assert {text.get_text() for text in ax.texts} == {"10,000", "20,000"}
 
 
-def test_a_cell_without_missions_stays_empty(tmp_path):
+def test_a_cell_without_missions_stays_empty(studied):
     rows = [{"uavs": 1, "quota": 20}, {"uavs": 2, "quota": 40}]
-    study = small_study(tmp_path, design={"kind": "table", "rows": rows}, missions=4)
-    ax = figures.heat_map(run_study(study, tmp_path / "out"), "uavs", "quota").figure.axes[0]
+    few = studied(design={"kind": "table", "rows": rows}, missions=4)
+    ax = figures.heat_map(few, "uavs", "quota").figure.axes[0]
     assert np.isnan(np.asarray(ax.collections[0].get_array(), float)).sum() == 2
     assert len(ax.texts) == 2
 
@@ -143,7 +142,7 @@ def test_sensitivities_are_bars_with_intervals(indices):
     assert ax.get_ylim() == (2.5, -0.5)  # the first on top
 
 
-def test_the_front_goes_through_policies_that_are_not_dominated() -> None:
+def test_the_front_goes_through_policies_that_are_not_dominated():
     table = pd.DataFrame(
         {"policy": ["a", "b", "c"], "seconds": [1e-5, 1e-4, 1e-3], "mean": [0.5, 0.4, 0.9]}
         | {"low": 0.3, "high": 0.95, "on_front": [True, False, True]}

@@ -15,7 +15,7 @@ from dess.analysis.figures.style import KNOWN_POLICIES, node_colours, policy_col
 
 
 @pytest.mark.parametrize("count", [1, 9, 25, 40])
-def test_neighbouring_nodes_differ_in_colour(count: int) -> None:
+def test_neighbouring_nodes_differ_in_colour(count):
     palette = node_colours(count)
     assert len(palette) == count
     assert len(set(palette)) == min(count, 27)
@@ -24,7 +24,7 @@ def test_neighbouring_nodes_differ_in_colour(count: int) -> None:
     assert all(a != b for a, b in zip(palette, palette[columns:], strict=False))
 
 
-def test_policies_look_the_same_wherever_they_are_and_none_like_another() -> None:
+def test_policies_look_the_same_wherever_they_are_and_none_like_another():
     everywhere = policy_colours(KNOWN_POLICIES)
     for names in (["ddqn", "mine", "greedy", "ddqn"], ["a", "b", "ddqn-paper"], ["b", "a"]):
         looks = policy_colours(names)
@@ -33,12 +33,12 @@ def test_policies_look_the_same_wherever_they_are_and_none_like_another() -> Non
         assert all(looks[name] == everywhere[name] for name in looks if name in everywhere)
 
 
-def test_differences_on_an_axis_are_signed_points() -> None:
+def test_differences_on_an_axis_are_signed_points():
     shares = (0.025, -0.1, 0.0, 0.0005)
     assert [signed_points(share) for share in shares] == ["+2.5", "−10", "0", "+0.05"]
 
 
-def test_a_figure_has_the_look_and_leaves_no_state_behind() -> None:
+def test_a_figure_has_the_look_and_leaves_no_state_behind():
     before = dict(mpl.rcParams)
     with pytest.raises(KeyError), style.panels(3) as (figure, _):
         assert figure.axes and not mpl.rcParams["text.parse_math"]
@@ -48,7 +48,7 @@ def test_a_figure_has_the_look_and_leaves_no_state_behind() -> None:
         assert not re.search(r"import pyplot|matplotlib\.pyplot", module.read_text("utf-8"))
 
 
-def test_an_axis_holds_all_intervals_and_has_a_least_length() -> None:
+def test_an_axis_holds_all_intervals_and_has_a_least_length():
     rows = pd.DataFrame({"low": [0.5, 0.6], "high": [0.52, 0.9]})
     for length, zero in ((0.0, False), (0.0, True), (0.1, False), (0.8, False)):
         low, high = style.ends(rows, length, zero)
@@ -57,7 +57,7 @@ def test_an_axis_holds_all_intervals_and_has_a_least_length() -> None:
         assert (low < 0) == zero
 
 
-def test_a_notebook_shows_a_figure_though_nothing_has_imported_pyplot() -> None:
+def test_a_notebook_shows_a_figure_though_nothing_has_imported_pyplot():
     """Without pyplot, IPython has no hook for figures and shows the name of their class."""
     with style.panels(2.0) as (figure, _):
         pass

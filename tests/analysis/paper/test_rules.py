@@ -63,12 +63,12 @@ def judged(rule: str, *arguments: object) -> str:
         ("most", 0.4, 0.05, REFUTED),
     ],
 )
-def test_a_rule_about_one_interval(rule: str, mean: float, half: float, verdict: str) -> None:
+def test_a_rule_about_one_interval(rule, mean, half, verdict):
     assert judged(rule, around(mean, half)) == verdict
     assert judged(rule, Interval(mean, -9.0, 9.0)) == INCONCLUSIVE
 
 
-def test_the_paper_s_figures_vary_as_well() -> None:
+def test_the_paper_s_figures_vary_as_well():
     """Newcombe's example: 56 of 70 against 48 of 80, 20 points [5.2, 33.4]."""
     ours, theirs = values.spread(56 / 70, 70), values.spread(48 / 80, 80)
     assert tuple(rules.gap(ours, theirs)) == pytest.approx((0.2, 0.0524, 0.3339), abs=5e-5)
@@ -98,9 +98,7 @@ NONE, SOME, EVERY = Interval(0, 0, 0.01), Interval(0.1, 0.05, 0.2), Interval(1, 
         ("divided", around(0.0), around(0.75), INCONCLUSIVE),
     ],
 )
-def test_a_rule_about_two_intervals(
-    rule: str, first: Interval, second: Interval, verdict: str
-) -> None:
+def test_a_rule_about_two_intervals(rule, first, second, verdict):
     assert judged(rule, first, second) == verdict
 
 
@@ -113,7 +111,7 @@ def test_a_rule_about_two_intervals(
         (1, (1, 2), REFUTED),
     ],
 )
-def test_a_chosen_setting(best: int, left: tuple[int, ...], verdict: str) -> None:
+def test_a_chosen_setting(best, left, verdict):
     choice = Choice((), 0, True, "", best, left, guaranteed=True, stage=0)
     assert judged("chosen", choice, [4, 5]) == verdict
 
@@ -140,7 +138,7 @@ def transfer(
         ("levels_off", [0.4, transfer(0.1, length=values.CROSSING - 1)], INCONCLUSIVE),
     ],
 )
-def test_learning_curves(rule: str, arguments: list[object], verdict: str) -> None:
+def test_learning_curves(rule, arguments, verdict):
     assert judged(rule, *arguments) == verdict
 
 
@@ -185,7 +183,7 @@ def leads_of(
         ("rises", Shape(PEAK, (1,)), REFUTED),
     ],
 )
-def test_the_values_of_a_parameter(rule: str, of: object, verdict: str) -> None:
+def test_the_values_of_a_parameter(rule, of, verdict):
     assert judged(rule, of) == verdict
 
 
@@ -199,5 +197,5 @@ def test_the_values_of_a_parameter(rule: str, of: object, verdict: str) -> None:
         (Shape(VALLEY, ()), REFUTED),
     ],
 )
-def test_a_peak(shape: Shape, verdict: str) -> None:
+def test_a_peak(shape, verdict):
     assert judged("peaks", shape, 2) == verdict

@@ -39,7 +39,7 @@ NONE = pd.DataFrame()
 
 
 @pytest.fixture(scope="module")
-def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Results]:
+def studies(tmp_path_factory):
     """Tiny results of all studies that are read."""
     folder = tmp_path_factory.mktemp("results")
     corners = grid(uavs=[1, 3], initial_data=[[5, 7.5], 10])
@@ -56,7 +56,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Results]:
 
 
 @pytest.fixture(scope="module")
-def trainings() -> pd.DataFrame:
+def trainings():
     """Learning with transfer surely wins, in trainings as long as the paper's."""
     return trained({VARIANTS[0]: (0.8, 0.8), VARIANTS[1]: (0.4, 0.4)})
 
@@ -80,7 +80,7 @@ def trained(tops: dict[str, tuple[float, float]], length: int = 2 * paper.CROSSI
 
 
 @pytest.fixture(scope="module")
-def rows(studies: dict[str, Results], trainings: pd.DataFrame) -> list[Row]:
+def rows(studies, trainings):
     return scorecard(studies, trainings)
 
 
@@ -103,7 +103,7 @@ def changed(results: Results, **values: object) -> Results:
     return replace(results, missions=missions)
 
 
-def test_every_claim_has_a_section_with_its_evidence_and_a_rule(rows: list[Row]) -> None:
+def test_every_claim_has_a_section_with_its_evidence_and_a_rule(rows):
     assert len(rows) >= 25
     assert len({row.claim.text for row in rows}) == len(rows)
     for row in rows:
@@ -113,7 +113,7 @@ def test_every_claim_has_a_section_with_its_evidence_and_a_rule(rows: list[Row])
         assert {finding.verdict for finding in row.findings} <= {*VERDICTS}
 
 
-def test_every_claim_is_judged_by_the_learned_policy_alone(rows: list[Row]) -> None:
+def test_every_claim_is_judged_by_the_learned_policy_alone(rows):
     for row in rows:
         ours, papers, *nulls = row.findings
         learning = row.claim.study == TRAININGS
@@ -125,9 +125,7 @@ def test_every_claim_is_judged_by_the_learned_policy_alone(rows: list[Row]) -> N
 
 
 @pytest.mark.parametrize("null", [NULLS[0], pytest.param(NULLS[1], marks=pytest.mark.slow)])
-def test_in_the_place_of_the_learned_policy_a_null_passes_no_diagnostic_claim(
-    null: str, studies: dict[str, Results]
-) -> None:
+def test_in_the_place_of_the_learned_policy_a_null_passes_no_diagnostic_claim(null, studies):
     posing = {}
     for name in ("table4", "fig5"):
         missions = studies[name].missions
@@ -139,7 +137,7 @@ def test_in_the_place_of_the_learned_policy_a_null_passes_no_diagnostic_claim(
     assert found and sum(row.findings[0].holds for row in found) <= 2
 
 
-def test_what_holds_above_the_papers_number_exceeds_it() -> None:
+def test_what_holds_above_the_papers_number_exceeds_it():
     outcomes = {
         Finding(HOLDS, against=ABOVE): EXCEEDS,
         Finding(HOLDS, against=INCONCLUSIVE): MATCHES,
@@ -151,7 +149,7 @@ def test_what_holds_above_the_papers_number_exceeds_it() -> None:
     assert all(finding.outcome == outcome for finding, outcome in outcomes.items())
 
 
-def test_without_results_there_are_no_verdicts(rows: list[Row]) -> None:
+def test_without_results_there_are_no_verdicts(rows):
     empty = scorecard({}, NONE)
     assert [row.claim for row in empty] == [row.claim for row in rows]
     for row in empty:
@@ -159,7 +157,7 @@ def test_without_results_there_are_no_verdicts(rows: list[Row]) -> None:
             assert finding.verdict == NO_RESULTS and finding.note
 
 
-def test_a_single_mission_tells_nothing(studies: dict[str, Results]) -> None:
+def test_a_single_mission_tells_nothing(studies):
     alone = studies["table4"].missions.query("replication == 0")
     for row in scorecard({"table4": replace(studies["table4"], missions=alone)}, NONE):
         assert row.findings[0].verdict == (
@@ -167,20 +165,20 @@ def test_a_single_mission_tells_nothing(studies: dict[str, Results]) -> None:
         )
 
 
-def test_a_policy_that_is_not_in_the_study_is_not_judged(studies: dict[str, Results]) -> None:
+def test_a_policy_that_is_not_in_the_study_is_not_judged(studies):
     for ask in (studies["sweet-spot"].choice, studies["sweet-spot"].cheapest):
         with pytest.raises(InputError, match="policy: 'absent' is not in the study"):
             ask("absent")
 
 
-def test_learning_is_judged_by_the_curves(rows: list[Row]) -> None:
+def test_learning_is_judged_by_the_curves(rows):
     higher, passes, levels = (row for row in rows if row.claim.study == TRAININGS)
     assert {row.findings[0].verdict for row in (higher, passes, levels)} == {HOLDS}
     assert passes.findings[0].quantities[0].interval.mean == pytest.approx(0.4)
     assert higher.findings[0].note == "trainings quick and no transfer: is above in all of phase II"
 
 
-def test_learning_that_fails_is_told() -> None:
+def test_learning_that_fails_is_told():
     """It ends below, and what it should beat levels off, but not low."""
     using, without = VARIANTS
     curves = trained({using: (0.1, 0.5), without: (0.9, 0.9)})
@@ -189,7 +187,7 @@ def test_learning_that_fails_is_told() -> None:
     assert levels.findings[0].verdict == IN_PART
 
 
-def test_the_best_learned_policy_is_judged(tmp_path: Path) -> None:
+def test_the_best_learned_policy_is_judged(tmp_path):
     """Of several learners that with the higher product, never a heuristic."""
     study = load_study("table4", policies=["greedy", "ddqn", "ddqn-paper"], missions=2)
     table4 = run_study(study, tmp_path / "table4")
@@ -200,7 +198,7 @@ def test_the_best_learned_policy_is_judged(tmp_path: Path) -> None:
     assert row.findings[0] == row.findings[1] and row.findings[0].policy == "ddqn-paper"
 
 
-def test_studies_of_another_kind_never_break_it(studied, tmp_path: Path) -> None:
+def test_studies_of_another_kind_never_break_it(studied, tmp_path):
     """One number of UAVs, two fields at a time, a single mission."""
     designs = {"fig4": grid(uavs=[2], flying_time=[70, 80]), "fig5": grid(uavs=[2])}
     changes = {"policies": ["ddqn"], "missions": 1, "logged": 1}

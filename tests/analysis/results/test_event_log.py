@@ -55,7 +55,7 @@ def assert_agree(record: Any, log: pd.DataFrame) -> None:
 
 @pytest.mark.parametrize("fields", CASES)
 @pytest.mark.parametrize("policy", ["greedy", "random"])
-def test_tables_agree_with_the_record(policy: str, fields: dict[str, Any]) -> None:
+def test_tables_agree_with_the_record(policy, fields):
     record, log = logged(policy, 3, **fields)
     assert_agree(record, log)
     if fields:
@@ -63,7 +63,7 @@ def test_tables_agree_with_the_record(policy: str, fields: dict[str, Any]) -> No
 
 
 @given(drawn.spaces(), drawn.seeds)
-def test_tables_agree_on_any_scenario(space: dess.ScenarioSpace, seed: int) -> None:
+def test_tables_agree_on_any_scenario(space, seed):
     record = dess.simulate(space, policies.load("random"), seed, events=True)
     assert_agree(record, pd.DataFrame(record.events.columns()))
 
@@ -82,9 +82,7 @@ class _Witness(drawn.Wanderer):
 @given(
     st.one_of(drawn.extended_spaces(age={"measured": True}), drawn.continuous_spaces()), drawn.seeds
 )
-def test_ages_of_a_log_are_those_of_the_record_and_those_that_policies_see(
-    space: dess.ScenarioSpace, seed: int
-) -> None:
+def test_ages_of_a_log_are_those_of_the_record_and_those_that_policies_see(space, seed):
     witness = _Witness()
     record = dess.simulate(space, witness, seed, events=True)
     log = pd.DataFrame(record.events.columns())
@@ -97,7 +95,7 @@ def test_ages_of_a_log_are_those_of_the_record_and_those_that_policies_see(
     assert of_nodes.loc[duration(log)].mean() == pytest.approx(age[-1], abs=1e-9)
 
 
-def test_the_node_of_a_slot_is_the_one_served_most_and_last() -> None:
+def test_the_node_of_a_slot_is_the_one_served_most_and_last():
     log = {
         "time": [0, 0, 0, 0.25, 0.5, 0.75, 1.0, 1, 1.25, 1.5, 1.75, 2.0, 2, 3],
         "event": ["mission_start"] * 2
@@ -115,7 +113,7 @@ def test_the_node_of_a_slot_is_the_one_served_most_and_last() -> None:
     assert uav_slots(log)["node"].tolist() == [2, 1, -1]
 
 
-def test_batteries_start_full_and_move_by_a_flight_or_a_charge() -> None:
+def test_batteries_start_full_and_move_by_a_flight_or_a_charge():
     record, log = logged("greedy", uavs=3)
     levels = battery_levels(log)
     for uav, curve in levels.groupby("uav"):
@@ -196,7 +194,7 @@ ENDS = {
 
 
 @pytest.mark.parametrize("case", ENDS.values(), ids=ENDS)
-def test_what_ended_a_mission_is_said(case: Case) -> None:
+def test_what_ended_a_mission_is_said(case):
     scenario = Scenario.of(**FIELDS | {"uavs": len(case.routes)} | case.fields)
     record, log = flown(scenario, *case.routes, starts=case.starts)
     assert causes(log, scenario) == case.said

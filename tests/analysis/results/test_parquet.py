@@ -26,7 +26,7 @@ Forge = Callable[[pa.Table], pa.Table]
 
 
 @pytest.fixture(scope="module")
-def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def sound(tmp_path_factory):
     """Small results with an event log."""
     folder = tmp_path_factory.mktemp("sound")
     run_study(small_study(folder, logged=1, policies=["greedy"]), folder / "out")
@@ -78,8 +78,8 @@ WRONG: dict[str, tuple[str, Forge]] = {
 
 @pytest.mark.parametrize(("kind", "forge"), WRONG.values(), ids=[*WRONG])
 def test_a_table_that_is_no_record_is_damaged_and_computed_anew(
-    kind: str, forge: Forge, sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    kind, forge, sound, tmp_path, capsys
+):
     folder = forged(sound, tmp_path / "out", kind, forge)
     store = Store.read(folder)
     assert store.damaged and all(path.is_relative_to(folder / "") for path in store.damaged)
@@ -92,7 +92,7 @@ def test_a_table_that_is_no_record_is_damaged_and_computed_anew(
     assert again.uavs.equals(load_results(sound).uavs) and not load_results(folder).store.damaged
 
 
-def test_event_logs_of_before_are_read_and_verified(sound: Path, tmp_path: Path) -> None:
+def test_event_logs_of_before_are_read_and_verified(sound, tmp_path):
     """Logs had the first seven columns only, and no rows of parameters."""
 
     def former(table: pa.Table) -> pa.Table:
@@ -108,9 +108,7 @@ def test_event_logs_of_before_are_read_and_verified(sound: Path, tmp_path: Path)
     assert main(["verify", str(changed)]) == 1
 
 
-def test_a_small_file_with_very_many_rows_is_refused_before_it_is_read(
-    sound: Path, tmp_path: Path
-) -> None:
+def test_a_small_file_with_very_many_rows_is_refused_before_it_is_read(sound, tmp_path):
     """All columns are constant, so that a million rows take next to no space."""
     folder = shutil.copytree(sound, tmp_path / "out")
     path = sorted((folder / "uavs").rglob("*.parquet"))[0]
@@ -135,7 +133,7 @@ def test_a_small_file_with_very_many_rows_is_refused_before_it_is_read(
             Store.read(folder)
 
 
-def test_what_only_has_the_name_of_a_chunk_is_left_alone(sound: Path, tmp_path: Path) -> None:
+def test_what_only_has_the_name_of_a_chunk_is_left_alone(sound, tmp_path):
     folder = shutil.copytree(sound, tmp_path / "out")
     places = [path.parent for path in sorted(folder.rglob("*.parquet"))]
     outside = tmp_path / "outside"
@@ -153,9 +151,7 @@ def test_what_only_has_the_name_of_a_chunk_is_left_alone(sound: Path, tmp_path: 
 
 
 @pytest.mark.parametrize("name", [".lock", "missions", "failures", "uavs/policy=greedy"])
-def test_a_run_does_not_write_or_delete_where_a_link_leads(
-    name: str, sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_does_not_write_or_delete_where_a_link_leads(name, sound, tmp_path, capsys):
     folder, outside = shutil.copytree(sound, tmp_path / "out"), tmp_path / "outside"
     place = folder / name
     if place.exists():
@@ -172,9 +168,7 @@ def test_a_run_does_not_write_or_delete_where_a_link_leads(
     assert {**files_of(tmp_path), **before} == files_of(tmp_path)
 
 
-def test_a_file_that_is_too_large_is_not_read(
-    sound: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_is_too_large_is_not_read(sound, tmp_path, monkeypatch):
     copied = shutil.copytree(sound, tmp_path / "copied")  # files that nobody has read yet
     monkeypatch.setattr(parquet, "LIMIT", 10)
     with pytest.raises(InputError, match="is too large"):

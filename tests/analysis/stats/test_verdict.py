@@ -51,7 +51,7 @@ def test_a_significant_difference_lies_on_one_side(difference, p, side):
     assert position_by_test(difference, p) == side
 
 
-def test_verdicts_on_parts() -> None:
+def test_verdicts_on_parts():
     assert judged(True) == judged(True, True) == HOLDS
     assert judged(True, False) == judged(True, None) == IN_PART
     assert judged(False) == judged(False, None) == judged(False, False) == REFUTED

@@ -14,7 +14,7 @@ from dess.scenario import ScenarioSpace, load_scenario
 from tests.analysis.study.test_selection import check_that_interruptions_leave_no_trace
 
 
-def test_prices_change_no_key_of_a_mission() -> None:
+def test_prices_change_no_key_of_a_mission():
     free = Manifest.of(load_study("table4", missions=2, policies=["greedy"]))
     study = load_study("table4", missions=2, policies=["greedy"], costs={"uav": 20_000})
     assert Manifest.of(study).cells == free.cells
@@ -24,7 +24,7 @@ def space(**fields: Any) -> ScenarioSpace:
     return load_scenario("paper", **fields)
 
 
-def test_the_cost_of_missions_by_hand() -> None:
+def test_the_cost_of_missions_by_hand():
     # Point 0: 2 UAVs, 16 pads; point 1: 1 UAV, 3 pads, and batteries that gain 20 % in a slot.
     spaces = [space(uavs=2), space(uavs=1, pads=3, charge_rate=20)]
     missions = {"point": [1, 0], "uavs": [1, 2], "slots": [90, 30]}

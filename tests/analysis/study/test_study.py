@@ -23,10 +23,6 @@ def test_a_study_takes_the_engine_that_one_of_its_points_needs(tmp_path):
         small_study(tmp_path, design=design, engine="batch")
 
 
-def test_teams_are_written_alike(tmp_path):
-    assert small_study(tmp_path, policies=["greedy , tour"]).policies == ("greedy,tour",)
-
-
 BAD = {
     "missions = 0": ["missions: 0 is out of range; allowed: an integer 1.."],
     "seed = -1": ["seed: -1 is out of range; allowed: an integer 0.."],
@@ -89,16 +85,6 @@ def test_the_sea_may_differ_from_point_to_point(tmp_path):
     ):
         with pytest.raises(InputError, match=line):
             small_study(tmp_path, design={"kind": "grid", "values": {"scenario": [unknown, "bay"]}})
-
-
-def test_a_study_that_is_not_there(tmp_path):
-    with pytest.raises(InputError, match="no such study; allowed: age, .* others, or a TOML file"):
-        load_study(tmp_path / "none.toml")
-    with pytest.raises(InputError, match="cannot be read"):
-        load_study(tmp_path)
-    (tmp_path / "latin.toml").write_bytes(b"name = '\xe9'")
-    with pytest.raises(InputError, match="cannot be read"):
-        load_study(tmp_path / "latin.toml")
 
 
 def test_overrides_are_validated_too(tmp_path):

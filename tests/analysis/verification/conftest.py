@@ -4,27 +4,22 @@ from typing import Any
 
 import pytest
 
-from dess.analysis import run_study
-from dess.analysis.results.tables import Results
 from dess.analysis.verification import measurements
-from dess.analysis.verification.measurements import CrossCheck, Log
-from tests.analysis.small import small_study
 
 # Two groups of communication slots, a queue for one pad, all nodes emptied now and then.
 CHANGES: dict[str, Any] = {"communication_slots": 6, "pads": 1, "initial_data": [0, 2], "quota": 90}
 
 
 @pytest.fixture(scope="session")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
-    folder = tmp_path_factory.mktemp("results")
-    return run_study(small_study(folder, logged=8, set=CHANGES), folder / "out")
+def results(studied):
+    return studied(logged=8, set=CHANGES)
 
 
 @pytest.fixture(scope="session")
-def logs(results: Results) -> list[Log]:
+def logs(results):
     return measurements.logs_of(results)
 
 
 @pytest.fixture(scope="session")
-def again(results: Results) -> CrossCheck:
+def again(results):
     return measurements.simulate_missions(results, 3)

@@ -15,10 +15,9 @@ from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess.analysis.verification import balances, draws, measurements
 from dess.analysis.verification.checks import ALPHA, Check, judge, poisson_fit, uniform_fit
-from dess.analysis.verification.measurements import CrossCheck, Log
+from dess.analysis.verification.measurements import Log
 from dess.fields import SAMPLED
 from dess.mission import simulate
-from dess.scenario import ScenarioSpace
 from dess.state import sample_scenario
 from tests.drawn import extended_spaces, policies, replications, seeds
 
@@ -58,7 +57,7 @@ def with_records(results: Results, row: int, **changes: Callable[[Any], Any]) ->
     return replace(results, missions=missions)
 
 
-def test_p_values_are_corrected_for_their_number() -> None:
+def test_p_values_are_corrected_for_their_number():
     p = 0.6 * ALPHA
     assert judge([check(p=p), check(p=0.5)])["verdict"].tolist() == [HOLDS, HOLDS]
     assert judge([check(p=p / 2), check(p=0.5)])["verdict"].tolist() == [REFUTED, HOLDS]
@@ -67,7 +66,7 @@ def test_p_values_are_corrected_for_their_number() -> None:
 
 
 @pytest.mark.parametrize("mean", [0.02, 1.0, 40.0])
-def test_classes_of_a_fit_have_all_of_the_distribution(mean: float) -> None:
+def test_classes_of_a_fit_have_all_of_the_distribution(mean):
     counts = np.random.default_rng(2).poisson(mean, 5000)
     table = poisson_fit(counts, mean).table
     assert table["expected"].sum() == pytest.approx(5000)
@@ -121,7 +120,7 @@ OTHERS: dict[str, tuple[Any, str]] = {
 
 
 @pytest.mark.parametrize("case", OTHERS)
-def test_draws_of_another_distribution_are_found_out(case: str) -> None:
+def test_draws_of_another_distribution_are_found_out(case):
     given, test = OTHERS[case]
     if isinstance(given, np.ndarray):
         assert not failing(draws.arrival_checks(poisson(), RATE))
@@ -131,7 +130,7 @@ def test_draws_of_another_distribution_are_found_out(case: str) -> None:
         assert failing(draws.parameter_checks(given, SPACE)) == {test}
 
 
-def test_intervals_of_missions_that_depend_on_each_other_cover_too_rarely() -> None:
+def test_intervals_of_missions_that_depend_on_each_other_cover_too_rarely():
     generator = np.random.default_rng(14)
     shifts, noise = np.repeat(generator.normal(size=200), 100), generator.normal(size=20_000)
     assert failing([draws.coverage_check("metric", shifts + noise, 100, False)])
@@ -141,7 +140,7 @@ def test_intervals_of_missions_that_depend_on_each_other_cover_too_rarely() -> N
         assert not failing([draws.coverage_check("metric", independent, 100, True)])
 
 
-def test_starts_rates_and_shadowing_of_another_simulator_are_found_out() -> None:
+def test_starts_rates_and_shadowing_of_another_simulator_are_found_out():
     x, y, width, height = SPACE.zone
     cells = np.random.default_rng(10).integers([x, y], [x + width, y + height], (400, 2))
     assert not failing([draws.start_check(cells, SPACE)])
@@ -156,9 +155,7 @@ def test_starts_rates_and_shadowing_of_another_simulator_are_found_out() -> None
 
 
 @given(extended_spaces(landing=False), policies, seeds, replications)
-def test_the_batteries_of_every_scenario_follow_the_rules(
-    space: ScenarioSpace, policy: object, seed: int, replication: int
-) -> None:
+def test_the_batteries_of_every_scenario_follow_the_rules(space, policy, seed, replication):
     """With wind, fleets, shared power and failures; a battery that is off by one is noticed."""
     record = simulate(space, policy, seed, replication, events=True)
     assert record.events is not None
@@ -169,9 +166,7 @@ def test_the_batteries_of_every_scenario_follow_the_rules(
     assert balances.battery_errors(changed).any()
 
 
-def test_what_the_simulator_leaves_passes(
-    results: Results, logs: list[Log], again: CrossCheck
-) -> None:
+def test_what_the_simulator_leaves_passes(results, logs, again):
     checks = [
         *draws.communication_checks(logs, results.manifest["seed"]),
         balances.conservation_check({"trial": results}),
@@ -190,7 +185,7 @@ OF_MISSION = ["slots", "uav_slots", "arrived", "initial", "collected"]
 
 
 @pytest.mark.parametrize("name", [*OF_MISSION, "quota", "battery", "slots_charging"])
-def test_a_record_that_its_log_does_not_add_up_to_is_noticed(logs: list[Log], name: str) -> None:
+def test_a_record_that_its_log_does_not_add_up_to_is_noticed(logs, name):
     first, *rest = logs
     changed = replace(first, uavs=first.uavs.assign(**{name: first.uavs.get(name, 0) + 1}))
     if name in OF_MISSION:
@@ -199,9 +194,7 @@ def test_a_record_that_its_log_does_not_add_up_to_is_noticed(logs: list[Log], na
     assert fails(balances.record_check([changed, *rest]))
 
 
-def test_logs_and_missions_that_are_not_of_the_study_are_noticed(
-    results: Results, logs: list[Log]
-) -> None:
+def test_logs_and_missions_that_are_not_of_the_study_are_noticed(results, logs):
     """Data that are a trifle off, another node, an arrival that is lost, and another mission."""
     trifle = altered(logs, "communication", 5, value=lambda value: value * (1 + 1e-9))
     choice, amount = draws.communication_checks(trifle, 7)
@@ -219,7 +212,7 @@ def test_logs_and_missions_that_are_not_of_the_study_are_noticed(
         assert fails(balances.realisation_checks(changed, logs)[0])
 
 
-def test_data_that_come_from_nowhere_or_another_engine_are_noticed(results: Results) -> None:
+def test_data_that_come_from_nowhere_or_another_engine_are_noticed(results):
     """Off by a trifle; data that are recorded as lost are no imbalance."""
     for name in ("collected", "residual", "initial", "arrived"):
         changed = with_records(results, 3, **{name: lambda value: value + 1e-9})

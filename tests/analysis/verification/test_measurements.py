@@ -1,21 +1,18 @@
 """Missions beside a study are those of its replications, and are kept in a file to the last bit."""
 
-from pathlib import Path
-
 import pytest
 
 from dess import InputError
 from dess.analysis import run_study
-from dess.analysis.results.tables import Results
 from dess.analysis.verification import measurements
-from dess.analysis.verification.measurements import FILE, STUDY, CrossCheck, Log
+from dess.analysis.verification.measurements import FILE, STUDY
 from dess.analysis.verification.suite import Suite
 from tests.analysis.small import small_study
 
 ANOTHER = "f" * 16  # the key of another study
 
 
-def test_of_every_replication_the_longest_log_is_taken(logs: list[Log]) -> None:
+def test_of_every_replication_the_longest_log_is_taken(logs):
     kept = measurements.longest(logs)
     assert [log.replication for log in kept] == list(range(8))
     for log in kept:
@@ -24,8 +21,8 @@ def test_of_every_replication_the_longest_log_is_taken(logs: list[Log]) -> None:
 
 
 def test_missions_are_kept_and_refused_where_they_are_not_of_these_results(
-    results: Results, again: CrossCheck, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    results, again, tmp_path, monkeypatch
+):
     """They are simulated only if they are missing or of other results."""
     simulated = [(mission.policy, mission.replication) for mission in again.missions]
     last = int(results.missions["replication"].max())
@@ -46,7 +43,7 @@ def test_missions_are_kept_and_refused_where_they_are_not_of_these_results(
     assert measurements.read(tmp_path, results) == again
 
 
-def test_a_study_with_failures_is_refused(tmp_path: Path) -> None:
+def test_a_study_with_failures_is_refused(tmp_path):
     study = small_study(tmp_path, set={"failures.node_rate": 0.1})
     run_study(study, tmp_path / STUDY)
     with pytest.raises(InputError, match="verification: its scenario has failures.*; allowed: "):

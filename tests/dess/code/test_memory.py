@@ -1,6 +1,5 @@
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -16,9 +15,7 @@ def test_what_needs_more_than_is_available_is_refused(monkeypatch):
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_the_limit_of_a_container_counts(
-    version: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_limit_of_a_container_counts(version, tmp_path, monkeypatch):
     names, prefix = memory._LIMITS[2 - version], "total_" if version == 1 else ""
     monkeypatch.setattr(memory, "GROUPS", tmp_path)
     free = memory.available_memory()

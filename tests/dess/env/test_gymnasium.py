@@ -23,7 +23,7 @@ NAME = "dess/Paper-v0"
 
 
 @pytest.mark.parametrize("first", ["dess", "gymnasium"])
-def test_gymnasium_knows_the_names_once_dess_is_imported(first: str) -> None:
+def test_gymnasium_knows_the_names_once_dess_is_imported(first):
     """In any order, and with the module in front of the name as before."""
     other = {"dess": "gymnasium", "gymnasium": "dess"}[first]
     script = f"import {first}, {other}, sys; assert 'dess.env.vector' not in sys.modules; "
@@ -35,14 +35,14 @@ def test_gymnasium_knows_the_names_once_dess_is_imported(first: str) -> None:
     assert done.stdout.split()[0].decode() == str(2 * PAPER.uavs[1])
 
 
-def test_importing_dess_does_not_import_gymnasium() -> None:
+def test_importing_dess_does_not_import_gymnasium():
     script = "import dess, sys; assert 'gymnasium' not in sys.modules"
     subprocess.run([sys.executable, "-c", script], check=True)
 
 
 @pytest.mark.parametrize("observation", [kind for kind in KINDS if kind != "sets"])
 @pytest.mark.parametrize("scenario", ["paper", dess.load_scenario("paper", uavs=3)], ids=str)
-def test_gymnasiums_check_env_passes_for_a_lone_uav(observation: str, scenario: Any) -> None:
+def test_gymnasiums_check_env_passes_for_a_lone_uav(observation, scenario):
     options = {"scenario": scenario, "observation": observation, "render_mode": "rgb_array"}
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -50,7 +50,7 @@ def test_gymnasiums_check_env_passes_for_a_lone_uav(observation: str, scenario: 
         check_env(gymnasium.make(NAME, **options).unwrapped)
 
 
-def test_a_lone_uav_flies_the_mission_of_simulate() -> None:
+def test_a_lone_uav_flies_the_mission_of_simulate():
     env = gymnasium.make(NAME, observation="state").unwrapped
     assert isinstance(env, dess.single_env)
     _, info = env.reset(seed=4, options={"replication": 2})
@@ -68,7 +68,7 @@ def test_a_lone_uav_flies_the_mission_of_simulate() -> None:
     assert env.mission.record().metrics == record.metrics and reward == record.reward
 
 
-def test_gymnasiums_vectors_and_wrappers_take_it() -> None:
+def test_gymnasiums_vectors_and_wrappers_take_it():
     short = dess.load_scenario("paper", max_slots=20)
 
     def made() -> gymnasium.Env:
@@ -101,7 +101,7 @@ MADE: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("kind", MADE)
-def test_copies_without_a_seed_play_missions_of_their_own(kind: str) -> None:
+def test_copies_without_a_seed_play_missions_of_their_own(kind):
     original = MADE[kind]()
     copies = [original, deepcopy(original), deepcopy(original), MADE[kind]()]
     for _ in range(2):
@@ -117,14 +117,14 @@ def test_copies_without_a_seed_play_missions_of_their_own(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", MADE)
-def test_copies_with_a_seed_play_the_same_missions(kind: str) -> None:
+def test_copies_with_a_seed_play_the_same_missions(kind):
     original = MADE[kind](seed=3)
     for env in (original, deepcopy(original)):
         env.reset()
         assert {*seeds_of(env)} == {3}
 
 
-def test_each_mission_of_a_vector_may_have_a_seed() -> None:
+def test_each_mission_of_a_vector_may_have_a_seed():
     env = dess.vector_env("paper", 3)
     alone = [dess.vector_env("paper", 1, seed) for seed in (1, 2, 3)]
     actions = np.full(env.num_envs, 4)
@@ -149,7 +149,7 @@ REFUSED: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("line", REFUSED)
-def test_what_reset_does_not_honour_it_refuses(line: str) -> None:
+def test_what_reset_does_not_honour_it_refuses(line):
     env = dess.vector_env("paper", np.int64(3), 1)  # type: ignore[arg-type]
     before = env.reset()[1]["replication"]
     with pytest.raises(InputError, match=f"^{line}"):

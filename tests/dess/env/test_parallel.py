@@ -9,13 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dess
-from dess import ScenarioSpace
 from dess.state import END_NAMES, HOVER
 from tests.dess.env.episodes import PAPER, masks_of, play
 from tests.drawn import Commuter, Recorder, Wanderer, replications, seeds, spaces
 
 
-def test_a_seed_repeats_a_sequence_of_whole_episodes() -> None:
+def test_a_seed_repeats_a_sequence_of_whole_episodes():
     env, other = dess.parallel_env(PAPER), dess.parallel_env(PAPER, seed=4)
     first = [play(env, 1, seed=3), play(env, 2)]
     assert data_equivalence(first, [play(other, 1, seed=3), play(other, 2)], exact=True)
@@ -38,9 +37,7 @@ ENDINGS = st.sampled_from([{}, {}, {}, {}, {"landing": True}, {"landing": True, 
     st.sampled_from([Wanderer(), Commuter()]),
     st.integers(0, 9),
 )
-def test_the_same_actions_give_the_record_of_simulate(
-    space: ScenarioSpace, seed: int, replication: int, policy: Any, whims: int
-) -> None:
+def test_the_same_actions_give_the_record_of_simulate(space, seed, replication, policy, whims):
     recorder = Recorder(policy)
     record = dess.simulate(space, recorder, seed, replication)
     env = dess.parallel_env(space, seed, observation="state")
@@ -72,9 +69,7 @@ def test_the_same_actions_give_the_record_of_simulate(
 
 
 @given(spaces(), seeds, st.integers(0, 9))
-def test_who_stays_observes_zeros_and_changes_nothing(
-    space: ScenarioSpace, seed: int, whims: int
-) -> None:
+def test_who_stays_observes_zeros_and_changes_nothing(space, seed, whims):
     """With ``ended="stay"`` the mission is the same, and only flying UAVs have something in it."""
     kind: dict[str, Any] = {"mask": "info", "observation": "state"}
     leave = dess.parallel_env(space, seed, **kind)

@@ -42,7 +42,7 @@ def made(uavs: Any, **choice: Any) -> HarvestEnv:
 @pytest.mark.filterwarnings("ignore:Observation:UserWarning")  # a dictionary; zeros after the end
 @pytest.mark.filterwarnings("ignore:Agent's m..imum observation:UserWarning")  # no bounds
 @every_choice
-def test_pettingzoos_tests_pass(choice: dict[str, Any]) -> None:
+def test_pettingzoos_tests_pass(choice):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         # The fleet of an episode can be smaller than the largest one.
@@ -56,7 +56,7 @@ def test_pettingzoos_tests_pass(choice: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(("uavs", "ended"), [(3, "leave"), (3, "stay"), ([1, 3], "stay")])
-def test_pettingzoos_max_cycles_test_passes(uavs: Any, ended: str) -> None:
+def test_pettingzoos_max_cycles_test_passes(uavs, ended):
     """``max_cycles`` is ``max_slots`` of the scenario; no UAV ends before in this mission."""
 
     def mission(max_cycles: int) -> HarvestEnv:
@@ -70,9 +70,7 @@ def test_pettingzoos_max_cycles_test_passes(uavs: Any, ended: str) -> None:
 
 
 @every_choice
-def test_infos_are_numbers_and_arrays_with_the_same_keys_in_every_step(
-    choice: dict[str, Any],
-) -> None:
+def test_infos_are_numbers_and_arrays_with_the_same_keys_in_every_step(choice):
     kinds = {"active": bool, "reward_terms": np.ndarray, "collected": float}
     kinds |= {"team_collected": float, "end": int, "overruled": bool}
     in_info = {"action_mask": np.ndarray} if choice["mask"] == "info" else {}
@@ -87,7 +85,7 @@ def test_infos_are_numbers_and_arrays_with_the_same_keys_in_every_step(
 # --- pictures ---
 
 
-def test_a_picture_shows_the_mission() -> None:
+def test_a_picture_shows_the_mission():
     assert dess.parallel_env(PAPER).render() is None
     env = dess.parallel_env(small(), render_mode="rgb_array")
     env.reset(seed=0)
@@ -101,7 +99,7 @@ def test_a_picture_shows_the_mission() -> None:
     assert (east_x - west_x, east_y - west_y) == (1, 0)
 
 
-def test_a_window_opens_and_is_closed_once() -> None:
+def test_a_window_opens_and_is_closed_once():
     pyplot.switch_backend("agg")  # no window is opened on the screen of who runs the tests
     their.render_test(lambda render_mode: parallel_to_aec(dess.parallel_env(PAPER, 0, render_mode)))
     pyplot.close("all")  # the test leaves a window open

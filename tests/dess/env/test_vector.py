@@ -53,7 +53,7 @@ def assert_same_record(record: Any, final: dict[str, Any], first: int) -> None:
 
 @pytest.mark.parametrize("num_envs", [1, 3])
 @pytest.mark.parametrize("observation", KINDS)
-def test_a_batch_equals_single_episodes(num_envs: int, observation: str) -> None:
+def test_a_batch_equals_single_episodes(num_envs, observation):
     kind: dict[str, Any] = {"seed": 5, "observation": observation, "guarded": num_envs == 3}
     batch = dess.vector_env(QUICK, num_envs, **kind)
     singles = [dess.parallel_env(QUICK, **kind) for _ in range(num_envs)]
@@ -92,7 +92,7 @@ def test_a_batch_equals_single_episodes(num_envs: int, observation: str) -> None
 
 
 @pytest.mark.parametrize("observation", KINDS)
-def test_rows_without_a_uav_are_zeros_that_may_only_hover(observation: str) -> None:
+def test_rows_without_a_uav_are_zeros_that_may_only_hover(observation):
     """And what was returned is never overwritten: another environment returns the same."""
     env, again = (dess.vector_env(QUICK, 5, 2, observation) for _ in range(2))
     (rows, info), idle, steps = env.reset(), np.zeros(1), []
@@ -115,7 +115,7 @@ def test_rows_without_a_uav_are_zeros_that_may_only_hover(observation: str) -> N
 
 
 @pytest.mark.parametrize("num_envs", [1, 3])
-def test_missions_are_numbered_as_they_start(num_envs: int) -> None:
+def test_missions_are_numbered_as_they_start(num_envs):
     env = dess.vector_env(QUICK, num_envs, seed=1)
 
     def numbers(info: dict[str, Any]) -> list[int]:
@@ -137,13 +137,13 @@ def test_missions_are_numbered_as_they_start(num_envs: int) -> None:
     assert data_equivalence(env.reset(seed=1)[0], first, exact=True)
 
 
-def test_gymnasium_makes_it_from_a_name_with_options() -> None:
+def test_gymnasium_makes_it_from_a_name_with_options():
     env = gymnasium.make_vec("dess.env.vector:dess/Paper-v0", 2, observation="maps", guarded=True)
     assert env.num_envs == 2 * PAPER.uavs[1]
     assert set(env.single_observation_space.keys()) == {"local", "global", "battery"}
 
 
-def test_the_next_mission_can_start_in_the_next_step() -> None:
+def test_the_next_mission_can_start_in_the_next_step():
     env = dess.vector_env(QUICK, 4, seed=3, autoreset_mode="NextStep")
     plain = dess.vector_env(QUICK, 1, seed=3)
     assert env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
@@ -180,12 +180,12 @@ REFUSED: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("line", REFUSED)
-def test_bad_arguments_are_refused(line: str) -> None:
+def test_bad_arguments_are_refused(line):
     with pytest.raises(InputError, match=f"^{line}.*; allowed: .*$"):
         REFUSED[line]()
 
 
-def test_bad_actions_and_seeds_are_refused() -> None:
+def test_bad_actions_and_seeds_are_refused():
     batch, single = dess.vector_env(small(), 2), dess.parallel_env(small())
     batch.reset(), single.reset()
     shapes: list[Any] = [np.zeros(2), np.zeros(3, int), np.zeros((2, 1), int), ["north", "east"]]

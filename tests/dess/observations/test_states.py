@@ -15,7 +15,7 @@ from dess.observations.states import compact_states, masks
 from dess.state import HOVER
 from dess.view import View
 from tests.dess.env.episodes import placed
-from tests.drawn import replications, seeds, spaces, teams
+from tests.drawn import PLAIN_SEA, replications, seeds, spaces, teams
 
 FIELDS = ("x", "y", "battery", "active", "latch", "charging")
 
@@ -48,7 +48,10 @@ class _Compared:
         return self.policy.act(view)
 
 
-@given(spaces() | spaces(fleet=[{"slots_per_cell": 3}, {}]), teams, seeds, replications)
+SLOW = spaces(fleet=[{"slots_per_cell": 3}, {}], **PLAIN_SEA)  # with islands, compiled once more
+
+
+@given(spaces() | SLOW, teams, seeds, replications)
 def test_compact_states_tell_what_the_view_tells(space, team, seed, replication):
     simulate(space, [*map(_Compared, team[: space.uavs[1]])], seed, replication)
 

@@ -51,24 +51,24 @@ def check(name: str) -> ScenarioSpace:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_seas_are_valid_and_their_nodes_within_reach(family: str) -> None:
+def test_seas_are_valid_and_their_nodes_within_reach(family):
     for seed in (0, 1, 2, SETS["train"][0], SETS["validation"][0], SETS["test"][-1], MOST_SEED):
         check(f"{family}:{seed}")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SETS)
-def test_all_seas_of_the_sets_are(name: str) -> None:
+def test_all_seas_of_the_sets_are(name):
     drawn = [check(sea) for sea in seas_of(name)]
     assert len({*drawn}) == len(drawn)
 
 
 @pytest.mark.parametrize("name", HASHES)
-def test_a_sea_never_changes(name: str) -> None:
+def test_a_sea_never_changes(name):
     assert hashlib.sha256(load_scenario(name).to_toml().encode()).hexdigest()[:16] == HASHES[name]
 
 
-def test_a_sea_depends_on_its_name_alone() -> None:
+def test_a_sea_depends_on_its_name_alone():
     """Not on those drawn before it, nor on the hashes of a process."""
     script = "from dess import load_scenario; print(load_scenario('archipelago:11').to_toml())"
     command = [sys.executable, "-c", script]
@@ -79,7 +79,7 @@ def test_a_sea_depends_on_its_name_alone() -> None:
     assert load_scenario("archipelago:11").to_toml().strip() == done.stdout.strip()
 
 
-def test_sets_are_disjoint_and_have_seas_of_each_family() -> None:
+def test_sets_are_disjoint_and_have_seas_of_each_family():
     sizes = {"train": 300, "validation": 10, "test": 60}
     drawn = {name: seas_of(name) for name in sizes}
     for name, size in sizes.items():
@@ -90,12 +90,12 @@ def test_sets_are_disjoint_and_have_seas_of_each_family() -> None:
         seas_of("tests")
 
 
-def test_the_test_seas_of_a_family_have_one_to_six_uavs_alike() -> None:
+def test_the_test_seas_of_a_family_have_one_to_six_uavs_alike():
     uavs = [load_scenario(f"coast:{seed}").uavs for seed in SETS["test"]]
     assert sorted(map(uavs.count, [(1, 2), (3, 4), (5, 6)])) == [20, 20, 20]
 
 
-def test_coasts_face_all_ways_and_corridors_run_both_ways() -> None:
+def test_coasts_face_all_ways_and_corridors_run_both_ways():
     """So that no policy learns that the shore is in the north."""
     sides, shapes = set(), set()
     for seed in range(30):
@@ -109,7 +109,7 @@ def test_coasts_face_all_ways_and_corridors_run_both_ways() -> None:
 
 
 @given(st.sampled_from([*FAMILIES]), st.integers(0, MOST_SEED))
-def test_a_sea_is_a_scenario_as_any(family: str, seed: int) -> None:
+def test_a_sea_is_a_scenario_as_any(family, seed):
     name = f"{family}:{seed}"
     space = check(name)
     changed = load_scenario(name, uavs=1, no_fly=[])
@@ -118,7 +118,7 @@ def test_a_sea_is_a_scenario_as_any(family: str, seed: int) -> None:
     assert name not in scenario_names()
 
 
-def test_the_paper_s_channel_cell_by_cell() -> None:
+def test_the_paper_s_channel_cell_by_cell():
     """The SNR at a distance of 5 cells is that of the paper, give or take 2 dB and rounding."""
 
     def at_five_cells(space: ScenarioSpace) -> float:
@@ -141,7 +141,7 @@ def test_the_paper_s_channel_cell_by_cell() -> None:
         ("coats:7", "coats:7: no such family of seas .did you mean coast.*; allowed: scattered, "),
     ],
 )
-def test_bad_names_are_refused_in_one_line(name: str, line: str) -> None:
+def test_bad_names_are_refused_in_one_line(name, line):
     with pytest.raises(InputError, match=f"^{line}") as error:
         load_scenario(name)
     assert "\n" not in str(error.value)

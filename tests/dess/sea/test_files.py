@@ -45,7 +45,7 @@ Write = Callable[[str, Any], Path]
 
 
 @pytest.fixture
-def write(tmp_path: Path) -> Write:
+def write(tmp_path):
     def write(name: str, content: Any) -> Path:
         path = tmp_path / name
         if isinstance(content, bytes):
@@ -73,12 +73,12 @@ def square(west: float, south: float, east: float, north: float) -> list[list[fl
 # --- nodes ---
 
 
-def test_columns_x_and_y_are_cells(write: Write) -> None:
+def test_columns_x_and_y_are_cells(write):
     path = write("buoys.csv", "\ufeffname, y ,x\na,3,1\n\nb,0,7\r\n")
     assert nodes_in(path, (8, 8), 800.0) == ((1, 3), (7, 0))
 
 
-def test_degrees_are_projected_about_the_centre_of_their_box(write: Write) -> None:
+def test_degrees_are_projected_about_the_centre_of_their_box(write):
     """At 60 degrees north a degree of longitude is half a degree of latitude long: 55,597 m."""
     places = [(10.0, 60.0), (9.91, 60.0), (10.09, 60.0), (10.0, 60.045), (10.0, 59.955)]
     # 0.09 x 55,597 m = 5,004 m and 0.045 x 111,195 m = 5,004 m: five cells of 1 km and a bit.
@@ -93,7 +93,7 @@ def test_degrees_are_projected_about_the_centre_of_their_box(write: Write) -> No
     assert len({x for x, _ in found}) == 3
 
 
-def test_a_grid_that_is_not_square_has_the_same_centre(write: Write) -> None:
+def test_a_grid_that_is_not_square_has_the_same_centre(write):
     """0.09 degrees of latitude at the equator are ten cells of 1 km and a bit."""
     path = write("buoys.csv", "lon,lat\n0,0.045\n0,-0.045\n0.045,0\n-0.045,0\n")
     assert nodes_in(path, (20, 12), 1000.0) == ((10, 0), (10, 11), (15, 6), (4, 6))
@@ -101,7 +101,7 @@ def test_a_grid_that_is_not_square_has_the_same_centre(write: Write) -> None:
         nodes_in(path, (20, 10), 1000.0)
 
 
-def test_a_scenario_names_a_file_beside_it(write: Write, tmp_path: Path) -> None:
+def test_a_scenario_names_a_file_beside_it(write, tmp_path):
     """It may be a link within the folder."""
     write("buoys.csv", "lon,lat\n8.50,54.25\n8.52,54.26\n")
     (tmp_path / "nodes.csv").symlink_to("buoys.csv")
@@ -120,7 +120,7 @@ def test_a_scenario_names_a_file_beside_it(write: Write, tmp_path: Path) -> None
     + ["loop/secret.csv", "out/secret.csv"],
 )  # fmt: skip
 @pytest.mark.parametrize("key", ["nodes", "no_fly"])
-def test_a_table_lies_in_the_folder_of_its_scenario(key: str, name: str, tmp_path: Path) -> None:
+def test_a_table_lies_in_the_folder_of_its_scenario(key, name, tmp_path):
     """What a stranger's scenario names elsewhere is neither read nor shown, be it by a link."""
     secret, folder = tmp_path / "secret.csv", tmp_path / "sea"
     secret.write_text("password\n")
@@ -138,7 +138,7 @@ def test_a_table_lies_in_the_folder_of_its_scenario(key: str, name: str, tmp_pat
     assert "password" not in str(error.value)
 
 
-def test_the_shipped_bay_has_its_nodes_beside_it() -> None:
+def test_the_shipped_bay_has_its_nodes_beside_it():
     bay = load_scenario("bay")
     assert (len(bay.nodes), bay.grid, bay.quota) == (36, 40, 600)
     assert bay.nodes[0] == (2, 2)  # B01, in the north-west
@@ -147,19 +147,19 @@ def test_the_shipped_bay_has_its_nodes_beside_it() -> None:
 # --- no-fly cells ---
 
 
-def test_a_map_has_a_line_for_each_row_from_north_to_south(write: Write) -> None:
+def test_a_map_has_a_line_for_each_row_from_north_to_south(write):
     path = write("islands.txt", "..#\r\n##.  \n\n")
     assert no_fly_in(path, (3, 2), None) == ((2, 0), (0, 1), (1, 1))
 
 
-def test_a_table_has_cells_or_degrees(write: Write) -> None:
+def test_a_table_has_cells_or_degrees(write):
     cells = write("islands.csv", "name,x,y\na,2,1\nb,0,0\nc,2,1\n")
     assert no_fly_in(cells, (3, 2), None) == ((0, 0), (2, 1))
     degrees = write("rocks.csv", "lon,lat\n0.001,0.001\n-0.001,0.001\n0.0391,-0.0291\n")
     assert no_fly_in(degrees, (8, 6), EQUATOR) == ((3, 2), (4, 2), (7, 5))
 
 
-def test_a_polygon_closes_the_cells_whose_centres_lie_in_it(write: Write) -> None:
+def test_a_polygon_closes_the_cells_whose_centres_lie_in_it(write):
     """From 1.6 to 6.4 cells in the west-east, 0.6 to 5.4 in the north-south: 2..5 and 1..4."""
     outer, hole = square(-0.024, -0.024, 0.024, 0.024), square(-0.011, -0.011, 0.011, 0.011)
     path = write("island.geojson", features(("Polygon", [outer, hole])))
@@ -167,7 +167,7 @@ def test_a_polygon_closes_the_cells_whose_centres_lie_in_it(write: Write) -> Non
     assert {*no_fly_in(path, (8, 6), EQUATOR)} == ring
 
 
-def test_what_lies_beyond_the_grid_is_cut(write: Write) -> None:
+def test_what_lies_beyond_the_grid_is_cut(write):
     """A polygon from beyond the north-western corner, and one of two islands, the other far off."""
     corner = [square(-1, 0.0105, -0.0205, 1)]
     far, near = [square(9, 9, 10, 10)], [square(0.0295, -0.0295, 0.035, -0.0205)]
@@ -175,7 +175,7 @@ def test_what_lies_beyond_the_grid_is_cut(write: Write) -> None:
     assert no_fly_in(path, (8, 6), EQUATOR) == ((0, 0), (1, 0), (0, 1), (1, 1), (7, 5))
 
 
-def test_polygons_share_the_projection_of_the_nodes(write: Write) -> None:
+def test_polygons_share_the_projection_of_the_nodes(write):
     """At 60 degrees north a degree of longitude is half as long; the box is not that of land."""
     write("buoys.csv", "lon,lat\n9.91,60.045\n10.09,59.955\n")
     write("land.geojson", features(("Polygon", [square(9.5, 60.0205, 10.041, 61)])))
@@ -192,14 +192,14 @@ def test_polygons_share_the_projection_of_the_nodes(write: Write) -> None:
     assert load_scenario(sea, no_fly=[]).nodes == ((1, 1), (10, 10))
 
 
-def test_polygons_on_both_sides_of_the_180th_meridian(write: Write) -> None:
+def test_polygons_on_both_sides_of_the_180th_meridian(write):
     path = write("land.geojson", features(("Polygon", [square(179.99, -0.0105, 179.995, 0.0105)])))
     projection = EQUATOR._replace(centre=(-179.995, 0.0))
     assert no_fly_in(path, (8, 6), projection) == ((2, 2), (2, 3))
 
 
 @given(st.lists(st.tuples(*[st.integers(-3, 12)] * 2), min_size=3, max_size=9))
-def test_a_mirrored_polygon_closes_mirrored_cells(corners: list[tuple[int, int]]) -> None:
+def test_a_mirrored_polygon_closes_mirrored_cells(corners):
     """The corners are a little off, so that no centre of a cell lies on an edge."""
     ring = np.array([*corners, corners[0]]) * [0.61, 0.57] + [0.013, 0.0071]
     inside = centres_in([ring], (6, 5))
@@ -294,9 +294,7 @@ REFUSED = [(reader, *row) for reader, rows in READERS.items() for row in rows]
 @pytest.mark.parametrize(
     ("reader", "name", "content", "line"), REFUSED, ids=[row[3][:40] for row in REFUSED]
 )
-def test_files_that_are_refused(
-    reader: Any, name: str, content: Any, line: str, write: Write
-) -> None:
+def test_files_that_are_refused(reader, name, content, line, write):
     (read, *arguments), path = reader, write(name, content)
     with pytest.raises(InputError, match=f"^{path}: {line}") as error:
         read(path, *arguments)

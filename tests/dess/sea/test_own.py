@@ -33,7 +33,7 @@ EQUATOR = Projection((0.0, 0.0), (8, 6), CELL)
 
 
 @pytest.fixture
-def sea(tmp_path: Path) -> Sea:
+def sea(tmp_path):
     """Writes files into a folder, and a scenario with the given lines beside them."""
 
     def write(lines: str = "", **files: Any) -> Path:
@@ -69,7 +69,7 @@ def closed(path: Path, projection: Projection, **source: Any) -> np.ndarray:
     return no_fly.no_fly_in(path, projection.size, projection, source_of)
 
 
-def test_the_charts_of_shipped_seas_are_those_of_before() -> None:
+def test_the_charts_of_shipped_seas_are_those_of_before():
     """Polygons, maps and tables close to the bit the cells that they have always closed."""
     kept = {"german-bight": "b937320433580aa2", "gulf-of-finland": "672faa533c324bb9"}
     kept |= {"saronic-gulf": "9d0383cfc4633d20", "tokyo-bay": "87b13b00eea774ed"}
@@ -100,8 +100,8 @@ ACROSS = {
 
 @pytest.mark.parametrize(("centre", "rings", "share"), ACROSS.values(), ids=ACROSS)
 def test_a_polygon_closes_what_lies_in_it_wherever_meridians_are(
-    centre: tuple[float, float], rings: list, share: float, sea: Sea, tmp_path: Path
-) -> None:
+    centre, rings, share, sea, tmp_path
+):
     sea(land_json=collection(feature("Polygon", rings)))
     cells = closed(tmp_path / "land.json", Projection(centre, (32, 32), 4000.0))
     assert cells.mean() == share
@@ -115,9 +115,7 @@ LINE = collection(feature("LineString", [[-1, 0.002], [1, 0.002]]))
 ROW = {(x, 2) for x in range(8)}
 
 
-def test_what_closes_no_cell_is_told_and_can_close_all_it_touches(
-    sea: Sea, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_what_closes_no_cell_is_told_and_can_close_all_it_touches(sea, tmp_path, caplog):
     sea(lane_json=LANE, far_json=collection(feature("Polygon", [box(9, 9, 10, 10)])))
     with caplog.at_level(logging.WARNING):
         assert not closed(tmp_path / "lane.json", EQUATOR).any()
@@ -129,7 +127,7 @@ def test_what_closes_no_cell_is_told_and_can_close_all_it_touches(
     assert {(x, y) for y, x in np.argwhere(touched).tolist()} == ROW
 
 
-def test_lines_are_lanes_and_everything_can_have_a_buffer(sea: Sea, tmp_path: Path) -> None:
+def test_lines_are_lanes_and_everything_can_have_a_buffer(sea, tmp_path):
     """The line is 0.3 cells south of the centres of row 2, and 0.7 north of those of row 3."""
     sea(line_json=LINE, rock_json=collection(feature("Point", [0.005, 0.005])))
     line, rock = tmp_path / "line.json", tmp_path / "rock.json"
@@ -148,7 +146,7 @@ def test_lines_are_lanes_and_everything_can_have_a_buffer(sea: Sea, tmp_path: Pa
 # --- coasts as they are published ---
 
 
-def test_a_coast_is_read_as_it_is_published(sea: Sea, tmp_path: Path) -> None:
+def test_a_coast_is_read_as_it_is_published(sea, tmp_path):
     """Rounding beyond 180 degrees, features elsewhere and of all kinds, empty ones, and large."""
     empty = {"type": "Feature", "geometry": None, "properties": None}
     mixed = {"type": "GeometryCollection", "geometries": []}
@@ -172,7 +170,7 @@ NEAR = "lon,lat,name\n0,0,A\n0.0001,-0.0001,B\n0.5,0.1,C\n-0.5,-0.1,D\n0,0,E\n"
 GRID = f"grid = 120\ncell_size = {CELL}\nzone = [0, 0, 2, 2]\n"
 
 
-def test_nodes_of_a_cell_are_merged_with_their_data_and_rates(sea: Sea) -> None:
+def test_nodes_of_a_cell_are_merged_with_their_data_and_rates(sea):
     nodes = 'nodes = {file = "n.csv", place = "merge"}\n'
     space = load_scenario(sea(nodes + GRID + "uavs = 2\ninitial_data = [5, 20]", n_csv=NEAR))
     assert space.names == ("A +2", "C", "D")
@@ -183,7 +181,7 @@ def test_nodes_of_a_cell_are_merged_with_their_data_and_rates(sea: Sea) -> None:
     assert space.node_rates == (0.75, 0.25, 0.25)
 
 
-def test_a_node_whose_cell_is_taken_or_closed_takes_the_nearest_free_one(sea: Sea) -> None:
+def test_a_node_whose_cell_is_taken_or_closed_takes_the_nearest_free_one(sea):
     lines = 'nodes = {file = "n.csv", place = "nearest"}\nno_fly = [[1, 1]]\ngrid = 6\n'
     table = "x,y\n1,1\n4,4\n4,4\n4,4\n"
     space = load_scenario(sea(lines + "zone = [0, 4, 1, 1]\nuavs = 1", n_csv=table))
@@ -195,7 +193,7 @@ def test_a_node_whose_cell_is_taken_or_closed_takes_the_nearest_free_one(sea: Se
     assert "Of the 4 nodes, 3 are in the nearest free cell" in placing(space)
 
 
-def test_the_advice_for_shared_cells_can_be_followed(sea: Sea) -> None:
+def test_the_advice_for_shared_cells_can_be_followed(sea):
     """Where no cell size parts the nodes, none is named; otherwise the one that is does."""
     pairs = {"0.0011,-0.0011": False, "0.001,-0.001": False, "0.007,-0.005": True}
     for other, is_parted in pairs.items():
@@ -231,13 +229,13 @@ TABLES = [
 
 
 @pytest.mark.parametrize("table", TABLES)
-def test_columns_and_numbers_are_read_as_people_write_them(table: str, sea: Sea) -> None:
+def test_columns_and_numbers_are_read_as_people_write_them(table, sea):
     lines = f'nodes = "n.csv"\ngrid = 8\nrows = 6\ncell_size = {CELL}\nzone = [0, 0, 2, 2]\n'
     space = load_scenario(sea(lines, n_csv=table))
     assert (space.nodes, space.names) == (((4, 2), (3, 3)), ("Alpha", "Beta"))
 
 
-def test_a_column_gives_each_node_its_rate_and_initial_data(sea: Sea) -> None:
+def test_a_column_gives_each_node_its_rate_and_initial_data(sea):
     """Both engines have them, and the mean of arrivals is that of each node."""
     table = "x,y,rate,data\n3,3,2.5,0\n5,3,0,40\n"
     lines = 'nodes = "n.csv"\ngrid = 8\nzone = [0, 0, 2, 2]\nuavs = 1\nmax_slots = 200\n'
@@ -256,7 +254,7 @@ def test_a_column_gives_each_node_its_rate_and_initial_data(sea: Sea) -> None:
         load_scenario(sea(lines, n_csv="x,y,rate\n1,1,1\n2,2,some\n"))
 
 
-def test_nodes_are_chosen_by_their_properties(sea: Sea, tmp_path: Path) -> None:
+def test_nodes_are_chosen_by_their_properties(sea, tmp_path):
     kinds = [("DK1", "up", 0.1), ("DK2", "down", 0.2), ("NO1", "up", 0.3)]
     places = [
         feature("Point", [lon, 0.0], Code=code, State=s, Title=f"T {code}")
@@ -271,7 +269,7 @@ def test_nodes_are_chosen_by_their_properties(sea: Sea, tmp_path: Path) -> None:
     assert (fields["nodes"], fields["names"]) == ([(4, 3)], ["T DK1"])
 
 
-def test_marks_folders_and_backslashes(sea: Sea, tmp_path: Path) -> None:
+def test_marks_folders_and_backslashes(sea, tmp_path):
     lines = 'nodes = "data/n.csv"\ngrid = 8\nzone = [0, 0, 2, 2]\n'
     path = sea(lines, data__n_csv="x,y\n3,3\n")
     assert load_scenario(path).nodes == ((3, 3),)
@@ -285,7 +283,7 @@ def test_marks_folders_and_backslashes(sea: Sea, tmp_path: Path) -> None:
 # --- maps of the field ---
 
 
-def test_maps_of_the_field(sea: Sea, tmp_path: Path) -> None:
+def test_maps_of_the_field(sea, tmp_path):
     """The header and letters of the MAPF benchmark, a blank first line, colours of a picture."""
     benchmark = "type octile\nheight 2\nwidth 3\nmap\n.@T\nGSW\n"
     pixels = np.zeros((2, 3, 3), np.uint8)
@@ -314,7 +312,7 @@ def _distances(chart, pairs, out):
         out[n] = distance(chart, pairs[n, 0], pairs[n, 1], pairs[n, 2], pairs[n, 3])
 
 
-def test_ways_on_a_large_grid_are_the_shortest() -> None:
+def test_ways_on_a_large_grid_are_the_shortest():
     """To parking cells and nodes, from them, and between any other cells."""
     wall = tuple((60, y) for y in range(100) if y != 7)
     chart = chart_at(120, 100, ((0, 0, 2, 2),), wall, ((110, 90), (30, 50)))
@@ -330,7 +328,7 @@ def test_ways_on_a_large_grid_are_the_shortest() -> None:
 # --- what is wrong with a sea ---
 
 
-def test_all_bad_nodes_are_named_at_once(sea: Sea) -> None:
+def test_all_bad_nodes_are_named_at_once(sea):
     table = "name,x,y\nA,1,1\nB,2,1\nC,7,7\nD,5,5\n"
     lines = 'nodes = "n.csv"\ngrid = 8\nzone = [4, 4, 2, 2]\nuavs = 1\n'
     islands = "no_fly = [[1, 1], [2, 1], [6, 7], [7, 6]]\n"
@@ -343,7 +341,7 @@ def test_all_bad_nodes_are_named_at_once(sea: Sea) -> None:
         load_scenario(sea(lines.replace("8", "5"), n_csv=table))
 
 
-def test_a_sea_that_is_refused_can_be_drawn(sea: Sea) -> None:
+def test_a_sea_that_is_refused_can_be_drawn(sea):
     path = sea("grid = 8\nzone = [7, 7, 4, 4]\nnodes = [[1, 1], [9, 9]]\nno_fly = [[1, 1]]\n")
     with pytest.raises(InputError, match="zone: "):
         load_scenario(path)
@@ -351,7 +349,7 @@ def test_a_sea_that_is_refused_can_be_drawn(sea: Sea) -> None:
     assert (draft.zone, draft.nodes) == ((7, 7, 4, 4), ((1, 1), (9, 9)))
 
 
-def test_charging_zones_are_places_on_the_earth(sea: Sea) -> None:
+def test_charging_zones_are_places_on_the_earth(sea):
     """A zone lies as near about its place as cells allow."""
     place = "{lon = 0.01, lat = 0.0, width = 2, height = 2}"
     lines = f"grid = 8\nrows = 6\ncell_size = {CELL}\nnodes = [[0, 0]]\nuavs = 1\nzone = {place}\n"
@@ -364,7 +362,7 @@ def test_charging_zones_are_places_on_the_earth(sea: Sea) -> None:
         load_scenario(sea(lines.replace("lat = 0.0", "lat = 91")))
 
 
-def test_no_uav_waits_to_death_where_another_zone_is_free() -> None:
+def test_no_uav_waits_to_death_where_another_zone_is_free():
     """Two UAVs and two zones with a pad each: no UAV has to wait for long."""
     space = load_scenario("german-bight", uavs=2, pads=1, **{"zones.pads": 1})
     records = simulate_batch(space, load_team("greedy"), 1, 16)

@@ -26,7 +26,7 @@ def _space(sheet: dict[str, Any] | None = None, **values: Any) -> ScenarioSpace:
     return ScenarioSpace.of(data_sheet=merged, **values)
 
 
-def test_the_list_of_an_engineer_is_recomputed_by_hand() -> None:
+def test_the_list_of_an_engineer_is_recomputed_by_hand():
     space = _space({"range": "2 km", "horizon": "8 h", "max_rate": "6 bit/s/Hz", "mtbf": "30 d"})
     slot = 35 * 60 / 100
     assert (space.units.slot, space.units.cell, space.units.data) == (21, 15 * 21, 125e3 * 21)
@@ -46,7 +46,7 @@ def test_the_list_of_an_engineer_is_recomputed_by_hand() -> None:
     assert space.flying_time == space.charge_complete == (100, 100)
 
 
-def test_a_link_budget_gives_the_snr_of_friis_equation() -> None:
+def test_a_link_budget_gives_the_snr_of_friis_equation():
     budget = {"snr": None, "tx_power": "100 mW", "noise_figure": "6 dB", "frequency": "868 MHz"}
     space = _space(budget | {"free_space": "100 m"})
     wavelength = 299_792_458 / 868e6
@@ -57,7 +57,7 @@ def test_a_link_budget_gives_the_snr_of_friis_equation() -> None:
     assert float(closed_forms.mean_snr(space, 1000.0)) == pytest.approx(space.edge_snr - 22.7)
 
 
-def test_the_snr_is_that_of_the_distance_and_not_of_the_grid() -> None:
+def test_the_snr_is_that_of_the_distance_and_not_of_the_grid():
     """A larger exponent lowers the SNR beyond its distance, and raises it nearer."""
     small, large = (_space({"range": "3 km"}, grid=grid) for grid in (32, 60))
     assert np.array_equal(world_of(small).mean_snr[:8, :8], world_of(large).mean_snr[:8, :8])
@@ -68,7 +68,7 @@ def test_the_snr_is_that_of_the_distance_and_not_of_the_grid() -> None:
     assert plain[0, 4 * 10] == -math.inf  # 3.15 km
 
 
-def test_a_charge_adds_whole_percents_that_add_up_to_its_rate() -> None:
+def test_a_charge_adds_whole_percents_that_add_up_to_its_rate():
     values = {"uavs": 1, "flying_time": 20, "charge_complete": 90, "charge_rate": 0.875}
     space = ScenarioSpace.of(**values, charge_start=30, zone=[0, 0, 2, 2], landing=True, quota=9)
     events = simulate(space, Script("." * 200), 1, events=True).events
@@ -77,7 +77,7 @@ def test_a_charge_adds_whole_percents_that_add_up_to_its_rate() -> None:
     assert battery[:81] == [20 + min(math.floor(0.875 * k), 70) for k in range(1, 82)]
 
 
-def test_out_of_range_no_node_is_served_and_no_slot_counts() -> None:
+def test_out_of_range_no_node_is_served_and_no_slot_counts():
     values = {"nodes": [[5, 0]], "uavs": 1, "zone": [0, 0, 1, 1], "initial_data": 1e6}
     space = ScenarioSpace.of(**values, cell_size=100, radio={"range": 210.0, "max_rate": 0.5})
     record = simulate(space, Script("EEEE...."), 1, events=True)
@@ -89,12 +89,12 @@ def test_out_of_range_no_node_is_served_and_no_slot_counts() -> None:
     assert max(e.value for e in served) <= 0.5 / 4 + 1e-12
 
 
-def test_the_largest_wind_is_the_one_that_costs_the_most() -> None:
+def test_the_largest_wind_is_the_one_that_costs_the_most():
     for direction in (0.0, 30.0, 45.0, 225.0, 300.0):
         assert max(moves_in(largest_wind(direction, 15), direction, 15)) == pytest.approx(MOST)
 
 
-def test_a_scenario_with_a_sheet_is_stored_and_changed_by_its_sheet() -> None:
+def test_a_scenario_with_a_sheet_is_stored_and_changed_by_its_sheet():
     space = _space({"reserve": "20 %", "backlog": "20 MB"}, uavs=2, landing=False, quota=50)
     assert ScenarioSpace.of(space) == space and "cell_size" not in space.model_dump()
     assert space.charge_complete == space.flying_time == (80, 80)
@@ -104,7 +104,7 @@ def test_a_scenario_with_a_sheet_is_stored_and_changed_by_its_sheet() -> None:
     assert not ScenarioSpace.of().units and "radio" not in ScenarioSpace.of().model_dump()
 
 
-def test_nodes_of_a_file_have_their_own_rates_in_units(tmp_path) -> None:
+def test_nodes_of_a_file_have_their_own_rates_in_units(tmp_path):
     sheet = "\n".join(f'{name} = "{of}"' for name, of in SHEET.items() if name != "data_rate")
     rows = "name,x,y,data_rate,backlog\na,1,1,3 MB/h,1 MB\nb,4,4,6 MB/h,0 MB\n"
     (tmp_path / "buoys.csv").write_text(rows)
@@ -145,18 +145,18 @@ def test_nodes_of_a_file_have_their_own_rates_in_units(tmp_path) -> None:
         ({}, {"arrivals": {"rates": [0.1] * 25}}, "arrivals.rates: follows from the data sheet"),
     ],
 )
-def test_what_a_sheet_cannot_be_is_refused(sheet: Any, values: Any, message: str) -> None:
+def test_what_a_sheet_cannot_be_is_refused(sheet, values, message):
     with pytest.raises(InputError) as raised:
         _space(sheet, **values)
     assert message in str(raised.value) and "\n" not in str(raised.value)
 
 
-def test_amounts_are_printed_in_the_unit_that_suits_them() -> None:
+def test_amounts_are_printed_in_the_unit_that_suits_them():
     assert [printed(n, "s") for n in (0.5, 21, 2100, 28800)] == ["0.5 s", "21 s", "35 min", "8 h"]
     assert [printed(n, "m") for n in (315, 2000)] == ["315 m", "2 km"]
 
 
-def test_the_bay_with_a_sheet_has_its_constants() -> None:
+def test_the_bay_with_a_sheet_has_its_constants():
     bay = load_scenario("jade-bight")
     mission = constants_of(bay)[0]
     assert mission["charge_gain"] == 0.875 and mission["max_rate"] == 6 and mission["range"] == 2000

@@ -27,7 +27,7 @@ def _only(flight: list[tuple[str, float, int]], *names: str) -> list[tuple[str, 
     return [row for row in flight if row[0] in names]
 
 
-def test_a_uav_on_the_ground_spends_and_serves_nothing_and_waits_for_a_pad_for_nothing() -> None:
+def test_a_uav_on_the_ground_spends_and_serves_nothing_and_waits_for_a_pad_for_nothing():
     space = ScenarioSpace.of(**SEA | {"uavs": 2, "pads": 1, "quota": 4, "max_slots": 12})
     record = simulate(space, Script("", ""), 1, events=True)
     events = record.events
@@ -41,7 +41,7 @@ def test_a_uav_on_the_ground_spends_and_serves_nothing_and_waits_for_a_pad_for_n
     assert [row["end"] for row in record.uav_rows()] == ["truncated", "truncated"]
 
 
-def test_a_uav_lands_in_the_slot_in_which_it_hovers_in_a_zone_with_its_quota_filled() -> None:
+def test_a_uav_lands_in_the_slot_in_which_it_hovers_in_a_zone_with_its_quota_filled():
     # Two slots south, two back: the quota of 12 is filled in the third, it hovers in the fifth.
     flight = _flight("SSNN.", quota=12, max_slots=50)
     named = _only(flight, "quota_filled", "charge_request", "landing", "mission_end")
@@ -52,16 +52,14 @@ def test_a_uav_lands_in_the_slot_in_which_it_hovers_in_a_zone_with_its_quota_fil
 
 
 @pytest.mark.parametrize("route, end", [("SSNN..", "landed"), ("SSNNSS", "truncated")])
-def test_without_a_quota_a_uav_works_to_the_last_slot_and_must_be_on_the_ground_then(
-    route: str, end: str
-) -> None:
+def test_without_a_quota_a_uav_works_to_the_last_slot_and_must_be_on_the_ground_then(route, end):
     space = ScenarioSpace.of(**SEA | {"quota": 0, "max_slots": 6})
     record = simulate(space, Script(route), 1)
     assert record.slots == 6 and record.uav_rows()[0]["end"] == end
     assert record.success == (end == "landed")
 
 
-def test_an_empty_battery_in_the_air_ends_a_mission_and_the_quota_is_paid_on_landing() -> None:
+def test_an_empty_battery_in_the_air_ends_a_mission_and_the_quota_is_paid_on_landing():
     depleted = ScenarioSpace.of(**SEA | {"quota": 12, "flying_time": 4})
     record = simulate(depleted, Script("SSSS"), 1)
     assert record.uavs["end"].tolist() == [BATTERY] and record.success == 0
@@ -71,12 +69,12 @@ def test_an_empty_battery_in_the_air_ends_a_mission_and_the_quota_is_paid_on_lan
     assert simulate(ScenarioSpace.of(depleted, **plain), Script("SSSS"), 1).reward == -3.0
 
 
-def test_no_quota_without_landing_is_refused() -> None:
+def test_no_quota_without_landing_is_refused():
     with pytest.raises(InputError, match="quota: 0 needs landing; allowed: "):
         ScenarioSpace.of(quota=0)
 
 
-def test_missions_without_landing_are_stored_as_before() -> None:
+def test_missions_without_landing_are_stored_as_before():
     space = load_scenario("paper")
     assert "landing" not in space.model_dump() and not space.is_extended
     assert ScenarioSpace.of(space, landing=True).model_dump()["landing"] is True
@@ -84,7 +82,7 @@ def test_missions_without_landing_are_stored_as_before() -> None:
 
 @pytest.mark.parametrize("quota", [None, 0])
 @pytest.mark.parametrize("family", FAMILIES)
-def test_guarded_uavs_end_on_the_ground(family: str, quota: int | None) -> None:
+def test_guarded_uavs_end_on_the_ground(family, quota):
     values = {"landing": True, "max_slots": 250} | ({} if quota is None else {"quota": quota})
     space = load_scenario(f"{family}:3", **values)
     space = ScenarioSpace.of(space, pads=max(space.uavs[1] // 2, 1))
@@ -92,7 +90,7 @@ def test_guarded_uavs_end_on_the_ground(family: str, quota: int | None) -> None:
     assert np.isin(ends[ends > 0], [LANDED]).mean() > 0.99
 
 
-def test_uavs_land_beside_those_that_stand_in_their_way_at_the_end() -> None:
+def test_uavs_land_beside_those_that_stand_in_their_way_at_the_end():
     """Three pads in a zone of two rows: who comes last has to fly around those who stand."""
     space = load_scenario("scattered:2177", landing=True, quota=0, max_slots=500)
     space = ScenarioSpace.of(space, pads=3)

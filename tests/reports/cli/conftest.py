@@ -1,10 +1,12 @@
 """Fixtures that run the command in a folder with a small scenario and study."""
 
 import json
+from pathlib import Path
 
 import pytest
 
 from dess.reports import cli
+from dess.reports.pages import notebook, render
 from tests.analysis.small import files_of, small_study
 
 # What a command may tell before it refuses: steps on a busy machine, what a training will take,
@@ -53,3 +55,21 @@ def refusal(dess, tmp_path):
         return line
 
     return run
+
+
+@pytest.fixture
+def unrendered(monkeypatch):
+    """No page is made, which takes seconds; the parameters of the page of a what-if question."""
+    given = []
+
+    def page_of(folder, out, *_):
+        return Path(out, f"study-{Path(folder).name}.html")
+
+    def note(names, results, out, progress, parameters):
+        notebook.check_parameters([notebook.read(*names)], parameters)
+        given.append(parameters)
+        return Path(out, f"{names[0]}.html")
+
+    monkeypatch.setattr(render, "render_study", page_of)
+    monkeypatch.setattr(render, "render", note)
+    return given

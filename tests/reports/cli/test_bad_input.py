@@ -3,8 +3,6 @@
 All checks of a command come before its first mission.
 """
 
-from pathlib import Path
-
 import pytest
 
 from dess.analysis.execution import evaluation, runner
@@ -29,20 +27,13 @@ BAD = {
     "simulate --policy gredy": ["'gredy' is unknown", "did you mean greedy"],
     "simulate --policy greedy,tour,nearest --set uavs=2": ["3 policies", "2 at most"],
     "study run trial.toml --policy greedy,tour,random,tour": ["largest fleet", "3 at most"],
-    "simulate --policy none.py:Eager": ["none.py: no such file; allowed: FILE.py:CLASS"],
     "policies show gredy": ["'gredy' is unknown (did you mean greedy?)"],
     "scenarios show paper --set uvs=2": ["uvs: unknown key (did you mean uavs?)"],
     "simulate --seed -1": ["seed: -1", "0..2**64-1"],
-    "simulate --replication 4294967296": ["replication: 4294967296", "0..2**32-1"],
     "simulate --set uavs=2..5": ["has several values; allowed: one, or dess sweep --set uavs=2..5"],
     "evaluate --policy tour --set pads=1,2": ["allowed: one, or dess sweep --set pads=1,2"],
     "report mission comparison --out pages": ["dess study run fig1 fig4 comparison --out"],
     "simulate --set uavs": ["'uavs' is not KEY=VALUE"],
-    "simulate --set uavs=two": ["uavs: 'two' has the wrong form", "an integer or [low, high]"],
-    "simulate --set arrival_rate=lots": ["arrival_rate: 'lots' is not a number", "0..100"],
-    "simulate --set arrivals.process=poisson": ["'poisson' is unknown; allowed: slotted, contin"],
-    "simulate --set arrivals.buffer=3": ["slotted arrivals have no schedule", "allowed: con"],
-    "simulate --set uavz=1": ["uavz: unknown key (did you mean uavs?)"],
     "simulate --set uavs=17": ["uavs: 17", "1..16"],
     "simulate --of .": ["manifest.json: no such file", "a results folder"],
     "simulate --point 2": ["--point: belongs to a study", "with --of"],
@@ -64,7 +55,6 @@ BAD = {
     "report comparison": ["holds no results of study comparison", "dess study run comparison"],
     "report mission --set uavs=5": ["--set: mission takes no --set", "what-if"],
     "report what-if --set uavs": ["--set: 'uavs' is not KEY=VALUE"],
-    "report what-if --parameter speed=2": ["'speed' is unknown to what-if", "baseline, missions"],
     "report what-if --parameter speed": ["--parameter: 'speed' is not KEY=VALUE"],
     "report what-if --parameter results='x'": ["parameter: 'results' is unknown"],
     "report own-sea --parameter scenario='small.toml' --parameter fields={uavs=[1,2]}": [
@@ -78,7 +68,6 @@ BAD = {
     f"{SWEEP} --set charging.measured=true,false --metric age": [
         "allowed: ratio, product, success"
     ],
-    f"{SWEEP} --metric cost": ["--metric: 'cost' is not measured; allowed: ratio, product,"],
     f"{SWEEP} --metric produkt": ["--metric: 'produkt' is not measured (did you mean product"],
     f"{SWEEP} --out loop": ["loop: cannot be written: "],
     f"{SWEEP} --out linked": ["linked/.index.lock: is a link; allowed: "],
@@ -105,7 +94,7 @@ BAD = {
 
 
 @pytest.fixture
-def broken(dess, tmp_path: Path) -> None:
+def broken(dess, tmp_path):
     """A folder with what outputs and studies trip over."""
     (tmp_path / "loop").symlink_to("loop")
     for name in ("linked", "taken/index.html", "pictures.png"):

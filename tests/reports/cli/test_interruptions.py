@@ -72,7 +72,7 @@ def check_studies(folder, workers, number, kills, missions, progress=chunks):
 
 
 def test_a_killed_study_equals_an_undisturbed_one(tmp_path):
-    check_studies(tmp_path, 1, signal.SIGKILL, 2, 100)
+    check_studies(tmp_path, 1, signal.SIGKILL, 1, 100)
 
 
 @pytest.mark.slow

@@ -1,14 +1,11 @@
 """The help, and the names that commands accept."""
 
 import re
-import subprocess
-import sys
 
 import pytest
 import typer
 from click.testing import CliRunner
 
-import dess as dess_package
 from dess import ScenarioSpace, load_scenario
 from dess.analysis import load_study
 from dess.analysis.names import fields as fields_in
@@ -16,7 +13,6 @@ from dess.fields import fields_of
 from dess.policies.registry import SHIPPED, trained_names
 from dess.reports.cli.commands import app
 from dess.scenario import scenario_families, scenario_names
-from tests.analysis.small import environment
 
 
 def test_names_are_listed(dess):
@@ -108,13 +104,6 @@ def test_a_study_is_shown_as_its_file_sets_it(dess, dess_json, tmp_path):
     (tmp_path / "again.toml").write_text(out)
     assert load_study(tmp_path / "again.toml").model_dump() == load_study("fig4").model_dump()
     assert dess_json("studies", "show", "fig4")["missions"] == load_study("fig4").missions
-
-
-def test_the_package_is_the_command():
-    command = [sys.executable, "-m", "dess", "--version"]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment())
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == f"dess {dess_package.__version__}\n"
 
 
 @pytest.mark.parametrize(

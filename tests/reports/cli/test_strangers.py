@@ -32,7 +32,7 @@ Evil1 = Evil0
 
 
 @pytest.fixture(scope="module")
-def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def sound(tmp_path_factory):
     """Small results with event logs."""
     folder = tmp_path_factory.mktemp("sound")
     run_study(small_study(folder, logged=1), folder / "out")
@@ -40,7 +40,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def stranger(sound: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def stranger(sound, tmp_path, monkeypatch):
     """Files whose policies are classes of a Python file that leaves a trace when it is run."""
     monkeypatch.chdir(tmp_path)
     small_study(tmp_path, policies=["greedy"])
@@ -73,9 +73,7 @@ def printed(capsys: pytest.CaptureFixture[str]) -> str:
         "verify results",
     ],
 )
-def test_a_python_file_that_only_data_name_is_not_run(
-    command: str, stranger: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_python_file_that_only_data_name_is_not_run(command, stranger, capsys):
     manifest = json.loads(Path("results/manifest.json").read_text())
     for name in ("policies", "missions", "selected"):
         del manifest[name][1:]
@@ -89,9 +87,7 @@ def test_a_python_file_that_only_data_name_is_not_run(
 
 
 @pytest.mark.parametrize("command", ["study show results", "study show results --json"])
-def test_results_of_a_python_file_are_shown_without_running_it(
-    command: str, stranger: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_results_of_a_python_file_are_shown_without_running_it(command, stranger, capsys):
     assert main(command.split()) == 0
     assert "evil_policy.py:Evil0" in capsys.readouterr().out
     assert "a Python file that was not read, of policy evil_policy" in at_hand(
@@ -101,7 +97,7 @@ def test_results_of_a_python_file_are_shown_without_running_it(
 
 
 @pytest.mark.usefixtures("stranger")
-def test_no_mission_of_a_python_file_that_only_results_name_is_simulated() -> None:
+def test_no_mission_of_a_python_file_that_only_results_name_is_simulated():
     results = load_results("results")
     for simulated in (
         lambda: resimulate(results, results.policies[0], 0, 0),
@@ -120,9 +116,7 @@ def _first_chunk(results: Results) -> tuple:
     return chunk, spaces, manifest.policies[0].policy, manifest.seed, "batch"
 
 
-def test_a_python_file_is_run_once_the_user_names_it(
-    sound: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_python_file_is_run_once_the_user_names_it(sound, tmp_path, monkeypatch, capsys):
     """The file has a name of its own, because a process keeps the modules that it has imported."""
     monkeypatch.chdir(tmp_path)
     small_study(tmp_path, policies=["greedy"])
@@ -138,9 +132,7 @@ def test_a_python_file_is_run_once_the_user_names_it(
 
 
 @pytest.mark.parametrize("copies", [1, 30])
-def test_a_page_whose_missions_would_take_hours_is_refused_at_once(
-    copies: int, sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_page_whose_missions_would_take_hours_is_refused_at_once(copies, sound, tmp_path, capsys):
     evidence = Evidence.of(load_results(sound)).data
     slots = 100_000 if copies == 1 else 20_000
     evidence["scenario"] |= {"max_slots": slots, "communication_slots": 64, "quota": 1_000_000}
@@ -154,9 +146,7 @@ def test_a_page_whose_missions_would_take_hours_is_refused_at_once(
     assert len(line) <= 300
 
 
-def test_a_page_that_no_memory_holds_is_not_read(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_page_that_no_memory_holds_is_not_read(tmp_path, capsys):
     with (tmp_path / "page.html").open("wb") as page:
         page.truncate(2**40)
     assert main(["verify", str(tmp_path / "page.html")]) == 2

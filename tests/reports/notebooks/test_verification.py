@@ -41,7 +41,7 @@ def run_with(folder: Path, monkeypatch: pytest.MonkeyPatch, **changes: Any) -> P
     return folder
 
 
-def test_another_simulator_is_found_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_simulator_is_found_out(tmp_path, monkeypatch):
     changes = {"arrival_rate": 0.03, "edge_snr": -24.0, "charge_rate": 11, "uavs": [1, 2]}
     text = said(run_with(tmp_path, monkeypatch, **changes))
     counted = re.search(r"(\d+) of \d+ checks do not hold: ([^.]*)\.", text)
@@ -60,7 +60,7 @@ def test_another_simulator_is_found_out(tmp_path: Path, monkeypatch: pytest.Monk
         assert f"{test} {HOLDS}" in text
 
 
-def test_too_few_missions_are_not_taken_for_a_proof(tmp_path: Path) -> None:
+def test_too_few_missions_are_not_taken_for_a_proof(tmp_path):
     few = load_study(NAME, policies=["random"], missions=3, logged=1)
     write(simulate_missions(run_study(few, tmp_path / NAME), 2), tmp_path)
     (tmp_path / "broken").mkdir()

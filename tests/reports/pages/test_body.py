@@ -41,7 +41,7 @@ def gallery() -> Part:
     return html.gallery([(Figure(figsize=(1, 1)), "a", "n = 4.")] * 2, "A note.")
 
 
-def test_the_answer_stands_in_the_header_and_on_the_card() -> None:
+def test_the_answer_stands_in_the_header_and_on_the_card():
     found = page("text", html.answer("The **product** is 4 % & more.", "4 %"))
     explained = f'<abbr title="{TERMS["product"]}">product</abbr>'
     assert f'<p class="lead">The {explained} is 4 % &amp; more.</p>' in found.text
@@ -51,7 +51,7 @@ def test_the_answer_stands_in_the_header_and_on_the_card() -> None:
     assert without.card.finding == "About it." and '<p class="lead">About it.</p>' in without.text
 
 
-def test_figures_have_numbers_and_anchors_on_the_page_alone() -> None:
+def test_figures_have_numbers_and_anchors_on_the_page_alone():
     found = main_of(figure(), gallery())
     assert re.findall('<figure id="(figure-.)">', found) == ["figure-1", "figure-2", "figure-3"]
     assert re.findall(r'href="#(figure-.)">Figure (.)</a> n = .', found) == [
@@ -62,7 +62,7 @@ def test_figures_have_numbers_and_anchors_on_the_page_alone() -> None:
     assert in_jupyter.count("<figcaption>n = 4.") == 2 and "Figure" not in in_jupyter
 
 
-def test_second_level_headings_make_sections_and_the_method_is_folded() -> None:
+def test_second_level_headings_make_sections_and_the_method_is_folded():
     parts = ("## Why\n\ntext one", "## Tables & C_S", HTML("<table></table>"))
     whole = page(*parts, f"## {FOLDED}\n\ntext two").text
     listed = re.findall('<a href="#(.*)">(.*)</a>', whole.split("<main>")[0])
@@ -74,20 +74,20 @@ def test_second_level_headings_make_sections_and_the_method_is_folded() -> None:
     assert "two" in folded and "one" not in folded and "<table>" not in folded
 
 
-def test_the_text_of_a_section_stands_beside_its_only_figure() -> None:
+def test_the_text_of_a_section_stands_beside_its_only_figure():
     assert 'class="beside"' in main_of("## Why\n\ntext one", figure())
     assert 'class="beside"' not in main_of("## Why\n\ntext one", figure(), figure())
     assert 'class="beside"' not in main_of("## Why", figure(), "## Next\n\ntext")
 
 
-def test_a_term_is_explained_once_and_only_in_text() -> None:
+def test_a_term_is_explained_once_and_only_in_text():
     text = "text: the return guard, the return guard, a `product`"
     found = main_of(text, HTML("<pre>product</pre>"))
     assert found.count(f'<abbr title="{TERMS["return guard"]}">return guard</abbr>') == 1
     assert found.count("<abbr") == 1
 
 
-def test_thresholds_have_indices_but_in_code() -> None:
+def test_thresholds_have_indices_but_in_code():
     found = main_of("C_S, DC_S, C_C\n\n```\nC_C\n```")
     assert "<p>C<sub>S</sub>, DC_S, C<sub>C</sub></p>" in found
     assert '<pre tabindex="0"><code>C_C' in found

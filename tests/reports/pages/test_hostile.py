@@ -3,9 +3,7 @@
 import json
 import re
 import shutil
-from collections.abc import Callable
 from html import unescape
-from pathlib import Path
 
 import matplotlib as mpl
 import pandas as pd
@@ -20,7 +18,6 @@ from dess.reports.pages.page import CARD, Page
 from dess.reports.pages.render import index_of, pages_in, render_study, with_bars
 from tests.analysis.hostile import hostile_folder
 from tests.analysis.small import small_study
-from tests.reports.browser import Visit
 from tests.reports.small import Links
 
 ATTACK = (
@@ -37,14 +34,14 @@ HARMLESS = r"</?(p|strong|em|del|code|pre|ul|ol|li|h[1-6]|blockquote|hr|br)( /)?
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def page(tmp_path_factory):
     """The page of a study all of whose free strings are an attack."""
     folder = tmp_path_factory.mktemp("hostile")
     run_study(small_study(folder), folder / "sound")
     return render_study(hostile_folder(folder / "sound", folder / "made", ATTACK), folder / "out")
 
 
-def test_a_hostile_study_is_text_on_its_page_and_in_the_index(page: Path) -> None:
+def test_a_hostile_study_is_text_on_its_page_and_in_the_index(page):
     for name in (page.name, "index.html"):
         found = Links((page.parent / name).read_text("utf-8"))
         assert unescape(found.outside_scripts).count(ATTACK) >= 2
@@ -56,7 +53,7 @@ def test_a_hostile_study_is_text_on_its_page_and_in_the_index(page: Path) -> Non
         assert images or name == "index.html"
 
 
-def test_a_hostile_page_runs_nothing(page: Path, visit: Callable[[Path, int], Visit]) -> None:
+def test_a_hostile_page_runs_nothing(page, visit):
     for name in (page.name, "index.html"):
         opened = visit(page.parent / name, 1000)
         assert opened.page.evaluate("window.hit") is None
@@ -66,9 +63,7 @@ def test_a_hostile_page_runs_nothing(page: Path, visit: Callable[[Path, int], Vi
         assert all(widths)
 
 
-def test_a_script_in_a_page_without_scripts_does_not_run(
-    page: Path, tmp_path: Path, visit: Callable[[Path, int], Visit]
-) -> None:
+def test_a_script_in_a_page_without_scripts_does_not_run(page, tmp_path, visit):
     """The second wall: even markup that was not escaped."""
     markup = "<script>window.hit=1</script><img src='http://example.org/' onerror='window.hit=1'>"
     path = tmp_path / "page.html"
@@ -79,7 +74,7 @@ def test_a_script_in_a_page_without_scripts_does_not_run(
     assert all("Content Security Policy" in complaint for complaint in opened.complaints)
 
 
-def test_the_index_takes_no_markup_from_a_forged_page(page: Path, tmp_path: Path) -> None:
+def test_the_index_takes_no_markup_from_a_forged_page(page, tmp_path):
     """Not even if its seal is right."""
     out = tmp_path / "out"
     shutil.copytree(page.parent, out)
@@ -99,7 +94,7 @@ def test_the_index_takes_no_markup_from_a_forged_page(page: Path, tmp_path: Path
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_name_in_markdown_is_text(name: str) -> None:
+def test_a_name_in_markdown_is_text(name):
     line = " ".join(name.split())
     shown = markdown2html(html.say("A {name} and {code}.", name=name, code=html.code(name)).data)
     assert {*re.findall("<[^>]*>", shown)} == {"<p>", "</p>", "<code>", "</code>"}
@@ -108,13 +103,13 @@ def test_a_name_in_markdown_is_text(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_composed_markdown_has_neither_html_nor_links(name: str) -> None:
+def test_composed_markdown_has_neither_html_nor_links(name):
     line = " ".join(name.split())
     shown = markdown2html(html.say("{text}", text=html.composed(f"- **{line}**: `{line}`")).data)
     assert "<" not in re.sub(HARMLESS, "", shown)
 
 
-def test_a_block_of_commands_cannot_be_left() -> None:
+def test_a_block_of_commands_cannot_be_left():
     lines = ["a", "```", "<b>", "`````"]
     shown = markdown2html(html.say("{lines}", lines=html.commands(lines)).data)
     assert shown.count("<pre>") == 1
@@ -122,7 +117,7 @@ def test_a_block_of_commands_cannot_be_left() -> None:
 
 
 @pytest.mark.parametrize("name", ["$\\foo$", "$", "a$b$c", "\\$x"])
-def test_a_name_is_no_formula_in_a_figure(name: str) -> None:
+def test_a_name_is_no_formula_in_a_figure(name):
     with style.panels(3) as (drawing, axes):
         axes.plot([1, 2], label=name)
         axes.set_title(name)
@@ -130,7 +125,7 @@ def test_a_name_is_no_formula_in_a_figure(name: str) -> None:
     assert mpl.rcParams["text.parse_math"]
 
 
-def test_a_name_is_no_formula_in_a_spreadsheet() -> None:
+def test_a_name_is_no_formula_in_a_spreadsheet():
     names = ["=1+1", "+1", "-1", "@x", "\t=1", "a=1", "a"]
     rows = numbers.csv(pd.DataFrame({"policy": names, "mean": -1.5})).splitlines()[1:]
     assert [row.startswith("'") for row in rows] == [True] * 5 + [False] * 2
@@ -138,7 +133,7 @@ def test_a_name_is_no_formula_in_a_spreadsheet() -> None:
 
 
 @pytest.mark.parametrize("name", [*NAMES, "'''\nimport os\n'''", '"\\', "\ud800", "a\0b"])
-def test_a_parameter_cannot_become_code(name: str) -> None:
+def test_a_parameter_cannot_become_code(name):
     source = with_values("policy = 'greedy'  # the policy\nseed = 0", {"policy": name})
     assert values_of(source) == {"policy": name, "seed": 0}
     assert source.count("\n") == 1

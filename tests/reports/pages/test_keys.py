@@ -1,7 +1,6 @@
 """A page is rendered again if and only if something that it depends on has changed."""
 
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,7 +18,7 @@ WITHOUT_STUDIES = SCORECARD.replace("studies: []", "studies: []\n#     optional:
 
 
 @pytest.fixture
-def rendered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def rendered(monkeypatch):
     """The names of the pages that are rendered, each with a cell that shows a number."""
     names: list[str] = []
     monkeypatch.setattr(
@@ -43,20 +42,20 @@ class Folder:
 
 
 @pytest.fixture
-def folder(tmp_path: Path, results: Path, rendered: list[str]) -> Iterator[Folder]:
+def folder(tmp_path, results, rendered):
     """Pages that were rendered; one reads a study, the other one only if it is there."""
     folder = Folder(tmp_path, results, rendered)
     assert folder.render() == {"mission", "scorecard"}
     yield folder
 
 
-def test_unchanged_pages_are_not_rendered_again(folder: Folder) -> None:
+def test_unchanged_pages_are_not_rendered_again(folder):
     before = {path.name: path.read_bytes() for path in folder.out.iterdir()}
     assert folder.render() == set()
     assert {path.name: path.read_bytes() for path in folder.out.iterdir()} == before
 
 
-def test_other_results_change_the_pages_that_read_them(folder: Folder, tmp_path: Path) -> None:
+def test_other_results_change_the_pages_that_read_them(folder, tmp_path):
     shutil.rmtree(folder.results / "trial")
     run_study(small_study(tmp_path, missions=11), folder.results / "trial")
     assert folder.render() == {"mission"}
@@ -64,15 +63,13 @@ def test_other_results_change_the_pages_that_read_them(folder: Folder, tmp_path:
     assert folder.render() == {"scorecard"}
 
 
-def test_another_notebook_changes_its_page(folder: Folder) -> None:
+def test_another_notebook_changes_its_page(folder):
     write_notebooks(folder.notebooks, mission=MISSION.replace("head(3)", "head(4)"))
     assert folder.render() == {"mission"}
 
 
 @pytest.mark.parametrize("what", ["code", "library"])
-def test_other_code_and_libraries_change_all_pages(
-    folder: Folder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
-) -> None:
+def test_other_code_and_libraries_change_all_pages(folder, tmp_path, monkeypatch, what):
     render._software.cache_clear()
     if what == "library":
         monkeypatch.setattr(render.metadata, "distributions", list)
@@ -86,20 +83,20 @@ def test_other_code_and_libraries_change_all_pages(
     render._software.cache_clear()
 
 
-def test_pages_that_are_altered_or_gone_are_rendered_again(folder: Folder) -> None:
+def test_pages_that_are_altered_or_gone_are_rendered_again(folder):
     page = folder.out / "mission.html"
     page.write_text(page.read_text("utf-8").replace("A trial", "A trail"), "utf-8")
     (folder.out / "scorecard.html").unlink()
     assert folder.render() == {"mission", "scorecard"}
 
 
-def test_pages_with_parameters_are_always_rendered(folder: Folder) -> None:
+def test_pages_with_parameters_are_always_rendered(folder):
     for _ in range(2):
         assert folder.render(policy="random") == {"mission", "scorecard"}
     assert folder.render() == {"mission", "scorecard"}
 
 
-def test_the_page_of_a_study_is_rendered_once(results: Path, tmp_path: Path, rendered) -> None:
+def test_the_page_of_a_study_is_rendered_once(results, tmp_path, rendered):
     for _ in range(2):
         render_study(results / "trial", tmp_path)
     assert rendered == ["study-trial"]

@@ -3,7 +3,6 @@
 import os
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -30,14 +29,14 @@ PLAIN = st.recursive(
 )
 
 
-def test_the_values_of_a_cell_are_read() -> None:
+def test_the_values_of_a_cell_are_read():
     assert values_of(CELL) == {
         **{"results": "../../results", "settings": {"uavs": 5}, "missions": 500},
         **{"name": "é", "shown": None},
     }
 
 
-def test_other_values_leave_comments_and_other_lines_as_they_are() -> None:
+def test_other_values_leave_comments_and_other_lines_as_they_are():
     written = with_values(CELL, {"settings": {"pads": 2}, "shown": "tour", "unknown": 1})
     assert written == CELL.replace(
         """{
@@ -49,7 +48,7 @@ def test_other_values_leave_comments_and_other_lines_as_they_are() -> None:
 
 
 @given(st.fixed_dictionaries({}, optional=dict.fromkeys(values_of(CELL), PLAIN)))
-def test_what_is_written_is_read(values: dict[str, Any]) -> None:
+def test_what_is_written_is_read(values):
     written = with_values(CELL, values)
     assert values_of(written) == values_of(CELL) | values
     assert written.count("#") >= 4 and "# A comment — of its own" in written
@@ -63,15 +62,13 @@ def test_what_is_written_is_read(values: dict[str, Any]) -> None:
         ({"uavs": 3}, {"uavs": 3}),
     ],
 )
-def test_paths_are_written_another_way_and_words_are_not(value: Any, moved: Any) -> None:
+def test_paths_are_written_another_way_and_words_are_not(value, moved):
     assert with_paths(value, os.path.abspath) == moved
     relative = partial(os.path.relpath, start=os.getcwd())
     assert with_paths(moved, relative) == with_paths(value, os.path.normpath)
 
 
-def test_policies_of_the_working_folder_are_paths(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_policies_of_the_working_folder_are_paths(tmp_path, monkeypatch):
     """A notebook runs in another folder; the folder of a trained policy may be named without ./."""
     monkeypatch.chdir(tmp_path)
     Path("mine").mkdir()

@@ -17,7 +17,7 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
-from dess import InputError
+from dess import InputError, __version__
 from dess.analysis import run_study
 from dess.reports.cli import main
 from dess.reports.pages import kernels
@@ -116,6 +116,7 @@ raise ArithmeticError("no such number")
 # %%
 "the cell after"
 """
+FORMATS = ("svg", "pdf", "png")
 TINY = {"mission": MISSION, "scorecard": SCORECARD}
 # What Python, IPython, Jupyter and the libraries would import or run in a working directory.
 MODULES = ("pandas", "sitecustomize", "matplotlib", "joblib", "typer")
@@ -133,7 +134,7 @@ def write_notebooks(folder: Path, **sources: str) -> Path:
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def results(tmp_path_factory):
     """Results of the study trial."""
     folder = tmp_path_factory.mktemp("results")
     run_study(small_study(tmp_path_factory.mktemp("study")), folder / "trial")
@@ -141,7 +142,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def trap(results: Path) -> Path:
+def trap(results):
     """The folder of the results, with files that would run if it is the working directory."""
     for name in (*(f"{module}.py" for module in MODULES), STARTUP):
         file = results / name
@@ -156,28 +157,22 @@ def trap(results: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def notebooks(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def notebooks(tmp_path_factory):
     return write_notebooks(tmp_path_factory.mktemp("notebooks"), **TINY)
 
 
 @pytest.fixture(scope="module")
-def progress() -> list[tuple[int, int, str]]:
+def progress():
     return []
 
 
 @pytest.fixture(scope="module")
-def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def out(tmp_path_factory):
     return tmp_path_factory.mktemp("out") / "deep" / "reports"
 
 
 @pytest.fixture(scope="module")
-def files(
-    trap: Path,
-    notebooks: Path,
-    out: Path,
-    progress: list[Any],
-    tmp_path_factory: pytest.TempPathFactory,
-) -> dict[str, str]:
+def files(trap, notebooks, out, progress, tmp_path_factory):
     """All files of the reports, rendered once in a folder of traps, by name."""
     home = tmp_path_factory.mktemp("home")
     with pytest.MonkeyPatch.context() as patch:
@@ -185,9 +180,10 @@ def files(
         patch.delenv("PYTHONSAFEPATH", raising=False)
         patch.chdir(trap)
         note = lambda *step: progress.append(step)  # noqa: E731
-        assert render([], ".", out, note, notebooks=notebooks) == out / "index.html"
+        index = render([], ".", out, note, notebooks=notebooks, formats=FORMATS)
+        assert index == out / "index.html"
     assert not list(home.glob(".ipython")) + list(home.glob(".jupyter")) + list(home.glob(".local"))
-    return {path.name: path.read_text("utf-8") for path in out.iterdir()}
+    return {path.name: path.read_text("utf-8") for path in out.glob("*.*")}
 
 
 def another_environment(results: Path, out: Path, folder: Path, patch: pytest.MonkeyPatch) -> Path:
@@ -202,12 +198,12 @@ def another_environment(results: Path, out: Path, folder: Path, patch: pytest.Mo
 # --- pages ---
 
 
-def test_there_are_pages_notebooks_and_an_index_and_nothing_else(files: dict[str, str]) -> None:
+def test_there_are_pages_notebooks_and_an_index_and_nothing_else(files):
     kinds = [f"{name}.{kind}" for name in TINY for kind in ("html", "ipynb")]
     assert {*files} == {*kinds, "index.html"}
 
 
-def test_a_page_shows_outputs_and_no_warnings(files: dict[str, str]) -> None:
+def test_a_page_shows_outputs_and_no_warnings(files):
     page = files["mission.html"]
     text = words_of(page)
     assert "Slots of every mission" in text and "charging threshold C S" in text
@@ -216,7 +212,7 @@ def test_a_page_shows_outputs_and_no_warnings(files: dict[str, str]) -> None:
     assert Links(page).found.count("mission.ipynb") == 1
 
 
-def test_the_index_has_a_card_per_page_and_every_page_a_bar(files: dict[str, str]) -> None:
+def test_the_index_has_a_card_per_page_and_every_page_a_bar(files):
     index = files["index.html"]
     assert index.count('<a class="card"') == 2
     assert "The missions of a trial." in index
@@ -228,54 +224,31 @@ def test_the_index_has_a_card_per_page_and_every_page_a_bar(files: dict[str, str
 
 
 @pytest.mark.usefixtures("files")
-def test_progress_counts_the_cells(progress: list[tuple[int, int, str]]) -> None:
+def test_progress_counts_the_cells(progress):
     # Of the mission five cells with code, of the scorecard two.
     assert [(done, total) for done, total, _ in progress] == [(n, 7) for n in range(1, 8)]
     assert {name for *_, name in progress} == {*TINY}
 
 
 def test_the_same_results_give_the_same_bytes(
-    files: dict[str, str],
-    results: Path,
-    notebooks: Path,
-    out: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """One page is rendered again, the index shows it beside the page of the earlier call."""
+    files, results, notebooks, out, tmp_path, monkeypatch
+):
+    """With figures as files a current page is rendered again; the index shows the other one."""
     folder = another_environment(results, out, tmp_path, monkeypatch)
-    (folder / "mission.html").unlink()
-    render(["mission"], tmp_path / results.name, folder, notebooks=notebooks)
-    for name, text in files.items():
-        assert (folder / name).read_text("utf-8") == text, name
-
-
-def test_figures_are_files_on_request(
-    files: dict[str, str],
-    results: Path,
-    notebooks: Path,
-    out: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Beside a page that is the same, rendered again though it is current; always the same."""
-    folder = another_environment(results, out, tmp_path, monkeypatch)
-    asked = ["mission"], tmp_path / results.name, folder, None, {}, notebooks, ("svg", "pdf", "png")
-    made = []
-    for _ in range(2):
-        render(*asked)
-        made.append({p.name: p.read_bytes() for p in (folder / "mission-figures").iterdir()})
-    assert made[0] == made[1]
+    made = {p.name: p.read_bytes() for p in (folder / "mission-figures").iterdir()}
     begins = {"figure-1.svg": b"<?xml", "figure-1.pdf": b"%PDF", "figure-1.png": b"\x89PNG"}
-    assert {name: content[: len(begins[name])] for name, content in made[0].items()} == begins
+    assert {name: content[: len(begins[name])] for name, content in made.items()} == begins
+    shutil.rmtree(folder / "mission-figures")
+    render(["mission"], tmp_path / results.name, folder, notebooks=notebooks, formats=FORMATS)
+    assert {p.name: p.read_bytes() for p in (folder / "mission-figures").iterdir()} == made
     for name, text in files.items():
         assert (folder / name).read_text("utf-8") == text, name
 
 
 @pytest.mark.usefixtures("files")
 def test_a_notebook_runs_in_jupyter_and_shows_what_the_page_shows(
-    results: Path, notebooks: Path, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    results, notebooks, out, tmp_path, monkeypatch
+):
     folder = another_environment(results, out, tmp_path, monkeypatch)
     notebook = nbformat.read(folder / "mission.ipynb", as_version=4)
     nbformat.validate(notebook)
@@ -288,14 +261,12 @@ def test_a_notebook_runs_in_jupyter_and_shows_what_the_page_shows(
     assert "Figure 1" in main and main in (folder / "mission.html").read_text("utf-8")
 
 
-def test_a_page_runs_nothing_of_the_working_directory(files: dict[str, str], trap: Path) -> None:
+def test_a_page_runs_nothing_of_the_working_directory(files, trap):
     assert not (trap / "hit").exists()
     assert all("of a stranger" not in text for text in files.values())
 
 
-def test_processes_of_a_command_import_nothing_of_the_working_directory(
-    trap: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_processes_of_a_command_import_nothing_of_the_working_directory(trap, monkeypatch):
     def start_a_process(*_: Any, **__: Any) -> int:
         return subprocess.run([sys.executable, "-c", "import joblib"], check=True).returncode
 
@@ -306,19 +277,18 @@ def test_processes_of_a_command_import_nothing_of_the_working_directory(
     assert not (trap / "hit").exists() and "PYTHONSAFEPATH" not in os.environ
 
 
-def test_the_command_imports_nothing_of_the_working_directory(trap: Path) -> None:
+def test_the_command_imports_nothing_of_the_working_directory(trap):
     variables = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
     command = [sys.executable, "-m", "dess", "--version"]
-    subprocess.run(command, cwd=trap, check=True, env=variables)
+    done = subprocess.run(command, cwd=trap, env=variables, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, f"dess {__version__}\n")
     assert not (trap / "hit").exists()
 
 
 # --- input that is refused ---
 
 
-def test_pages_without_results_are_left_out_with_a_note(
-    results: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_pages_without_results_are_left_out_with_a_note(results, tmp_path, caplog):
     """Of all pages; a page that is named must have its results."""
     lacking = MISSION.replace("[trial]", "[trial, fleets, pads]")
     notebooks = write_notebooks(tmp_path / "notebooks", scorecard=SCORECARD, comparison=lacking)
@@ -336,15 +306,13 @@ def test_pages_without_results_are_left_out_with_a_note(
     assert not (tmp_path / "a").exists()
 
 
-def test_results_of_another_study_are_refused(results: Path, tmp_path: Path) -> None:
+def test_results_of_another_study_are_refused(results, tmp_path):
     (tmp_path / "table4").symlink_to(results / "trial")
     with pytest.raises(InputError, match="table4 holds study trial; allowed: table4"):
         render(["performance"], tmp_path, tmp_path / "out")
 
 
-def test_a_notebook_that_refuses_its_input_leaves_nothing(
-    results: Path, notebooks: Path, tmp_path: Path
-) -> None:
+def test_a_notebook_that_refuses_its_input_leaves_nothing(results, notebooks, tmp_path):
     values = {"policy": "nobody"}
     with pytest.raises(InputError, match="^report mission: policy: nobody is not in the study"):
         render([], results, tmp_path / "a" / "out", parameters=values, notebooks=notebooks)
@@ -355,8 +323,8 @@ def test_a_notebook_that_refuses_its_input_leaves_nothing(
 
 
 def test_a_path_is_relative_in_the_notebook_and_a_name_on_the_page(
-    results: Path, notebooks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    results, notebooks, tmp_path, monkeypatch
+):
     """Values stand in the cell of the parameters; the notebook runs in another folder."""
     ran: list[Report] = []
     monkeypatch.setattr(kernels, "run", lambda reports, *_: ran.extend(reports))
@@ -375,8 +343,8 @@ def test_a_path_is_relative_in_the_notebook_and_a_name_on_the_page(
 
 
 def test_a_notebook_that_fails_or_dies_leaves_a_partial_page_and_names_the_cell(
-    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture
-) -> None:
+    results, tmp_path, monkeypatch, capfd
+):
     """What a process reports before it dies is part of the line; the others are rendered."""
     (tmp_path / "mission.html").write_text("before")
     working = FAILING.replace("raise ArithmeticError", "print")
@@ -444,7 +412,7 @@ def runs(process: int) -> bool:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="sends signals, and looks for a process")
-def test_a_signal_ends_the_kernels_and_leaves_nothing(results: Path, tmp_path: Path) -> None:
+def test_a_signal_ends_the_kernels_and_leaves_nothing(results, tmp_path):
     with rendering(results, tmp_path) as running:
         running.send_signal(signal.SIGTERM)
         assert b"KeyboardInterrupt" in running.communicate()[1]

@@ -5,7 +5,6 @@ import re
 import shutil
 import textwrap
 from base64 import b64decode
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,6 @@ from dess.reports.pages.page import STUDY, Page
 from dess.reports.pages.render import render
 from dess.reports.player import library
 from tests.pins.pinned import pinned
-from tests.reports.browser import Visit
 from tests.reports.pages.test_render import another_environment
 from tests.reports.small import EMBEDDED, Links, run_small_studies, said_by, words, words_of
 
@@ -59,13 +57,13 @@ FIGURES = {
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def results(tmp_path_factory):
     """Small results of all studies that the reports read."""
     return run_small_studies(tmp_path_factory.mktemp("results"))
 
 
 @pytest.fixture(scope="module")
-def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def out(tmp_path_factory):
     return tmp_path_factory.mktemp("out") / "deep" / "reports"
 
 
@@ -76,7 +74,7 @@ def timed(results: Results, **_: Any) -> Times:
 
 
 @pytest.fixture(scope="module")
-def files(results: Path, out: Path) -> dict[str, str]:
+def files(results, out):
     """All files of the reports, rendered once, by name."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(comparison, "measure", timed)
@@ -85,12 +83,12 @@ def files(results: Path, out: Path) -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def pages(files: dict[str, str]) -> dict[str, str]:
+def pages(files):
     return {name: text for name, text in files.items() if name.endswith(".html")}
 
 
 @pytest.mark.brief
-def test_pages_load_nothing(pages: dict[str, str], files: dict[str, str]) -> None:
+def test_pages_load_nothing(pages, files):
     for name, html in pages.items():
         links = Links(html)
         assert not {"link", "iframe", "object"} & links.tags
@@ -105,7 +103,7 @@ def test_pages_load_nothing(pages: dict[str, str], files: dict[str, str]) -> Non
 
 
 @pytest.mark.brief
-def test_pages_show_no_paths_and_no_times(files: dict[str, str], results: Path) -> None:
+def test_pages_show_no_paths_and_no_times(files, results):
     for html in files.values():
         html = html.replace(library().data, "")
         assert str(results) not in html
@@ -114,7 +112,7 @@ def test_pages_show_no_paths_and_no_times(files: dict[str, str], results: Path) 
 
 
 @pytest.mark.brief
-def test_pages_show_results_and_no_errors(pages: dict[str, str]) -> None:
+def test_pages_show_results_and_no_errors(pages):
     assert pages["index.html"].count('<a class="card"') == len(NAMES)
     assert 'href="scorecard.html"' in pages["index.html"]
     assert pages["scorecard.html"].count('<tr class="claim">') >= 15
@@ -128,7 +126,7 @@ def test_pages_show_results_and_no_errors(pages: dict[str, str]) -> None:
 
 @pytest.mark.brief
 @pytest.mark.parametrize("name", NAMES)
-def test_a_page_says_what_the_kept_one_says(pages: dict[str, str], name: str) -> None:
+def test_a_page_says_what_the_kept_one_says(pages, name):
     html = pages[f"{name}.html"]
     lead = words(" ".join(re.findall('<p class="lead"[^>]*>(.*?)</p>', html, re.S)))
     text = words_of(html).partition("How this page was made")[0]
@@ -136,7 +134,7 @@ def test_a_page_says_what_the_kept_one_says(pages: dict[str, str], name: str) ->
     pinned(f"pages/{name}.txt", "\n\n".join(parts) + "\n")
 
 
-def test_every_figure_has_a_caption_with_its_number(pages: dict[str, str]) -> None:
+def test_every_figure_has_a_caption_with_its_number(pages):
     for name in NAMES:
         html = pages[f"{name}.html"]
         captions = re.findall(r"<figcaption>(.*?)</figcaption>", html, re.S)
@@ -149,9 +147,7 @@ def test_every_figure_has_a_caption_with_its_number(pages: dict[str, str]) -> No
 
 
 @pytest.mark.brief
-def test_every_page_carries_the_evidence_of_its_studies(
-    pages: dict[str, str], results: Path
-) -> None:
+def test_every_page_carries_the_evidence_of_its_studies(pages, results):
     for name in NAMES:
         evidence_of_page = [json.loads(text) for text in Page(pages[f"{name}.html"]).hidden(STUDY)]
         studies = read(name).studies
@@ -169,7 +165,7 @@ def test_every_page_carries_the_evidence_of_its_studies(
 @pytest.mark.brief
 @pytest.mark.parametrize("odd", ["none", {"uavs": 1}])
 @pytest.mark.usefixtures("pages")  # missions that the pages read are beside the results
-def test_a_page_refuses_parameters_of_another_kind(odd: object, results: Path) -> None:
+def test_a_page_refuses_parameters_of_another_kind(odd, results):
     """Such as a policy that the study lacks, or a table in place of a number."""
     without_missions = (name for name in NAMES if "missions" not in read(name).parameters)
     for name in without_missions:
@@ -178,13 +174,7 @@ def test_a_page_refuses_parameters_of_another_kind(odd: object, results: Path) -
                 said_by(name, results=str(results), **{parameter: odd})
 
 
-def test_all_pages_are_the_same_bytes_elsewhere(
-    pages: dict[str, str],
-    results: Path,
-    out: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_all_pages_are_the_same_bytes_elsewhere(pages, results, out, tmp_path, monkeypatch):
     another_environment(results, out, tmp_path, monkeypatch)
     copy = tmp_path / results.name
     for asked in ("what-if", "sweeps"):  # simulated anew, like the missions drawn
@@ -197,9 +187,7 @@ def test_all_pages_are_the_same_bytes_elsewhere(
 
 
 @pytest.mark.parametrize("width", [1280, 390])
-def test_pages_fit_the_window_and_request_nothing(
-    visit: Callable[[Path, int], Visit], pages: dict[str, str], out: Path, width: int
-) -> None:
+def test_pages_fit_the_window_and_request_nothing(visit, pages, out, width):
     for name in pages:
         opened = visit(out / name, width)
         assert opened.page.evaluate("document.documentElement.scrollWidth") <= width
@@ -207,9 +195,7 @@ def test_pages_fit_the_window_and_request_nothing(
         assert opened.complaints == []
 
 
-def test_pages_fit_the_paper(
-    visit: Callable[[Path, int], Visit], pages: dict[str, str], out: Path
-) -> None:
+def test_pages_fit_the_paper(visit, pages, out):
     for name in pages:
         page = visit(out / name, A4).page
         page.emulate_media(media="print")
@@ -217,7 +203,7 @@ def test_pages_fit_the_paper(
 
 
 @pytest.mark.usefixtures("files")
-def test_a_mission_is_played_in_its_page(visit: Callable[[Path, int], Visit], out: Path) -> None:
+def test_a_mission_is_played_in_its_page(visit, out):
     opened = visit(out / "mission.html", 1280)
     opened.page.locator("#player button").click()
     # A function to wait for would be evaluated in the page, which forbids that.

@@ -66,7 +66,7 @@ def in_backticks(text: str) -> str:
     return re.sub("</?code>", "`", text)
 
 
-def test_every_input_parameter_is_in_the_table() -> None:
+def test_every_input_parameter_is_in_the_table():
     table = stress_des.describe(manifest()).parameters
     fields = table["Input parameter [unit]"].str.partition(":")[0]
     off = {*SECTIONS, *GEOMETRY, LANDING}
@@ -74,7 +74,7 @@ def test_every_input_parameter_is_in_the_table() -> None:
     assert table.notna().all(axis=None)
 
 
-def test_no_number_of_the_model_is_typed() -> None:
+def test_no_number_of_the_model_is_typed():
     """Scenarios that have nothing in common share the level of the intervals, and no more."""
     about = {"version": "x", "commit": "y", "libraries": {"python": "p", "numpy": "q"}}
     numbers = []

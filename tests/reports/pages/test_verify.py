@@ -34,7 +34,7 @@ ALL = 10**6
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def results(tmp_path_factory):
     """Small results of two studies."""
     folder = tmp_path_factory.mktemp("results")
     for name, logged in {"table4": 0, "fig4": 1}.items():
@@ -44,7 +44,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def page(results: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def page(results, tmp_path_factory):
     """A page on both, with the index of its folder; its notebook has not been run."""
     out = tmp_path_factory.mktemp("out")
     shown = html.table(pd.DataFrame({"Success": ["97.3 %"]}))
@@ -69,7 +69,7 @@ def altered(path: Path, old: str, new: str, out: Path) -> Path:
     return out
 
 
-def test_pages_and_results_that_nobody_altered_agree(results: Path, page: Path) -> None:
+def test_pages_and_results_that_nobody_altered_agree(results, page):
     for path in (page, page.with_name("index.html"), results, results / "fig4"):
         assert lines_of(path) == []
     compared = {verdict.what: verdict.compared for verdict in verify_page(page, ALL, 0)}
@@ -78,16 +78,14 @@ def test_pages_and_results_that_nobody_altered_agree(results: Path, page: Path) 
     assert compared == {"table4": 24, "fig4": 72, "fig4, event logs": 6}
 
 
-def test_another_number_on_a_page_is_found(page: Path, tmp_path: Path) -> None:
+def test_another_number_on_a_page_is_found(page, tmp_path):
     (shown,) = set(re.findall(r"<td>(\d+\.\d %)</td>", page.read_text("utf-8"))[:1])
     digit = "1" if shown[0] != "1" else "2"
     forged = altered(page, f"<td>{shown}", f"<td>{digit}{shown[1:]}", tmp_path / "page.html")
     assert lines_of(forged) == ["the page has been altered"]
 
 
-def test_a_page_whose_missions_were_altered_is_found_by_simulating_them(
-    page: Path, tmp_path: Path
-) -> None:
+def test_a_page_whose_missions_were_altered_is_found_by_simulating_them(page, tmp_path):
     """Even where the checksum was made anew."""
     text = Page.read(page).hidden(STUDY)[0]
     evidence = json.loads(text)
@@ -120,8 +118,8 @@ def forged(path: Path, column: str, change: Callable[[float], float], to: Path) 
     ],
 )
 def test_forged_records_and_logs_are_found_by_simulating_their_missions(
-    results: Path, tmp_path: Path, study: str, kind: str, column: str, differing: int, found: str
-) -> None:
+    results, tmp_path, study, kind, column, differing, found
+):
     """A file that is sound in itself, with the name that belongs to its bytes."""
     folder = shutil.copytree(results / study, tmp_path / study)
     path = sorted((folder / kind).rglob("*.parquet"))[0]
@@ -131,7 +129,7 @@ def test_forged_records_and_logs_are_found_by_simulating_their_missions(
     assert all(found in line for line in lines) or kind == "uavs" and found in lines[0]
 
 
-def test_two_files_that_tell_two_things_are_both_damaged(results: Path, tmp_path: Path) -> None:
+def test_two_files_that_tell_two_things_are_both_damaged(results, tmp_path):
     folder = shutil.copytree(results / "table4", tmp_path / "table4")
     path = sorted((folder / "missions").rglob("*.parquet"))[0]
     forged(path, "reward", lambda value: value + 1, path.with_name("second.parquet"))
@@ -141,16 +139,14 @@ def test_two_files_that_tell_two_things_are_both_damaged(results: Path, tmp_path
         load_results(folder)
 
 
-def test_a_page_without_missions_says_so(tmp_path: Path) -> None:
+def test_a_page_without_missions_says_so(tmp_path):
     bare = tmp_path / "bare.html"
     bare.write_text(Page('<meta name="dess-checksum" content="">').sealed.text)
     (verdict,) = verify_page(bare, ALL, 0)
     assert verdict.notes == ["contains no missions to simulate again"]
 
 
-def test_an_altered_page_does_not_get_into_the_index(
-    page: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_an_altered_page_does_not_get_into_the_index(page, tmp_path, caplog):
     folder = shutil.copytree(page.parent, tmp_path / "out")
     assert {*pages_in(folder)} == {"performance.html"}
     altered(page, "How good are the policies", "Perfection", folder / "performance.html")
@@ -165,7 +161,7 @@ def test_an_altered_page_does_not_get_into_the_index(
     assert "performance.html" not in index_of(pages_in(folder))
 
 
-def test_an_incomplete_folder_hides_no_other(results: Path, tmp_path: Path) -> None:
+def test_an_incomplete_folder_hides_no_other(results, tmp_path):
     folder = shutil.copytree(results, tmp_path / "results")
     manifest = folder / "fig4" / "manifest.json"
     manifest.write_text(manifest.read_text().replace('"complete": true', '"complete": false'))
@@ -175,7 +171,7 @@ def test_an_incomplete_folder_hides_no_other(results: Path, tmp_path: Path) -> N
     assert len(verify_results(folder, ALL, 0)[0].differing) == 1
 
 
-def test_other_weights_are_found(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_other_weights_are_found(tmp_path, capsys):
     folder = shutil.copytree(TRAINED, tmp_path / "trained")
     content = f'<meta name="dess-checksum" content="">{html.weights(folder).data}'
     path = tmp_path / "page.html"
@@ -194,7 +190,7 @@ def _digests(folder: Path) -> tuple[str, str]:
     return learned_files()[name], learned_files(folder)[name]
 
 
-def test_the_sample_is_drawn_at_random(results: Path) -> None:
+def test_the_sample_is_drawn_at_random(results):
     loaded = load_results(results / "fig4")
     few = [
         {(m.policy, str(m.values), m.replication) for m in Evidence.of(loaded, 20, seed).sample}
@@ -205,9 +201,7 @@ def test_the_sample_is_drawn_at_random(results: Path) -> None:
 
 
 @pytest.mark.parametrize("as_json", [False, True])
-def test_the_command_says_what_it_found(
-    page: Path, tmp_path: Path, as_json: bool, capsys: pytest.CaptureFixture
-) -> None:
+def test_the_command_says_what_it_found(page, tmp_path, as_json, capsys):
     options = ["--seed", "5", *(["--json"] if as_json else [])]
     assert main(["verify", str(page), *options]) == 0
     out = capsys.readouterr().out
@@ -226,9 +220,7 @@ def test_the_command_says_what_it_found(
         assert json.loads(captured.out)["checks"][0]["differing"]
 
 
-def test_of_damaged_tables_the_command_says_of_how_many(
-    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
+def test_of_damaged_tables_the_command_says_of_how_many(results, tmp_path, capsys):
     folder = shutil.copytree(results, tmp_path / "results")
     files = sorted((folder / "table4").rglob("*.parquet"))
     files[0].write_bytes(b"damaged")
@@ -243,9 +235,7 @@ def test_of_damaged_tables_the_command_says_of_how_many(
     assert sum(len(check.differing) for check in checks) == 1
 
 
-def test_forged_bounds_are_found_by_computing_them_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_forged_bounds_are_found_by_computing_them_again(tmp_path, monkeypatch):
     with quick():
         run_study(small_study(tmp_path, bounds=True, missions=6), tmp_path / "out")
     monkeypatch.setattr(verify, "upper_bound", made_up)

@@ -15,7 +15,6 @@ from dess.analysis.answers import settings
 from dess.reports.pages import html
 from dess.reports.pages.page import STUDY, Page
 from dess.reports.pages.render import render_study
-from dess.reports.pages.verify import verify_page
 from tests.analysis.small import files_of, grid, small_study
 from tests.reports.small import Links
 
@@ -105,12 +104,6 @@ def test_it_requests_nothing_and_fits_a_phone(page, out, visit):
         opened.page.keyboard.press("Enter")
     assert Path(started.value.path()).read_text("utf-8").startswith("rank,policy,point,")
     assert "index.html" in Links(page).found
-
-
-def test_it_is_verified(page, out):
-    page_check, records = verify_page(out / "study-trial.html", missions=5, seed=1)
-    assert (records.what, records.compared) == ("trial", 5)
-    assert page_check.differing == records.differing == []
 
 
 # --- files with data ---
