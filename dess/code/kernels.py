@@ -11,7 +11,7 @@ import gc
 import inspect
 import math
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from numba import config, njit
 from numba.core.caching import IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.types import unliteral
 from numba.extending import overload
 
 from dess.code.sources import code_of, combined
@@ -74,9 +75,18 @@ def kernel(function: Callable) -> Any:
         compiled = njit(cache=bool(stamp), **_OPTIONS)(function)
     except RuntimeError:  # numba has found no folder for its cache ("no locator available")
         return njit(**_OPTIONS)(function)
+    compiled.get_call_template = partial(_without_literals, compiled.get_call_template)
     if stamp:
         compiled._cache._cache_file = _cache_file(compiled._cache, stamp)
     return compiled
+
+
+def _without_literals(template: Callable, args: Any, kws: Any) -> Any:
+    """The types with which a compiled function calls another: a number in the code is any number.
+
+    Otherwise, the function would be compiled once more for each number that calls of it contain.
+    """
+    return template([*map(unliteral, args)], {name: unliteral(kws[name]) for name in kws})
 
 
 def _cache_file(cache: Any, stamp: str) -> IndexDataCacheFile:
