@@ -29,7 +29,7 @@ QUICK = Quick()
 
 
 @given(
-    spaces() | extended_spaces(),
+    extended_spaces(),  # on plain seas there are less costly tests, and the pins of records
     st.lists(st.sampled_from([QUICK, policies.load("greedy")]), min_size=1, max_size=3),
     seeds,
     st.lists(replications, min_size=1, max_size=4),
