@@ -121,7 +121,8 @@ def table(results: Results) -> Table:
         told = [of.change(*row) for row in differences.loc[of.column].loc[data["point"][1:]].values]
         place = cells.columns.get_loc(of.name) + 1
         cells.insert(place, f"Change of {of.within}", ["", *told])
-    cells["Requirements"], cells["Missions"] = data["kept"], counts(data["n"])
+    cells.insert(1, "Requirements", data["kept"])
+    cells["Missions"] = counts(data["n"])
     caption = (
         "The fleet, one more of it, and harder conditions: means, and changes on the same "
         f"missions, with {INTERVALS}; requirements are kept or broken if whole intervals say so"
