@@ -85,7 +85,9 @@ def lowest(session: nox.Session) -> None:
     pins = {name: f"{name}=={version}" for name, version in bounds}
     # Of older ones, PyPI has only builds with CUDA, of several GB.
     pins |= {"torch": re.findall("^torch==.*", Path("constraints.txt").read_text("utf-8"), re.M)[0]}
-    constraints = Path(session.create_tmp(), "lowest.txt")
+    # Not in a folder of the session, which nox would take for its environment the next time.
+    constraints = Path("build", "lowest.txt")
+    constraints.parent.mkdir(exist_ok=True)
     constraints.write_text("\n".join(pins.values()), "utf-8")
     wanted = ("-e", ".[test]", "-c", str(constraints))
     if session.virtualenv.venv_backend == "none":
