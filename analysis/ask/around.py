@@ -128,7 +128,7 @@ def table(results: Results) -> Table:
         f"missions, with {INTERVALS}; requirements are kept or broken if whole intervals say so"
     )
     if refused:
-        caption += f". Refused by the scenario: {'; '.join(map(_in_words, refused))}"
+        caption += f". Cannot be simulated here: {'; '.join(map(_in_words, refused))}"
     return Table(cells, caption, data)
 
 

@@ -57,3 +57,18 @@ def test_without_compilation_there_is_no_simulator(monkeypatch):
     monkeypatch.setattr(config, "DISABLE_JIT", 1)
     with pytest.raises(InputError, match="NUMBA_DISABLE_JIT: the simulator runs only compiled"):
         kernel(abs)
+
+
+@kernel
+def _next(number):
+    return number + 1
+
+
+@kernel
+def _calls_with_numbers(number):
+    return _next(1) + _next(2) + _next(number)
+
+
+def test_a_number_in_a_call_does_not_compile_the_function_again():
+    assert _calls_with_numbers(3) == 9
+    assert len(_next.signatures) == 1
