@@ -104,11 +104,13 @@ class MeanTest:
     """A sequential test of whether a mean meets a requirement; the first verdict is final.
 
     Attributes:
+        required: The least mean.
         verdict: ``met``, ``missed``, or ``open``.
         missions: Number of values observed up to the verdict; all values if it is ``open``.
     """
 
     def __init__(self, required: float, tolerance: float, error: float):
+        self.required = required
         least, most = required - tolerance, required + tolerance
         self._at_most, self._at_least = _Wealth(least, tolerance), _Wealth(1 - most, tolerance)
         self._target = -np.log(error)
@@ -148,10 +150,10 @@ def _first(holds: np.ndarray) -> int:
     return int(np.argmax(holds)) if holds.any() else len(holds)
 
 
-# A function that estimates costs. It takes the (s, g) design points of s candidates, and for each
-# (s,) whether it is feasible. It returns the feasible candidate with the lowest mean cost, and (s,)
-# an upper bound of how much more it costs than each candidate (0 for itself).
-Costing = Callable[[np.ndarray, np.ndarray], tuple[int, np.ndarray]]
+# A function that bounds costs. It takes the (s, g) design points of s candidates, and the number of
+# one of them. It returns (s,) an upper bound of how much more this one costs than each candidate (0
+# for itself).
+Excess = Callable[[np.ndarray, int], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -179,6 +181,7 @@ class Question:
     def __init__(self, condition: dict[str, Any] | None, candidates: Sequence[Sequence[int]]):
         self._condition = condition
         self.candidates = np.array(candidates, int).reshape(len(candidates), -1)
+        self._next = self.candidates  # of those left, the ones that need more missions
         self.settled = not candidates
         self._best: int | None = None
 
@@ -190,7 +193,7 @@ class Question:
     @property
     def needed(self) -> set[int]:
         """The design points that need more missions to settle the question."""
-        return set() if self.settled else set(self.candidates.ravel().tolist())
+        return set() if self.settled else set(self._next.ravel().tolist())
 
     @property
     def answer(self) -> Answer:
@@ -199,25 +202,38 @@ class Question:
         best = () if self._best is None else left[self._best]
         return Answer(self._condition, best, tuple(left), self.settled)
 
-    def look(self, verdicts: Sequence[Verdict], costs: Costing, indifference: float) -> None:
+    def look(self, points: "_Points", excess: Excess, indifference: float) -> None:
         """Rule out candidates that are infeasible or more expensive; check if the rest is settled.
 
         Args:
-            verdicts: For each design point, whether it meets the requirements, as far as known.
-            costs: The function that estimates the costs of candidates.
+            points: What is known of the design points.
+            excess: The function that bounds the costs of candidates.
             indifference: The smallest saving that matters, in the currency.
         """
-        of_points = np.array(verdicts)[self.candidates]
-        possible = ~(of_points == "missed").any(axis=1)
-        feasible = (of_points == "met").all(axis=1)[possible]
+        verdicts = points.verdicts[self.candidates]
+        possible = ~(verdicts == "missed").any(axis=1)
         self.candidates, self._best = self.candidates[possible], None
+        feasible = (verdicts[possible] == "met").all(axis=1)
         if not feasible.any():
             self.settled = not len(self.candidates)
+            self._next = self._up_to_promising(points, indifference)
             return
-        leader, excess = costs(self.candidates, feasible)
-        left = excess >= 0
+        costs = points.costs[self.candidates].mean(axis=1)
+        leader = int(np.argmin(np.where(feasible, costs, np.inf)))
+        bounds = excess(self.candidates, leader)
+        left = bounds >= 0
         self.candidates, self._best = self.candidates[left], int(left[:leader].sum())
-        self.settled = bool((excess <= indifference).all())
+        self._next = self.candidates
+        self.settled = bool((bounds <= indifference).all())
+
+    def _up_to_promising(self, points: "_Points", indifference: float) -> np.ndarray:
+        """The cheapest candidate that met the requirements so far, and all that hardly cost more.
+
+        Missions of more expensive ones would be of no use if one of these meets the requirements.
+        """
+        costs = points.costs[self.candidates].mean(axis=1)
+        promising = points.promising[self.candidates].all(axis=1)
+        return self.candidates[costs <= costs[promising].min(initial=np.inf) + indifference]
 
 
 def questions_about(values: Sequence[Mapping[str, Any]]) -> list[Question]:
@@ -413,7 +429,7 @@ class Cheapest(StrictTable):
         Returns:
             For each design point at least the n missions given; exactly n if no more are needed.
         """
-        return needed(_Search(self, samples, settings).counts, samples)
+        return needed(_Search(self, samples, settings).points.counts, samples)
 
     def choice(self, samples: Samples, settings: Sequence[Setting]) -> CheapestChoice:
         """The selected settings, and what is guaranteed about them.
@@ -428,12 +444,12 @@ class Cheapest(StrictTable):
         check_begun(samples, self.first)
         search = _Search(self, samples, settings)
         return CheapestChoice(
-            counts=based_on(search.counts, samples),
+            counts=based_on(search.points.counts, samples),
             rounds=search.rounds,
             done=search.done,
             guarantee=self._guarantee(search),
             answers=tuple(question.answer for question in search.questions),
-            verdicts=tuple(search.verdicts),
+            verdicts=tuple(search.points.verdicts),
             enough=self._enough(search),
         )
 
@@ -450,13 +466,13 @@ class Cheapest(StrictTable):
             return None
         endless = self.model_copy(update={"budget": MOST})
         names = ["cost", *(told(metric, search.samples[0]) for metric in self.requirements)]
-        points = [*zip(search.samples, search.counts, strict=True)]
+        points = [*zip(search.samples, search.points.counts, strict=True)]
         times = 2
-        while times <= FURTHER and times * search.counts.sum() <= MOST_FURTHER:
+        while times <= FURTHER and times * search.points.counts.sum() <= MOST_FURTHER:
             again = [{m: np.tile(of[m][:n], times) for m in names} for of, n in points]
             further = _Search(endless, again, search.settings)
             if further.done:
-                return int(further.counts.sum())
+                return int(further.points.counts.sum())
             times *= 2
         return None
 
@@ -493,12 +509,28 @@ AnySelection = Annotated[
 ]
 
 
+class _Points:
+    """What is known of the k design points.
+
+    Attributes:
+        counts: (k,) missions that each needs so far.
+        looks: (k,) the number of rounds for which each had missions.
+        verdicts: (k,) whether each meets the requirements: ``met``, ``missed`` or ``open``.
+        promising: (k,) whether the means of its missions meet the requirements.
+        costs: (k,) its mean cost.
+    """
+
+    def __init__(self, k: int, first: int):
+        self.counts, self.looks = np.full(k, first), np.ones(k, int)
+        self.verdicts, self.promising = np.full(k, "open", object), np.zeros(k, bool)
+        self.costs = np.zeros(k)
+
+
 class _Search:
     """The procedure, carried out as far as the simulated missions allow.
 
     Attributes:
-        counts: (k,) missions that each point needs so far.
-        verdicts: For each point, whether it meets the requirements.
+        points: What is known of the design points.
         questions: All questions.
         rounds: Number of rounds carried out.
         done: Whether no more missions are needed: all questions are settled or the budget is spent.
@@ -506,8 +538,7 @@ class _Search:
 
     def __init__(self, rule: Cheapest, samples: Samples, settings: Sequence[Setting]):
         self.rule, self.samples, self.settings = rule, samples, settings
-        self.counts = np.full(len(samples), rule.first)
-        self.verdicts: list[Verdict] = ["open"] * len(samples)
+        self.points = _Points(len(samples), rule.first)
         self.questions = questions_about([setting.values for setting in settings])
         self.rounds, self.done = 1, False
         self._error = (1 - rule.confidence) / 2
@@ -520,56 +551,63 @@ class _Search:
             for s in settings
         ]
         self._pairs = max(sum(question.pairs for question in self.questions), 1)
-        self._seen = 0  # missions taken into account, at each point that a question still needs
         self._play()
 
-    def _leader(
-        self, error: float, candidates: np.ndarray, feasible: np.ndarray
-    ) -> tuple[int, np.ndarray]:
-        """The feasible candidate with the lowest mean cost, and how much more it may cost."""
-        n = self._seen
-        costs = np.array(
-            [[self.samples[p]["cost"][:n] for p in points] for points in candidates], float
-        ).mean(axis=1)
-        leader = int(np.argmin(np.where(feasible, costs.mean(axis=1), np.inf)))
-        excess = costs[leader] - costs
+    def _excess(self, candidates: np.ndarray, leader: int) -> np.ndarray:
+        """How much more a candidate costs at most than each, by the missions that both have.
+
+        There is an error for every number of these missions, of which there are as many as looks.
+        """
         loss = np.mean([self.settings[p].loss for p in candidates[leader]])
-        widths = float(stdtrit(n - 1, 1 - error)) * excess.std(axis=1, ddof=1) / np.sqrt(n)
-        widths -= loss * np.log(error) / n
-        widths[leader] = 0.0
-        return leader, excess.mean(axis=1) + widths
+        bounds = np.zeros(len(candidates))
+        for number, candidate in enumerate(candidates):
+            if number == leader:
+                continue
+            both = [*candidate, *candidates[leader]]
+            n, looks = int(self.points.counts[both].min()), int(self.points.looks[both].min())
+            error = self._error / (self._pairs * looks * (looks + 1))
+            costs, least = (
+                np.mean([self.samples[p]["cost"][:n] for p in of], axis=0)
+                for of in (candidate, candidates[leader])
+            )
+            excess = least - costs
+            width = float(stdtrit(n - 1, 1 - error)) * excess.std(ddof=1) / np.sqrt(n)
+            bounds[number] = excess.mean() + width - loss * np.log(error) / n
+        return bounds
 
     def _play(self) -> None:
-        needed = [*range(len(self.samples))]
-        while all(len(self.samples[p]["cost"]) >= self.counts[p] for p in needed):
-            stage = int(self.counts.max())
-            self._test(needed, stage)
-            error = self._error / (self._pairs * self.rounds * (self.rounds + 1))
-            costs = partial(self._leader, error)
+        points, needed = self.points, [*range(len(self.samples))]
+        while all(len(self.samples[p]["cost"]) >= points.counts[p] for p in needed):
+            for point in needed:
+                self._test(point)
             for question in self.questions:
                 if not question.settled:
-                    question.look(self.verdicts, costs, self.rule.indifference)
+                    question.look(points, self._excess, self.rule.indifference)
             needed = sorted(set().union(*(question.needed for question in self.questions)))
-            room = self.rule.budget - int(self.counts.sum())
-            step = min(stage // 2, room // len(needed)) if needed else 0
-            if step < 1:
+            room = self.rule.budget - int(points.counts.sum())
+            steps = points.counts[needed] // 2
+            if steps.sum() > room:
+                steps = np.minimum(steps, room // len(needed))
+            if not steps.any():
                 self.done = True
                 return
-            self.counts[needed] += step
+            points.counts[needed] += steps
+            points.looks[needed] += 1
             self.rounds += 1
 
-    def _test(self, points: Sequence[int], stage: int) -> None:
-        """Test the requirements of points on their first ``stage`` missions.
+    def _test(self, point: int) -> None:
+        """Test the requirements of a point on its missions.
 
         The verdict on all requirements together is missed if one is missed, met if all are met.
         """
-        for point in points:
-            if self.verdicts[point] != "open":
-                continue
-            for metric, test in self._tests[point].items():
-                values = self.samples[point][told(metric, self.samples[point])][self._seen : stage]
-                horizon = self.settings[point].horizon
-                test.observe(as_share(metric, np.asarray(values, float), horizon))
-            found = {test.verdict for test in self._tests[point].values()}
-            self.verdicts[point] = min(found, key=["missed", "open", "met"].index)
-        self._seen = stage
+        points, sample = self.points, self.samples[point]
+        count, horizon = points.counts[point], self.settings[point].horizon
+        points.costs[point] = np.mean(sample["cost"][:count])
+        points.promising[point] = True
+        for metric, test in self._tests[point].items():
+            values = np.asarray(sample[told(metric, sample)][:count], float)
+            shares = as_share(metric, values, horizon)
+            test.observe(shares[test.missions :])
+            points.promising[point] &= shares.mean() >= test.required
+        found = {test.verdict for test in self._tests[point].values()}
+        points.verdicts[point] = min(found, key=["missed", "open", "met"].index)
