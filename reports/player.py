@@ -29,6 +29,7 @@ from PIL import Image
 from dess import InputError
 from dess.analysis.figures import missions, style
 from dess.analysis.figures.style import node_colours, uav_colours
+from dess.analysis.metrics import lasting, size_of
 from dess.analysis.results import event_log
 from dess.reports.pages.html import Part, figures, template
 from dess.scenario import Scenario
@@ -82,9 +83,11 @@ class Playback:
         pads = self.scenario.charging_pads
         queue = f", {waiting} waiting" if waiting else ""
         used = f"{charging} of {pads} pad{'s' * (pads != 1)} in use{queue}"
-        return (
-            f"slot {slot} of {self.end} · {self.residual[slot].sum():.1f} data units left · {used}"
-        )
+        left, units = self.residual[slot].sum(), self.scenario.units
+        if units:
+            now, end, data = lasting(slot, units), lasting(self.end, units), size_of("MB", units)
+            return f"{now} of {end} · {left * data:,.3g} MB left · {used}"
+        return f"slot {slot} of {self.end} · {left:.1f} data units left · {used}"
 
     @property
     def data(self) -> dict[str, Any]:
@@ -100,6 +103,7 @@ class Playback:
             "colours": {"uavs": self.uav_colours, "nodes": self.node_colours},
             "pads": scenario.charging_pads,
             "trail": TRAIL,
+            "units": units_of(scenario),
             "filled": np.isin(range(scenario.uavs), filled).tolist(),
             "fleet": {name: (1 * values).tolist() for name, values in self.fleet.items()},
             "residual": self.residual.round(2).tolist(),
@@ -107,6 +111,14 @@ class Playback:
             "ages": event_log.ages(log).round(2).to_numpy().tolist() if aged else None,
             "meanAge": event_log.mean_age(log).round(2).to_numpy().tolist() if aged else None,
         }
+
+
+def units_of(scenario: Scenario) -> dict[str, tuple[str, float]]:
+    """The units in which a player tells lengths, times and data, and what 1 of the model is."""
+    if not (units := scenario.units):
+        return {"length": ("cells", 1), "time": ("mission slots", 1), "data": ("data units", 1)}
+    told = {"length": "km", "time": "h", "data": "MB"}
+    return {what: (unit, size_of(unit, units)) for what, unit in told.items()}
 
 
 def _check(log: pd.DataFrame, scenario: Scenario) -> None:

@@ -19,7 +19,7 @@ from dess.analysis.execution.jobs import (
     simulate_missions,
 )
 from dess.analysis.execution.workers import Here, Pool
-from dess.analysis.metrics import ALWAYS, HOME, SUCCESS, measured_in
+from dess.analysis.metrics import ALWAYS, HOME, SUCCESS, in_units, measured_in
 from dess.analysis.results.chunks import Part, split
 from dess.analysis.results.manifest import Cell
 from dess.analysis.results.tables import Results
@@ -143,7 +143,7 @@ def _evaluated(asked: Asked, size: int, progress: Progress | None) -> Evaluation
     records: Records | None = None
     pieces = (range(n, min(n + size, asked.missions)) for n in range(0, asked.missions, size))
     for records, took in _simulated(asked, pieces, progress):
-        _add(moments, _metrics(records), records.missions["uavs"])
+        _add(moments, _metrics(records, asked.scenario), records.missions["uavs"])
         uav_slots += int(records.missions["uav_slots"].sum())
         seconds += took
     kept = records if size >= asked.missions else None
@@ -178,11 +178,12 @@ def _over_space(moments: ByFleet, space: ScenarioSpace, missions: int) -> dict[s
     return {m: Moments.of_space([of.get(n) for n in fleets], missions) for m, of in moments.items()}
 
 
-def _metrics(records: Records) -> dict[str, np.ndarray]:
-    """The values of every metric that some of the missions have measured."""
+def _metrics(records: Records, space: ScenarioSpace) -> dict[str, np.ndarray]:
+    """The values of every metric that some of the missions have measured, in units as well."""
     values = {metric: records.missions[metric] for metric in (SUCCESS, HOME, *ALWAYS)}
     if len(records.operations):
         values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
+    values |= in_units(values, space.units) if space.units else {}
     return {metric: of.astype(float) for metric, of in values.items()}
 
 

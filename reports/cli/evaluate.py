@@ -121,8 +121,11 @@ def _without_nan(row: Any) -> Any:
 
 
 def _print_rows(rows: list[dict[str, Any]]) -> None:
+    from dess.analysis.metrics import told
+
     for row in rows:
-        metrics = {name: value for name, value in row.items() if isinstance(value, dict)}
+        metrics = {name: of for name, of in row.items() if isinstance(of, dict)}
+        metrics = {name: of for name, of in metrics.items() if told(name, metrics) == name}
         cells = [[name, *(f"{x:.4f}" for x in value.values())] for name, value in metrics.items()]
         console.print_table([row["policy"], "mean", "low", "high"], cells)
         engine = ", SimPy engine" if row["engine"] == "events" else ""

@@ -117,10 +117,9 @@ def simulate(
                 writers[file](mission, temporary, file.suffix[1:].lower())
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
-        fields = record.metrics.dtype.names or ()
-        others = [key for key in fields if key not in (*asked.names, *metrics, "uavs")]
-        metrics |= {key: record.metrics[key].item() for key in others}
-        measured = {"operations": record.measured} if record.operations is not None else {}
+        others, told = _metrics(mission).items(), _told(record.measured, mission)
+        metrics |= {k: value for k, value in others if k not in (*asked.names, *metrics, "uavs")}
+        measured = {"operations": told} if record.operations is not None else {}
         print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
     elif not is_binary:
         _print_mission(mission)
@@ -287,21 +286,34 @@ def _write_page(mission: _Mission, path: Path) -> None:
     writing.fill(path, page)
 
 
+def _metrics(mission: _Mission) -> dict[str, float]:
+    """The metrics of every mission."""
+    metrics = mission.record.metrics
+    return _told({name: metrics[name].item() for name in metrics.dtype.names or ()}, mission)
+
+
+def _told(values: dict[str, Any], mission: _Mission) -> dict[str, Any]:
+    """Values of the mission; with a data sheet, in units as well."""
+    from dess.analysis.metrics import in_units
+
+    units = mission.scenario.units
+    return values | in_units(values, units) if units else values
+
+
 def _print_mission(mission: _Mission) -> None:
-    from dess.analysis.metrics import in_units, measured_in, metric_of
+    from dess.analysis.metrics import measured_in, metric_of, told
     from dess.analysis.results.event_log import causes, residual_data
 
-    record = mission.record
-    metrics = record.metrics
-    rows = [[name, f"{metrics[name].item():g}"] for name in metrics.dtype.names or ()]
+    metrics = _metrics(mission)
+    rows = [
+        [name, f"{metrics[name]:g}"] for name in dict.fromkeys(told(n, metrics) for n in metrics)
+    ]
     console.print_table(["", "mission"], rows)
-    if measured := record.measured:
-        if units := mission.scenario.units:
-            measured = measured | in_units(measured, units)
-        told = [(metric_of(name).label, measured[name]) for name in measured_in(measured)]
-        rows = [[label, f"{value:g}"] for label, value in told]
+    if measured := _told(mission.record.measured, mission):
+        labelled = [(metric_of(name).label, measured[name]) for name in measured_in(measured)]
+        rows = [[label, f"{value:g}"] for label, value in labelled]
         console.print_table(["", "beyond the paper"], rows)
-    uavs = record.uav_rows()
+    uavs = mission.record.uav_rows()
     rows = [[str(number), *map(str, row.values())] for number, row in enumerate(uavs)]
     console.print_table(["UAV", *uavs[0]], rows)
     if names := mission.scenario.names:

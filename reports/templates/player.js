@@ -57,8 +57,9 @@ function playMission(id, mission) {
         pen.fillText(words, x, y);
     }
 
-    // Round numbers, about as many as asked for, from 0 or the beginning of the range.
-    function steps([low, high], count) {
+    // Round numbers of a unit of which 1 is so much, about as many as asked for, in the range.
+    function steps([low, high], count, size = 1) {
+        if (size !== 1) return steps([low * size, high * size], count).map((v) => v / size);
         const rough = Math.abs(high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
         const step = [1, 2, 5, 10].map((m) => m * power).find((m) => m >= rough);
         const [from, to] = [Math.min(low, high), Math.max(low, high)], first = Math.ceil(from / step);
@@ -68,11 +69,12 @@ function playMission(id, mission) {
     function frame(p) {
         const { box } = p;
         text(p.title, box.x, box.y - 10, "left", "bold 12.5px");
-        for (const v of p.yTicks ?? steps(p.y, 4)) {
+        const written = (v, size = 1) => Number((v * size).toPrecision(9)).toLocaleString("en");
+        for (const v of p.yTicks ?? steps(p.y, 4, p.ySize)) {
             if (!p.yTicks) line([[box.x, p.py(v)], [box.x + box.w, p.py(v)]], GRID, 1);
-            text(v.toLocaleString("en"), box.x - 6, p.py(v), "right", "11px");
+            text(written(v, p.ySize), box.x - 6, p.py(v), "right", "11px");
         }
-        for (const v of p.xTicks ?? []) text(v, p.px(v), box.y + box.h + 10, "center", "11px");
+        for (const v of p.xTicks ?? []) text(written(v, p.xSize), p.px(v), box.y + box.h + 10, "center", "11px");
         if (p.xTitle) text(p.xTitle, box.x + box.w / 2, box.y + box.h + 26, "center", "12px");
         rectangle(box.x, box.y, box.w, box.h, null, MUTED);
     }
@@ -83,7 +85,8 @@ function playMission(id, mission) {
         const [columns, rows] = mission.size, longest = Math.max(columns, rows);
         const scale = box.w / longest;
         box = { ...box, w: scale * columns, h: scale * rows };
-        const numbers = (cells) => steps([0, longest - 1], 7).filter((v) => v < cells);
+        const [unit, size] = mission.units.length;
+        const numbers = (cells) => steps([0, longest - 1], 7, size).filter((v) => v < cells);
         const cells = (x, y, w, h, fill, edge) =>
             rectangle(p.px(x - 0.5), p.py(y - 0.5), w * scale, h * scale, fill, edge);
         const p = panel("", box, [-0.5, columns - 0.5], [-0.5, rows - 0.5], () => {
@@ -108,7 +111,7 @@ function playMission(id, mission) {
                 text(i + 1, x, y + 0.5, "center", "bold 11px", "white");
                 pen.globalAlpha = 1;
             });
-        }, { fill: SEA, xTicks: numbers(columns), yTicks: numbers(rows), xTitle: "x, east [cells]", isMap: true });
+        }, { fill: SEA, xTicks: numbers(columns), yTicks: numbers(rows), xSize: size, ySize: size, xTitle: `x, east [${unit}]`, isMap: true });
         return p;
     }
 
@@ -134,7 +137,8 @@ function playMission(id, mission) {
             line(range(ends[i] + 1).map((t) => [p.px(t), p.py(fleet.battery[t][i])]), colour));
     }, (p, t) => uavs.forEach((colour, i) => disc(p.px(t), p.py(fleet.battery[t][i]), 4.5, colour, "white")));
 
-    const data = overTime("Residual data, a band per node", [1.05 * Math.max(...sums, 1), 0], (p) => {
+    const [time, perSlot] = mission.units.time, [amount, perUnit] = mission.units.data;
+    const data = overTime(`Residual data [${amount}], a band per node`, [1.05 * Math.max(...sums, 1), 0], (p) => {
         let base = residual.map(() => 0);
         nodes.forEach((_, k) => {
             const top = base.map((b, t) => b + residual[t][k]);
@@ -147,11 +151,11 @@ function playMission(id, mission) {
             pen.globalAlpha = 1;
             base = top;
         });
-    });
+    }, null, { ySize: perUnit });
 
     const age = mission.meanAge && overTime(
-        "Mean age of the nodes [slots]", [1.05 * Math.max(...mission.meanAge.map((corner) => corner[1]), 1), 0],
-        (p) => line(mission.meanAge.map(([t, v]) => [p.px(t), p.py(v)]), INK));
+        `Mean age of the nodes [${time}]`, [1.05 * Math.max(...mission.meanAge.map((corner) => corner[1]), 1), 0],
+        (p) => line(mission.meanAge.map(([t, v]) => [p.px(t), p.py(v)]), INK), null, { ySize: perSlot });
 
     const room = 0.6 + Math.max(0, 3 - uavs.length) / 2; // so that a single row does not fill the panel
     const waits = fleet.waiting.some((row) => row.some(Boolean));
@@ -169,16 +173,16 @@ function playMission(id, mission) {
         });
     }, null, {
         yTicks: range(uavs.length).map((i) => i + 1).filter((i) => (i - 1) % Math.ceil(uavs.length / 6) === 0),
-        xTicks: steps([0, Math.max(end, 1)], 7), xTitle: "time [mission slots]",
+        xTicks: steps([0, Math.max(end, 1)], 7, perSlot), xSize: perSlot, xTitle: `time [${time}]`,
     });
 
     function nodeAges(box) {
         const top = 1.05 * Math.max(...mission.ages.flat(), 1);
-        const p = panel("Age of each node [slots]", box, [-0.7, nodes.length - 0.3], [top, 0], () => {}, (t) =>
+        const p = panel(`Age of each node [${time}]`, box, [-0.7, nodes.length - 0.3], [top, 0], () => {}, (t) =>
             mission.ages[t].forEach((value, k) => {
                 line([[p.px(k), p.py(0)], [p.px(k), p.py(value)]], INK, 1);
                 disc(p.px(k), p.py(value), 4, mission.colours.nodes[k]);
-            }), { xTicks: steps([0, nodes.length - 1], 10), xTitle: "node" });
+            }), { xTicks: steps([0, nodes.length - 1], 10), xTitle: "node", ySize: perSlot });
         return p;
     }
 

@@ -1,0 +1,35 @@
+"""What commands tell of missions with a data sheet is in its units."""
+
+import json
+
+import pytest
+
+from dess import load_scenario, simulate
+from dess.analysis.metrics import lasting
+from dess.reports.cli import main
+from dess.reports.player import Playback
+from dess.state import sample_scenario
+from tests.analysis.small import SHEET, write_scenario
+
+SLOT, UNIT = 21.0, 21.0 * 125e3  # of SHEET: [s] and [bit]
+
+
+def test_single_missions_and_their_player_are_told_in_units(tmp_path, capsys):
+    file = write_scenario(tmp_path, **SHEET)
+    shown = {}
+    for command in ("simulate", "evaluate --policy greedy --missions 3"):
+        assert main([*command.split(), "--scenario", str(file), "--json"]) == 0
+        shown[command] = json.loads(capsys.readouterr().out)
+    mission, (mean,) = shown.values()
+    assert mission["slots_h"] == pytest.approx(mission["slots"] * SLOT / 3600)
+    assert mission["collected_MB"] == pytest.approx(mission["collected"] * UNIT / 8e6)
+    measured = mission["operations"]
+    assert measured["age_h"] == pytest.approx(measured["age"] * SLOT / 3600)
+    assert mean["age_h"]["mean"] == pytest.approx(mean["age"]["mean"] * SLOT / 3600)
+    scenario = sample_scenario(load_scenario(file), 0, 0)
+    record = simulate(load_scenario(file), "greedy", events=True)
+    playback = Playback(record.events.columns(), scenario)
+    left = playback.residual[-1].sum() * UNIT / 8e6
+    assert playback.status(playback.end).startswith(f"{lasting(record.slots, scenario.units)} of")
+    assert f" · {left:,.3g} MB left · " in playback.status(playback.end)
+    assert playback.data["units"]["length"] == ("km", pytest.approx(0.315))
