@@ -15,10 +15,11 @@ nox.options.sessions = ["tests"]
 
 # The studies that the reports read, and the options of those whose default budget takes long. The
 # pages say what their studies were made with.
-FEWER = "--policy ddqn --policy greedy --policy random --policy random-unguarded"
 STUDIES = {
-    "table4 fig1 fig4 sensitivity pads failures verification fig5-paper sweet-spot-paper": "",
-    "fig5 sweet-spot": FEWER,
+    "table4 fig1 fig4 sensitivity failures verification fig5-paper sweet-spot-paper": "",
+    "pads": "--missions 300",
+    "fig5": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
+    "sweet-spot": "--policy ddqn --policy greedy",
     "comparison": "--missions 1000",
     "explorer age": "--missions 50",
     "gap": "--missions 12",

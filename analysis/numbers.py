@@ -98,8 +98,13 @@ def money(amount: float, currency: str) -> str:
 
 
 def amounts(mean: float, low: float, high: float) -> str:
-    """A cost and its interval as ``69,120 [68,400, 69,840]``; with two decimals below 100."""
+    """A cost and its interval as ``69,120 [68,400, 69,840]``; with two decimals below 100.
+
+    A cost that is the same in every mission has no interval.
+    """
     digits = 0 if abs(mean) >= 100 else 2
+    if low == high:
+        return minus(f"{mean:,.{digits}f}")
     return with_ends(lambda amount: minus(f"{amount:,.{digits}f}"), mean, low, high)
 
 

@@ -40,6 +40,7 @@ ASKED_WITH = {
 TEXTS = Path(__file__).with_name("inputs")
 # What scenarios name beside them: nodes, polygons and a map of no-fly cells.
 SEAS = ("bay.csv", "oresund.csv", "oresund.geojson", "galway-bay.csv", "galway-bay.txt")
+SEAS += ("jade-bight.csv", "jade-bight.geojson")
 # The ready inputs that most cases have.
 INPUTS = tuple(
     copy(name, f"in/{name}")

@@ -15,7 +15,7 @@ _STUDY_OF = {  # of results
     ready.SELECTED: ready.SELECTION,
     ready.EXTENDED: ready.STUDIED,
 }
-_BAYS = ("bay.toml", "oresund.toml", "galway-bay.toml")
+_BAYS = ("bay.toml", "oresund.toml", "galway-bay.toml", "jade-bight.toml")
 # The ready inputs of each kind.
 _READY = {
     "scenario": (ready.SCENARIO, ready.SECTIONS, ready.SECTIONS, "paper.toml", *_BAYS),

@@ -20,6 +20,9 @@ PLAIN = (
     "failures={pad_rate=0.3, pad_repair=2}",
     "wind={strength=0.7, direction=225, gusts=0.3, seed=9}",
     "fleet=[{slots_per_cell=2, rate=0.5}, {flying_time=60, quota=9}]",
+    'data_sheet={endurance="35 min", cruise="15 m/s", charging="40 min", wind="4 m/s from SW"}',
+    'data_sheet={bandwidth="125 kHz", snr="12 dB at 2 km", range="2 km", mtbf="100 h"}',
+    'data_sheet.data_rate="3 MB/h"',
     "landing=true",
     "quota=0",  # which needs landing
 )
@@ -29,7 +32,7 @@ _ENDS = st.sampled_from(
     + ["360.1", "true", '"lost"', '"kept"', '"newest"', '"continuous"', '"lowest-battery"']
     + ["[[1, 2]]", "[[0, 1], [0, 2]]", "[[1.5, 1]]", "[0.1, 0.1, 0.1]", '"storm.csv"', "[{}]"]
     + ['"/dev/zero"', "{}", "{measured=true}", "[{slots_per_cell=0}]", "[{a=1}]"]
-    + ["[{slots_per_cell=100000}]"]
+    + ["[{slots_per_cell=100000}]", '"0 km"', '"1e300 h"', '"-3 MB"', '"5 m/s from nowhere"']
 )
 _names = st.sampled_from(FIELDS) | st.sampled_from(SECTIONS).flatmap(
     lambda section: texts.map(lambda name: f"{section}.{name}")
