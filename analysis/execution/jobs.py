@@ -137,8 +137,11 @@ class MissionsJob(Job):
         store.keep(self.kind, self.chunk, parquet.tables_of(self.chunk, records))
 
     def warm_up(self) -> None:
-        """Compile the engine, with a heuristic, since it is unknown what other policies do."""
-        replace(next(self.alone()), policy="random").run()
+        """Compile the engine, with a heuristic, since it is unknown what other policies do.
+
+        Most studies have this one, so that it compiles nothing of which no worker has a use.
+        """
+        replace(next(self.alone()), policy="greedy").run()
 
 
 class LogJob(Job):
