@@ -14,7 +14,7 @@ import pytest
 from scipy import stats
 
 from dess.analysis.metrics import PRODUCT, REWARD
-from dess.analysis.stats.differences import adjust, paired
+from dess.analysis.stats.differences import paired
 from dess.analysis.stats.distribution import quantile_interval
 from dess.analysis.stats.intervals import bounded_ends, mean_interval, stratified
 from dess.analysis.stats.learners import crossed
@@ -261,23 +261,6 @@ def test_the_table_of_rare_failures_of_the_docs_is_measured():
     assert table_of_rare_failures() in page.read_text("utf-8")
 
 
-# Many comparisons
-
-
-def p_values(effects: np.ndarray, families: int) -> np.ndarray:
-    """Two-sided p-values of differences to one common baseline: (families, effects)."""
-    draws = rng(11).normal(size=(families, len(effects) + 1))
-    z = (draws[:, 1:] - draws[:, :1]) / np.sqrt(2) + effects
-    return 2 * stats.norm.sf(np.abs(z))
-
-
-def test_holm_bounds_the_chance_of_a_false_claim():
-    families = p_values(np.zeros(20), TRIALS)
-    assert np.mean(families.min(axis=1) <= 0.05) > 0.3  # without
-    false = [adjust(p, "holm").min() <= 0.05 for p in families]
-    assert 0.01 < np.mean(false) <= 0.05 + error(TRIALS, 0.05)
-
-
 # Learners
 
 
@@ -303,11 +286,3 @@ def test_the_interval_of_a_learner_covers_trainings_and_missions(trainings, tria
     assert holds(float(np.mean(new)), trials)
     missions_alone = (mean_interval(d.mean(axis=0))[1:] for d, _ in drawn)
     assert covered(missions_alone, 0.0) < 0.75
-
-
-@pytest.mark.parametrize("trainings", [3, 5])
-def test_the_components_are_told_apart(trainings):
-    results = [crossed(d) for d, _ in layouts((trainings, 50), 0.1, 0.2, 0.05, trials=300)]
-    variances = np.square([r[-3:] for r in results]).mean(axis=0)
-    # a variance of S - 1 degrees of freedom: relative error sqrt(2 / (S - 1) / 300) = 0.06
-    assert variances == pytest.approx([0.01, 0.04, 0.0025], rel=0.24)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dess import InputError
-from dess.analysis.answers import costs, settings
+from dess.analysis.answers import costs
 from dess.analysis.ask import around
 from dess.analysis.ask.assumptions import assumptions
 from dess.analysis.ask.question import sweep_question, what_if_question
@@ -48,15 +48,6 @@ def test_the_price_of_an_hour_takes_the_slot_of_the_sheet(searched):
     hours = costs.parts(searched)["hours"]
     means = searched.missions.groupby("point", sort=False)["slots"].mean()
     np.testing.assert_allclose(hours, 36 * means.to_numpy() * SLOT / 3600)
-
-
-def test_settings_have_the_same_ranks_in_units(searched):
-    rows = settings.ranked(searched, "age_h")
-    means = searched.missions.groupby("point")[AGE].mean()
-    assert rows["point"].tolist() == means.sort_values(kind="stable").index.tolist()
-    ends = rows[["age_h", "age_h_low", "age_h_high"]].iloc[0]
-    assert settings.answer(searched, rows, "age_h").count(metric_of("age_h").written(*ends)) == 1
-    assert " h, n = " in settings.answer(searched, rows, "age_h")
 
 
 def test_without_a_sheet_nothing_is_told_in_units(studied):

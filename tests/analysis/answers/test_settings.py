@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess import InputError
 from dess.analysis import compare
 from dess.analysis.answers import settings
 from dess.analysis.metrics import METRICS, PRODUCT
@@ -165,28 +164,9 @@ def test_differences_to_a_baseline_are_those_of_compare(results):
         missions = results.missions[results.missions["policy"] == policy]
         expected = compare(missions, 2, [*METRICS], of="point").set_index(["metric", "point"])
         for row in table[table["policy"] == policy].itertuples():
-            theirs = expected.loc[(row.metric, row.point)]
-            found = [row.difference, row.low, row.high, row.p, row.n]
-            assert found == pytest.approx(theirs[["difference", "low", "high", "p", "n"]].tolist())
-    for _, rows in table.groupby("metric"):
-        assert (rows["p_adjusted"] >= rows["p"]).all()
-
-
-@pytest.mark.parametrize(
-    ("ask", "message"),
-    [
-        (lambda r: settings.against(r, 6), "baseline: 6 is not a design point; allowed: 0..5"),
-        (lambda r: settings.ranked(r, "speed"), "metric: 'speed' is unknown; allowed: success, "),
-        (
-            lambda r: settings.ranked(r, policy="tour"),
-            "policy: 'tour' is not in the study; allowed",
-        ),
-        (lambda r: settings.averaged(r, ["quota"]), "quota: has not several values in the study"),
-    ],
-)
-def test_what_the_study_has_not_is_refused(results, ask, message):
-    with pytest.raises(InputError, match=message):
-        ask(results)
+            theirs = expected.loc[(row.metric, row.point), ["difference", "p"]]
+            assert [row.difference, row.p] == pytest.approx(theirs.tolist())
+    assert (table["p_adjusted"] >= table["p"]).all()
 
 
 def test_varied_fields_have_their_values_in_order(results, studied):

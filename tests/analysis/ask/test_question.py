@@ -1,14 +1,13 @@
 """Questions: studies made of values, kept, and asked again."""
 
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from dess import InputError, load_scenario
-from dess.analysis import load_results, load_study, run_study
+from dess.analysis import load_results, run_study
 from dess.analysis.ask.question import sweep_question, values_of, what_if_question
 from dess.analysis.execution import effort
 from dess.analysis.execution.effort import BASELINE, SECONDS
@@ -109,20 +108,6 @@ def test_a_damaged_folder_gives_nothing(damage, asking, tmp_path):
     question, results, done = asking(OTHERS["wider"][0])
     assert done == 36
     check_equal_to_a_fresh_run(question, results, tmp_path)
-
-
-def test_the_file_completes_the_sweep(asking, tmp_path, monkeypatch):
-    prices = {"uav": 20_000, "hour": 10.0, "slot_seconds": 60.0}
-    question, *_ = asking(prices=prices)
-    study, out = question.study, question.out
-    monkeypatch.chdir(tmp_path)
-    again = load_study(question.file.relative_to(tmp_path))
-    assert again.model_dump() == study.model_dump() | {"scenario": again.scenario}
-    assert Path(again.scenario).resolve() == Path(study.scenario).resolve()
-    before = files_of(out)
-    shutil.rmtree(out)
-    run_study(again, out)
-    assert files_of(out) == before
 
 
 def test_a_name_is_of_one_question(asking, tmp_path):
@@ -230,19 +215,3 @@ def test_what_is_no_question_is_refused_in_one_line(values, message):
     with pytest.raises(InputError, match=message) as caught:
         what_if_question(**{"settings": {"uavs": 5}, "policies": ["greedy"]} | values)
     assert "\n" not in str(caught.value)
-
-
-def test_a_policy_that_cannot_act_in_the_variation_leaves_nothing_behind(tmp_path):
-    moved = {"zone": [0, 0, 4, 4]}
-    question = what_if_question(moved, policies=["ddqn"], missions=2, folder=tmp_path)
-    with pytest.raises(InputError, match="policy ddqn: has learned zone_x 26, not 0; allowed: "):
-        question.ask()
-    assert not list(tmp_path.iterdir())
-
-
-def test_the_command_has_what_makes_the_question(tmp_path):
-    scenario = write_scenario(tmp_path)
-    asked = what_if_question({"uavs": 6}, {"uavs": 2, "initial_data": [5, 9]}, scenario, POLICIES)
-    sides = "--set uavs=6 --baseline 'initial_data=[5,9]' --baseline uavs=2"
-    about = "--policy random --policy greedy --missions 500 --seed 0 --scenario small.toml"
-    assert asked.command == f"dess what-if {sides} {about}"

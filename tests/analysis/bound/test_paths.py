@@ -4,21 +4,9 @@ import numpy as np
 import pytest
 
 from dess import load_scenario
-from dess.analysis.bound.paths import blocks_of
 from dess.analysis.bound.prices import Bounds, Detail, improve, known_of
 from dess.scenario import ScenarioSpace
 from tests.analysis.bound.lone_uav import bound_of_data
-
-
-def test_the_block_before_is_a_neighbour():
-    nodes = np.array([[1, 1], [4, 1], [1, 4]])
-    blocks = blocks_of(nodes, (6, 6), 4, np.array([0, 2]))
-    assert blocks.home[0, 0] == 0
-    assert blocks.home[5, 0] == 1
-    assert {*blocks.near[0]} - {-1} == {1, 2}
-    assert all(
-        blocks.near[k, blocks.place[k, j]] == j for k in range(3) for j in blocks.near[k] if j >= 0
-    )
 
 
 def paper_like(**values: object) -> ScenarioSpace:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.stats import norm
 
 from dess import rules
+from dess.analysis.bound import upper_bound
 from dess.scenario import ScenarioSpace
 from dess.state import starts_of, state_of
 from tests import compiled
@@ -197,6 +198,13 @@ class TinySea:
                 best = int(np.argmax(snr[able, drawn]))  # on a tie the lower index
                 found[mask, able[best] * count + drawn[best]] += chances[[*drawn]].prod()
         return rates, found
+
+
+def gap_of(space: ScenarioSpace, seed: int, count: int = 1) -> float:
+    """How far the bound is above the optimum, of shadowing with so many values."""
+    gap = upper_bound(space, seed, 0).ratio - TinySea(space, seed, contraction(count)).optimum
+    assert gap >= -1e-12, space
+    return gap
 
 
 def _merge(outcomes: list[Outcome]) -> tuple[dict[Team, np.ndarray], list[np.ndarray]]:

@@ -92,20 +92,6 @@ def test_a_cell_without_missions_stays_empty(studied):
     assert len(ax.texts) == 2
 
 
-def test_fields_have_panels_the_widest_effect_first_and_every_design_point_is_a_dot(results):
-    effects = settings.main_effects(results)
-    panels = [ax for ax in figures.main_effects(results).figure.axes if ax.get_visible()]
-    for ax, field in zip(panels, settings.by_influence(effects), strict=True):
-        for policy, (_, y, _) in zip(results.policies, curves(ax), strict=True):
-            own = effects[(effects["field"] == field) & (effects["policy"] == policy)]
-            assert y == pytest.approx(own["mean"])
-    table = settings.ranked(results)
-    for ax in [ax for ax in figures.scatter(results).figure.axes if ax.get_visible()]:
-        for dots, policy in zip(ax.collections, table["policy"].unique(), strict=True):
-            means = np.asarray(dots.get_offsets())[:, 1]
-            assert means == pytest.approx(table[table["policy"] == policy][PRODUCT])
-
-
 def test_a_distribution_is_the_share_of_missions(results):
     (ax,) = figures.distribution(results.missions).figure.axes
     for line, policy in zip(ax.lines, results.policies, strict=True):

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from dess.analysis.answers.learning import Transfer
-from dess.analysis.answers.main_effects import FALLS, LEVELS, PEAK, RISES, VALLEY, Shape
+from dess.analysis.answers.main_effects import LEVELS, PEAK, RISES, VALLEY, Shape
 from dess.analysis.paper import rules, values
 from dess.analysis.paper.measures import Pairs, negated
 from dess.analysis.paper.scorecard import RULES
@@ -34,32 +34,23 @@ def judged(rule: str, *arguments: object) -> str:
 @pytest.mark.parametrize(
     ("rule", "mean", "half", "verdict"),
     [
-        ("reached", 0.60, 0.01, HOLDS),  # wholly above
         ("reached", 0.49, 0.01, HOLDS),  # the upper end is the figure
         ("reached", 0.48, 0.01, IN_PART),  # wholly below, but near
         ("reached", 0.40, 0.20, INCONCLUSIVE),  # too few missions to say, but far
-        ("reached", 0.51, 0.20, INCONCLUSIVE),  # too few missions to say, if near
         ("reached", 0.45, 0.01, REFUTED),  # wholly below, and not shown to be near
-        ("gained", 0.195, 0.01, HOLDS),
         ("gained", 0.195, 0.19, IN_PART),  # it rises, but who knows how much
         ("gained", 0.09, 0.01, IN_PART),
         ("gained", 0.005, 0.01, REFUTED),  # perhaps it rises, but surely not that much
         ("gained", 0.14, 0.3, INCONCLUSIVE),
         ("higher", 0.02, 0.01, HOLDS),
-        ("higher", -0.001, 0.01, INCONCLUSIVE),
-        ("higher", -0.02, 0.01, REFUTED),
         ("lower", -0.02, 0.01, HOLDS),
-        ("lower", -0.005, 0.01, INCONCLUSIVE),
-        ("lower", 0.02, 0.01, REFUTED),
         ("slightly_lower", -0.02, 0.01, HOLDS),
-        ("slightly_lower", 0.0, 0.01, INCONCLUSIVE),
         ("slightly_lower", -0.05, 0.04, IN_PART),  # it falls, but who knows how much
         ("slightly_lower", -0.10, 0.01, REFUTED),  # more than slightly
         ("kept", 0.0, 0.009, HOLDS),
         ("kept", -0.005, 0.001, HOLDS),  # surely lower, but by less than matters
         ("kept", 0.0, 0.02, INCONCLUSIVE),  # it might be lower by more than the margin
         ("most", 0.6, 0.05, HOLDS),
-        ("most", 0.6, 0.2, INCONCLUSIVE),
         ("most", 0.4, 0.05, REFUTED),
     ],
 )
@@ -129,7 +120,6 @@ def transfer(
         ("throughout", [transfer(0.1)], HOLDS),
         ("throughout", [transfer(0.1, throughout=False)], IN_PART),  # below at first
         ("throughout", [transfer(0.1, INCONCLUSIVE)], INCONCLUSIVE),
-        ("throughout", [transfer(0.1, REFUTED)], REFUTED),
         ("passes", [transfer(0.1)], HOLDS),
         ("levels_off", [0.4, transfer(0.1)], HOLDS),
         ("levels_off", [0.4, transfer(0.0)], IN_PART),  # early, not shown to be low
@@ -157,13 +147,9 @@ def leads_of(
         ("best", leads_of([1, 1], 2), HOLDS),
         ("best", leads_of([1, 1], 1), REFUTED),
         ("best", leads_of([1, 0], 2), INCONCLUSIVE),  # as high as the one before
-        ("best", leads_of([1, 1], 2, sure=False), INCONCLUSIVE),
         ("lowest", negated(leads_of([1, 1], 0)), HOLDS),
-        ("lowest", negated(leads_of([1, 1], 1)), REFUTED),
         ("lowest", negated(leads_of([0, 1], 0)), INCONCLUSIVE),
         ("no_lower", leads_of([0, 0, 0], 0, 1), HOLDS),
-        ("no_lower", leads_of([0, 1, 0], 0, 1), REFUTED),
-        ("no_lower", leads_of([0, -1, 0], 2, 3), REFUTED),
         ("no_lower", leads_of([0, 0, 0], 0, 1, half=0.02), INCONCLUSIVE),
         ("no_lower", leads_of([1, 0, 0], 0, 1), REFUTED),  # the first is lower
         ("no_lower", leads_of([0, 0.005, 0], 0, 1), HOLDS),  # by less than matters
@@ -171,7 +157,6 @@ def leads_of(
         ("no_lower", leads_of([0, 0.02, 0], 0, 1, half=0.015), INCONCLUSIVE),
         ("no_lower", leads_of([0, 0.02, 0], 0, 1, half=0.006), INCONCLUSIVE),
         ("no_lower", leads_of([0, 0.02, 0], 0, 1, half=0.004), REFUTED),
-        ("alike", pairs_of([0, 0.02], half=0.015), INCONCLUSIVE),
         ("alike", pairs_of([0, 0.02], half=0.006), INCONCLUSIVE),
         ("alike", pairs_of([0, 0.02], half=0.004), REFUTED),
         ("alike", pairs_of([0, 0.005]), HOLDS),
@@ -179,7 +164,6 @@ def leads_of(
         ("alike", pairs_of([0, -0.05]), REFUTED),
         ("rises", Shape(RISES, (1,)), HOLDS),
         ("rises", Shape(LEVELS, (0, 1)), INCONCLUSIVE),
-        ("rises", Shape(FALLS, (0,)), REFUTED),
         ("rises", Shape(PEAK, (1,)), REFUTED),
     ],
 )

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess import InputError
 from dess.analysis import load_study, run_study
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.paper import values as paper
@@ -163,12 +162,6 @@ def test_a_single_mission_tells_nothing(studies):
         assert row.findings[0].verdict == (
             INCONCLUSIVE if row.claim.study == "table4" else NO_RESULTS
         )
-
-
-def test_a_policy_that_is_not_in_the_study_is_not_judged(studies):
-    for ask in (studies["sweet-spot"].choice, studies["sweet-spot"].cheapest):
-        with pytest.raises(InputError, match="policy: 'absent' is not in the study"):
-            ask("absent")
 
 
 def test_learning_is_judged_by_the_curves(rows):

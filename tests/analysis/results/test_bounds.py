@@ -124,19 +124,6 @@ def test_a_bound_that_cannot_be_computed_is_a_failure_of_its_chunk(tmp_path, mon
         load_results(tmp_path / "out")
 
 
-def test_a_damaged_file_is_noticed_and_computed_again(out, tmp_path):
-    whole = files_of(out)
-    path = next((out / "bounds").glob("*.parquet"))
-    path.write_bytes(path.read_bytes()[:-9])
-    assert Store.read(out).damaged == [path]
-    with pytest.raises(
-        InputError, match=r"incomplete, the first \d of 7 bounds .*allowed: run the study again"
-    ):
-        load_results(out)
-    run_study(bounded(tmp_path), out)
-    assert files_of(out) == whole
-
-
 def test_two_files_with_different_bounds_of_a_mission_are_refused(out, tmp_path):
     """Such as after files of two folders were merged."""
     manifest = Store.read(out).manifest

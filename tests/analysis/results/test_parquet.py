@@ -26,11 +26,9 @@ Forge = Callable[[pa.Table], pa.Table]
 
 
 @pytest.fixture(scope="module")
-def sound(tmp_path_factory):
+def sound(studied):
     """Small results with an event log."""
-    folder = tmp_path_factory.mktemp("sound")
-    run_study(small_study(folder, logged=1, policies=["greedy"]), folder / "out")
-    return folder / "out"
+    return studied(logged=1, policies=["greedy"]).store.folder
 
 
 def forged(sound: Path, out: Path, kinds: str, forge: Forge) -> Path:

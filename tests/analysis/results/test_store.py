@@ -7,13 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dess import InputError, simulate_batch
-from dess.analysis import load_results, run_study
+from dess.analysis import load_results, load_study, run_study
 from dess.analysis.results import parquet, provenance
 from dess.analysis.results.chunks import Chunk, Part, gaps, split
 from dess.analysis.results.manifest import Cell
 from dess.analysis.results.store import Failure, Store
 from dess.policies import load
 from tests.analysis.small import files_of, grid, small_study, write_scenario
+from tests.reports.small import quick
 
 
 @pytest.fixture
@@ -33,9 +34,12 @@ def _text(path):
     path.write_text("nothing like parquet")
 
 
-@pytest.mark.parametrize("kind", ["missions", "uavs", "events"])
+@pytest.mark.parametrize("kind", ["missions", "uavs", "events", "bounds"])
 @pytest.mark.parametrize("damage", [_flip, _text])
 def test_a_damaged_file_is_noticed_and_computed_again(kind, damage, out, tmp_path):
+    study = small_study(tmp_path, logged=1, bounds=True)
+    with quick():
+        run_study(study, out)
     whole = files_of(out)
     path = next((out / kind).rglob("*.parquet"))
     damage(path)
@@ -43,7 +47,8 @@ def test_a_damaged_file_is_noticed_and_computed_again(kind, damage, out, tmp_pat
         results = load_results(out)
         for policy in ("greedy", "random"):
             results.events(policy)
-    run_study(small_study(tmp_path, logged=1), out)
+    with quick():
+        run_study(study, out)
     assert files_of(out) == whole
 
 
@@ -96,19 +101,11 @@ def test_another_study_is_refused(line, out, tmp_path):
 
 
 def test_the_scenario_counts_not_its_name(out, tmp_path):
-    study = small_study(tmp_path)
     write_scenario(tmp_path, quota=50)
     with pytest.raises(InputError, match="holds other scenarios"):
-        run_study(small_study_again(tmp_path), out)
+        run_study(load_study(tmp_path / "trial.toml"), out)
     write_scenario(tmp_path).rename(tmp_path / "renamed.toml")
-    run_study(small_study_again(tmp_path, scenario=str(tmp_path / "renamed.toml")), out)
-    assert study.scenarios[0] == load_results(out).scenario()
-
-
-def small_study_again(folder, **changes):
-    from dess.analysis import load_study
-
-    return load_study(folder / "trial.toml", **changes)
+    run_study(load_study(tmp_path / "trial.toml", scenario=str(tmp_path / "renamed.toml")), out)
 
 
 def _simulated_by_other_code(out, *modules):

@@ -155,27 +155,3 @@ def test_the_best_mean_is_always_among_them(values, repeated):
     assert kept[means.argmax()]
     if repeated:  # the same setting twice has the same verdict
         assert kept[: len(kept) // 2].tolist() == kept[len(kept) // 2 :].tolist()
-
-
-def kept_best(generator, trials, spread, missions=30, count=40):
-    """In how many trials the true best is kept, of settings that share their luck."""
-    truth = np.zeros(count)
-    truth[generator.integers(count)] = spread
-    best, kept = truth.argmax(), 0
-    for _ in range(trials):
-        luck = generator.gamma(2.0, size=(missions, 1))
-        values = truth + luck + generator.normal(size=(missions, count))
-        kept += may_be_best(values)[best]
-    return kept
-
-
-SLOW = [(2000, spread, count) for spread in (0.0, 0.01, 0.1) for count in (2, 10, 200)]
-
-
-@pytest.mark.parametrize(
-    ("trials", "spread", "count"),
-    [(200, 0.02, 40), *(pytest.param(*case, marks=pytest.mark.slow) for case in SLOW)],
-)
-def test_the_true_best_is_kept_as_often_as_promised(trials, spread, count):
-    kept = kept_best(np.random.default_rng(count), trials, spread, count=count)
-    assert kept >= stats.binom.ppf(1e-4, trials, 0.95)

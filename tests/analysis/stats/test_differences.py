@@ -142,23 +142,17 @@ def test_missions_without_point_and_seed_are_paired_by_replication():
     assert_frame_equal(compared(alone.drop(columns=["point", "seed"])), compared(alone))
 
 
-OF_DDQN = STUDY.index[STUDY.policy == "ddqn"]
-
-
 @pytest.mark.parametrize(
     ("missions", "arguments", "line"),
     [
         (STUDY.drop(index=[3, 13]), {}, "tour: lacks 2 of the missions of greedy, the first at "),
-        (STUDY.drop(index=OF_DDQN[4:6]), {}, "ddqn: lacks 2 .*point 0, seed 7, replication 4; "),
         (pd.concat([STUDY, STUDY.iloc[[2]]]), {}, "missions: policy tour, .* 2 is there twice"),
-        (STUDY, {"baseline": "random"}, "policy: random has no missions; allowed: tour, greedy"),
         (STUDY[STUDY.policy == "tour"], {}, "policy: nothing to compare with tour"),
         (STUDY, {"metrics": ["sped"]}, "sped: no such column .did you mean seed"),
         (STUDY.assign(collection_ratio=np.nan), {}, "collection_ratio: no number in 96 missions"),
         (STUDY, {"by": ["policy"]}, "by: policy is what is compared; allowed: other columns"),
         (STUDY, {"of": "seed"}, "of: 'seed'; allowed: policy, point"),
         (STUDY, {"level": 95}, "level: 95; allowed: between 0 and 1"),
-        (STUDY, {"correction": "sidak"}, "correction: 'sidak'; allowed: holm, fdr, or none"),
     ],
 )
 def test_missions_that_do_not_match_are_refused_in_a_line(missions, arguments, line):

@@ -262,18 +262,6 @@ def test_means_differences_and_ranks_have_the_same_weights():
     assert best_policy(both) == "lone"
 
 
-def test_the_interval_covers_with_half_the_width():
-    generator, covered, lengths = np.random.default_rng(5), [], []
-    for seed in range(300):
-        table = missions_of(generator.integers(1, 4, 300), seed=seed)
-        row = summary(table, by=[]).set_index("metric").loc[PRODUCT]
-        covered.append(row["low"] <= LEVELS.mean() <= row["high"])
-        plain = interval_of(PRODUCT, table[PRODUCT].to_numpy())
-        lengths.append((row["high"] - row["low"]) / (plain.high - plain.low))
-    assert np.mean(covered) >= 0.95
-    assert np.mean(lengths) < 0.6
-
-
 @pytest.mark.parametrize("fleets", [[1, 1, 3, 3, 3], [1] * 9 + [3] * 9, [1] * 9 + [2] * 4, [2] * 9])
 def test_a_number_of_uavs_that_is_seldom_or_never_drawn_leaves_a_plain_mean(fleets):
     table = missions_of(np.array(fleets))

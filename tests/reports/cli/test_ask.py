@@ -89,7 +89,7 @@ def test_a_what_if_question_is_answered_and_asked_again(dess, unrendered, tmp_pa
     assert files_of(tmp_path / "results") == before
     asked = {"settings": {"uavs": 2}, "baseline": {"uavs": 1}, "policies": ["greedy", "random"]}
     asked |= {"scenario": "small.toml", "missions": 6, "seed": 0, "shown": None}
-    assert unrendered == [asked] * 3
+    assert [page[-1] for page in unrendered] == [asked] * 3
 
 
 def test_an_interruption_names_the_command_that_goes_on(dess, unrendered, monkeypatch):
@@ -114,7 +114,6 @@ def test_an_interruption_names_the_command_that_goes_on(dess, unrendered, monkey
 
 
 BAD = {
-    "sweep --set uavs=2 --set uavs=3": "--set: uavs is given twice; allowed: once",
     "sweep --set uavs=2,7": "uavs: 7 is out of range; allowed: 1..6",
     "sweep --set nodes=[[1,1]] --set grid=8,9 --policy ddqn": "ddqn: has learned grid 32, not 8",
     "sweep --missions 0": "--missions",
@@ -126,15 +125,11 @@ BAD = {
     "sweep --price uav=1 --require success=2": "requirements.success: 2 is out of range",
     "sweep --price uavs=3": "prices: 'uavs' is unknown (did you mean uav?); allowed: currency,",
     "sweep --name a/b": "name: 'a/b' has the wrong form",
-    "sweep --set pads=7": "pads: 7 is more than the zone has cells",
     "sweep --price uav=0 --require ratio=0.9": "prices: all are 0",
-    "sweep --out small.toml/pages": "small.toml/pages: cannot be written",
     "sweep --set quota=1..1000 --set arrival_rate=0..1:1000": "design: 1,000,000 points; allowed: ",
     "what-if": "Missing option '--set'",
     "what-if --set uvs=2": "uvs: unknown key (did you mean uavs?)",
     "what-if --set uavs=2 --set uavs=3": "--set: uavs is given twice; allowed: once",
-    "what-if --set uavs=2 --baseline uavs=2": "settings: uavs is 2 in the baseline already",
-    "what-if --set uavs=2 --baseline pads": "--baseline: 'pads' is not KEY=VALUE; allowed: a fie",
     "what-if --set uavs=2 --missions 1": "--missions",
     "what-if --set uavs=2 --shown tour": "shown: 'tour' is not asked about",
 }

@@ -186,6 +186,12 @@ def results(tmp_path):
     return tmp_path / "results"
 
 
+def test_a_report_that_is_terminated_leaves_no_page_no_process_and_no_file(results, tmp_path):
+    command = a_page(tmp_path / "pages", results)
+    assert command.kill(signal.SIGTERM, lambda: renderings(command) > 0, 0.5)
+    assert not command.out.exists()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", SIGNALS)
 def test_reports_that_are_killed_equal_an_undisturbed_one(number, results, tmp_path):

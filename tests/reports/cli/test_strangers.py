@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from dess import InputError
-from dess.analysis import run_study
 from dess.analysis.answers.diff import at_hand
 from dess.analysis.execution.jobs import MissionsJob
 from dess.analysis.results.chunks import parts_of, split
@@ -32,11 +31,9 @@ Evil1 = Evil0
 
 
 @pytest.fixture(scope="module")
-def sound(tmp_path_factory):
+def sound(studied):
     """Small results with event logs."""
-    folder = tmp_path_factory.mktemp("sound")
-    run_study(small_study(folder, logged=1), folder / "out")
-    return folder / "out"
+    return studied(logged=1).store.folder
 
 
 @pytest.fixture

@@ -4,12 +4,8 @@ error in one line."""
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +20,7 @@ from dess.reports.pages import kernels
 from dess.reports.pages.body import page_of
 from dess.reports.pages.notebook import Report, read
 from dess.reports.pages.render import ReportError, render
-from tests.analysis.small import environment, small_study
+from tests.analysis.small import small_study
 from tests.reports.small import Links, words_of
 
 MISSION = """
@@ -369,55 +365,3 @@ def test_a_notebook_that_fails_or_dies_leaves_a_partial_page_and_names_the_cell(
     monkeypatch.setattr(kernels, "run", lambda reports, *_: None)
     render(["mission"], results, tmp_path, notebooks=notebooks)
     assert not (tmp_path / "mission.partial.html").exists()
-
-
-@contextmanager
-def rendering(results: Path, folder: Path) -> Iterator[subprocess.Popen]:
-    """A process that renders a page into ``out`` and is in a cell; ``kernel`` names its kernel."""
-    kernel = folder / "kernel"
-    cell = (
-        f"import os, time; open({str(kernel)!r} + '.new', 'w').write(str(os.getpid())); "
-        f"os.replace({str(kernel)!r} + '.new', {str(kernel)!r}); time.sleep(600) #"
-    )
-    write_notebooks(folder / "notebooks", mission=FAILING.replace("raise", cell))
-    (folder / "tmp").mkdir()
-    script = (
-        "from pathlib import Path; from dess.reports.interrupts import Interrupts; "
-        "from dess.reports.pages.render import render\nwith Interrupts(is_last=False): "
-        f"render([], {str(results)!r}, 'out', notebooks=Path('notebooks'))"
-    )
-
-    def heed() -> None:
-        """Heed a signal that a background job of a shell may ignore, and its children with it."""
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-    command = [sys.executable, "-c", script]
-    places = environment() | {"TMPDIR": str(folder / "tmp")}
-    with subprocess.Popen(
-        command, cwd=folder, env=places, preexec_fn=heed, stderr=subprocess.PIPE
-    ) as running:
-        while not kernel.exists():
-            assert running.poll() is None
-            time.sleep(0.01)
-        yield running
-
-
-def runs(process: int) -> bool:
-    """Whether a process still runs; one that has ended may still wait for its parent."""
-    try:
-        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
-    except FileNotFoundError:
-        return False
-    return state != "Z"
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="sends signals, and looks for a process")
-def test_a_signal_ends_the_kernels_and_leaves_nothing(results, tmp_path):
-    with rendering(results, tmp_path) as running:
-        running.send_signal(signal.SIGTERM)
-        assert b"KeyboardInterrupt" in running.communicate()[1]
-    kernel = int((tmp_path / "kernel").read_text())
-    while runs(kernel):
-        time.sleep(0.05)
-    assert os.listdir(tmp_path / "tmp") == []
-    assert not (tmp_path / "out").exists()

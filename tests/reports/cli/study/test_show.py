@@ -66,10 +66,7 @@ BAD = {
     "--target succes=0.9": "--target: 'succes' is unknown (did you mean success?); allowed: ",
     "--target success": "--target: 'success' is not KEY=VALUE; allowed: a metric and its least",
     "--target success=99": "--target: success: 99 is not a share; allowed: 0..1",
-    "--target success=true": "--target: success: True is not a share; allowed: 0..1",
-    "--target ratio=0.5 --target ratio=0.6": "--target: ratio is given twice; allowed: once",
     "--target ratio=0.5 --target collection_ratio=1": "collection_ratio is given twice",
-    "--csv --json": "--csv: not with --json; allowed: one of them",
     "--policy tour": "--policy: 'tour' is not in the study; allowed: greedy, random",
 }
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from dess.analysis import load_results, run_study
+from dess.analysis import load_results
 from dess.analysis.answers import settings
 from dess.reports.pages import html
 from dess.reports.pages.page import STUDY, Page
 from dess.reports.pages.render import render_study
-from tests.analysis.small import files_of, grid, small_study
+from tests.analysis.small import files_of, grid
 from tests.reports.small import Links
 
 
@@ -37,13 +37,10 @@ class Downloads(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(studied):
     """Results of a grid of two fields."""
-    home = tmp_path_factory.mktemp("study")
-    study = small_study(home, design=grid(uavs=[1, 2, 3], pads=[1, 2]), missions=12,
-                        description="How many UAVs & pads?")  # fmt: skip
-    run_study(study, home / "fleets")
-    return home / "fleets"
+    fleets = grid(uavs=[1, 2, 3], pads=[1, 2])
+    return studied(design=fleets, missions=12, description="How many UAVs & pads?").store.folder
 
 
 @pytest.fixture(scope="module")
