@@ -138,11 +138,3 @@ def test_an_answer_says_what_would_have_settled_it(studied, tmp_path):
     enough = found.cheapest("random").enough
     assert 40 < enough < 40 * 64
     assert "The budget of 40 missions ended before this was decided; about" in text
-    longer = found.store.manifest.study.selection.model_copy(update={"budget": 4 * enough})
-    samples = small_study(tmp_path, missions=4 * enough, policies=["random"], set=TWO_ZONES)
-    done = run_study(samples, tmp_path / "longer").missions
-    columns = {name: done[name].to_numpy() for name in ("collection_ratio",)}
-    choice = longer.choice([columns | {"cost": done["uavs"] * 0.0}], found.store.manifest.settings)
-    assert choice.answers[0].settled
-    assert choice.missions < 4 * enough
-    assert choice.enough is None

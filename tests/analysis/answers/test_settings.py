@@ -9,7 +9,6 @@ import pytest
 from dess.analysis import compare
 from dess.analysis.answers import settings
 from dess.analysis.metrics import METRICS, PRODUCT
-from dess.analysis.stats.intervals import bounded_interval
 from tests.analysis.small import grid
 
 
@@ -120,8 +119,6 @@ def test_the_partial_dependence_of_an_additive_metric_is_exact(results):
     expected = 0.1 * np.mean([1, 4, 9]) + np.array([0, 0.03]) + common
     assert of_data["mean"].tolist() == pytest.approx(expected)
     assert settings.by_influence(effects) == ["uavs", "initial_data"]
-    interval = bounded_interval(0.001 * np.arange(12) + 0.115)
-    assert of_uavs.iloc[0][["mean", "low", "high"]].tolist() == pytest.approx([*interval])
 
 
 def test_cells_count_the_replications_that_all_their_points_have(results):

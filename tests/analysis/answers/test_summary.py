@@ -1,7 +1,6 @@
 """The summary of a study: tables of means, comparisons, selections and the worst missions."""
 
 import warnings
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,15 +8,11 @@ import pandas as pd
 import pytest
 
 from dess import InputError
+from dess.analysis import load_study, run_study
 from dess.analysis.answers import summary
 from dess.analysis.answers.summary import sensitivity
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.study.design import Saltelli
-from dess.policies import load
-from dess.policies.learner.dqn import DQNTraining
-from dess.policies.learner.trained import save_policy
-from tests.analysis.small import write_scenario
-from tests.policies.learner.tiny import CPU, PHASES, tiny
 
 FIELDS = ("edge_snr", "arrival_rate", "path_loss_exponent")  # names only: nothing is simulated
 INDICES = ["first", "first_low", "first_high", "total", "total_low", "total_high"]
@@ -148,34 +143,17 @@ def test_policies_are_ranked_by_the_mean_over_design_points():
     assert summary.best_policy(missions, among=["a", "c"]) == "c"
 
 
-@pytest.fixture
-def trained_twice(tmp_path):
-    """Folders of two trainings that differ in their seed, and of one that does not learn alike."""
-    scenario, folders = str(write_scenario(tmp_path)), []
-    for seed, discount in ((1, 0.99), (2, 0.99), (1, 0.9)):
-        phases = [PHASES[1] | {"ticks": 3}]
-        config = tiny(
-            scenario=scenario, seed=seed, discount=discount, learning_starts=5, phases=phases
-        )
-        training = DQNTraining(config, CPU)
-        training.run(2)
-        folders.append(str(tmp_path / f"{seed}-{discount}"))
-        weights = training.learner.online.state_dict()
-        save_policy(Path(folders[-1]), weights, config, training.space)
-    return folders
+def test_checkpoints_of_one_learner_are_one_learner(tmp_path):
+    def results_of(*policies):
+        study = load_study("table4", policies=policies, missions=5)
+        return run_study(study, tmp_path / "-".join(policies))
 
-
-def test_checkpoints_of_one_learner_are_one_learner(studied, trained_twice):
-    first, second, other = trained_twice
-    assert load(first).learner == load(second).learner != load(other).learner
-    policies = ["greedy", "random", first, second]
-    results = studied(policies=policies)
-    assert summary.learners(results) == {"tiny": [first, second]}
-    policies = ["greedy", first, other, f"{first},greedy"]
-    mixed = studied(policies=policies)
-    assert sorted(summary.learners(mixed).values()) == sorted([[first], [other]])
+    results = results_of("greedy", "random", "ddqn", "ddqn-2")
+    assert summary.learners(results) == {"ddqn": ["ddqn", "ddqn-2"]}
+    mixed = results_of("greedy", "ddqn", "ddqn-paper", "ddqn,greedy")
+    assert sorted(summary.learners(mixed).values()) == [["ddqn"], ["ddqn-paper"]]
     table = summary.learned_against_heuristic(results)
     assert set(table["about"]) == {"the learner"}
     assert set(table["trainings"]) == {2}
-    alone = studied(policies=["greedy", first])
+    alone = results_of("greedy", "ddqn")
     assert set(summary.learned_against_heuristic(alone)["about"]) == {"this checkpoint"}

@@ -9,14 +9,14 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from dess import InputError
-from dess.analysis import sweep, what_if
+from dess.analysis import sweep
 from dess.analysis.answers.settings import varied
 from dess.analysis.ask import what_if as found
-from dess.analysis.ask.what_if import BASELINE, VARIATION, WhatIf
+from dess.analysis.ask.what_if import BASELINE, VARIATION
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE
-from tests.analysis.small import asked, files_of, write_scenario
+from tests.analysis.small import asked, write_scenario
 
 POLICIES = ["random", "greedy"]
 
@@ -70,25 +70,8 @@ MISSIONS = 12
 
 
 @pytest.fixture(scope="module")
-def ask(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("what-if")
-    return lambda **changes: asked(folder, **changes)
-
-
-@pytest.fixture(scope="module")
-def answer(ask):
-    return ask()
-
-
-def test_questions_lie_side_by_side_and_the_same_one_is_found_again(ask, answer):
-    folders = {answer.question.out}
-    for changes in ({"settings": {"uavs": 5}}, {"baseline": {}}, {"seed": 4}):
-        folders.add(ask(missions=2, **changes).question.out)
-    assert len(folders) == 4
-    assert {folder.parent for folder in folders} == {answer.question.out.parent}
-    before = files_of(answer.question.out)
-    assert ask().question.out == answer.question.out
-    assert files_of(answer.question.out) == before
+def answer(tmp_path_factory):
+    return asked(tmp_path_factory.mktemp("what-if"))
 
 
 def row(difference, low, high, p=0.01, n=100):
@@ -191,14 +174,3 @@ def test_a_conclusion_names_the_side_of_the_whole_interval_or_how_many_missions_
 ):
     about = {"policy": "greedy", "metric": PRODUCT, "before": 0.9, "after": 0.9 + ends[0]}
     assert said in found.conclusion(pd.Series({**row(*ends, p=0.2), "n": 100, **about}))
-
-
-def test_another_variation_of_the_same_baseline_simulates_that_side_only(tmp_path):
-    done: list[int] = []
-    about = {"baseline": {"uavs": 2}, "policies": POLICIES, "missions": 3, "folder": tmp_path}
-    about |= {"scenario": write_scenario(tmp_path), "progress": done.append}
-    assert isinstance(what_if({"uavs": 6}, **about), WhatIf)
-    for settings, new in (({"uavs": 3}, 6), ({"uavs": 6}, 0)):
-        done.clear()
-        what_if(settings, **about)
-        assert (done[0], sum(done)) == (12 - new, 12)

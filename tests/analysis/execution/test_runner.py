@@ -8,7 +8,6 @@ from dess import InputError, simulate
 from dess.analysis import evaluate, load_results, run_study
 from dess.analysis.execution import jobs
 from dess.analysis.results import parquet, store
-from dess.analysis.study.study import CHECK
 from dess.policies import load_team
 from dess.policies.heuristics import Greedy
 from dess.record import MISSION_RECORD, UAV_RECORD
@@ -141,19 +140,6 @@ def test_precision_decides_how_many_missions_there_are(tmp_path):
     for (_, _), cell in results.missions.groupby(["policy", "point"]):
         assert cell["replication"].tolist() == [*range(len(cell))]
         assert study.precision.wanted([{f: cell[f].to_numpy() for f in fields}]) == [len(cell)]
-
-
-def test_a_selection_is_checked_by_missions_that_did_not_select(tmp_path):
-    study = selecting(tmp_path)
-    results = run_study(study, tmp_path / "out")
-    for policy, best in zip(study.policies, results.manifest["selected"], strict=True):
-        assert results.choice(policy).best == best
-        checks = results.checks[results.checks["policy"] == policy]
-        assert (checks["point"] == best).all()
-        assert checks["replication"].tolist() == [CHECK + n for n in range(5)]
-        assert checks["quota"].iloc[0] == study.points[best].values["quota"]
-    assert results.missions["replication"].max() < CHECK
-    assert len(results.checks) == 10
 
 
 def test_an_interrupt_in_compiled_code_is_an_interrupt(tmp_path, monkeypatch):

@@ -171,15 +171,6 @@ def test_learning_is_judged_by_the_curves(rows):
     assert higher.findings[0].note == "trainings quick and no transfer: is above in all of phase II"
 
 
-def test_learning_that_fails_is_told():
-    """It ends below, and what it should beat levels off, but not low."""
-    using, without = VARIANTS
-    curves = trained({using: (0.1, 0.5), without: (0.9, 0.9)})
-    *both, levels = (row for row in scorecard({}, curves) if row.claim.study == TRAININGS)
-    assert [row.findings[0].verdict for row in both] == [REFUTED, REFUTED]
-    assert levels.findings[0].verdict == IN_PART
-
-
 def test_the_best_learned_policy_is_judged(tmp_path):
     """Of several learners that with the higher product, never a heuristic."""
     study = load_study("table4", policies=["greedy", "ddqn", "ddqn-paper"], missions=2)

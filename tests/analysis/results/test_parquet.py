@@ -164,10 +164,3 @@ def test_a_run_does_not_write_or_delete_where_a_link_leads(name, sound, tmp_path
     assert main([*command, "--out", str(folder)]) == 2
     assert f"{place}: is a link" in capsys.readouterr().err
     assert {**files_of(tmp_path), **before} == files_of(tmp_path)
-
-
-def test_a_file_that_is_too_large_is_not_read(sound, tmp_path, monkeypatch):
-    copied = shutil.copytree(sound, tmp_path / "copied")  # files that nobody has read yet
-    monkeypatch.setattr(parquet, "LIMIT", 10)
-    with pytest.raises(InputError, match="is too large"):
-        load_results(copied)

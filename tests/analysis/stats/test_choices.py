@@ -2,9 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from scipy import stats
 from scipy.special import ndtri
 
@@ -142,16 +139,3 @@ def test_shares_are_judged_as_the_test_of_shares_does():
 def test_settings_without_common_replications_are_not_compared():
     values = np.array([[1.0, np.nan], [1.1, np.nan], [np.nan, 9.0], [np.nan, 9.1]])
     assert may_be_best(values).all()
-
-
-@given(
-    arrays(float, st.tuples(st.integers(2, 9), st.integers(1, 6)), elements=st.floats(-9, 9)),
-    st.booleans(),
-)
-def test_the_best_mean_is_always_among_them(values, repeated):
-    values = np.concatenate([values, values], axis=1) if repeated else values
-    kept = may_be_best(values)
-    means = values.mean(axis=0)
-    assert kept[means.argmax()]
-    if repeated:  # the same setting twice has the same verdict
-        assert kept[: len(kept) // 2].tolist() == kept[len(kept) // 2 :].tolist()

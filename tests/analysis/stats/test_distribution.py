@@ -78,10 +78,7 @@ def test_the_interval_of_the_worst_is_wider_than_that_of_its_bootstrap():
     ("arguments", "line"),
     [
         ({"metric": "speed"}, "speed: no such column; allowed: policy, uavs, "),
-        ({"by": ["point"]}, "point: no such column; allowed: policy, "),
-        ({"quantiles": [0.5, 95]}, "quantiles: 95; allowed: between 0 and 1"),
         ({"tail": 0}, "tail: 0; allowed: between 0 and 1"),
-        ({"level": 1.0}, "level: 1.0; allowed: between 0 and 1"),
         ({"worst": "low"}, "worst: 'low'; allowed: lowest, highest"),
     ],
 )

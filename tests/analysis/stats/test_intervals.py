@@ -45,13 +45,6 @@ def test_it_has_a_length_holds_the_mean_and_ends_where_shares_do(values, level):
     assert low < high
 
 
-@given(SAMPLES)
-def test_the_other_end_of_the_scale_is_the_mirror_image(values):
-    mean, low, high = bounded_interval(values)
-    turned = bounded_interval(1 - np.array(values))
-    assert turned == pytest.approx((1 - mean, 1 - high, 1 - low), abs=1e-9)
-
-
 @pytest.mark.parametrize(
     ("metric", "expected"),
     [(SUCCESS, wilson(7, 8)), (RATIO, bounded_interval([1.0] * 7 + [0.0]))]

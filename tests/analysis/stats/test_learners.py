@@ -73,14 +73,15 @@ def test_learners_are_known_by_their_trainings():
     assert rows["trainings"].tolist() == [2, 2, 1, 1]
     assert rows["n"].tolist() == [12] * 4
     trained, tour = np.stack([ratios(c) for c in ("ddqn", "ddqn-2")]), ratios("tour")
-    expected = crossed(trained - tour)
+    expected, row = crossed(trained - tour), rows.loc[("ddqn", 0)]
+    assert row["difference"] == pytest.approx(expected.difference)
+    assert row[["training_sd", "rest_sd"]].tolist() == pytest.approx(expected[-3::2])
     # One trained policy falls to 0 while the baseline is at its mean, or the other way round.
-    ends = [[max(a, 1 - b), -max(b, 1 - a)] for a, b in [(trained.mean(), tour.mean())]]
-    smooth = crossed(np.hstack([trained - tour, np.repeat(ends, 2, axis=0)]))
-    expected = expected._replace(**{f: getattr(smooth, f) for f in ("low", "high", "p")})
-    expected = expected._replace(new_low=smooth.new_low, new_high=smooth.new_high)
-    fields = list(expected._fields)
-    assert rows.loc[("ddqn", 0), fields].tolist() == pytest.approx(list(expected))
+    a, b = trained.mean(), tour.mean()
+    smooth = crossed(np.hstack([trained - tour, [[max(a, 1 - b), -max(b, 1 - a)]] * 2]))
+    assert row[["low", "new_low", "p"]].tolist() == pytest.approx(
+        [smooth.low, smooth.new_low, smooth.p]
+    )
     assert table["p_adjusted"].tolist() == adjust(table["p"].to_numpy(), "holm").tolist()
 
 

@@ -24,8 +24,6 @@ from dess.analysis.stats.verdict import (
     [
         (0.1, 0.3, ABOVE, True),
         (-0.3, -0.1, BELOW, False),
-        (-0.1, 0.3, INCONCLUSIVE, None),
-        (0.0, 0.3, INCONCLUSIVE, None),
         (0.0, 0.0, INCONCLUSIVE, None),
         (np.nan, np.nan, INCONCLUSIVE, None),
     ],

@@ -176,7 +176,6 @@ BAD = {
     "[design]\nkind = 'sobel'": ["kind: 'sobel' is unknown", "latin-hypercube, saltelli"],
     "kind = 'grid'\nvalues = {uavs = []}": ["grid: values: uavs has no values; allowed: one"],
     "kind = 'table'\nrows = []": ["table: rows: ", "too short"],
-    HEAD + 'latin-hypercube"\nsize = true': ["latin-hypercube: size: True is not an integer"],
     HEAD + f'latin-hypercube"\nsize = {MAX_SIZE + 1}': ["size: ", f"1..{MAX_SIZE:,}"],
     HEAD + 'saltelli"\nbase = 24': ["saltelli: base: 24 is not a power of two; allowed: 1, 2, 4"],
     HEAD + f'saltelli"\nbase = 4\nreplications = {MAX_REPLICATION + 2}': ["replications: "],
@@ -184,9 +183,7 @@ BAD = {
 NO_RANGES = {
     "uavs = [3, 1]": "uavs: [3, 1]",
     "uavs = [1, 2.5]": "uavs: [1, 2.5]",
-    "uavs = [1, 2, 3]": "uavs: [1, 2, 3]",
     "arrival_rate = [false, true]": "arrival_rate: [False, True]",
-    "arrival_rate = [0, nan]": "arrival_rate: [0, nan]",
     f"arrival_rate = [0, {10**400}]": "arrival_rate: [0, 10000",
 }
 BAD |= {

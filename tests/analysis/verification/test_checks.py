@@ -14,7 +14,7 @@ from dess import load_scenario
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess.analysis.verification import balances, draws, measurements
-from dess.analysis.verification.checks import ALPHA, Check, judge, poisson_fit, uniform_fit
+from dess.analysis.verification.checks import ALPHA, Check, judge, overall, poisson_fit, uniform_fit
 from dess.analysis.verification.measurements import Log
 from dess.fields import SAMPLED
 from dess.mission import simulate
@@ -63,6 +63,7 @@ def test_p_values_are_corrected_for_their_number():
     assert judge([check(p=p / 2), check(p=0.5)])["verdict"].tolist() == [REFUTED, HOLDS]
     table = judge([check(p=p), check(error=0.0), check(), check()])  # exact and open ones
     assert table["verdict"].tolist() == [REFUTED, HOLDS, INCONCLUSIVE, INCONCLUSIVE]
+    assert overall(table).startswith("**1 of 4 checks do not hold**: test. Too few observations")
 
 
 @pytest.mark.parametrize("mean", [0.02, 1.0, 40.0])

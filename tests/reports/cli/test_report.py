@@ -1,9 +1,6 @@
 """``dess report`` and ``dess study run --report``: which pages are rendered, and from what."""
 
-import os
 from pathlib import Path
-
-import pytest
 
 from dess.reports.pages import notebook, render
 
@@ -11,12 +8,12 @@ from dess.reports.pages import notebook, render
 def test_names_are_reports_and_folders_are_studies(dess, unrendered, tmp_path):
     (tmp_path / "fleets").mkdir()
     code, out, _ = dess(
-        "report", "mission", "fleets", "--out", "pages", "--parameter", "baseline=2"
+        "report", "mission", "fleets", "--out", "pages", "--parameter", "policy='tour'"
     )
     assert (code, out.split()) == (0, ["pages/mission.html", "pages/study-fleets.html"])
     assert unrendered == [
-        ("mission", "results", "pages", {}),
-        ("fleets", "pages", {"baseline": 2}),
+        ("mission", "results", "pages", {"policy": "tour"}),
+        ("fleets", "pages", {"policy": "tour"}),
     ]
 
 
@@ -61,34 +58,6 @@ def test_formats_of_figures_are_named(dess, unrendered, refusal):
     code, out, _ = dess("report", "mission", "--figures", "pdf, svg")
     where = Path("build", "reports")
     assert (code, out) == (0, f"{where / 'mission.html'}\nfigures: {where / '*-figures'}\n")
-
-
-def odd(path: Path, kind: str) -> None:
-    """Put something other than a file into the place of a file."""
-    path.parent.mkdir(exist_ok=True)
-    if kind in ("loop", "link"):
-        path.symlink_to(path if kind == "loop" else "somewhere")
-    else:
-        os.mkfifo(path) if kind == "pipe" else path.mkdir()
-
-
-@pytest.mark.parametrize(
-    ("name", "kind"),
-    [
-        (".index.lock", "link"),
-        (".index.lock", "pipe"),
-        ("index.html", "folder"),
-        ("mission.html", "folder"),
-    ],
-)
-def test_a_folder_of_pages_is_checked_before_the_first_cell(
-    refusal, monkeypatch, tmp_path, name, kind
-):
-    monkeypatch.delattr("dess.reports.pages.kernels.run")
-    monkeypatch.setattr("dess.reports.pages.render._lacking", lambda *_: {})
-    odd(tmp_path / "pages" / name, kind)
-    line = refusal("report", "mission", "--out", "pages")
-    assert f"pages/{name}: " in line and "; allowed: " in line
 
 
 def test_a_parameter_that_the_study_refuses_is_refused_before_any_cell(dess, refusal, monkeypatch):

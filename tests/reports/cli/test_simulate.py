@@ -169,8 +169,6 @@ def test_nodes_have_their_names_in_table_log_and_maps(dess, tmp_path, buoys):
     ).replace(": ", ":")
     texts = [text.get_text() for text in sea_figure(buoys).axes[0].texts]
     assert texts == ["Alpha", "Beta"]
-    assert dess("simulate", "--scenario", "small.toml", "--events", "e.parquet")[0] == 0
-    assert "name" not in pq.read_schema(tmp_path / "e.parquet").names
 
 
 def test_a_video_needs_ffmpeg(refusal, monkeypatch):

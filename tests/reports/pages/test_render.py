@@ -23,21 +23,23 @@ from dess.reports.pages.render import ReportError, render
 from tests.analysis.small import small_study
 from tests.reports.small import Links, words_of
 
-MISSION = """
+HEAD = """
 # ---
 # jupyter:
 #   dess:
-#     studies: [trial]
+#     studies: [{}]
 # ---
 
 # %% [markdown]
-# # A trial
+# # {}
 #
-# The missions of a trial.
+# {}
 
 # %% tags=["parameters"]
 results = "../../results"
-policy = "greedy"
+"""
+MISSION = HEAD.format("trial", "A trial", "The missions of a trial.")
+MISSION += """policy = "greedy"
 
 # %%
 import sys
@@ -68,42 +70,14 @@ html.figure(drawing, "slots", "Slots of every mission, n = 10.")
 # %%
 html.provenance([study])
 """
-SCORECARD = """
-# ---
-# jupyter:
-#   dess:
-#     studies: []
-# ---
-
-# %% [markdown]
-# # Scorecard
-#
-# The claims.
-
-# %% tags=["parameters"]
-results = "../../results"
-
-# %%
+SCORECARD = HEAD.format("", "Scorecard", "The claims.")
+SCORECARD += """# %%
 from IPython.display import HTML
 
 HTML('<section id="scorecard">one claim</section>')
 """
-FAILING = """
-# ---
-# jupyter:
-#   dess:
-#     studies: [trial]
-# ---
-
-# %% [markdown]
-# # Failing
-#
-# It fails.
-
-# %% tags=["parameters"]
-results = "."
-
-# %%
+FAILING = HEAD.format("trial", "Failing", "It fails.")
+FAILING += """# %%
 "the cell before"
 
 # %%

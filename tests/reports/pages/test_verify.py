@@ -222,10 +222,6 @@ def test_of_damaged_tables_the_command_says_of_how_many(results, tmp_path, capsy
         f"differs: {files[0]}: has been changed since it was written",
         f"dess: error: {folder / 'table4'}: 1 of {len(files)} differ (--seed 5)",
     ]
-    (folder / "table4" / "manifest.json").write_text("{}")
-    checks = verify_results(folder, 1, 0)
-    assert all(check.compared >= len(check.differing) for check in checks)
-    assert sum(len(check.differing) for check in checks) == 1
 
 
 def test_forged_bounds_are_found_by_computing_them_again(tmp_path, monkeypatch):

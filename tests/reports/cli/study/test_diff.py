@@ -74,11 +74,3 @@ def test_design_points_and_both_commands_are_shown(dess, tmp_path):
     (of_a,) = re.findall(r"     A: dess simulate .*--policy greedy", out)
     (of_b,) = re.findall(r"     B: dess simulate .*--policy random", out)
     assert "2 more" not in out
-
-
-def test_folders_that_cannot_be_compared_get_one_line(dess, refusal, tmp_path):
-    assert dess("study", "run", "trial.toml", "--out", "a")[0] == 0
-    shutil.copytree("a", "b")
-    next((tmp_path / "b" / "uavs").rglob("*.parquet")).unlink()
-    for pair, words in {("a", "b"): "b: incomplete", ("a", "none"): "no such file"}.items():
-        assert words in refusal("study", "diff", *pair)

@@ -37,8 +37,6 @@ def test_a_study_is_shown(dess, dess_json):
     code, out, _ = dess("study", "show", "results/trial", "--worst", 2)
     assert code == 0
     data = dess_json("study", "show", "results/trial", "--worst", 2)
-    assert data["study"] == "trial"
-    assert {row["policy"] for row in data["means"]} == {"greedy", "random"}
     assert [row["baseline"] for row in data["comparisons"]] == ["greedy"] * 3
     assert len(data["worst"]) == 2
     for row in data["worst"]:
@@ -48,10 +46,9 @@ def test_a_study_is_shown(dess, dess_json):
     assert f"{100 * product['mean']:.1f} %" in out
 
 
-def test_a_failed_chunk_is_an_exit_code_and_a_command(dess, tmp_path, monkeypatch):
-    troublesome.install(tmp_path / "plugin", monkeypatch)
-    asked = ["study", "run", "trial.toml", "--policy", "raising", "--policy", "greedy"]
-    code, out, err = dess(*asked)
+def test_a_failed_chunk_is_an_exit_code_and_a_command(dess, tmp_path):
+    raising = f"{troublesome.copied(tmp_path)}:Raising"
+    code, out, err = dess("study", "run", "trial.toml", "--policy", raising, "--policy", "greedy")
     assert (code, out) == (1, "")
     _, first, last = err.splitlines()
     assert first.startswith(

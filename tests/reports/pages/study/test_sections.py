@@ -21,11 +21,6 @@ STUDIES = {
         ["The best policy is", "The other policy", "Means with 95 % intervals", "Single missions"],
         ["Effects of the fields", "baseline", "Sobol", "The selection"],
     ),
-    "a field": (
-        {"design": grid(uavs=[1, 2])},
-        ["Effects of the fields", "n = 10 missions per point; bars", "Comparison with a baseline"],
-        ["Orange frames", "One panel for each"],
-    ),
     "two fields": (
         {"design": grid(uavs=[1, 2], pads=[1, 2]), "policies": ["greedy"]},
         ["Orange frames: cells that are not significantly worse", "n = 10 missions per cell"],
