@@ -218,7 +218,8 @@ RARE = [(0.02, 50), (0.01, 100), (0.003, 300), (0.001, 1000), (0.03, 100), (0.06
 def test_paired_intervals_cover_where_one_policy_never_fails(share, n, metric, trials):
     a, b = lone(0.0, share, 1.0, n, trials)
     truth = share * 0.8
-    if metric == REWARD:  # a product of 0 is a failure, which costs 400 and the data
+    # A product of 0 is a failure, which costs 400 and the data.
+    if metric == REWARD:
         a, b, truth = 300 * a - 400 * (a == 0), 300 * b - 400 * (b == 0), share * (240 + 400)
     low, high, p = compared(a, b, metric)
     assert np.mean((low <= truth) & (truth <= high)) >= 0.95 - error(trials)

@@ -54,15 +54,15 @@ def test_the_pair_is_the_best_learned_policy_and_the_best_other(
 
 
 def test_what_is_no_pair_is_refused(results, studied):
-    with pytest.raises(InputError, match="learned: 'ddqn' is not in the study; allowed: random, "):
+    with pytest.raises(InputError, match="learned: 'ddqn' is not in the study"):
         comparison.pair_of(results, learned="ddqn")
     with pytest.raises(InputError, match="no two policies to compare among random, "):
         comparison.pair_of(results, "greedy", "greedy")
     alone = studied(policies=["greedy"])
-    with pytest.raises(InputError, match="no two policies to compare among greedy; allowed: two"):
+    with pytest.raises(InputError, match="no two policies to compare among greedy"):
         comparison.pair_of(alone)
     several = studied(design=grid(uavs=[1, 2]), missions=2)
-    with pytest.raises(InputError, match="study trial: 2 design points; allowed: one"):
+    with pytest.raises(InputError, match="study trial: 2 design points"):
         comparison.duels(several, Pair("greedy", "random", 1))
 
 
@@ -80,7 +80,8 @@ def test_missions_are_won_tied_lost_and_failed():
         "only ours fails": "1",
         "only theirs fails": "2",
     }
-    assert table["Share"].iloc[2] == "20.0 % [5.7, 51.0]"  # Wilson's interval of 2 in 10
+    # Wilson's interval of 2 in 10.
+    assert table["Share"].iloc[2] == "20.0 % [5.7, 51.0]"
 
 
 def test_the_worst_missions_and_the_most_lost():
@@ -130,7 +131,8 @@ def test_bins_are_the_values_or_hold_about_as_many():
     codes, names = comparison.bins(pd.Series(values), 5)
     assert set(np.bincount(codes)) == {200}
     assert all(values[codes == a].max() < values[codes == a + 1].min() for a in range(4))
-    codes, names = comparison.bins(pd.Series([0] * 90 + [*range(1, 11)]), 5)  # quantiles coincide
+    # Quantiles coincide.
+    codes, names = comparison.bins(pd.Series([0] * 90 + [*range(1, 11)]), 5)
     assert len(names) == codes.max() + 1 < 5 and names[0] == "0"
 
 
@@ -209,7 +211,8 @@ def measured(timed_study):
 
 def test_times_are_those_of_the_calls_alone(measured, timed_study):
     assert {(cost.median, cost.slow) for cost in measured.costs} == {(2 * TICK, 2 * TICK)}
-    clock = Ticks(*([0.0, TICK] * 9), 0.0, 9 * TICK)  # of ten calls, one takes 9 ticks
+    # Of ten calls, one takes 9 ticks.
+    clock = Ticks(*([0.0, TICK] * 9), 0.0, 9 * TICK)
     slow = comparison.measure(timed_study, clock).costs[0]
     assert (slow.median, slow.slow) == (TICK, 9 * TICK)
 

@@ -109,7 +109,6 @@ def test_with_other_seeds_all_missions_are_compared_without_pairs(results, tmp_p
     of = [r.missions.query("policy == 'greedy' and point == 1")[PRODUCT] for r in (other, results)]
     # with a 0 and a 1 added to both, so that 10 of 10 against 10 of 10 has an interval
     expected = stats.ttest_ind(*([*values, 0, 1] for values in of), equal_var=False)
-    assert row["difference"] == pytest.approx(of[0].mean() - of[1].mean())
     assert row["p"] == pytest.approx(expected.pvalue)
     assert [row["low"], row["high"]] == pytest.approx([*expected.confidence_interval()])
 

@@ -67,7 +67,8 @@ def test_what_is_collected_and_held():
     """The battery at the start is no data."""
     assert missions.collected(EVENTS, 2, 2).tolist() == [[2.0, 0.0], [1.5, 1.0]]
     assert missions.held(EVENTS, 2).tolist() == [6.0, 5.0]
-    assert missions.left_behind(EVENTS, 2).tolist() == [False, True]  # 3.5 of 6, 1 of 5
+    # 3.5 of 6, 1 of 5.
+    assert missions.left_behind(EVENTS, 2).tolist() == [False, True]
 
 
 def test_the_far_edges_of_the_paper():
@@ -90,7 +91,8 @@ def test_division():
         ([1, 0, 1, 0], [0, 1, 0, 1], 1.0),  # left and right
         ([1, 1, 0, 0], [0, 0, 1, 1], 1.0),  # top and bottom
         ([1, 0, 0, 0], [0, 1, 1, 1], 1.0),  # a corner
-        ([1, 0, 0, 1], [0, 1, 1, 0], 0.75),  # crosswise: a line leaves one on the wrong side
+        # Crosswise: a line leaves one on the wrong side.
+        ([1, 0, 0, 1], [0, 1, 1, 0], 0.75),
         ([4, 0, 0, 1], [0, 3, 2, 0], 0.9),  # that one is the least
         ([1, 1, 1, 1], [1, 1, 1, 1], 0.5),
         ([5, 1, 0, 0], [0, 0, 0, 0], 1.0),  # all on one side

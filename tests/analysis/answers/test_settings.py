@@ -39,7 +39,8 @@ def test_long_and_unset_values_are_short_texts(studied):
         {"nodes": [[1, 1], [2, 2]], "initial_data": [4, 4]},
     ]
     table = settings.points(studied(design={"kind": "table", "rows": rows}, missions=2))
-    assert table["pads"].tolist() == [2, 4, 6, 6, 6]  # without a number, as many as the zone has
+    # Without a number, as many as the zone has.
+    assert table["pads"].tolist() == [2, 4, 6, 6, 6]
     assert table["zone"].tolist() == [
         "3 x 2 at (5, 0)",
         "2 x 2 at (0, 0)",

@@ -14,7 +14,8 @@ from dess.analysis.answers.summary import sensitivity
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.study.design import Saltelli
 
-FIELDS = ("edge_snr", "arrival_rate", "path_loss_exponent")  # names only: nothing is simulated
+# Names only: nothing is simulated.
+FIELDS = ("edge_snr", "arrival_rate", "path_loss_exponent")
 INDICES = ["first", "first_low", "first_high", "total", "total_low", "total_high"]
 
 
@@ -138,7 +139,8 @@ def test_policies_are_ranked_by_the_mean_over_design_points():
         ("c", 0, 0.6),
     ]
     missions = pd.DataFrame(rows, columns=["policy", "point", PRODUCT])
-    assert summary.ranked_policies(missions) == ["b", "c", "a"]  # a: (0.9 + 0.1) / 2
+    # A: (0.9 + 0.1) / 2.
+    assert summary.ranked_policies(missions) == ["b", "c", "a"]
     assert summary.best_policy(missions) == "b"
     assert summary.best_policy(missions, among=["a", "c"]) == "c"
 

@@ -107,7 +107,8 @@ def test_what_one_side_measures_has_no_difference(tmp_path):
     [
         (row(-0.2, -0.3, -0.1), BELOW),
         (row(0.1, -0.1, 0.3), INCONCLUSIVE),
-        (row(0.5, 0.5, 0.5, p=0.5, n=2), INCONCLUSIVE),  # two equal differences prove nothing
+        # Two equal differences prove nothing.
+        (row(0.5, 0.5, 0.5, p=0.5, n=2), INCONCLUSIVE),
         (row(0.5, 0.5, 0.5, p=0.002, n=10), ABOVE),
     ],
 )

@@ -3,11 +3,11 @@
 import shutil
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from dess import InputError, load_scenario
 from dess.analysis import load_results, run_study
+from dess.analysis.answers.diff import diff
 from dess.analysis.ask.question import sweep_question, values_of, what_if_question
 from dess.analysis.execution import effort
 from dess.analysis.execution.effort import BASELINE, SECONDS
@@ -36,24 +36,8 @@ def sweep_of(fields, folder, **about):
     return sweep_question(values, write_scenario(folder), **about)
 
 
-def tables(results):
-    """All records, by cell, in an order that no folder decides."""
-    cells = {c.point: c.key for cells in results.store.manifest.cells for c in cells}
-    return [
-        table.assign(cell=table["point"].map(cells))
-        .drop(columns="point")
-        .sort_values([*keys, "cell"], ignore_index=True)
-        for table, keys in (
-            (results.missions, ["policy", "replication"]),
-            (results.uavs, ["policy", "replication", "uav"]),
-        )
-    ]
-
-
 def check_equal_to_a_fresh_run(question, results, folder):
-    fresh = run_study(question.study, folder / "fresh")
-    for found, expected in zip(tables(results), tables(fresh), strict=True):
-        pd.testing.assert_frame_equal(found, expected)
+    assert diff(results, run_study(question.study, folder / "fresh")).identical
 
 
 OTHERS = {
@@ -121,7 +105,8 @@ def test_a_search_has_a_policy_for_the_missions_that_it_will_take():
 
 
 def test_missions_of_other_sweeps_take_no_time(asking, tmp_path, monkeypatch):
-    monkeypatch.setattr(effort, "LONG_RUN", 0.00015)  # less than 24 missions take
+    # Less than 24 missions take.
+    monkeypatch.setattr(effort, "LONG_RUN", 0.00015)
     question = sweep_of(FIELDS, tmp_path, missions=6)
     with pytest.raises(InputError, match="24 missions to simulate"):
         question.ask()
@@ -186,10 +171,10 @@ def test_both_sides_measure_what_belongs_to_a_section(settings, baseline, measur
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"settings": {"uavs": 99}}, r"uavs: 99 is out of range; allowed: 1\.\.16"),
+        ({"settings": {"uavs": 99}}, r"uavs: 99 is out of range"),
         ({"baseline": {"quota": 0}}, r"scenario paper: quota: .*0"),
         ({"settings": {}}, r"settings: none is given; allowed: .*uavs"),
-        ({"settings": {"uavs": [1, 3]}}, r"uavs is 1 to 3 in the baseline already; allowed: an"),
+        ({"settings": {"uavs": [1, 3]}}, r"uavs is 1 to 3 in the baseline already"),
         ({"settings": {"pads": 16}}, r"pads is 16 in the baseline already"),
         ({"policies": []}, r"question: policies: .*is too short"),
         ({"policies": "greedy"}, r"question: policies: 'greedy' has the wrong form"),

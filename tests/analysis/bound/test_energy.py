@@ -43,7 +43,8 @@ def test_the_phases_allow_all_that_a_battery_allows(start, low, charge, rate, co
     phases = phases_of(
         scenario(**values, charge_rate=rate, flight_cost=cost, quota=4 * slots, max_slots=longest)
     )
-    free = len(phases.deadline) - 1  # the phase in which batteries count no more
+    # The phase in which batteries count no more.
+    free = len(phases.deadline) - 1
 
     @cache
     def go(slot: int, f: int, battery: int, latch: bool, phase: int) -> None:

@@ -6,7 +6,7 @@ import pytest
 from dess import load_scenario
 from dess.analysis.bound.prices import Bounds, Detail, improve, known_of
 from dess.scenario import ScenarioSpace
-from tests.analysis.bound.lone_uav import bound_of_data
+from tests.analysis.bound.tiny_sea import bound_of_data
 
 
 def paper_like(**values: object) -> ScenarioSpace:
@@ -45,14 +45,6 @@ def test_a_uav_can_take_all_that_its_node_has_had():
     last = known.phases.clock[:, -1].max()
     assert last > known.phases.clock[0, -1]  # there is a charge
     assert bound_of_data(space, 4) == pytest.approx(known.data[last, 0])
-
-
-def test_a_cut_without_a_price_changes_nothing():
-    known = known_of(paper_like(), 4, 0)
-    prices = np.full((1, 9), 0.3)
-    one = Bounds(known, Detail(cuts=())).at(prices)[0]
-    two = Bounds(known, Detail(cuts=(0.5,))).at(np.vstack([np.zeros((1, 9)), prices]))[0]
-    assert one == pytest.approx(two, 1e-12)
 
 
 def test_more_iterations_never_raise_the_bound():

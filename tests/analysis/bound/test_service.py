@@ -48,13 +48,6 @@ def test_a_slot_is_worth_more_than_the_mean_of_the_best_node(worth):
     assert best.mean() - 4 * best.std() / len(best) ** 0.5 <= value <= 1.01 * best.mean()
 
 
-def test_a_local_price_takes_from_the_home_node_alone():
-    _, rates = world()
-    free, priced = values_of(rates, [1.0, 1.0], [0.0, 1.0])[HOVER, 1, 1]
-    assert free > 2 * priced
-    assert priced == pytest.approx(values_of(rates, [0.0, 1.0], [0.0])[HOVER, 1, 1, 0])
-
-
 def test_takings_are_what_makes_up_the_worth():
     _, rates = world()
     worth, takings = np.array([0.7, 1.0]), np.zeros(2)

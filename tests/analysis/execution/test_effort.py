@@ -53,12 +53,14 @@ def test_a_larger_question_never_has_a_slower_policy(uavs):
     assert chosen[-1] == BASELINE
     places = [FASTER.index(name) for name in chosen]
     assert places == sorted(places)
-    assert ("planner-short" in chosen) == (uavs == 1)  # any is better for large fleets
+    # Any is better for large fleets.
+    assert ("planner-short" in chosen) == (uavs == 1)
     assert "any" in chosen
     assert policies_for([space], 1) == (FASTER[0], BASELINE)
     assert policies_for([space], 10**8) == (BASELINE,)
     twice = policies_for([space, space], 150)
-    assert twice == policies_for([space], 300)  # settings count as missions do
+    # Settings count as missions do.
+    assert twice == policies_for([space], 300)
 
 
 PAPER = load_scenario("paper")
@@ -66,7 +68,7 @@ PAPER = load_scenario("paper")
 
 @pytest.mark.parametrize("workers", [0, -1, MAX_WORKERS + 1, 10**9])
 def test_numbers_of_workers_have_limits(workers):
-    with pytest.raises(InputError, match=rf"workers: {workers} is out of range; allowed: 1..1,024"):
+    with pytest.raises(InputError, match=rf"workers: {workers} is out of range"):
         check_workers(workers)
     check_workers(MAX_WORKERS)
 

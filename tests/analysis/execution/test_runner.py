@@ -5,31 +5,18 @@ import pandas as pd
 import pytest
 
 from dess import InputError, simulate
-from dess.analysis import evaluate, load_results, run_study
+from dess.analysis import load_results, run_study
 from dess.analysis.execution import jobs
 from dess.analysis.results import parquet, store
 from dess.policies import load_team
 from dess.policies.heuristics import Greedy
-from dess.record import MISSION_RECORD, UAV_RECORD
-from dess.reports import cli
+from dess.record import MISSION_RECORD
 from tests.analysis.small import files_of, grid, small_study
 
 
 def assert_same(ours, other):
     pd.testing.assert_frame_equal(ours.missions, other.missions)
     pd.testing.assert_frame_equal(ours.uavs, other.uavs)
-
-
-def test_results_are_tidy(tmp_path):
-    design, policies = grid(quota=[20, 600], uavs=[1, 2]), ["random-unguarded", "greedy"]
-    study = small_study(tmp_path, design=design, policies=policies)
-    results = run_study(study, tmp_path / "out")
-    missions, uavs = results.missions, results.uavs
-    assert list(missions.columns) == ["policy", "point", "quota", *MISSION_RECORD.names]
-    assert list(uavs.columns) == ["policy", "point", "replication", "uav", *UAV_RECORD.names]
-    order = [(p, d, r) for p in study.policies for d in range(4) for r in range(10)]
-    assert list(missions[["policy", "point", "replication"]].itertuples(index=False)) == order
-    assert (missions["uavs"] == missions["point"].map({0: 1, 1: 2, 2: 1, 3: 2})).all()
 
 
 def test_a_mission_of_a_study_equals_the_same_one_alone(tmp_path):
@@ -109,7 +96,7 @@ def check_that_an_interrupted_run_is_completed(study, folder, after, workers):
 
     with pytest.raises(KeyboardInterrupt):
         run_study(study, folder / "out", progress=interrupt)
-    with pytest.raises(InputError, match="incomplete.*; allowed: run the study again"):
+    with pytest.raises(InputError, match="incomplete.*"):
         load_results(folder / "out")
     run_study(study, folder / "out", workers)
     run_study(study, folder / "undisturbed")
@@ -224,7 +211,7 @@ def test_a_full_disk_is_no_failure_of_a_chunk(tmp_path, monkeypatch):
         run_study(small_study(tmp_path), tmp_path / "out")
     assert files_of(tmp_path / "out").keys() == {"manifest.json"}
     monkeypatch.setattr(jobs, "simulate_missions", raises(full))
-    with pytest.raises(InputError, match="greedy: No space left on device; allowed: "):
+    with pytest.raises(InputError, match="greedy: No space left on device"):
         run_study(small_study(tmp_path), tmp_path / "out")
 
 
@@ -233,17 +220,3 @@ def raises(error):
         raise error
 
     return fail
-
-
-@pytest.mark.parametrize("engine", ["batch", "events"])
-def test_a_team_may_be_larger_than_the_fleet_of_some_points(engine, tmp_path):
-    values = {"policies": ["greedy,tour,random"], "missions": 3, "engine": engine}
-    study = small_study(tmp_path, design=grid(uavs=[1, 3]), logged=1, **values)
-    results = run_study(study, tmp_path / "out", workers=1)
-    alone = evaluate(study.scenarios[0], "greedy", 3, study.seed)
-    of_one = results.missions.query("point == 0")
-    assert (of_one["reward"].to_numpy() == alone.records.missions["reward"]).all()
-    again = ["simulate", "--of", str(tmp_path / "out"), "--point", "0", "--replication", "2"]
-    assert cli.main(again) == 0
-    with pytest.raises(InputError, match="more policies than the largest fleet has UAVs; allowed"):
-        small_study(tmp_path, design=grid(uavs=[1, 2]), policies=["greedy,tour,random"])

@@ -56,7 +56,8 @@ def test_a_killed_worker_is_replaced(trouble, tmp_path):
     assert (tmp_path / "killed").exists()
     assert (failure.policy, failure.missions, sum(done)) == (policies[1], 4, 30)
     assert "in trouble" in failure.traceback
-    failing(study, tmp_path / "undisturbed")  # it has been killed, so it hovers
+    # It has been killed, so it hovers.
+    failing(study, tmp_path / "undisturbed")
     ours, undisturbed = (
         {name: content for name, content in files_of(tmp_path / run).items() if "fail" not in name}
         for run in ("out", "undisturbed")

@@ -7,7 +7,7 @@ from matplotlib.patches import Rectangle
 
 from dess.analysis.answers import settings
 from dess.analysis.figures import settings as figures
-from dess.analysis.metrics import PRODUCT, SUCCESS
+from dess.analysis.metrics import SUCCESS
 from tests.analysis.small import grid
 
 
@@ -56,14 +56,6 @@ def test_a_heat_map_frames_what_may_be_the_best_and_marks_the_best(results, face
     assert best == table["mean"].max()
     texts = [text.get_text() for ax in panels for text in ax.texts]
     assert sorted(texts) == sorted(f"{100 * mean:.1f}" for mean in table["mean"])
-
-
-def test_a_distribution_is_the_share_of_missions(results):
-    (ax,) = figures.distribution(results.missions).figure.axes
-    for line, policy in zip(ax.lines, results.policies, strict=True):
-        values = results.missions[results.missions["policy"] == policy][PRODUCT]
-        heights = dict(zip(*(list(data)[1:] for data in line.get_data()), strict=True))
-        assert heights == pytest.approx({value: (values <= value).mean() for value in values})
 
 
 def test_many_values_have_panels_that_are_spread_evenly():

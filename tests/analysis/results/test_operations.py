@@ -69,7 +69,8 @@ def test_missions_without_a_value_are_left_out_of_means_and_comparisons(results)
     row = rows.loc["random", 1, "queue"]
     assert row["n"] == len(mine) == 9
     assert tuple(row[["mean", "low", "high"]]) == tuple(interval_of("queue", mine))
-    assert ("greedy", 0, "failures") not in rows.index  # nothing can fail there
+    # Nothing can fail there.
+    assert ("greedy", 0, "failures") not in rows.index
     table = compare(missions[missions["point"] == 1], "greedy", ["queue"])
     assert table["n"].tolist() == [9]
 

@@ -39,7 +39,8 @@ def forged(sound: Path, out: Path, kinds: str, forge: Forge) -> Path:
         table = forge(pq.ParquetFile(path).read())
         path.unlink()
         name = path.stem.rpartition("-")[0]
-        with suppress(ValueError, RecursionError, TypeError, KeyError):  # an event log has no parts
+        # An event log has no parts.
+        with suppress(ValueError, RecursionError, TypeError, KeyError):
             name = name_of(json.loads((table.schema.metadata or {})[b"dess.parts"]))
         parquet.write(path.parent, name, table)
     return out

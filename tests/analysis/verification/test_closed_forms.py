@@ -16,7 +16,8 @@ def test_initial_data_of_few_nodes_by_hand():
     assert one.cdf([5, 8.75, 20]) == pytest.approx([0, 0.25, 1])
     two = closed_forms.initial_total(Scenario.of(nodes=[[0, 0], [1, 1]]))
     assert two.cdf([10, 25, 40]) == pytest.approx([0, 0.5, 1])
-    assert two.cdf(17.5) == pytest.approx(0.125)  # a triangle, a quarter of the way
+    # A triangle, a quarter of the way.
+    assert two.cdf(17.5) == pytest.approx(0.125)
 
 
 @pytest.mark.parametrize("successes", [0, 2, 6, 9])

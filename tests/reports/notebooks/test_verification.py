@@ -1,9 +1,9 @@
-"""The page of the verification says so when something is wrong; of sound results it is kept."""
+"""Pages of few or no results say so; pages of sound results are kept."""
 
 from dess.analysis import load_study, run_study
 from dess.analysis.stats.verdict import REFUTED
 from dess.analysis.verification.measurements import simulate_missions, write
-from tests.reports.small import said_by
+from tests.reports.small import run_small_studies, said_by
 
 NAME = "verification"
 
@@ -18,3 +18,9 @@ def test_too_few_missions_are_not_taken_for_a_proof(tmp_path):
     assert "Too few observations for" in text
     assert "not read, incomplete or of other code: broken" in text
     assert REFUTED not in text
+
+
+def test_without_the_study_of_the_gap_the_page_says_how_to_run_it(tmp_path):
+    run_small_studies(tmp_path, "table4", "fig4")
+    said = said_by("performance", results=str(tmp_path))
+    assert "is not known here: `dess study run gap` computes" in said

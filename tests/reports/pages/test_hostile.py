@@ -69,7 +69,8 @@ def test_a_script_in_a_page_without_scripts_does_not_run(page, tmp_path, visit):
     path.write_text(page.read_text("utf-8").replace("</main>", f"{markup}</main>"), "utf-8")
     opened = visit(path, 1000)
     assert opened.page.evaluate("window.hit") is None
-    assert len(opened.complaints) == 3  # about the script, the image and its handler
+    # About the script, the image and its handler.
+    assert len(opened.complaints) == 3
     assert all("Content Security Policy" in complaint for complaint in opened.complaints)
 
 

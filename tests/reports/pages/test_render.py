@@ -269,7 +269,6 @@ def test_pages_without_results_are_left_out_with_a_note(results, tmp_path, caplo
     assert len(listed) == 1
     commands = re.findall("<code>(.*?)</code>", listed[0])
     assert commands == ["dess study run fleets", "dess study run pads"]
-    assert str(results) not in page
     assert "note: report comparison is left out: results: " in caplog.text
     with pytest.raises(InputError, match="of 2 studies; .*: dess study run fleets pads --out"):
         render(["comparison", "scorecard"], results, tmp_path / "a", notebooks=notebooks)
@@ -278,7 +277,7 @@ def test_pages_without_results_are_left_out_with_a_note(results, tmp_path, caplo
 
 def test_results_of_another_study_are_refused(results, tmp_path):
     (tmp_path / "table4").symlink_to(results / "trial")
-    with pytest.raises(InputError, match="table4 holds study trial; allowed: table4"):
+    with pytest.raises(InputError, match="table4 holds study trial"):
         render(["performance"], tmp_path, tmp_path / "out")
 
 
@@ -334,7 +333,8 @@ def test_a_notebook_that_fails_or_dies_leaves_a_partial_page_and_names_the_cell(
         text = words_of((tmp_path / f"{name}.partial.html").read_text("utf-8"))
         assert f"This page is incomplete. report {name}: cell 3 of 4" in text
         assert "the cell before" in text and "the cell after" not in text
-    assert (tmp_path / "mission.html").read_text() == "before"  # the complete page stays
+    # The complete page stays.
+    assert (tmp_path / "mission.html").read_text() == "before"
     assert "the cell after" in words_of((tmp_path / "performance.html").read_text("utf-8"))
     monkeypatch.setattr(kernels, "run", lambda reports, *_: None)
     render(["mission"], results, tmp_path, notebooks=notebooks)

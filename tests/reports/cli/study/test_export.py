@@ -34,7 +34,7 @@ BAD = {
     "out": "Missing option '--crate'",
     "out --crate out": "--crate: out is not a zip file; allowed: .zip",
     "out --crate none/a.zip": "none/a.zip: cannot be written",
-    "out --crate a.zip --license mine": "--license: 'mine' is unknown; allowed: an identifier of",
+    "out --crate a.zip --license mine": "--license: 'mine' is unknown",
     "out --crate a.zip --page none.html": "none.html: no such file",
     "out --crate a.zip --page small.toml": "small.toml: does not show the results of this study",
     "none --crate a.zip": "none/manifest.json: no such file",

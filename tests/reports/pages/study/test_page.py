@@ -10,8 +10,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from dess.analysis import load_results
-from dess.analysis.answers import settings
 from dess.reports.pages import html
 from dess.reports.pages.page import STUDY, Page
 from dess.reports.pages.render import render_study
@@ -70,17 +68,10 @@ def test_there_are_a_page_a_notebook_and_an_index_with_a_card(page, out):
         assert len(Page(text).hidden(STUDY)) == 1
 
 
-def test_every_figure_and_table_has_its_data(page, downloads, folder):
+def test_every_figure_and_table_has_its_data(page, downloads):
     tables = page.split("How this page was made</h2>")[0].count("<table")
     assert len(downloads) == 2 * (page.count("<img ") + tables)
     assert {kind for _, kind, _ in downloads.values()} == {"text/csv", "application/x-tex"}
-    results = load_results(folder)
-    (ranked,) = [text for name, (_, _, text) in downloads.items() if name.startswith("the-first-12")
-                 and name.endswith(".csv")]  # fmt: skip
-    expected = settings.ranked(results)
-    found = pd.read_csv(io.StringIO(ranked))
-    assert [*found] == [*expected] and len(found) == len(expected)
-    assert found["reward"].tolist() == pytest.approx(expected["reward"].tolist(), rel=1e-5)
     for name, (label, _, text) in downloads.items():
         assert label.endswith((": CSV", ": LaTeX"))
         if name.endswith(".csv"):

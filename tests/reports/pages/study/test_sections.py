@@ -13,7 +13,6 @@ from tests.reports.small import shown_by
 PRECISION = {"first": 5, "look_ahead": 2, "budget": 12,
              "targets": {"collection_ratio": {"absolute": 0.05}}}  # fmt: skip
 SELECTION = {"procedure": "kn-bounded", "first": 5, "indifference": 0.05, "budget": 60, "check": 9}
-SAMPLED = {"kind": "latin-hypercube", "size": 14, "ranges": {"uavs": [1, 3], "quota": [20, 60]}}
 # What is changed in the small study, what the page says, and what it does not.
 STUDIES = {
     "a single point": (
@@ -35,11 +34,6 @@ STUDIES = {
         {"design": {"kind": "one-at-a-time", "values": {"uavs": [1, 2], "quota": [20, 60]}}},
         ["The lowest panel shows the paired difference"],
         ["Orange frames", "One panel for each field"],
-    ),
-    "a sample": (
-        {"design": SAMPLED},
-        ["One panel for each field. A dot is the mean of a policy"],
-        ["Orange frames"],
     ),
     "sensitivity": (
         {"design": {"kind": "saltelli", "base": 8, "ranges": {"uavs": [1, 3], "quota": [20, 60]}},
