@@ -117,6 +117,7 @@ def test_transfer_is_judged_by_the_interval_of_the_end(using, without, level, ve
     result = compared(using, without, level=level)
     assert (result.verdict, result.since) == (verdict, since)
     assert result.throughout == (since == STEPS[0])
+    assert (result.course == "ends below, or level") == (since is None)
     # Only the last phase counts.
     late = compared(using, without, level=level, before=2)
     assert late.since is None or late.since >= STEPS[2]

@@ -1,5 +1,7 @@
 """Fronts go through what is not dominated; the front of costs is tested with its question."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -56,6 +58,14 @@ def test_a_heat_map_frames_what_may_be_the_best_and_marks_the_best(results, face
     assert best == table["mean"].max()
     texts = [text.get_text() for ax in panels for text in ax.texts]
     assert sorted(texts) == sorted(f"{100 * mean:.1f}" for mean in table["mean"])
+
+
+def test_of_costs_the_lowest_cell_is_marked(results):
+    missions = results.missions
+    priced = replace(results, missions=missions.assign(cost=1e4 * missions["uavs"]))
+    ax = figures.heat_map(priced, "uavs", "quota", "cost").figure.axes[0]
+    assert ax.lines[0].get_xdata()[0] == 0.5  # the smaller fleet
+    assert {text.get_text() for text in ax.texts} == {"10,000", "20,000"}
 
 
 def test_many_values_have_panels_that_are_spread_evenly():

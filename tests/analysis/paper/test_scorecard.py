@@ -156,6 +156,14 @@ def test_without_results_there_are_no_verdicts(rows):
             assert finding.verdict == NO_RESULTS and finding.note
 
 
+def test_a_single_mission_tells_nothing(studies):
+    alone = studies["table4"].missions.query("replication == 0")
+    for row in scorecard({"table4": replace(studies["table4"], missions=alone)}, NONE):
+        assert row.findings[0].verdict == (
+            INCONCLUSIVE if row.claim.study == "table4" else NO_RESULTS
+        )
+
+
 def test_learning_is_judged_by_the_curves(rows):
     higher, passes, levels = (row for row in rows if row.claim.study == TRAININGS)
     assert {row.findings[0].verdict for row in (higher, passes, levels)} == {HOLDS}
