@@ -37,17 +37,10 @@ class Command:
         arguments: The arguments of the command, whose ``--out`` is ``out``.
         folder: The folder in which it runs.
         before: Python code that is run before the command.
-        again: A file in ``out``, and an option of the command once there is the file.
     """
 
-    def __init__(
-        self,
-        arguments: list[str],
-        folder: Path,
-        before: str = "pass",
-        again: tuple[str, str] | None = None,
-    ):
-        self.folder, self.out, self.again = folder, folder / "out", again
+    def __init__(self, arguments: list[str], folder: Path, before: str = "pass"):
+        self.folder, self.out = folder, folder / "out"
         # Not beside the folder, since the names of the sockets of kernels must be short.
         self.temporary = Path(tempfile.mkdtemp(prefix="dess-killed-"))
         atexit.register(shutil.rmtree, self.temporary, ignore_errors=True)
@@ -95,10 +88,9 @@ class Command:
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, signal.SIG_DFL)
 
-        more = [self.again[1]] if self.again and (self.out / self.again[0]).exists() else []
         with open(self.stderr, "wb") as stderr:
             return subprocess.Popen(
-                [*self.words, *more],
+                self.words,
                 cwd=self.folder,
                 env=variables,
                 stdout=subprocess.DEVNULL,

@@ -5,10 +5,12 @@ a command that reads such a folder gets as far as with sound results, and shows 
 """
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 
 from dess.analysis.results import parquet
 from dess.analysis.results.chunks import (
@@ -61,6 +63,16 @@ def hostile_folder(sound: Path, into: Path, text: str) -> Path:
     (into / "manifest.json").write_text(manifest.text, "utf-8")
     _add_files(into, text)
     return into
+
+
+def forged(path: Path, column: str, change: Callable[[list], list]) -> Path:
+    """Change a column of a parquet file, under the name that belongs to its bytes."""
+    table = pq.read_table(path, partitioning=None)
+    path.unlink()
+    number = table.schema.get_field_index(column)
+    values = [change(table[column].to_pylist())]
+    table = table.set_column(number, table.schema.field(number), values)
+    return parquet.write(path.parent, parquet.content_hash(path), table)
 
 
 def _changed(manifest: Manifest, text: str) -> dict[str, Any]:

@@ -14,13 +14,12 @@ import pytest
 from scipy import stats
 
 from dess.analysis.metrics import PRODUCT, REWARD
-from dess.analysis.stats.differences import adjust, paired
+from dess.analysis.stats.differences import paired
 from dess.analysis.stats.distribution import quantile_interval
 from dess.analysis.stats.intervals import bounded_ends, mean_interval, stratified
 from dess.analysis.stats.learners import crossed
 
 Drawing = tuple[Callable[[np.random.Generator, tuple[int, int]], np.ndarray], float]
-Intervals = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 TRIALS = 2000
 QUICK = [300, pytest.param(TRIALS, marks=pytest.mark.slow)]
@@ -66,15 +65,6 @@ PRODUCTS: dict[str, Drawing] = {
 }
 
 
-def lengths_and_coverage(
-    intervals: Intervals, drawing: Drawing, n: int, trials: int
-) -> tuple[float, float]:
-    """The mean length of intervals of n values, and the share of them that hold the mean."""
-    draw, mean = drawing
-    low, high = intervals(draw(rng(1, n), (trials, n)))
-    return float(np.mean(high - low)), float(np.mean((low <= mean) & (mean <= high)))
-
-
 def bounded(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return bounded_ends(values.mean(axis=1), values.var(axis=1), values.shape[1])
 
@@ -113,23 +103,33 @@ def betting(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("n", [10, 30, 100, 300])
 @pytest.mark.parametrize("drawing", PRODUCTS.values(), ids=PRODUCTS)
 def test_bounded_intervals_cover_wherever_the_values_lie(drawing, n):
-    assert lengths_and_coverage(bounded, drawing, n, 500)[1] >= 0.95 - error(500)
+    draw, mean = drawing
+    low, high = bounded(draw(rng(1, n), (500, n)))
+    assert np.mean((low <= mean) & (mean <= high)) >= 0.95 - error(500)
+
+
+def in_markdown(*rows: list[str]) -> str:
+    """A table whose first row is its head."""
+    head, *others = rows
+    return "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *others))
+
+
+def told(ends: tuple[np.ndarray, np.ndarray], truth: float) -> str:
+    """The coverage and the mean length [points] of intervals."""
+    low, high = ends
+    coverage = np.mean((low <= truth) & (truth <= high))
+    return f"{100 * coverage:.1f} %, {100 * np.mean(high - low):.1f}"
 
 
 def table_of_the_docs() -> str:
-    """Coverage and mean length [points] of the intervals for some products: a table in Markdown."""
-    lines = [
-        "| missions | n | Student's t | one 0 and one 1 added | betting |",
-        "| --- | --- | --- | --- | --- |",
-    ]
+    """Of the intervals of some products."""
+    rows = [["missions", "n", "Student's t", "one 0 and one 1 added", "betting"]]
     cases = [("no failures", 300), ("one failure in 100", 100), ("one failure in 100", 1000)]
     for name, n in [*cases, ("one failure in 20", 300), ("failures but one in 200", 100)]:
-        cells = []
-        for intervals in (student, bounded, betting):
-            length, coverage = lengths_and_coverage(intervals, PRODUCTS[name], n, 1000)
-            cells.append(f"{100 * coverage:.1f} %, {100 * length:.1f}")
-        lines.append(f"| {name} | {n} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        draw, mean = PRODUCTS[name]
+        values = draw(rng(1, n), (1000, n))
+        rows.append([name, str(n), *(told(f(values), mean) for f in (student, bounded, betting))])
+    return in_markdown(*rows)
 
 
 @pytest.mark.slow
@@ -218,7 +218,8 @@ RARE = [(0.02, 50), (0.01, 100), (0.003, 300), (0.001, 1000), (0.03, 100), (0.06
 def test_paired_intervals_cover_where_one_policy_never_fails(share, n, metric, trials):
     a, b = lone(0.0, share, 1.0, n, trials)
     truth = share * 0.8
-    if metric == REWARD:  # a product of 0 is a failure, which costs 400 and the data
+    # A product of 0 is a failure, which costs 400 and the data.
+    if metric == REWARD:
         a, b, truth = 300 * a - 400 * (a == 0), 300 * b - 400 * (b == 0), share * (240 + 400)
     low, high, p = compared(a, b, metric)
     assert np.mean((low <= truth) & (truth <= high)) >= 0.95 - error(trials)
@@ -241,41 +242,19 @@ def of_pairs(a: np.ndarray, b: np.ndarray) -> dict[str, tuple[np.ndarray, np.nda
 
 
 def table_of_rare_failures() -> str:
-    """Coverage and mean length [points] of intervals of differences: a table in Markdown."""
-    lines = [
-        "| B fails, A never | n | Student's t | 1 and -1 added | rare differences added |",
-        "| --- | --- | --- | --- | --- |",
-    ]
+    """Of the intervals of differences."""
+    kinds = ["Student's t", "1 and -1 added", "rare differences added"]
+    rows = [["B fails, A never", "n", *kinds]]
     for share, n in RARE:
-        cells = []
-        for low, high in of_pairs(*lone(0.0, share, 1.0, n, 1000)).values():
-            coverage = np.mean((low <= 0.8 * share) & (0.8 * share <= high))
-            cells.append(f"{100 * coverage:.1f} %, {100 * np.mean(high - low):.1f}")
-        lines.append(f"| {100 * share:g} % | {n} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        found = of_pairs(*lone(0.0, share, 1.0, n, 1000)).values()
+        rows.append([f"{100 * share:g} %", str(n), *(told(ends, 0.8 * share) for ends in found)])
+    return in_markdown(*rows)
 
 
 @pytest.mark.slow
 def test_the_table_of_rare_failures_of_the_docs_is_measured():
     page = Path(__file__).parents[2] / "docs" / "concepts" / "confidence-intervals.md"
     assert table_of_rare_failures() in page.read_text("utf-8")
-
-
-# Many comparisons
-
-
-def p_values(effects: np.ndarray, families: int) -> np.ndarray:
-    """Two-sided p-values of differences to one common baseline: (families, effects)."""
-    draws = rng(11).normal(size=(families, len(effects) + 1))
-    z = (draws[:, 1:] - draws[:, :1]) / np.sqrt(2) + effects
-    return 2 * stats.norm.sf(np.abs(z))
-
-
-def test_holm_bounds_the_chance_of_a_false_claim():
-    families = p_values(np.zeros(20), TRIALS)
-    assert np.mean(families.min(axis=1) <= 0.05) > 0.3  # without
-    false = [adjust(p, "holm").min() <= 0.05 for p in families]
-    assert 0.01 < np.mean(false) <= 0.05 + error(TRIALS, 0.05)
 
 
 # Learners
@@ -303,11 +282,3 @@ def test_the_interval_of_a_learner_covers_trainings_and_missions(trainings, tria
     assert holds(float(np.mean(new)), trials)
     missions_alone = (mean_interval(d.mean(axis=0))[1:] for d, _ in drawn)
     assert covered(missions_alone, 0.0) < 0.75
-
-
-@pytest.mark.parametrize("trainings", [3, 5])
-def test_the_components_are_told_apart(trainings):
-    results = [crossed(d) for d, _ in layouts((trainings, 50), 0.1, 0.2, 0.05, trials=300)]
-    variances = np.square([r[-3:] for r in results]).mean(axis=0)
-    # a variance of S - 1 degrees of freedom: relative error sqrt(2 / (S - 1) / 300) = 0.06
-    assert variances == pytest.approx([0.01, 0.04, 0.0025], rel=0.24)

@@ -1,17 +1,18 @@
-"""Policies of another package that get into trouble at replication 5, as an installed plug-in."""
+"""Policies that get into trouble at replication 5; tests copy this file, as one of a user."""
 
-import sys
-from pathlib import Path
-
-import pytest
-
-CODE = """
 import os
+import shutil
 import signal
+from pathlib import Path
 
 import numpy as np
 
 HERE = os.path.dirname(__file__)
+
+
+def copied(folder: Path) -> Path:
+    """A copy of this file, whose name no other test has: a process keeps what it has imported."""
+    return shutil.copy(__file__, folder / f"{folder.name}.py")
 
 
 class Hover:
@@ -49,25 +50,3 @@ class KilledAlways(Hover):
 
     def trouble(self):
         os.kill(os.getpid(), signal.SIGKILL)
-"""
-
-ENTRY_POINTS = """[dess.policies]
-hover = troublesome_plugin:Hover
-raising = troublesome_plugin:Raising
-killed-once = troublesome_plugin:KilledOnce
-killed-always = troublesome_plugin:KilledAlways
-"""
-
-
-def install(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Put the plug-in on the path of this process and of the workers that it starts from now on."""
-    from joblib.externals.loky import get_reusable_executor
-
-    info = folder / "troublesome-1.0.dist-info"
-    info.mkdir(parents=True)
-    (folder / "troublesome_plugin.py").write_text(CODE)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: troublesome\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(ENTRY_POINTS)
-    monkeypatch.syspath_prepend(folder)
-    monkeypatch.delitem(sys.modules, "troublesome_plugin", raising=False)  # of an earlier test
-    get_reusable_executor().shutdown(wait=True)

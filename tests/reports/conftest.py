@@ -5,7 +5,10 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import sync_playwright
 
+from tests.analysis.conftest import studied
 from tests.reports import browser
+
+__all__ = ["studied"]  # a fixture
 
 
 @pytest.fixture(scope="module")

@@ -22,12 +22,14 @@ from dess.reports.pages import html
 from dess.reports.pages.notebook import Report, read
 from dess.reports.player import library
 from dess.scenario import ScenarioSpace
+from tests.analysis.small import grid
 
 EMBEDDED = re.compile("data:image/svg\\+xml;base64,([A-Za-z0-9+/=]+)")
 
 POLICIES = ["random", "greedy", "ddqn"]
 # Three generated seas of as many families.
-_SEAS = {"kind": "grid", "values": {"scenario": ["coast:2", "scattered:2", "large:2"]}}
+_SEAS = grid(scenario=["coast:2", "scattered:2", "large:2"])
+_CORNERS = grid(uavs=[1, 3], initial_data=[[5, 7.5], 10])
 RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.01, "budget": 60, "check": 12}
 STUDIES: dict[str, dict[str, Any]] = {
     "table4": {"policies": POLICIES, "missions": 40},
@@ -36,42 +38,19 @@ STUDIES: dict[str, dict[str, Any]] = {
     "verification": {"missions": 200, "logged": 8},
     "fig4": {"policies": POLICIES, "missions": 8, "logged": 2},
     "fig5": {"policies": POLICIES, "missions": 8},
-    "explorer": {
-        "policies": POLICIES,
-        "missions": 8,
-        "design": {"kind": "grid", "values": {"uavs": [1, 3], "initial_data": [[5, 7.5], 10]}},
-    },
-    "sweet-spot": {
-        "policies": POLICIES,
-        "selection": RULE,
-        "design": {"kind": "grid", "values": {"uavs": [1, 3], "initial_data": [[5, 7.5], 10]}},
-    },
-    "pads": {
-        "missions": 8,
-        "logged": 2,
-        "design": {"kind": "grid", "values": {"uavs": [2, 4], "pads": [1, 2, 4]}},
-    },
-    "age": {
-        "missions": 4,
-        "design": {"kind": "grid", "values": {"uavs": [1, 2], "arrival_rate": [0.1, 0.5]}},
-    },
+    "explorer": {"policies": POLICIES, "missions": 8, "design": _CORNERS},
+    "sweet-spot": {"policies": POLICIES, "selection": RULE, "design": _CORNERS},
+    "pads": {"missions": 8, "logged": 2, "design": grid(uavs=[2, 4], pads=[1, 2, 4])},
+    "age": {"missions": 4, "design": grid(uavs=[1, 2], arrival_rate=[0.1, 0.5])},
     "failures": {
         "missions": 8,
-        "design": {
-            "kind": "grid",
-            "values": {
-                "uavs": [2, 3],
-                "failures.uav_rate": [0.0, 0.01],
-                "failures.uav_repair": [0.0, 20.0],
-            },
-        },
+        "design": grid(
+            **{"uavs": [2, 3], "failures.uav_rate": [0.0, 0.01]},
+            **{"failures.uav_repair": [0.0, 20.0]},
+        ),
     },
     "gap": {"policies": [*POLICIES, "planner"], "missions": 12, "logged": 2},
-    "seas": {
-        "policies": ["any", "greedy", "planner"],
-        "missions": 4,
-        "design": _SEAS,
-    },
+    "seas": {"policies": ["any", "greedy", "planner"], "missions": 4, "design": _SEAS},
     "seas-landing": {"policies": ["any", "greedy"], "missions": 4, "design": _SEAS},
     "seas-horizon": {
         "policies": ["any", "greedy"],

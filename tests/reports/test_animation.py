@@ -49,7 +49,7 @@ def test_a_film_draws_what_the_player_shows():
 
 
 def test_a_gif_has_a_frame_per_slot_and_holds_the_last(tmp_path):
-    short = mission(quota=80)
+    short = mission(quota=30)
     for name in "ab":
         write_animation(*short, tmp_path / name, GIF, "greedy")
     content = (tmp_path / "a").read_bytes()
@@ -67,7 +67,7 @@ def test_a_gif_has_a_frame_per_slot_and_holds_the_last(tmp_path):
 
 @pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason="no ffmpeg on this machine")
 def test_a_video_has_a_frame_per_slot(tmp_path):
-    short = mission(quota=80)
+    short = mission(quota=30)
     write_animation(*short, tmp_path / "mission", MP4)
     program = [FFMpegWriter.bin_path(), "-i", str(tmp_path / "mission"), "-f", "null", "-"]
     told = subprocess.run(program, capture_output=True, text=True, check=True).stderr

@@ -5,12 +5,11 @@ import pytest
 from playwright.sync_api import Locator, Page
 
 from dess import InputError
-from dess.analysis import run_study
 from dess.analysis.metrics import METRICS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.intervals import interval_of
 from dess.reports.explorer import explorer
-from tests.analysis.small import grid, small_study
+from tests.analysis.small import grid
 
 DESIGN = {"uavs": [1, 2, 3], "charge_complete": [40, 60], "initial_data": [[1, 2], 5]}
 # As the study has them; the page has numbers in ascending order.
@@ -21,10 +20,8 @@ MISSIONS = 12
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("explorer")
-    study = small_study(folder, policies=POLICIES, missions=MISSIONS, design=grid(**SHUFFLED))
-    return run_study(study, folder / "results")
+def results(studied):
+    return studied(policies=POLICIES, missions=MISSIONS, design=grid(**SHUFFLED))
 
 
 @pytest.fixture(scope="module")
@@ -131,17 +128,9 @@ def test_without_scripts_one_setting_is_shown(chromium, results, document):
     page.close()
 
 
-@pytest.mark.parametrize(
-    "design",
-    [
-        {"kind": "table", "rows": [{"uavs": 1, "quota": 50}, {"uavs": 2, "quota": 60}]},
-        grid(uavs=[1, 2]),
-        None,
-    ],
-)
-def test_what_is_no_grid_is_refused(design, tmp_path):
-    changes = {"design": design} if design else {}
-    study = small_study(tmp_path, policies=["random"], missions=2, **changes)
-    results = run_study(study, tmp_path / "results")
-    with pytest.raises(InputError, match="trial is not a full grid of two fields or more; allowed"):
-        explorer(results)
+def test_what_is_no_grid_is_refused(studied):
+    rows = [{"uavs": 1, "quota": 50}, {"uavs": 2, "quota": 60}]
+    for changes in ({}, {"design": grid(uavs=[1, 2])}, {"design": {"kind": "table", "rows": rows}}):
+        results = studied(policies=["random"], missions=2, **changes)
+        with pytest.raises(InputError, match="is not a full grid of two fields or more"):
+            explorer(results)

@@ -37,10 +37,12 @@ def during(work, monkeypatch, capsys):
 
 @pytest.mark.parametrize("number", SIGNALS)
 def test_a_signal_ends_a_command_with_one_line(number, monkeypatch, capsys):
-    before = [signal.getsignal(each) for each in SIGNALS], sys.unraisablehook
+    heeded = [*SIGNALS, signal.SIGALRM]
+    before = [signal.getsignal(each) for each in heeded], sys.unraisablehook
     signalled = during(lambda: signal.raise_signal(number), monkeypatch, capsys)
     assert signalled == (130, "", LINE)
-    assert ([signal.getsignal(each) for each in SIGNALS], sys.unraisablehook) == before
+    assert ([signal.getsignal(each) for each in heeded], sys.unraisablehook) == before
+    assert signal.getitimer(signal.ITIMER_REAL) == (0, 0)
 
 
 def test_what_a_library_makes_of_a_signal_is_an_interruption(monkeypatch, capsys):
@@ -90,13 +92,6 @@ def test_a_signal_is_not_lost(lose, monkeypatch, capsys):
     begin = time.monotonic()
     assert during(lost, monkeypatch, capsys) == (130, "", LINE)
     assert time.monotonic() - begin < 30
-
-
-def test_a_signal_disturbs_no_command_after_it(monkeypatch, capsys):
-    before = signal.getsignal(signal.SIGALRM)
-    during(lambda: signal.raise_signal(signal.SIGTERM), monkeypatch, capsys)
-    assert signal.getsignal(signal.SIGALRM) is before
-    assert signal.getitimer(signal.ITIMER_REAL) == (0, 0)
 
 
 def test_a_signal_that_was_ignored_stays_ignored(monkeypatch, capsys):

@@ -102,18 +102,24 @@ def test_pairs_need_trainings_of_both_variants():
 @pytest.mark.parametrize(
     ("using", "without", "level", "verdict", "since"),
     [
-        ([9.0, 9.01, 9.02], [5.0, 5.01, 5.02], -1.0, HOLDS, STEPS[2]),  # behind at first
-        ([4.0, 9.0], [3.0, 8.0], 1.0, INCONCLUSIVE, STEPS[0]),  # the interval contains 0
+        # Behind at first.
+        ([9.0, 9.01, 9.02], [5.0, 5.01, 5.02], -1.0, HOLDS, STEPS[2]),
+        # The interval contains 0.
+        ([4.0, 9.0], [3.0, 8.0], 1.0, INCONCLUSIVE, STEPS[0]),
         ([3.0, 8.0], [4.0, 9.0], 0.0, INCONCLUSIVE, None),  # ends below
-        ([9.0], [5.0], 0.0, INCONCLUSIVE, STEPS[1]),  # two single trainings, equal at first
-        ([2.0, 2.1, 2.2], [9.0, 9.1, 9.2], 1.0, REFUTED, None),  # ahead at first
+        # Two single trainings, equal at first.
+        ([9.0], [5.0], 0.0, INCONCLUSIVE, STEPS[1]),
+        # Ahead at first.
+        ([2.0, 2.1, 2.2], [9.0, 9.1, 9.2], 1.0, REFUTED, None),
     ],
 )
 def test_transfer_is_judged_by_the_interval_of_the_end(using, without, level, verdict, since):
     result = compared(using, without, level=level)
     assert (result.verdict, result.since) == (verdict, since)
     assert result.throughout == (since == STEPS[0])
-    late = compared(using, without, level=level, before=2)  # only the last phase counts
+    assert (result.course == "ends below, or level") == (since is None)
+    # Only the last phase counts.
+    late = compared(using, without, level=level, before=2)
     assert late.since is None or late.since >= STEPS[2]
     both = pd.concat([several("with", using), several("without", without)])
     averages = learning.smoothed(both, METRIC)

@@ -136,7 +136,8 @@ def test_a_uav_waits_from_its_request_until_it_charges_gives_up_or_ends():
 
 
 def test_the_queue_of_the_logs_is_that_of_the_records(pads):
-    table = operations.queues(pads, "greedy", [4]).set_index("slot")  # four UAVs, one pad
+    # Four UAVs, one pad.
+    table = operations.queues(pads, "greedy", [4]).set_index("slot")
     missions = pads.missions.query("point == 4 and replication < 2")
     assert len(table) == missions["slots"].max()
     waited = (missions["queue"] * missions["slots"]).sum() / 2

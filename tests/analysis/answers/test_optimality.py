@@ -4,12 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess.analysis import run_study
 from dess.analysis.answers import optimality
-from dess.analysis.bound import Bound
-from dess.analysis.execution import jobs
 from dess.analysis.metrics import BOUND, GAP, PRODUCT
-from tests.analysis.small import small_study
 
 
 class Made:
@@ -57,15 +53,3 @@ def test_rows_are_by_number_of_uavs_then_over_all(made):
         *((optimality.ALL, "low", 5), (optimality.ALL, "high", 5)),
     ]
     assert table[GAP].tolist() == pytest.approx([0.2, 0.15, 0.2, 0.05, 0.2, 0.11])
-
-
-def test_results_without_bounds_have_no_gap(studied, tmp_path, monkeypatch):
-    plain = studied(missions=2)
-    assert optimality.by_fleet(plain).empty
-    bound = Bound(0.9, np.zeros((1, 3)), np.array([30]), 0)
-    monkeypatch.setattr(jobs, "upper_bound", lambda *_, **__: bound)
-    bounded = run_study(small_study(tmp_path, missions=2, bounds=True), tmp_path / "bounded")
-    table = optimality.by_fleet(bounded)
-    rows = table[table["uavs"] == optimality.ALL] if optimality.ALL in {*table["uavs"]} else table
-    means = bounded.missions.groupby("policy", sort=False)[PRODUCT].mean()
-    assert rows[GAP].tolist() == pytest.approx((0.9 - means).tolist())

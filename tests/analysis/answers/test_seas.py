@@ -35,7 +35,8 @@ def test_a_sea_counts_once(results):
     known = of_sea(results, "nearest", SUCCESS)[:2].mean()
     assert families.loc[("scattered", "nearest"), "mean"] == pytest.approx(known)
     assert {*seas.quality(results, "nodes")["nodes"]} >= {"61 and more"}
-    assert {*seas.quality(results, "uavs")["uavs"]} <= {5, 6}  # seed 2 has five or six
+    # Seed 2 has five or six.
+    assert {*seas.quality(results, "uavs")["uavs"]} <= {5, 6}
 
 
 def test_gains_and_shares_are_paired_by_sea(results):

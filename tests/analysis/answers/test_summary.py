@@ -1,7 +1,6 @@
 """The summary of a study: tables of means, comparisons, selections and the worst missions."""
 
 import warnings
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,26 +8,20 @@ import pandas as pd
 import pytest
 
 from dess import InputError
+from dess.analysis import load_study, run_study
 from dess.analysis.answers import summary
 from dess.analysis.answers.summary import sensitivity
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.study.design import Saltelli
-from dess.policies import load
-from dess.policies.learner.dqn import DQNTraining
-from dess.policies.learner.trained import save_policy
-from tests.analysis.small import write_scenario
-from tests.policies.learner.tiny import CPU, PHASES, tiny
 
-FIELDS = ("edge_snr", "arrival_rate", "path_loss_exponent")  # names only: nothing is simulated
+# Names only: nothing is simulated.
+FIELDS = ("edge_snr", "arrival_rate", "path_loss_exponent")
 INDICES = ["first", "first_low", "first_high", "total", "total_low", "total_high"]
 
 
 def noise_of(replication):
-    """A number in [0, 1) of a replication, as good as random (splitmix64)."""
-    z = np.asarray(replication, np.uint64) + np.uint64(0x9E3779B97F4A7C15)
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return ((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+    """A number in [0, 1) of a replication, as good as random."""
+    return np.array([np.random.default_rng(each).random() for each in replication])
 
 
 def unit(number, base, seed=0):
@@ -48,11 +41,6 @@ def evaluated(design, **functions):
 KNOWN = {
     # Variances 1 : 4. Nothing interacts, so total = first.
     "additive": (lambda x, e: x + 2 * e, [1 / 5, 4 / 5], [1 / 5, 4 / 5]),
-    "two fields": (
-        lambda x, y, e: x + 2 * y + 3 * e,
-        [1 / 14, 4 / 14, 9 / 14],
-        [1 / 14, 4 / 14, 9 / 14],
-    ),
     # Variance E[x^2] / 12 = 1/36. The mean does not depend on x: its first is 0.
     # E[. | e] = (e - 1/2) / 2 has variance 1/48, 3/4 of it; all of it is gone once e is known.
     "spread": (lambda x, e: x * (e - 1 / 2), [0, 3 / 4], [1 / 4, 1]),
@@ -89,12 +77,7 @@ def test_a_metric_without_variance_has_no_shares():
         table = sensitivity(design, missions, ["always", "tenth", "elsewhere", "y"])
     assert table.loc[table["metric"] != "y", INDICES].isna().all(axis=None)
     assert table.loc[table["metric"] == "y", INDICES].notna().all(axis=None)
-
-
-def test_there_is_one_mission_of_every_point_of_the_design():
-    design = unit(1, base=4)
-    missions = evaluated(design, y=lambda x, e: x + e)
-    with pytest.raises(InputError, match="32 are not .* one for each of its 16 design points$"):
+    with pytest.raises(InputError, match="160 are not .* one for each of its 80 design points$"):
         sensitivity(design, pd.concat([missions, missions]), ["y"])
 
 
@@ -156,39 +139,23 @@ def test_policies_are_ranked_by_the_mean_over_design_points():
         ("c", 0, 0.6),
     ]
     missions = pd.DataFrame(rows, columns=["policy", "point", PRODUCT])
-    assert summary.ranked_policies(missions) == ["b", "c", "a"]  # a: (0.9 + 0.1) / 2
+    # A: (0.9 + 0.1) / 2.
+    assert summary.ranked_policies(missions) == ["b", "c", "a"]
     assert summary.best_policy(missions) == "b"
     assert summary.best_policy(missions, among=["a", "c"]) == "c"
 
 
-@pytest.fixture
-def trained_twice(tmp_path):
-    """Folders of two trainings that differ in their seed, and of one that does not learn alike."""
-    scenario, folders = str(write_scenario(tmp_path)), []
-    for seed, discount in ((1, 0.99), (2, 0.99), (1, 0.9)):
-        phases = [PHASES[1] | {"ticks": 3}]
-        config = tiny(
-            scenario=scenario, seed=seed, discount=discount, learning_starts=5, phases=phases
-        )
-        training = DQNTraining(config, CPU)
-        training.run(2)
-        folders.append(str(tmp_path / f"{seed}-{discount}"))
-        weights = training.learner.online.state_dict()
-        save_policy(Path(folders[-1]), weights, config, training.space)
-    return folders
+def test_checkpoints_of_one_learner_are_one_learner(tmp_path):
+    def results_of(*policies):
+        study = load_study("table4", policies=policies, missions=5)
+        return run_study(study, tmp_path / "-".join(policies))
 
-
-def test_checkpoints_of_one_learner_are_one_learner(studied, trained_twice):
-    first, second, other = trained_twice
-    assert load(first).learner == load(second).learner != load(other).learner
-    policies = ["greedy", "random", first, second]
-    results = studied(policies=policies)
-    assert summary.learners(results) == {"tiny": [first, second]}
-    policies = ["greedy", first, other, f"{first},greedy"]
-    mixed = studied(policies=policies)
-    assert sorted(summary.learners(mixed).values()) == sorted([[first], [other]])
+    results = results_of("greedy", "random", "ddqn", "ddqn-2")
+    assert summary.learners(results) == {"ddqn": ["ddqn", "ddqn-2"]}
+    mixed = results_of("greedy", "ddqn", "ddqn-paper", "ddqn,greedy")
+    assert sorted(summary.learners(mixed).values()) == [["ddqn"], ["ddqn-paper"]]
     table = summary.learned_against_heuristic(results)
     assert set(table["about"]) == {"the learner"}
     assert set(table["trainings"]) == {2}
-    alone = studied(policies=["greedy", first])
+    alone = results_of("greedy", "ddqn")
     assert set(summary.learned_against_heuristic(alone)["about"]) == {"this checkpoint"}

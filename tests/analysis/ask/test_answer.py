@@ -9,14 +9,14 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from dess import InputError
-from dess.analysis import sweep, what_if
+from dess.analysis import sweep
 from dess.analysis.answers.settings import varied
 from dess.analysis.ask import what_if as found
-from dess.analysis.ask.what_if import BASELINE, VARIATION, WhatIf
+from dess.analysis.ask.what_if import BASELINE, VARIATION
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE
-from tests.analysis.small import asked, files_of, write_scenario
+from tests.analysis.small import asked, write_scenario
 
 POLICIES = ["random", "greedy"]
 
@@ -40,11 +40,6 @@ def test_settings_are_ranked(asking):
     assert len(table) == 2 * 2 * 2
     assert [*table["rank"]] == [*range(1, 9)]
     assert table[PRODUCT].is_monotonic_decreasing
-    missions = answer.results.missions
-    for row in table.itertuples():
-        of_row = missions[(missions["policy"] == row.policy) & (missions["point"] == row.point)]
-        assert row.collection_ratio == pytest.approx(of_row["collection_ratio"].mean())
-        assert {*of_row["uavs"]} == {row.uavs}
     best = answer.best()
     assert [*best["policy"]] == [*table["policy"].unique()]
     assert best["rank"].iloc[0] == 1
@@ -55,19 +50,10 @@ def test_settings_are_ranked(asking):
     assert answer.guarantee == ""
 
 
-def test_the_cheapest_settings_are_the_best(tmp_path):
-    about = {"missions": 5, "folder": tmp_path, "prices": {"uav": 7}, "progress": False}
-    about["policies"] = ["greedy"]
-    answer = sweep(
-        write_scenario(tmp_path), requirements={"ratio": 0.1}, uavs=[1, 2], quota=[20, 40], **about
-    )
-    best = answer.best()
-    assert [*best["uavs"]] == [1, 1]
-    assert [*best["quota"]] == [20, 40]
-    assert {*best["verdict"]} == {"met"}
-    assert len(answer.answers()) == 3
-    assert "with probability at least 0.95" in answer.guarantee
-    assert len(answer.results.checks) == 2 * 5
+def test_the_cheapest_settings_are_the_best(asking):
+    fleets = {"uavs": [1, 2], "quota": [20, 40]}
+    best = asking(prices={"uav": 7}, requirements={"ratio": 0.1}, **fleets).best()
+    assert best[["uavs", "quota"]].drop_duplicates().to_numpy().tolist() == [[1, 20], [1, 40]]
 
 
 def test_a_plot_is_over_the_first_fields(asking):
@@ -84,40 +70,8 @@ MISSIONS = 12
 
 
 @pytest.fixture(scope="module")
-def ask(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("what-if")
-    return lambda **changes: asked(folder, **changes)
-
-
-@pytest.fixture(scope="module")
-def answer(ask):
-    return ask()
-
-
-def test_questions_lie_side_by_side_and_the_same_one_is_found_again(ask, answer):
-    folders = {answer.question.out}
-    for changes in (
-        {"settings": {"uavs": 5}},
-        {"baseline": {}},
-        {"policies": ["greedy"]},
-        {"seed": 4},
-    ):
-        folders.add(ask(missions=2, **changes).question.out)
-    assert len(folders) == 5
-    assert {folder.parent for folder in folders} == {answer.question.out.parent}
-    before = files_of(answer.question.out)
-    assert ask().question.out == answer.question.out
-    assert files_of(answer.question.out) == before
-
-
-def test_both_sides_meet_the_same_realisations(answer):
-    sides = answer.results.missions.pivot(
-        index=["policy", "replication"], columns="point", values=["initial", "flying_time", "uavs"]
-    )
-    for field in ("initial", "flying_time"):
-        assert (sides[field, BASELINE] == sides[field, VARIATION]).all()
-        assert sides[field, BASELINE].nunique() > 1
-    assert (sides["uavs", BASELINE] == 2).all() and (sides["uavs", VARIATION] == 6).all()
+def answer(tmp_path_factory):
+    return asked(tmp_path_factory.mktemp("what-if"))
 
 
 def row(difference, low, high, p=0.01, n=100):
@@ -128,7 +82,6 @@ def row(difference, low, high, p=0.01, n=100):
 def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(tmp_path):
     changes = {"age.reward": -1.0, "failures.uav_rate": 0.2}
     results = asked(tmp_path, 6, settings=changes, policies=["greedy"]).results
-    assert {"age", "failures"} <= {*found.measured(results)}
     answers = found.answers(results).set_index("metric")
     sides = results.missions.pivot(index="replication", columns="point", values="age")
     change = (sides[VARIATION] - sides[BASELINE]).mean()
@@ -136,9 +89,6 @@ def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(t
     assert (answers.loc["failures", "before"], answers.loc["failures", "n"]) == (0, 6)
     failed = results.missions.query("point == @VARIATION")["failures"].mean()
     assert answers.loc["failures", "difference"] == pytest.approx(failed) and failed > 0
-    assert found.means(results).query("metric == 'age'")["mean"].tolist() == (
-        pytest.approx(answers.loc["age", ["before", "after"]].tolist())
-    )
 
 
 def test_what_one_side_measures_has_no_difference(tmp_path):
@@ -155,11 +105,10 @@ def test_what_one_side_measures_has_no_difference(tmp_path):
 @pytest.mark.parametrize(
     ("answer", "side"),
     [
-        (row(0.2, 0.1, 0.3), ABOVE),
         (row(-0.2, -0.3, -0.1), BELOW),
         (row(0.1, -0.1, 0.3), INCONCLUSIVE),
-        (row(0.0, 0.0, 0.0, p=1.0), INCONCLUSIVE),
-        (row(0.5, 0.5, 0.5, p=0.5, n=2), INCONCLUSIVE),  # two equal differences prove nothing
+        # Two equal differences prove nothing.
+        (row(0.5, 0.5, 0.5, p=0.5, n=2), INCONCLUSIVE),
         (row(0.5, 0.5, 0.5, p=0.002, n=10), ABOVE),
     ],
 )
@@ -226,14 +175,3 @@ def test_a_conclusion_names_the_side_of_the_whole_interval_or_how_many_missions_
 ):
     about = {"policy": "greedy", "metric": PRODUCT, "before": 0.9, "after": 0.9 + ends[0]}
     assert said in found.conclusion(pd.Series({**row(*ends, p=0.2), "n": 100, **about}))
-
-
-def test_another_variation_of_the_same_baseline_simulates_that_side_only(tmp_path):
-    done: list[int] = []
-    about = {"baseline": {"uavs": 2}, "policies": POLICIES, "missions": 3, "folder": tmp_path}
-    about |= {"scenario": write_scenario(tmp_path), "progress": done.append}
-    assert isinstance(what_if({"uavs": 6}, **about), WhatIf)
-    for settings, new in (({"uavs": 3}, 6), ({"uavs": 6}, 0)):
-        done.clear()
-        what_if(settings, **about)
-        assert (done[0], sum(done)) == (12 - new, 12)

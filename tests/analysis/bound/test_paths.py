@@ -4,21 +4,9 @@ import numpy as np
 import pytest
 
 from dess import load_scenario
-from dess.analysis.bound.paths import blocks_of
 from dess.analysis.bound.prices import Bounds, Detail, improve, known_of
 from dess.scenario import ScenarioSpace
-from tests.analysis.bound.lone_uav import bound_of_data
-
-
-def test_the_block_before_is_a_neighbour():
-    nodes = np.array([[1, 1], [4, 1], [1, 4]])
-    blocks = blocks_of(nodes, (6, 6), 4, np.array([0, 2]))
-    assert blocks.home[0, 0] == 0
-    assert blocks.home[5, 0] == 1
-    assert {*blocks.near[0]} - {-1} == {1, 2}
-    assert all(
-        blocks.near[k, blocks.place[k, j]] == j for k in range(3) for j in blocks.near[k] if j >= 0
-    )
+from tests.analysis.bound.tiny_sea import bound_of_data
 
 
 def paper_like(**values: object) -> ScenarioSpace:
@@ -57,14 +45,6 @@ def test_a_uav_can_take_all_that_its_node_has_had():
     last = known.phases.clock[:, -1].max()
     assert last > known.phases.clock[0, -1]  # there is a charge
     assert bound_of_data(space, 4) == pytest.approx(known.data[last, 0])
-
-
-def test_a_cut_without_a_price_changes_nothing():
-    known = known_of(paper_like(), 4, 0)
-    prices = np.full((1, 9), 0.3)
-    one = Bounds(known, Detail(cuts=())).at(prices)[0]
-    two = Bounds(known, Detail(cuts=(0.5,))).at(np.vstack([np.zeros((1, 9)), prices]))[0]
-    assert one == pytest.approx(two, 1e-12)
 
 
 def test_more_iterations_never_raise_the_bound():

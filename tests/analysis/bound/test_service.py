@@ -7,7 +7,7 @@ from scipy.stats import norm
 from dess import load_scenario
 from dess.analysis.bound.service import POINTS, rates_of, spread, step_takings, step_values
 from dess.channel import world_of
-from dess.state import EAST, HOVER, WEST, constants_of
+from dess.state import EAST, HOVER, constants_of
 
 NODES = ((1, 1), (3, 1))
 
@@ -46,20 +46,6 @@ def test_a_slot_is_worth_more_than_the_mean_of_the_best_node(worth):
     best = 4 * (drawn * worth).max(axis=1)
     value = values_of(rates, worth, [0.0])[HOVER, x, 1, 0]
     assert best.mean() - 4 * best.std() / len(best) ** 0.5 <= value <= 1.01 * best.mean()
-
-
-def test_a_local_price_takes_from_the_home_node_alone():
-    _, rates = world()
-    free, priced = values_of(rates, [1.0, 1.0], [0.0, 1.0])[HOVER, 1, 1]
-    assert free > 2 * priced
-    assert priced == pytest.approx(values_of(rates, [0.0, 1.0], [0.0])[HOVER, 1, 1, 0])
-
-
-def test_there_and_back_pass_the_same_places():
-    _, rates = world()
-    values = values_of(rates, [1.0, 1.0], [0.0])[..., 0]
-    ends = {x: values[HOVER, x, 1] / 4 for x in (0, 1)}
-    assert values[EAST, 1, 1] - ends[1] == pytest.approx(values[WEST, 0, 1] - ends[0])
 
 
 def test_takings_are_what_makes_up_the_worth():

@@ -15,6 +15,9 @@ import numpy as np
 from scipy.stats import norm
 
 from dess import rules
+from dess.analysis.bound import upper_bound
+from dess.analysis.bound.paths import bound_paths
+from dess.analysis.bound.prices import Bounds, Detail, known_of
 from dess.scenario import ScenarioSpace
 from dess.state import starts_of, state_of
 from tests import compiled
@@ -23,7 +26,8 @@ from tests import compiled
 FIELDS = ["active", "x", "y", "charging", "latch", "battery", "pad_request", "end"]
 FIELDS += ["communications"]
 Team = tuple[tuple, ...]  # the fields of each UAV
-Aim = Callable[[float, np.ndarray], np.ndarray]  # by the data that there were, and what is left
+# By the data that there were, and what is left.
+Aim = Callable[[float, np.ndarray], np.ndarray]
 
 
 class Deviates(NamedTuple):
@@ -194,9 +198,17 @@ class TinySea:
         for mask in range(1, 2**nodes):
             able = [k for k in range(nodes) if mask >> k & 1]
             for drawn in product(range(count), repeat=len(able)):
-                best = int(np.argmax(snr[able, drawn]))  # on a tie the lower index
+                # On a tie the lower index.
+                best = int(np.argmax(snr[able, drawn]))
                 found[mask, able[best] * count + drawn[best]] += chances[[*drawn]].prod()
         return rates, found
+
+
+def gap_of(space: ScenarioSpace, seed: int, count: int = 1) -> float:
+    """How far the bound is above the optimum, of shadowing with so many values."""
+    gap = upper_bound(space, seed, 0).ratio - TinySea(space, seed, contraction(count)).optimum
+    assert gap >= -1e-12, space
+    return gap
 
 
 def _merge(outcomes: list[Outcome]) -> tuple[dict[Team, np.ndarray], list[np.ndarray]]:
@@ -208,7 +220,8 @@ def _merge(outcomes: list[Outcome]) -> tuple[dict[Team, np.ndarray], list[np.nda
     for team, rows in parts.items():
         together = np.concatenate(rows)
         first = place = np.arange(len(together))
-        if _is_active(team):  # otherwise nothing comes after it that merging would save
+        # Otherwise nothing comes after it that merging would save.
+        if _is_active(team):
             # Rounding unites sums that differ by the order of their terms.
             _, first, place = np.unique(
                 np.round(together, 9), axis=0, return_index=True, return_inverse=True
@@ -220,3 +233,28 @@ def _merge(outcomes: list[Outcome]) -> tuple[dict[Team, np.ndarray], list[np.nda
 
 def _is_active(team: Team) -> bool:
     return any(uav[0] for uav in team)
+
+
+def bound_of_data(space: ScenarioSpace, seed: int) -> float:
+    """An upper bound on the data [data units] that a lone UAV is expected to collect."""
+    known = known_of(space, seed, 0)
+    bounds = Bounds(known, Detail(cuts=()))
+    bounds.at(np.zeros((1, len(known.nodes))))  # sets the worth of the steps
+    local = np.tile(bounds.parts, (len(known.nodes), 1))
+    bound_paths(
+        known.to_zone, known.phases, known.data, bounds.period, bounds.blocks, local,
+        bounds.values, np.zeros(len(known.data)), bounds.ceilings,
+    )  # fmt: skip
+    x, y = known.starts[0]
+    home = bounds.blocks.home[x, y]
+    had = known.data[known.phases.clock[0, 0], home]
+    return float((bounds.ceilings[0, 0, x, y, 0] + local[home] * had).min())
+
+
+def check(space: ScenarioSpace, seed: int, count: int) -> float:
+    """How far the bound is above the optimum; neither it nor the table is below."""
+    exact = TinySea(space, seed, contraction(count))
+    gap = upper_bound(space, seed, 0).ratio - exact.optimum
+    assert gap >= -1e-12, space
+    assert exact.most_collected <= bound_of_data(space, seed) + 1e-9, space
+    return gap

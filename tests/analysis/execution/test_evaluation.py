@@ -36,7 +36,8 @@ def test_means_are_those_of_all_records(monkeypatch, handed):
     assert found.uav_slots == records["uav_slots"].sum()
     events = means(Asked(SPACE, "greedy,random", 300, 5, "events"))
     assert events.moments == found.moments
-    monkeypatch.setattr(evaluation, "MEMORY", 20_000)  # 32 missions of three UAVs
+    # 32 missions of three UAVs.
+    monkeypatch.setattr(evaluation, "MEMORY", 20_000)
     handed.clear()
     pieces = means(Asked(SPACE, "greedy,random", 300, 5))
     assert handed == [1, *(range(n, min(n + 32, 300)) for n in range(0, 300, 32))]

@@ -1,47 +1,22 @@
 import errno
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from dess import InputError, simulate
-from dess.analysis import evaluate, load_results, resimulate, run_study
-from dess.analysis.answers.summary import sensitivity
+from dess.analysis import load_results, run_study
 from dess.analysis.execution import jobs
 from dess.analysis.results import parquet, store
-from dess.analysis.study.study import CHECK
 from dess.policies import load_team
 from dess.policies.heuristics import Greedy
-from dess.record import MISSION_RECORD, UAV_RECORD
-from dess.reports import cli
-from dess.state import END_NAMES
+from dess.record import MISSION_RECORD
 from tests.analysis.small import files_of, grid, small_study
 
 
 def assert_same(ours, other):
     pd.testing.assert_frame_equal(ours.missions, other.missions)
     pd.testing.assert_frame_equal(ours.uavs, other.uavs)
-
-
-def test_results_are_tidy(tmp_path):
-    design, policies = grid(quota=[20, 600], uavs=[1, 2]), ["random-unguarded", "greedy"]
-    study = small_study(tmp_path, design=design, policies=policies)
-    results = run_study(study, tmp_path / "out")
-    missions, uavs = results.missions, results.uavs
-    assert list(missions.columns) == ["policy", "point", "quota", *MISSION_RECORD.names]
-    assert list(uavs.columns) == ["policy", "point", "replication", "uav", *UAV_RECORD.names]
-    assert len(missions) == 2 * 4 * 10
-    assert len(uavs) == missions["uavs"].sum()
-    order = [(p, d, r) for p in study.policies for d in range(4) for r in range(10)]
-    assert list(missions[["policy", "point", "replication"]].itertuples(index=False)) == order
-    assert (missions["uavs"] == missions["point"].map({0: 1, 1: 2, 2: 1, 3: 2})).all()
-    assert set(uavs["end"]) <= set(END_NAMES[1:])
-    success = uavs.groupby(["policy", "point", "replication"], sort=False)["end"].agg(
-        lambda ends: (ends == "quota").all()
-    )
-    assert (success.to_numpy() == missions["success"]).all()
-    assert 0 < missions["success"].mean() < 1  # or this test says little
 
 
 def test_a_mission_of_a_study_equals_the_same_one_alone(tmp_path):
@@ -121,45 +96,25 @@ def check_that_an_interrupted_run_is_completed(study, folder, after, workers):
 
     with pytest.raises(KeyboardInterrupt):
         run_study(study, folder / "out", progress=interrupt)
-    with pytest.raises(InputError, match="incomplete.*; allowed: run the study again"):
+    with pytest.raises(InputError, match="incomplete.*"):
         load_results(folder / "out")
     run_study(study, folder / "out", workers)
     run_study(study, folder / "undisturbed")
     assert files_of(folder / "out") == files_of(folder / "undisturbed")
 
 
-def test_event_logs_are_those_of_the_missions(tmp_path):
-    study = small_study(tmp_path, design=grid(uavs=[1, 2]), logged=2)
-    results = run_study(study, tmp_path / "out")
-    alone = simulate(study.scenarios[1], load_team("random"), 7, 1, events=True)
-    log = results.events("random", point=1, replication=1)
-    columns = alone.events.columns()
-    assert list(log.columns) == list(columns)
-    for name, column in columns.items():
-        np.testing.assert_array_equal(log[name].to_numpy(), column)
-    ends = log[(log["event"] == "mission_end") & (log["node"] >= 0)]
-    row = results.missions.query("policy == 'random' and point == 1 and replication == 1")
-    assert ends["value"].sum() == pytest.approx(row["residual"].item(), abs=1e-9)
-
-
-def precise(folder, **changes):
+def precise(folder):
     """A study that runs until the success of every cell is known well enough."""
     targets = {"success": {"absolute": 0.2}, "reward": {"relative": 0.2}}
     rule = {"first": 5, "look_ahead": 3, "budget": 60, "targets": targets}
-    return small_study(folder, precision=rule, design=grid(quota=[20, 60]), **changes)
+    return small_study(folder, precision=rule, design=grid(quota=[20, 60]))
 
 
-def selecting(folder, **changes):
+def selecting(folder, design=None, budget=400):
     """A study that selects the best of some settings."""
-    rule = {
-        "procedure": "kn",
-        "metric": "collection_ratio",
-        "first": 8,
-        "indifference": 0.02,
-        "budget": 400,
-        "check": 5,
-    }
-    return small_study(folder, selection=rule, design=grid(quota=[20, 40, 60, 80]), **changes)
+    rule = {"procedure": "kn", "metric": "collection_ratio", "indifference": 0.02}
+    rule |= {"first": 8, "budget": budget, "check": 5}
+    return small_study(folder, selection=rule, design=design or grid(quota=[20, 40, 60, 80]))
 
 
 def test_precision_decides_how_many_missions_there_are(tmp_path):
@@ -172,19 +127,6 @@ def test_precision_decides_how_many_missions_there_are(tmp_path):
     for (_, _), cell in results.missions.groupby(["policy", "point"]):
         assert cell["replication"].tolist() == [*range(len(cell))]
         assert study.precision.wanted([{f: cell[f].to_numpy() for f in fields}]) == [len(cell)]
-
-
-def test_a_selection_is_checked_by_missions_that_did_not_select(tmp_path):
-    study = selecting(tmp_path)
-    results = run_study(study, tmp_path / "out")
-    for policy, best in zip(study.policies, results.manifest["selected"], strict=True):
-        assert results.choice(policy).best == best
-        checks = results.checks[results.checks["policy"] == policy]
-        assert (checks["point"] == best).all()
-        assert checks["replication"].tolist() == [CHECK + n for n in range(5)]
-        assert checks["quota"].iloc[0] == study.points[best].values["quota"]
-    assert results.missions["replication"].max() < CHECK
-    assert len(results.checks) == 10
 
 
 def test_an_interrupt_in_compiled_code_is_an_interrupt(tmp_path, monkeypatch):
@@ -214,27 +156,14 @@ def test_a_saltelli_design_runs_every_point_at_its_own_replication(tmp_path):
     missions = run_study(study, tmp_path / "out").missions
     assert missions["point"].tolist() == [*range(len(study.points))]
     assert missions["replication"].tolist() == [point.replication for point in study.points]
-    assert missions["quota"].tolist() == [point.values["quota"] for point in study.points]
     assert missions["replication"].nunique() > 4
-    indices = sensitivity(study.design, missions, ["reward"])
-    assert np.isfinite(indices["total"]).all()
 
 
 def test_points_that_are_one_scenario_share_their_missions(tmp_path):
     """Where a list holds the scenario's own value, or drawn integers fall together."""
-    rule = {
-        "procedure": "kn",
-        "metric": "collection_ratio",
-        "first": 4,
-        "indifference": 0.02,
-        "budget": 60,
-        "check": 0,
-    }
     values = {"quota": [20, 60], "flying_time": [[20, 30], 20]}
-    design = {"kind": "one-at-a-time", "values": values}
-    study = small_study(tmp_path, selection=rule, design=design)
-    told = []
-    results = run_study(study, tmp_path / "out", announce=told.append)
+    study = selecting(tmp_path, {"kind": "one-at-a-time", "values": values}, budget=60)
+    results = run_study(study, tmp_path / "out")
     cells = results.store.manifest.cells[0]
     assert cells[1].key == cells[2].key
     for counts in results.manifest["missions"]:
@@ -282,7 +211,7 @@ def test_a_full_disk_is_no_failure_of_a_chunk(tmp_path, monkeypatch):
         run_study(small_study(tmp_path), tmp_path / "out")
     assert files_of(tmp_path / "out").keys() == {"manifest.json"}
     monkeypatch.setattr(jobs, "simulate_missions", raises(full))
-    with pytest.raises(InputError, match="greedy: No space left on device; allowed: "):
+    with pytest.raises(InputError, match="greedy: No space left on device"):
         run_study(small_study(tmp_path), tmp_path / "out")
 
 
@@ -291,19 +220,3 @@ def raises(error):
         raise error
 
     return fail
-
-
-@pytest.mark.parametrize("engine", ["batch", "events"])
-def test_a_team_may_be_larger_than_the_fleet_of_some_points(engine, tmp_path):
-    values = {"policies": ["greedy,tour,random"], "missions": 3, "engine": engine}
-    study = small_study(tmp_path, design=grid(uavs=[1, 3]), logged=1, **values)
-    results = run_study(study, tmp_path / "out", workers=1)
-    (team,) = results.policies
-    alone = evaluate(study.scenarios[0], "greedy", 3, study.seed)
-    of_one = results.missions.query("point == 0")
-    assert (of_one["reward"].to_numpy() == alone.records.missions["reward"]).all()
-    assert resimulate(results, team, 0, 2).record.uavs.shape == (1,)
-    again = ["simulate", "--of", str(tmp_path / "out"), "--point", "0", "--replication", "2"]
-    assert cli.main(again) == 0
-    with pytest.raises(InputError, match="more policies than the largest fleet has UAVs; allowed"):
-        small_study(tmp_path, design=grid(uavs=[1, 2]), policies=["greedy,tour,random"])

@@ -6,6 +6,7 @@ import pytest
 from dess import InputError
 from dess.analysis import load_results, run_study
 from dess.analysis.execution.runner import ChunkError
+from tests.analysis import troublesome
 from tests.analysis.small import files_of, small_study
 
 
@@ -29,33 +30,34 @@ def check_that_the_rest_is_there(study, out, policy, missing):
     assert done[0] == study.missions * len(study.policies) - missing
 
 
-def test_a_chunk_that_raises_is_recorded_and_the_rest_goes_on(plugin, tmp_path):
-    study = small_study(tmp_path, policies=["raising", "greedy"])
+@pytest.fixture
+def trouble(tmp_path):
+    """The file of policies that get into trouble."""
+    return troublesome.copied(tmp_path)
+
+
+def test_a_chunk_that_raises_is_recorded_and_the_rest_goes_on(trouble, tmp_path):
+    raising = f"{trouble}:Raising"
+    study = small_study(tmp_path, policies=[raising, "greedy"])
     failure = failing(study, tmp_path / "out")
-    assert failure.policy == "raising"
+    assert failure.policy == raising
     assert failure.missions == 4
     assert failure.error == "ZeroDivisionError: nothing to divide by"
     assert "in trouble" in failure.traceback
-    again = ["--policy", "raising", "--replication", "5"]
-    assert shlex.split(failure.command)[-4:] == again
-    check_that_the_rest_is_there(study, tmp_path / "out", "raising", 4)
+    assert shlex.split(failure.command)[-4:] == ["--policy", raising, "--replication", "5"]
+    check_that_the_rest_is_there(study, tmp_path / "out", raising, 4)
 
 
-def test_an_event_log_that_fails_is_recorded_too(plugin, tmp_path):
-    study = small_study(tmp_path, policies=["raising"], logged=6, missions=6)
-    with pytest.raises(ChunkError) as error:
-        run_study(study, tmp_path / "out")
-    assert sorted(failure.missions for failure in error.value.failures.values()) == [1, 2]
-
-
-def test_a_killed_worker_is_replaced(plugin, tmp_path):
-    study = small_study(tmp_path, policies=["killed-once", "raising", "greedy"])
+def test_a_killed_worker_is_replaced(trouble, tmp_path):
+    policies = [f"{trouble}:KilledOnce", f"{trouble}:Raising", "greedy"]
+    study = small_study(tmp_path, policies=policies)
     done: list[int] = []
     failure = failing(study, tmp_path / "out", workers=2, progress=done.append)
-    assert (tmp_path / "plugin" / "killed").exists()
-    assert (failure.policy, failure.missions, sum(done)) == ("raising", 4, 30)
+    assert (tmp_path / "killed").exists()
+    assert (failure.policy, failure.missions, sum(done)) == (policies[1], 4, 30)
     assert "in trouble" in failure.traceback
-    failing(study, tmp_path / "undisturbed")  # it has been killed, so it hovers
+    # It has been killed, so it hovers.
+    failing(study, tmp_path / "undisturbed")
     ours, undisturbed = (
         {name: content for name, content in files_of(tmp_path / run).items() if "fail" not in name}
         for run in ("out", "undisturbed")
@@ -64,11 +66,11 @@ def test_a_killed_worker_is_replaced(plugin, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_chunk_that_kills_every_worker_is_given_up(plugin, tmp_path):
-    study = small_study(tmp_path, policies=["killed-always", "greedy"])
+def test_a_chunk_that_kills_every_worker_is_given_up(trouble, tmp_path):
+    killed = f"{trouble}:KilledAlways"
+    study = small_study(tmp_path, policies=[killed, "greedy"])
     failure = failing(study, tmp_path / "out", workers=2)
-    assert failure.policy == "killed-always"
+    assert failure.policy == killed
     assert failure.missions == 4
     assert "its workers died" in failure.error
-    again = ["--policy", "killed-always", "--replication", "5"]
-    assert shlex.split(failure.command)[-4:] == again
+    assert shlex.split(failure.command)[-4:] == ["--policy", killed, "--replication", "5"]

@@ -77,7 +77,7 @@ def test_nodes_zone_and_ends_lie_where_they_are(mission, parts):
     assert top < bottom  # y grows south
 
 
-def test_battery_ends_as_recorded(mission, parts):
+def test_battery_and_residual_data_end_as_recorded(mission, parts):
     record, _, scenario = mission
     lines = {line.get_label(): line for line in parts[1].lines}
     for uav, row in enumerate(record.uav_rows()):
@@ -86,10 +86,6 @@ def test_battery_ends_as_recorded(mission, parts):
         assert line.get_ydata()[-1] == row["battery"]
     levels = {line.get_ydata()[0] for line in parts[1].lines if len(set(line.get_ydata())) == 1}
     assert {scenario.charge_start, scenario.charge_complete} <= levels
-
-
-def test_residual_data_ends_as_recorded(mission, parts):
-    record, _, scenario = mission
     (total,) = parts[2].lines
     assert total.get_ydata()[0] == pytest.approx(record.initial)
     assert total.get_ydata()[-1] == pytest.approx(record.residual)

@@ -7,11 +7,9 @@ import pandas as pd
 import pytest
 from matplotlib.patches import Rectangle
 
-from dess import InputError
 from dess.analysis.answers import settings
 from dess.analysis.figures import settings as figures
-from dess.analysis.metrics import PRODUCT, SUCCESS
-from dess.analysis.study.design import NOISE
+from dess.analysis.metrics import SUCCESS
 from tests.analysis.small import grid
 
 
@@ -38,20 +36,6 @@ def test_curves_are_the_means_with_intervals_at_their_places(results):
         assert y == pytest.approx(own["mean"])
         assert ends == pytest.approx(own[["low", "high"]].to_numpy())
     assert ax.get_xlabel() == "Communication quota [communication slots]"
-
-
-def test_a_second_field_has_a_curve_per_value_and_policies_have_panels(results):
-    drawing = figures.plot(results, "initial_data", hue="uavs").figure
-    table = settings.averaged(results, ["initial_data", "uavs"])
-    titles = [ax.get_title(loc="left") for ax in drawing.axes]
-    assert titles == [f"Policy {name}" for name in results.policies]
-    for ax, policy in zip(drawing.axes, results.policies, strict=True):
-        for uavs, (_, y, _) in zip((1, 2), curves(ax), strict=True):
-            own = table[(table["policy"] == policy) & (table["uavs"] == uavs)]
-            assert y == pytest.approx(own["mean"])
-    assert [t.get_text() for t in drawing.axes[-1].get_xticklabels()] == ["5–7", "10"]
-    with pytest.raises(InputError, match="pads: has not several values in the study; allowed: qu"):
-        figures.plot(results, "pads")
 
 
 @pytest.mark.parametrize("facet", [None, "uavs"])
@@ -84,62 +68,10 @@ def test_of_costs_the_lowest_cell_is_marked(results):
     assert {text.get_text() for text in ax.texts} == {"10,000", "20,000"}
 
 
-def test_a_cell_without_missions_stays_empty(studied):
-    rows = [{"uavs": 1, "quota": 20}, {"uavs": 2, "quota": 40}]
-    few = studied(design={"kind": "table", "rows": rows}, missions=4)
-    ax = figures.heat_map(few, "uavs", "quota").figure.axes[0]
-    assert np.isnan(np.asarray(ax.collections[0].get_array(), float)).sum() == 2
-    assert len(ax.texts) == 2
-
-
-def test_fields_have_panels_the_widest_effect_first_and_every_design_point_is_a_dot(results):
-    effects = settings.main_effects(results)
-    panels = [ax for ax in figures.main_effects(results).figure.axes if ax.get_visible()]
-    for ax, field in zip(panels, settings.by_influence(effects), strict=True):
-        for policy, (_, y, _) in zip(results.policies, curves(ax), strict=True):
-            own = effects[(effects["field"] == field) & (effects["policy"] == policy)]
-            assert y == pytest.approx(own["mean"])
-    table = settings.ranked(results)
-    for ax in [ax for ax in figures.scatter(results).figure.axes if ax.get_visible()]:
-        for dots, policy in zip(ax.collections, table["policy"].unique(), strict=True):
-            means = np.asarray(dots.get_offsets())[:, 1]
-            assert means == pytest.approx(table[table["policy"] == policy][PRODUCT])
-
-
-def test_a_distribution_is_the_share_of_missions(results):
-    (ax,) = figures.distribution(results.missions).figure.axes
-    for line, policy in zip(ax.lines, results.policies, strict=True):
-        values = results.missions[results.missions["policy"] == policy][PRODUCT]
-        heights = dict(zip(*(list(data)[1:] for data in line.get_data()), strict=True))
-        assert heights == pytest.approx({value: (values <= value).mean() for value in values})
-
-
 def test_many_values_have_panels_that_are_spread_evenly():
     assert figures.shown([1, 2, 3]) == [1, 2, 3]
     some = figures.shown([*range(100)])
     assert (len(some), some[0], some[-1]) == (figures.MOST_PANELS, 0, 99)
-
-
-@pytest.fixture
-def indices():
-    first = np.array([0.6, -0.02, 0.1])
-    total = np.array([0.8, 0.03, 0.2])
-    ends = {f"{n}_{e}": v + s for n, v in (("first", first), ("total", total))
-            for e, s in (("low", -0.05), ("high", 0.07))}  # fmt: skip
-    names = ["uavs", "charge_start", NOISE]
-    return pd.DataFrame({"parameter": names, "first": first, "total": total, **ends})
-
-
-def test_sensitivities_are_bars_with_intervals(indices):
-    (ax,) = figures.sensitivity(indices, "mine").axes
-    for bar, index in zip(ax.containers, ("first", "total"), strict=True):
-        assert bar.lines[0].get_xdata() == pytest.approx(indices[index])
-    drawn = np.concatenate([np.array(a.get_segments())[:, :, 0] for a in ax.collections])
-    expected = [indices[[f"{i}_low", f"{i}_high"]].to_numpy() for i in ("first", "total")]
-    assert drawn == pytest.approx(np.concatenate(expected))
-    names = [label.get_text().replace("\n", " ") for label in ax.get_yticklabels()]
-    assert names == ["UAVs", "$C_S$", "noise of the replication"]
-    assert ax.get_ylim() == (2.5, -0.5)  # the first on top
 
 
 def test_the_front_goes_through_policies_that_are_not_dominated():

@@ -12,7 +12,6 @@ import dess
 from dess import policies
 from dess.analysis.results.event_log import (
     ages,
-    battery_levels,
     causes,
     duration,
     mean_age,
@@ -23,20 +22,6 @@ from dess.scenario import Scenario
 from dess.view import View
 from tests import drawn
 from tests.dess.flights import CHANNEL, flown
-
-# A queue for one pad; an odd number of communication slots; a mission that is truncated.
-CASES: list[dict[str, Any]] = [
-    {},
-    {"pads": 1, "zone": [26, 2, 4, 1]},
-    {"uavs": 4, "pads": 1, "communication_slots": 3, "quota": 700, "max_slots": 200},
-]
-
-
-def logged(policy: str, replication: int = 0, **fields: Any) -> tuple[Any, pd.DataFrame]:
-    """The record of a mission of the ``fig4`` scenario, and its event log."""
-    space = dess.load_scenario("fig4", **fields)
-    record = dess.simulate(space, policies.load(policy), 1, replication, events=True)
-    return record, pd.DataFrame(record.events.columns())
 
 
 def assert_agree(record: Any, log: pd.DataFrame) -> None:
@@ -51,15 +36,6 @@ def assert_agree(record: Any, log: pd.DataFrame) -> None:
     assert duration(log) == record.slots == slots["slot"].max() + 1
     end = log[(log["event"] == "mission_end") & (log["node"] >= 0)]
     assert np.allclose(residual_data(log).iloc[-1], end["value"], atol=1e-9, rtol=0)
-
-
-@pytest.mark.parametrize("fields", CASES)
-@pytest.mark.parametrize("policy", ["greedy", "random"])
-def test_tables_agree_with_the_record(policy, fields):
-    record, log = logged(policy, 3, **fields)
-    assert_agree(record, log)
-    if fields:
-        assert record.uavs["slots_waiting"].sum() > 0  # the case is the one it is meant to be
 
 
 @given(drawn.spaces(), drawn.seeds)
@@ -111,18 +87,6 @@ def test_the_node_of_a_slot_is_the_one_served_most_and_last():
         "y": [0] * 14,
     }
     assert uav_slots(log)["node"].tolist() == [2, 1, -1]
-
-
-def test_batteries_start_full_and_move_by_a_flight_or_a_charge():
-    record, log = logged("greedy", uavs=3)
-    levels = battery_levels(log)
-    for uav, curve in levels.groupby("uav"):
-        assert curve["time"].tolist() == [*range(len(curve))]
-        assert curve["battery"].iloc[0] == record.flying_time
-        assert curve["battery"].iloc[-1] == record.uavs["battery"][uav]
-        steps = curve["battery"].diff().iloc[1:]
-        assert (steps == -1).sum() == record.uavs["slots_flying"][uav]
-        assert (steps > 0).sum() == record.uavs["slots_charging"][uav]
 
 
 # A zone of two cells at the western edge, with a pad. UAVs may charge from a battery of 12 on. Each

@@ -26,11 +26,9 @@ Forge = Callable[[pa.Table], pa.Table]
 
 
 @pytest.fixture(scope="module")
-def sound(tmp_path_factory):
+def sound(studied):
     """Small results with an event log."""
-    folder = tmp_path_factory.mktemp("sound")
-    run_study(small_study(folder, logged=1, policies=["greedy"]), folder / "out")
-    return folder / "out"
+    return studied(logged=1, policies=["greedy"]).store.folder
 
 
 def forged(sound: Path, out: Path, kinds: str, forge: Forge) -> Path:
@@ -41,7 +39,8 @@ def forged(sound: Path, out: Path, kinds: str, forge: Forge) -> Path:
         table = forge(pq.ParquetFile(path).read())
         path.unlink()
         name = path.stem.rpartition("-")[0]
-        with suppress(ValueError, RecursionError, TypeError, KeyError):  # an event log has no parts
+        # An event log has no parts.
+        with suppress(ValueError, RecursionError, TypeError, KeyError):
             name = name_of(json.loads((table.schema.metadata or {})[b"dess.parts"]))
         parquet.write(path.parent, name, table)
     return out
@@ -166,10 +165,3 @@ def test_a_run_does_not_write_or_delete_where_a_link_leads(name, sound, tmp_path
     assert main([*command, "--out", str(folder)]) == 2
     assert f"{place}: is a link" in capsys.readouterr().err
     assert {**files_of(tmp_path), **before} == files_of(tmp_path)
-
-
-def test_a_file_that_is_too_large_is_not_read(sound, tmp_path, monkeypatch):
-    copied = shutil.copytree(sound, tmp_path / "copied")  # files that nobody has read yet
-    monkeypatch.setattr(parquet, "LIMIT", 10)
-    with pytest.raises(InputError, match="is too large"):
-        load_results(copied)

@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from dess.analysis.answers.summary import best_policy
 from dess.analysis.execution.evaluation import Asked, evaluate, means
 from dess.analysis.metrics import PRODUCT, RATIO, REWARD, SUCCESS
 from dess.analysis.stats import intervals
@@ -45,13 +44,6 @@ def test_it_has_a_length_holds_the_mean_and_ends_where_shares_do(values, level):
     assert low < high
 
 
-@given(SAMPLES)
-def test_the_other_end_of_the_scale_is_the_mirror_image(values):
-    mean, low, high = bounded_interval(values)
-    turned = bounded_interval(1 - np.array(values))
-    assert turned == pytest.approx((1 - mean, 1 - high, 1 - low), abs=1e-9)
-
-
 @pytest.mark.parametrize(
     ("metric", "expected"),
     [(SUCCESS, wilson(7, 8)), (RATIO, bounded_interval([1.0] * 7 + [0.0]))]
@@ -86,7 +78,8 @@ def test_points_that_share_all_chance_count_as_one():
     alike = np.repeat(one, 5, axis=1)
     assert stratified(alike, PRODUCT) == pytest.approx(bounded_interval(one[:, 0]))
     assert stratified(alike, REWARD) == pytest.approx(mean_interval(one[:, 0]))
-    certain = np.ones((40, 5))  # failures, none of which is seen, may hit all points at once
+    # Failures, none of which is seen, may hit all points at once.
+    certain = np.ones((40, 5))
     assert stratified(certain, SUCCESS) == pytest.approx(bounded_interval(np.ones(40)))
 
 
@@ -157,7 +150,8 @@ MISSIONS = pd.DataFrame(
 def test_summary_has_a_row_per_group_and_metric():
     table = summary(MISSIONS)
     assert list(table.columns) == ["policy", "metric", "mean", "low", "high", "n"]
-    assert list(table["policy"].unique()) == ["tour", "greedy"]  # as they come, not by alphabet
+    # As they come, not by alphabet.
+    assert list(table["policy"].unique()) == ["tour", "greedy"]
     rows = table.set_index(["policy", "metric"])
     ends = ["mean", "low", "high"]
     assert tuple(rows.loc[("tour", "success"), ends]) == wilson(2, 3)
@@ -193,7 +187,8 @@ def test_bootstrap_of_many_resamples_at_once_is_that_of_one_by_one(monkeypatch):
     one_by_one = interval(lambda values: np.mean(values))
     assert interval(mean) == pytest.approx(one_by_one, rel=1e-12)
     assert len(sizes) < 10
-    monkeypatch.setattr(intervals, "_BATCH", 1000)  # what is in memory: three resamples
+    # What is in memory: three resamples.
+    monkeypatch.setattr(intervals, "_BATCH", 1000)
     sizes.clear()
     assert interval(mean) == pytest.approx(one_by_one, rel=1e-12)
     assert max(sizes) <= 1000
@@ -203,8 +198,10 @@ def test_bootstrap_of_many_resamples_at_once_is_that_of_one_by_one(monkeypatch):
 @pytest.mark.parametrize(
     ("sample", "statistic"),
     [
-        (np.arange(20.0), lambda values: len(np.unique(values))),  # more than in any resample
-        (np.array([1.0, 2.0, 2.0, 2.0, 3.0]), np.median),  # whichever is left out
+        # More than in any resample.
+        (np.arange(20.0), lambda values: len(np.unique(values))),
+        # Whichever is left out.
+        (np.array([1.0, 2.0, 2.0, 2.0, 3.0]), np.median),
         (np.array([0.0, 1.0]), np.mean),
         (np.array([1.0, 2.0, 5.0]), np.max),
     ],
@@ -236,7 +233,8 @@ FLEETS = np.repeat([1, 2, 3], [10, 30, 20])  # two UAVs are drawn too often
 
 
 def test_every_number_of_uavs_has_the_same_weight_by_hand():
-    values = np.array([1.0] * 5 + [2.0, 4.0] * 5)  # means 1 and 3, of 5 and 10 missions
+    # Means 1 and 3, of 5 and 10 missions.
+    values = np.array([1.0] * 5 + [2.0, 4.0] * 5)
     linear = post_stratified(values, np.repeat([1, 2], [5, 10]))
     assert linear.mean() == pytest.approx(2.0)
     # the variance of the mean is (1 / 4) (0 / 5 + s^2 / 10), with s^2 = 10 / 9
@@ -254,24 +252,6 @@ def test_means_differences_and_ranks_have_the_same_weights():
     )
     row = compare(table, "tour", [PRODUCT]).iloc[0]
     assert row["difference"] == pytest.approx(of_fleets["greedy"] - of_fleets["tour"])
-    # By plain means, the first policy would be ahead: it has drawn fewer lone UAVs.
-    ahead = missions_of(FLEETS, lead=0.3).assign(policy="lone", **{"replication": range(60)})
-    ahead[PRODUCT] -= 0.06 * (ahead["uavs"] > 1)
-    both = pd.concat([tour.assign(policy="tour"), ahead])
-    assert ahead[PRODUCT].mean() < tour[PRODUCT].mean() + 0.01
-    assert best_policy(both) == "lone"
-
-
-def test_the_interval_covers_with_half_the_width():
-    generator, covered, lengths = np.random.default_rng(5), [], []
-    for seed in range(300):
-        table = missions_of(generator.integers(1, 4, 300), seed=seed)
-        row = summary(table, by=[]).set_index("metric").loc[PRODUCT]
-        covered.append(row["low"] <= LEVELS.mean() <= row["high"])
-        plain = interval_of(PRODUCT, table[PRODUCT].to_numpy())
-        lengths.append((row["high"] - row["low"]) / (plain.high - plain.low))
-    assert np.mean(covered) >= 0.95
-    assert np.mean(lengths) < 0.6
 
 
 @pytest.mark.parametrize("fleets", [[1, 1, 3, 3, 3], [1] * 9 + [3] * 9, [1] * 9 + [2] * 4, [2] * 9])

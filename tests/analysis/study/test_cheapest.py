@@ -192,13 +192,6 @@ def test_conditions_have_their_answers_and_one_for_all_of_them():
     assert choice.selected == [0, 2, 3]
 
 
-def test_losses_that_have_not_happened_are_reckoned_with():
-    samples, settings = constant([1.0, 1.0], [50e3, 52e3])
-    risky = [Setting(s.values, 1e6 if n == 0 else 0.0) for n, s in enumerate(settings)]
-    alone = rule().choice(samples, settings)
-    assert rule().choice(samples, risky).missions > alone.missions
-
-
 def test_the_budget_is_kept():
     choice = rule(budget=2345).choice(*RARE)
     assert choice.done

@@ -215,13 +215,6 @@ def test_a_single_point_needs_no_selection(procedure):
     assert "only" in choice.guarantee
 
 
-def test_points_that_are_alike_tie_and_the_first_wins():
-    row = normal(9, [0.8], spread=0.1)[0]
-    choice = chosen(rule(indifference=0.05), np.stack([row - 0.5, row, row]))
-    assert (choice.best, choice.survivors, choice.stage) == (1, (1, 2), 10)
-    assert "the best is among 2 that tie, it included" in choice.guarantee
-
-
 def test_a_choice_needs_the_missions_of_round_one():
     data = normal(10, [0.0, 1.0])
     assert rule().wanted(samples_of(data, [10, 0])) == [10, 10]

@@ -1,5 +1,3 @@
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -13,14 +11,12 @@ def rule(**fields):
     return Precision.model_validate({"first": 2, "look_ahead": 0} | fields)
 
 
-def finished(rule, data, rounds=None):
+def finished(rule, data):
     """The samples with which the rule is content, from one that begins with ``first`` missions."""
     count = rule.first
     while True:
         samples = [{metric: values[:count] for metric, values in data.items()}]
         (wanted,) = rule.wanted(samples)
-        if rounds is not None:
-            rounds.append(count)
         if wanted == count:
             return samples
         count = wanted
@@ -91,7 +87,8 @@ def test_a_mean_of_zero_meets_no_relative_target():
     relative = rule(budget=400, targets={"reward": {"relative": 0.5}})
     row = reached(relative, reward=[1.0, -1.0] * 300)
     assert (row.missions, row.stop, row.met, row.target) == (400, None, False, 0.0)
-    assert reached(relative, reward=[0.0] * 300).missions == 2  # certain, as far as it shows
+    # Certain, as far as it shows.
+    assert reached(relative, reward=[0.0] * 300).missions == 2
 
 
 def test_where_the_budget_ends_it_says_what_was_missed():
@@ -119,20 +116,10 @@ def test_the_stopping_point_is_the_one_of_the_definition(seed):
     assert len(samples[0]["reward"]) == (300 if stop is None else stop + look_ahead)
 
 
-def test_the_rounds_are_few_and_do_not_lead_past_the_stopping_point():
-    fine = rule(first=30, look_ahead=50, targets={"reward": {"absolute": 0.02}})
-    for seed in range(10):
-        values = np.random.default_rng(seed).normal(size=(1, 5000)) * 0.4
-        (row,) = fine.reached(finished(fine, {"reward": values[0]}, rounds := []))
-        assert row.missions == row.stop + fine.look_ahead
-        assert len(rounds) < 15
-        assert all(later <= 2 * earlier + 51 for earlier, later in pairwise(rounds))
-
-
 @pytest.mark.parametrize(
     "fields, complaint",
     [
-        ({"targets": {"speed": {"absolute": 1.0}}}, "'speed' is unknown; allowed: success"),
+        ({"targets": {"speed": {"absolute": 1.0}}}, "'speed' is unknown"),
         ({"targets": {"reward": {}}}, "allowed: absolute, relative, or both"),
         ({"targets": {"reward": {"relative": float("inf")}}}, "finite"),
         (

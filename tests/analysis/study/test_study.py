@@ -25,13 +25,10 @@ def test_a_study_takes_the_engine_that_one_of_its_points_needs(tmp_path):
 
 BAD = {
     "missions = 0": ["missions: 0 is out of range; allowed: an integer 1.."],
-    "seed = -1": ["seed: -1 is out of range; allowed: an integer 0.."],
     "logged = 2000": ["logged: 2000", "0..1000"],
     "policies = ['greedy', 'greedy']": ["greedy is listed twice"],
-    "design = {kind = 'grid', values.uavs = [1, 20]}": ["at uavs=20", "1..16"],
     "design = {kind = 'grid', values.uavs = [[1, 1], 1]}": ["uavs=1 is listed twice"],
     "design = {kind = 'one-at-a-time', values.arrival_rate = [0.0, -0.0]}": ["is listed twice"],
-    "design = {kind = 'cube', values.uavs = [1]}": ["kind: 'cube' is unknown", "grid", "saltelli"],
     "design = {kind = 'saltelli', base = 2, ranges.uavs = [1, 2]}": ["missions = 1"],
     "set.uavs = 1\ndesign = {kind = 'grid', values.uavs = [1, 2]}": ["uavs is also in set"],
     "design = {kind = 'grid', values.charge_start = [30, 70]}": [
@@ -120,11 +117,11 @@ def test_nodes_of_a_file_stay_where_they_are(tmp_path):
     nodes = ((5, 6), (6, 5))
     assert [space.nodes for space in study(design=grid(quota=[1, 2])).scenarios] == [nodes] * 2
     assert study(set={"grid": 14}).scenarios[0].nodes == ((6, 7), (7, 6))
-    with pytest.raises(InputError, match="at grid=14: grid moves the nodes of a file; allowed"):
+    with pytest.raises(InputError, match="at grid=14: grid moves the nodes of a file"):
         study(design=grid(grid=[12, 14]))
     (tmp_path / "rocks.csv").write_text("lon,lat\n8.52,54.25\n")
     scenario.write_text(f'no_fly = "rocks.csv"\n{scenario.read_text()}')
-    with pytest.raises(InputError, match="at grid=14: grid moves the no_fly of a file; allowed"):
+    with pytest.raises(InputError, match="at grid=14: grid moves the no_fly of a file"):
         study(design=grid(grid=[12, 14]), set={"nodes": [[7, 1]]})
     scenario.write_text(scenario.read_text().partition("\n")[2])
     fixed = grid(grid=[12, 14])

@@ -10,15 +10,18 @@ import pytest
 from hypothesis import given
 from scipy import stats
 
-from dess import load_scenario
+from dess import InputError, load_scenario
+from dess.analysis import run_study
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess.analysis.verification import balances, draws, measurements
-from dess.analysis.verification.checks import ALPHA, Check, judge, poisson_fit, uniform_fit
-from dess.analysis.verification.measurements import Log
+from dess.analysis.verification.checks import ALPHA, Check, judge, overall, poisson_fit, uniform_fit
+from dess.analysis.verification.measurements import STUDY, Log
+from dess.analysis.verification.suite import Suite
 from dess.fields import SAMPLED
 from dess.mission import simulate
 from dess.state import sample_scenario
+from tests.analysis.small import small_study
 from tests.drawn import extended_spaces, policies, replications, seeds
 
 SPACE = load_scenario("paper")
@@ -61,8 +64,10 @@ def test_p_values_are_corrected_for_their_number():
     p = 0.6 * ALPHA
     assert judge([check(p=p), check(p=0.5)])["verdict"].tolist() == [HOLDS, HOLDS]
     assert judge([check(p=p / 2), check(p=0.5)])["verdict"].tolist() == [REFUTED, HOLDS]
-    table = judge([check(p=p), check(error=0.0), check(), check()])  # exact and open ones
+    # Exact and open ones.
+    table = judge([check(p=p), check(error=0.0), check(), check()])
     assert table["verdict"].tolist() == [REFUTED, HOLDS, INCONCLUSIVE, INCONCLUSIVE]
+    assert overall(table).startswith("**1 of 4 checks do not hold**: test. Too few observations")
 
 
 @pytest.mark.parametrize("mean", [0.02, 1.0, 40.0])
@@ -135,7 +140,8 @@ def test_intervals_of_missions_that_depend_on_each_other_cover_too_rarely():
     shifts, noise = np.repeat(generator.normal(size=200), 100), generator.normal(size=20_000)
     assert failing([draws.coverage_check("metric", shifts + noise, 100, False)])
     assert not failing([draws.coverage_check("metric", noise, 100, False)])
-    for p in (0.6, 0.97, 0.9995):  # here Wilson covers more or less often than 95 %
+    # Here Wilson covers more or less often than 95 %.
+    for p in (0.6, 0.97, 0.9995):
         independent = (generator.random(20_000) < p).astype(int)
         assert not failing([draws.coverage_check("metric", independent, 100, True)])
 
@@ -178,7 +184,8 @@ def test_what_the_simulator_leaves_passes(results, logs, again):
     ]
     assert not any(map(fails, checks))
     assert all(check.n > 0 for check in checks)
-    assert balances.balance_check([]).error is None  # without logs nothing is told
+    # Without logs nothing is told.
+    assert balances.balance_check([]).error is None
 
 
 OF_MISSION = ["slots", "uav_slots", "arrived", "initial", "collected"]
@@ -227,3 +234,60 @@ def test_data_that_come_from_nowhere_or_another_engine_are_noticed(results):
     again = measurements.simulate_missions(replace(changed, uavs=uavs), 3)
     engine = balances.engine_check(changed, again)
     assert (engine.n, engine.error) == (6, 2)
+
+
+# Two groups of communication slots, a queue for one pad, all nodes emptied now and then.
+CHANGES: dict[str, Any] = {"communication_slots": 6, "pads": 1, "initial_data": [0, 2], "quota": 90}
+
+
+@pytest.fixture(scope="session")
+def results(studied):
+    return studied(logged=8, set=CHANGES)
+
+
+@pytest.fixture(scope="session")
+def logs(results):
+    return measurements.logs_of(results)
+
+
+@pytest.fixture(scope="session")
+def again(results):
+    return measurements.simulate_missions(results, 3)
+
+
+ANOTHER = "f" * 16  # the key of another study
+
+
+def test_of_every_replication_the_longest_log_is_taken(logs):
+    kept = measurements.longest(logs)
+    assert [log.replication for log in kept] == list(range(8))
+    for log in kept:
+        others = [o.record["slots"] for o in logs if o.replication == log.replication]
+        assert log.record["slots"] == max(others)
+
+
+def test_missions_are_kept_and_refused_where_they_are_not_of_these_results(
+    results, again, tmp_path, monkeypatch
+):
+    """They are simulated only if they are missing or of other results."""
+    simulated = [(mission.policy, mission.replication) for mission in again.missions]
+    last = int(results.missions["replication"].max())
+    assert simulated == [(p, r) for p in results.policies for r in (0, last // 2, last)]
+    with pytest.raises(InputError, match="no such file.*dess report verification"):
+        measurements.read(tmp_path, results)
+    measurements.write(again, tmp_path)
+    measurements.make(tmp_path, results)
+    assert measurements.read(tmp_path, results) == again
+    measurements.write(again.model_copy(update={"study": ANOTHER}), tmp_path)
+    with pytest.raises(InputError, match="has study 'f+', not '.*'"):
+        measurements.read(tmp_path, results)
+    monkeypatch.setattr(measurements, "simulate_missions", lambda results, progress: again)
+    measurements.make(tmp_path, results)
+    assert measurements.read(tmp_path, results) == again
+
+
+def test_a_study_with_failures_is_refused(tmp_path):
+    study = small_study(tmp_path, set={"failures.node_rate": 0.1})
+    run_study(study, tmp_path / STUDY)
+    with pytest.raises(InputError, match="verification: its scenario has failures.*"):
+        Suite(tmp_path)

@@ -59,17 +59,18 @@ def refusal(dess, tmp_path):
 
 @pytest.fixture
 def unrendered(monkeypatch):
-    """No page is made, which takes seconds; the parameters of the page of a what-if question."""
-    given = []
+    """No page is made, which takes seconds; of what pages would be made, where, and with what."""
+    pages = []
 
-    def page_of(folder, out, *_):
+    def note_study(folder, out, progress=None, parameters=None, formats=()):
+        pages.append((str(folder), str(out), parameters))
         return Path(out, f"study-{Path(folder).name}.html")
 
-    def note(names, results, out, progress, parameters):
-        notebook.check_parameters([notebook.read(*names)], parameters)
-        given.append(parameters)
-        return Path(out, f"{names[0]}.html")
+    def note(names, results, out, progress=None, parameters=None, formats=()):
+        notebook.check_parameters([notebook.read(name) for name in names], parameters)
+        pages.append((*names, str(results), str(out), parameters))
+        return Path(out, f"{names[0]}.html" if len(names) == 1 else "index.html")
 
-    monkeypatch.setattr(render, "render_study", page_of)
+    monkeypatch.setattr(render, "render_study", note_study)
     monkeypatch.setattr(render, "render", note)
-    return given
+    return pages

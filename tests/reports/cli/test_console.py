@@ -20,7 +20,8 @@ RAW = "\x1b[31mred\x1b]0;title\x07\x9b2J \u202egpj.exe\r\x00"
 def test_compilation_is_announced_once(capsys):
     console.announce_compiling.cache_clear()
     double = njit(lambda x: 2 * x)
-    for _ in range(2):  # as of a command that checks, simulates and writes a page
+    # As of a command that checks, simulates and writes a page.
+    for _ in range(2):
         with console.compile_notice():
             assert (double(1), double(1.5)) == (2, 3.0)  # compiled twice
         double = njit(lambda x: 2 * x)
@@ -37,7 +38,8 @@ def test_code_that_cannot_be_kept_says_how(capsys, monkeypatch):
 def test_a_bar_says_that_something_is_compiled():
     with console.bar("mission", 10) as progress:
         progress.set_description("round 2", refresh=False)
-        with trigger_event("numba:compile"), trigger_event("numba:compile"):  # what it calls
+        # What it calls.
+        with trigger_event("numba:compile"), trigger_event("numba:compile"):
             assert progress.desc == "compiling: "
         assert progress.desc == "round 2: "
 

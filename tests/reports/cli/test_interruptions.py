@@ -1,6 +1,5 @@
 """A command that is killed at any moment is completed by the same command, to the same bytes."""
 
-import json
 import os
 import random
 import signal
@@ -9,18 +8,16 @@ from contextlib import suppress
 from functools import partial
 from itertools import count
 
-import pyarrow.parquet as pq
 import pytest
-import safetensors
 
 from dess.analysis import run_study
 from tests.analysis.small import files_of, small_study
 from tests.killing import Command, kill
-from tests.policies.learner.tiny import PHASES, write_config
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends signals")
 
-SIGNALS = [signal.SIGKILL, signal.SIGTERM]  # SIGHUP and SIGINT have the handler of SIGTERM
+# SIGHUP and SIGINT have the handler of SIGTERM.
+SIGNALS = [signal.SIGKILL, signal.SIGTERM]
 KILLS = 12  # by each signal
 
 
@@ -102,66 +99,6 @@ def test_studies_that_are_killed_in_their_bounds_equal_an_undisturbed_one(
     check_studies(tmp_path, workers, number, KILLS // 4, 60, bounds)
 
 
-# --- trainings ---
-
-CHECKPOINT = "checkpoint.safetensors"
-EVERY_TICK = (
-    "sys.modules['torch.utils.tensorboard'] = None\n"
-    "from dess.policies.learner import session; session.CHECKPOINT_EVERY = 0"
-)
-
-
-def a_training(folder):
-    """The command that trains a tiny policy, with a checkpoint after every tick."""
-    folder.mkdir()
-    phases = [PHASES[0] | {"ticks": 100}, PHASES[1] | {"ticks": 500}]
-    write_config(folder, phases=phases, evaluate_every=100)
-    words = ["train", "tiny.toml", "--device", "cpu"]
-    return Command(words, folder, EVERY_TICK, (CHECKPOINT, "--resume"))
-
-
-def header_of(command):
-    """The header of the last checkpoint; None without one."""
-    path = command.out / CHECKPOINT
-    if path.exists():
-        with safetensors.safe_open(path, "numpy") as file:
-            return json.loads(file.metadata()["dess"])
-    return None
-
-
-def ticks(command):
-    """The ticks before the last checkpoint."""
-    header = header_of(command)
-    return header["progress"]["tick"] if header else 0
-
-
-def trained(command):
-    """All that a training leaves but for the times."""
-    header = header_of(command)
-    del header["sha256"], header["progress"]["seconds"]
-    for row in header["curve"]:
-        del row["seconds"]
-    with safetensors.safe_open(command.out / CHECKPOINT, "numpy") as file:
-        tensors = {name: file.get_tensor(name).tobytes() for name in file.keys()}  # noqa: SIM118
-    config = json.loads((command.out / "config.json").read_text("utf-8"))
-    del config["run"]["seconds"]
-    model = (command.out / "model.safetensors").read_bytes()
-    curve = pq.read_table(command.out / "training.parquet").drop(["seconds"])
-    names = [name for name in files_of(command.out) if not name.startswith(".")]
-    return header, tensors, config, model, curve, names
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("number", SIGNALS)
-def test_trainings_that_are_killed_equal_an_undisturbed_one(number, tmp_path):
-    undisturbed = a_training(tmp_path / "undisturbed")
-    undisturbed.run()
-    whole = trained(undisturbed)
-    commands = (a_training(tmp_path / f"killed-{n}") for n in count())
-    for killed in kill(commands, number, KILLS, ticks, 0.2, seeded("train", number)):
-        assert trained(killed) == whole
-
-
 # --- pages ---
 
 
@@ -184,6 +121,12 @@ def results(tmp_path):
     """Results of a small study; nothing is rendered yet."""
     run_study(small_study(tmp_path), tmp_path / "results")
     return tmp_path / "results"
+
+
+def test_a_report_that_is_terminated_leaves_no_page_no_process_and_no_file(results, tmp_path):
+    command = a_page(tmp_path / "pages", results)
+    assert command.kill(signal.SIGTERM, lambda: renderings(command) > 0, 0.5)
+    assert not command.out.exists()
 
 
 @pytest.mark.slow

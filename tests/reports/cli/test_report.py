@@ -1,57 +1,39 @@
 """``dess report`` and ``dess study run --report``: which pages are rendered, and from what."""
 
-import os
 from pathlib import Path
-
-import pytest
 
 from dess.reports.pages import notebook, render
 
 
-@pytest.fixture
-def rendered(monkeypatch):
-    """The pages that commands render: nothing is rendered, only noted."""
-    pages = []
-
-    def note_reports(names, results, out, progress=None, parameters=None, formats=()):
-        pages.append((*names, str(results), str(out)))
-        return Path(out, "index.html")
-
-    def note_study(folder, out, progress=None, parameters=None, formats=()):
-        pages.append((str(folder), str(out), parameters))
-        return Path(out, f"study-{Path(folder).name}.html")
-
-    monkeypatch.setattr(render, "render", note_reports)
-    monkeypatch.setattr(render, "render_study", note_study)
-    return pages
-
-
-def test_names_are_reports_and_folders_are_studies(dess, rendered, tmp_path):
+def test_names_are_reports_and_folders_are_studies(dess, unrendered, tmp_path):
     (tmp_path / "fleets").mkdir()
     code, out, _ = dess(
-        "report", "mission", "fleets", "--out", "pages", "--parameter", "baseline=2"
+        "report", "mission", "fleets", "--out", "pages", "--parameter", "policy='tour'"
     )
-    assert (code, out.split()) == (0, ["pages/index.html", "pages/study-fleets.html"])
-    assert rendered == [("mission", "results", "pages"), ("fleets", "pages", {"baseline": 2})]
+    assert (code, out.split()) == (0, ["pages/mission.html", "pages/study-fleets.html"])
+    assert unrendered == [
+        ("mission", "results", "pages", {"policy": "tour"}),
+        ("fleets", "pages", {"policy": "tour"}),
+    ]
 
 
-def test_a_folder_that_is_called_like_a_report_needs_a_separator(dess, rendered, tmp_path):
+def test_a_folder_that_is_called_like_a_report_needs_a_separator(dess, unrendered, tmp_path):
     (tmp_path / "learning").mkdir()
     assert dess("report", "learning")[0] == dess("report", "./learning")[0] == 0
     pages = str(Path("build", "reports"))
-    assert rendered == [("learning", "results", pages), ("./learning", pages, {})]
+    assert unrendered == [("learning", "results", pages, {}), ("./learning", pages, {})]
 
 
-def test_without_arguments_all_reports_are_rendered(dess, rendered):
+def test_without_arguments_all_reports_are_rendered(dess, unrendered):
     assert dess("report")[0] == 0
-    assert rendered == [("results", str(Path("build", "reports")))]
+    assert unrendered == [("results", str(Path("build", "reports")), {})]
 
 
-def test_a_study_is_run_and_its_page_rendered(dess, rendered):
+def test_a_study_is_run_and_its_page_rendered(dess, unrendered):
     code, out, _ = dess("study", "run", "trial.toml", "--missions", 2, "--report")
     assert code == 0
     assert out.splitlines()[-1] == str(Path("build", "reports", "study-trial.html"))
-    assert [page[0] for page in rendered] == [str(Path("results", "trial"))]
+    assert [page[0] for page in unrendered] == [str(Path("results", "trial"))]
 
 
 def test_a_notebook_that_fails_is_one_line(dess, monkeypatch, tmp_path):
@@ -64,53 +46,18 @@ def test_a_notebook_that_fails_is_one_line(dess, monkeypatch, tmp_path):
     assert err.splitlines()[-1].startswith("dess: error: report study-fleets: cell 3 of 9")
 
 
-def test_yes_is_for_the_notebooks_that_simulate(dess, monkeypatch):
-    given = []
-
-    def note(names, results, out, progress=None, parameters=None, formats=()):
-        given.append(parameters)
-        return Path(out, "index.html")
-
-    monkeypatch.setattr(render, "render", note)
+def test_yes_is_for_the_notebooks_that_simulate(dess, unrendered):
     assert dess("report", "what-if", "--yes")[0] == dess("report", "sweep")[0] == 0
-    assert given == [{"yes": True}, {}]
+    assert [page[-1] for page in unrendered] == [{"yes": True}, {}]
     for name in ("what-if", "sweep", "own-sea"):
         assert notebook.read(name).parameters["yes"] is False
 
 
-def test_formats_of_figures_are_named(dess, rendered, refusal):
+def test_formats_of_figures_are_named(dess, unrendered, refusal):
     assert "'gif' is unknown; allowed: svg, pdf, png" in refusal("report", "--figures", "pdf,gif")
     code, out, _ = dess("report", "mission", "--figures", "pdf, svg")
     where = Path("build", "reports")
-    assert (code, out) == (0, f"{where / 'index.html'}\nfigures: {where / '*-figures'}\n")
-
-
-def odd(path: Path, kind: str) -> None:
-    """Put something other than a file into the place of a file."""
-    path.parent.mkdir(exist_ok=True)
-    if kind in ("loop", "link"):
-        path.symlink_to(path if kind == "loop" else "somewhere")
-    else:
-        os.mkfifo(path) if kind == "pipe" else path.mkdir()
-
-
-@pytest.mark.parametrize(
-    ("name", "kind"),
-    [
-        (".index.lock", "link"),
-        (".index.lock", "pipe"),
-        ("index.html", "folder"),
-        ("mission.html", "folder"),
-    ],
-)
-def test_a_folder_of_pages_is_checked_before_the_first_cell(
-    refusal, monkeypatch, tmp_path, name, kind
-):
-    monkeypatch.delattr("dess.reports.pages.kernels.run")
-    monkeypatch.setattr("dess.reports.pages.render._lacking", lambda *_: {})
-    odd(tmp_path / "pages" / name, kind)
-    line = refusal("report", "mission", "--out", "pages")
-    assert f"pages/{name}: " in line and "; allowed: " in line
+    assert (code, out) == (0, f"{where / 'mission.html'}\nfigures: {where / '*-figures'}\n")
 
 
 def test_a_parameter_that_the_study_refuses_is_refused_before_any_cell(dess, refusal, monkeypatch):

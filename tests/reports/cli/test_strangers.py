@@ -6,13 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from dess import InputError
-from dess.analysis import run_study
 from dess.analysis.answers.diff import at_hand
-from dess.analysis.execution.jobs import MissionsJob
-from dess.analysis.results.chunks import parts_of, split
-from dess.analysis.results.resimulate import Evidence, resimulate
-from dess.analysis.results.tables import Results, load_results
+from dess.analysis.results.resimulate import Evidence
+from dess.analysis.results.tables import load_results
 from dess.reports.cli import main
 from dess.reports.pages import html
 from dess.reports.pages.page import Page
@@ -32,11 +28,9 @@ Evil1 = Evil0
 
 
 @pytest.fixture(scope="module")
-def sound(tmp_path_factory):
+def sound(studied):
     """Small results with event logs."""
-    folder = tmp_path_factory.mktemp("sound")
-    run_study(small_study(folder, logged=1), folder / "out")
-    return folder / "out"
+    return studied(logged=1).store.folder
 
 
 @pytest.fixture
@@ -94,26 +88,6 @@ def test_results_of_a_python_file_are_shown_without_running_it(command, stranger
         load_results("results")
     )
     assert not Path("trace").exists()
-
-
-@pytest.mark.usefixtures("stranger")
-def test_no_mission_of_a_python_file_that_only_results_name_is_simulated():
-    results = load_results("results")
-    for simulated in (
-        lambda: resimulate(results, results.policies[0], 0, 0),
-        lambda: MissionsJob(*_first_chunk(results)).run(),
-    ):
-        with pytest.raises(InputError, match=r"Python file"):
-            simulated()
-    assert not Path("trace").exists()
-
-
-def _first_chunk(results: Results) -> tuple:
-    """The first missions of results, as the arguments of a job."""
-    manifest = results.store.manifest
-    chunk = next(split(parts_of(manifest, 0), 1))
-    spaces = (manifest.scenarios[0],)
-    return chunk, spaces, manifest.policies[0].policy, manifest.seed, "batch"
 
 
 def test_a_python_file_is_run_once_the_user_names_it(sound, tmp_path, monkeypatch, capsys):

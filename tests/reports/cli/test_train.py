@@ -71,10 +71,6 @@ def test_a_training_leaves_a_policy_that_flies(dess, tmp_path):
     code, out, _ = dess("simulate", *arguments)
     assert code == 0
     assert len(json.loads(out)["uavs"]) == 2
-    # A mission elsewhere is refused.
-    code, out, err = dess("simulate", "--policy", "runs/tiny", "--set", "zone=[2,2,4,4]")
-    assert (code, out) == (2, "")
-    assert "has learned zone_x 26, not 2" in err
 
 
 def test_the_seed_can_be_set(dess):
@@ -93,7 +89,6 @@ BAD = {
     "train tiny.toml": ["--out"],
     "train tiny.toml --out out --device tpu": ["--device", "'auto', 'cpu', 'cuda'"],
     "train tiny.toml --out out --device cuda": ["no CUDA device", "auto, cpu"],
-    "train tiny.toml --out out --seed -1": ["tiny.toml: seed", "-1"],
     "train tiny.toml --out out --resume": ["out/checkpoint.safetensors: no such file"],
     "evaluate --policy begun": ["begun is a training that has no weights yet", "--resume"],
     "evaluate --policy broken": ["broken/config.json: format: is missing"],
@@ -138,7 +133,7 @@ def test_a_large_training_has_to_be_confirmed(dess, monkeypatch):
 
 BEGUN = "any sea, begun with a policy"
 KINDS = {"double DQN": (), "any sea": (), BEGUN: ("--from", "begun")}
-ENDS = [("double DQN", False), ("double DQN", True), ("any sea", True)]
+ENDS = [("double DQN", False), ("any sea", True)]
 ENDS += [pytest.param(BEGUN, True, marks=pytest.mark.slow)]
 
 

@@ -10,14 +10,13 @@ import pandas as pd
 import pytest
 from nbconvert.filters import markdown2html
 
-from dess.analysis import numbers, run_study
+from dess.analysis import numbers
 from dess.analysis.figures import style
 from dess.reports.pages import html
 from dess.reports.pages.notebook import values_of, with_values
 from dess.reports.pages.page import CARD, Page
 from dess.reports.pages.render import index_of, pages_in, render_study, with_bars
 from tests.analysis.hostile import hostile_folder
-from tests.analysis.small import small_study
 from tests.reports.small import Links
 
 ATTACK = (
@@ -34,11 +33,11 @@ HARMLESS = r"</?(p|strong|em|del|code|pre|ul|ol|li|h[1-6]|blockquote|hr|br)( /)?
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
+def page(studied, tmp_path_factory):
     """The page of a study all of whose free strings are an attack."""
     folder = tmp_path_factory.mktemp("hostile")
-    run_study(small_study(folder), folder / "sound")
-    return render_study(hostile_folder(folder / "sound", folder / "made", ATTACK), folder / "out")
+    made = hostile_folder(studied().store.folder, folder / "made", ATTACK)
+    return render_study(made, folder / "out")
 
 
 def test_a_hostile_study_is_text_on_its_page_and_in_the_index(page):
@@ -70,7 +69,8 @@ def test_a_script_in_a_page_without_scripts_does_not_run(page, tmp_path, visit):
     path.write_text(page.read_text("utf-8").replace("</main>", f"{markup}</main>"), "utf-8")
     opened = visit(path, 1000)
     assert opened.page.evaluate("window.hit") is None
-    assert len(opened.complaints) == 3  # about the script, the image and its handler
+    # About the script, the image and its handler.
+    assert len(opened.complaints) == 3
     assert all("Content Security Policy" in complaint for complaint in opened.complaints)
 
 

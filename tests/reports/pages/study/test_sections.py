@@ -5,27 +5,20 @@ from html import unescape
 
 import pytest
 
-from dess.analysis import run_study
 from dess.reports.pages.notebook import SHIPPED
 from dess.reports.pages.study import parts, report_of
-from tests.analysis.small import grid, small_study
+from tests.analysis.small import grid
 from tests.reports.small import shown_by
 
 PRECISION = {"first": 5, "look_ahead": 2, "budget": 12,
              "targets": {"collection_ratio": {"absolute": 0.05}}}  # fmt: skip
 SELECTION = {"procedure": "kn-bounded", "first": 5, "indifference": 0.05, "budget": 60, "check": 9}
-SAMPLED = {"kind": "latin-hypercube", "size": 14, "ranges": {"uavs": [1, 3], "quota": [20, 60]}}
 # What is changed in the small study, what the page says, and what it does not.
 STUDIES = {
     "a single point": (
         {},
         ["The best policy is", "The other policy", "Means with 95 % intervals", "Single missions"],
         ["Effects of the fields", "baseline", "Sobol", "The selection"],
-    ),
-    "a field": (
-        {"design": grid(uavs=[1, 2])},
-        ["Effects of the fields", "n = 10 missions per point; bars", "Comparison with a baseline"],
-        ["Orange frames", "One panel for each"],
     ),
     "two fields": (
         {"design": grid(uavs=[1, 2], pads=[1, 2]), "policies": ["greedy"]},
@@ -41,11 +34,6 @@ STUDIES = {
         {"design": {"kind": "one-at-a-time", "values": {"uavs": [1, 2], "quota": [20, 60]}}},
         ["The lowest panel shows the paired difference"],
         ["Orange frames", "One panel for each field"],
-    ),
-    "a sample": (
-        {"design": SAMPLED},
-        ["One panel for each field. A dot is the mean of a policy"],
-        ["Orange frames"],
     ),
     "sensitivity": (
         {"design": {"kind": "saltelli", "base": 8, "ranges": {"uavs": [1, 3], "quota": [20, 60]}},
@@ -76,10 +64,9 @@ def page_of(folder, **parameters):
 
 
 @pytest.mark.parametrize("name", STUDIES)
-def test_the_page_says_what_the_study_can_answer(name, tmp_path):
+def test_the_page_says_what_the_study_can_answer(name, studied):
     changes, said, unsaid = STUDIES[name]
-    run_study(small_study(tmp_path, **changes), tmp_path / "out")
-    text = page_of(tmp_path / "out")
+    text = page_of(studied(**changes).store.folder)
     for part in said:
         assert part in text, part
     for part in unsaid:
@@ -87,24 +74,22 @@ def test_the_page_says_what_the_study_can_answer(name, tmp_path):
     assert "dess simulate --of results/trial " in text  # the worst missions
 
 
-def test_tags_of_the_notebook_are_those_that_have_a_meaning(tmp_path):
+def test_tags_of_the_notebook_are_those_that_have_a_meaning(studied):
     used = {*re.findall(r'"(if-[a-z-]+)"', (SHIPPED / "study.py").read_text("utf-8"))}
-    assert used == {*parts(run_study(small_study(tmp_path, missions=2), tmp_path / "out"))}
+    assert used == {*parts(studied())}
 
 
-def test_parameters_choose_the_metric_and_the_baseline(tmp_path):
-    study = small_study(tmp_path, design=grid(uavs=[1, 2]), policies=["greedy"])
-    run_study(study, tmp_path / "out")
-    text = page_of(tmp_path / "out", metric="reward", baseline=1)
+def test_parameters_choose_the_metric_and_the_baseline(studied):
+    study = studied(design=grid(uavs=[1, 2]), policies=["greedy"])
+    text = page_of(study.store.folder, metric="reward", baseline=1)
     assert "compared with itself at design point 1: 2 UAVs." in text
     assert re.search(r"The best setting is greedy with \d UAVs?: reward −?[\d,.]+ ", text)
 
 
-def test_pages_say_when_a_trained_policy_acts_outside_of_its_training(tmp_path):
+def test_pages_say_when_a_trained_policy_acts_outside_of_its_training(tmp_path, studied):
     """That of a study, and of a what-if question, be it on one side only."""
     question = {"settings": {"quota": 600}, "baseline": {}, "policies": ["ddqn"], "missions": 2}
     shown = shown_by("what-if", results=str(tmp_path), **question)
     note = "Note:** ddqn acts outside of its training: quota 440 to 600 (trained on 440)."
     assert note in shown
-    run_study(small_study(tmp_path, policies=["greedy"], missions=2), tmp_path / "out")
-    assert "Note:" not in page_of(tmp_path / "out")
+    assert "Note:" not in page_of(studied().store.folder)
