@@ -334,13 +334,6 @@ def test_the_sampling_of_ends_errs_as_the_page_says():
         assert np.round(found, 2).tolist() == numbers_of
 
 
-def test_the_limits_of_the_radio_are_those_of_the_page():
-    page, high, low = " ".join(PAGES["docs/concepts/left-out.md"].split()), 10.0, 1.0
-    turns = [4 * high * low / (299_792_458 / frequency) for frequency in (2.4e9, 868e6)]
-    assert f"this is {turns[0]:.0f} m; at 868 MHz it is {turns[1]:.0f} m" in page
-    assert f"{4.12 * (high**0.5 + low**0.5):.1f} km for 10 m and 1 m" in page
-
-
 def test_the_table_of_what_learning_needs_is_that_of_the_shipped_curves():
     curves = pd.read_parquet(ROOT / "policies/trained/curves.parquet")
     assert learning_curves.table(curves) in PAGES["docs/concepts/trainings.md"]

@@ -50,12 +50,6 @@ def check(name: str) -> ScenarioSpace:
     return space
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-def test_seas_are_valid_and_their_nodes_within_reach(family):
-    for seed in (0, 1, 2, SETS["train"][0], SETS["validation"][0], SETS["test"][-1], MOST_SEED):
-        check(f"{family}:{seed}")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SETS)
 def test_all_seas_of_the_sets_are(name):

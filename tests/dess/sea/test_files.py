@@ -138,12 +138,6 @@ def test_a_table_lies_in_the_folder_of_its_scenario(key, name, tmp_path):
     assert "password" not in str(error.value)
 
 
-def test_the_shipped_bay_has_its_nodes_beside_it():
-    bay = load_scenario("bay")
-    assert (len(bay.nodes), bay.grid, bay.quota) == (36, 40, 600)
-    assert bay.nodes[0] == (2, 2)  # B01, in the north-west
-
-
 # --- no-fly cells ---
 
 
@@ -190,12 +184,6 @@ def test_polygons_share_the_projection_of_the_nodes(write):
         load_scenario(sea)
     assert {*load_scenario(sea, nodes=[[1, 9]]).no_fly} == land
     assert load_scenario(sea, no_fly=[]).nodes == ((1, 1), (10, 10))
-
-
-def test_polygons_on_both_sides_of_the_180th_meridian(write):
-    path = write("land.geojson", features(("Polygon", [square(179.99, -0.0105, 179.995, 0.0105)])))
-    projection = EQUATOR._replace(centre=(-179.995, 0.0))
-    assert no_fly_in(path, (8, 6), projection) == ((2, 2), (2, 3))
 
 
 @given(st.lists(st.tuples(*[st.integers(-3, 12)] * 2), min_size=3, max_size=9))

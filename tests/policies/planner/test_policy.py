@@ -11,10 +11,10 @@ from dess import load_scenario, policies, simulate, simulate_batch
 from dess.guard import guard
 from dess.policies.planner import Planner, plan_of
 from dess.policies.planner import policy as module
-from dess.policies.planner.policy import _MEMORIES, Budget, memory_of
+from dess.policies.planner.policy import _MEMORIES, Budget
 from dess.scenario import ScenarioSpace
 from dess.view import View
-from tests.dess.flights import assert_same_alone, cells_of, first_view
+from tests.dess.flights import assert_same_alone, cells_of
 from tests.drawn import Checked, extended_spaces, replications, seeds, spaces
 
 
@@ -99,29 +99,6 @@ def test_plans_go_with_the_missions_that_they_belong_to():
     simulate_batch(load_scenario("paper", uavs=1, quota=20), QUICK, 1, 3, batch_size=2)
     gc.collect()
     assert len(_MEMORIES) == before
-
-
-def test_a_mission_departs_from_its_plan_by_a_node_or_by_a_uav():
-    """Small surprises add up, and cancel out; those of nodes count over several slots."""
-    view = first_view(load_scenario("paper", uavs=2))
-    QUICK.act(view)
-    state = view.state
-    mission, memory = state.missions[0], memory_of(state, QUICK.budget)
-    uavs, expected = state.uavs[0], memory.sea[0] + mission["arrival_rate"]
-    for name in ("x", "y", "charging"):
-        uavs[name] = memory.first[0][name]
-
-    def departs(residual: np.ndarray) -> bool:
-        return module._departs(mission, uavs, residual, memory, 0, 1)
-
-    surprise = np.zeros(len(expected))
-    surprise[3] = 1.0
-    assert not departs(expected)
-    assert not departs(expected + surprise) and not departs(expected - surprise)
-    assert not departs(expected - surprise) and departs(expected - surprise)
-    memory.surplus[0] = 0.0
-    uavs["x"][1] += 1
-    assert departs(expected)
 
 
 # --- how good it is ---
