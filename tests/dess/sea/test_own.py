@@ -25,11 +25,9 @@ from dess.sea.no_fly import NoFlyFile
 from dess.sea.nodes import NodesFile, NodesFound
 from dess.sea.places import Projection
 from tests import compiled
+from tests.dess.sea.shapes import CELL, EQUATOR, box, collection, feature
 
 Sea = Callable[..., Path]
-# A cell is a hundredth of a degree of latitude and, at the equator, of longitude.
-CELL = 1111.95
-EQUATOR = Projection((0.0, 0.0), (8, 6), CELL)
 
 
 @pytest.fixture
@@ -48,19 +46,6 @@ def sea(tmp_path):
         return path
 
     return write
-
-
-def feature(kind: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
-    shape = {"type": kind, "coordinates": coordinates}
-    return {"type": "Feature", "geometry": shape, "properties": properties}
-
-
-def collection(*features: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "FeatureCollection", "features": [*features]}
-
-
-def box(west: float, south: float, east: float, north: float) -> list[list[float]]:
-    return [[west, south], [east, south], [east, north], [west, north], [west, south]]
 
 
 def closed(path: Path, projection: Projection, **source: Any) -> np.ndarray:
