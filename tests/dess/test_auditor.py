@@ -8,14 +8,7 @@ from hypothesis import given
 from dess.mission import simulate
 from dess.record import MISSION_RECORD
 from tests.dess.auditor import audit
-from tests.drawn import (
-    continuous_spaces,
-    extended_spaces,
-    policies,
-    replications,
-    seeds,
-    spaces,
-)
+from tests.drawn import continuous_spaces, extended_spaces, policies, replications, seeds, spaces
 
 
 @given(spaces() | extended_spaces() | continuous_spaces(), policies, seeds, replications)
