@@ -3,7 +3,6 @@
 import json
 import re
 import shlex
-import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ from dess.channel import world_of
 from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
 from dess.reports import cli
 from dess.reports.cli import commands, options
+from tests.outside import install_package
 
 ROOT = Path(__file__).parents[1]
 TOP = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
@@ -89,8 +89,6 @@ def outside(tmp_path, monkeypatch):
 
     The working folder has this policy, and the files that pages give a title.
     """
-    folder = tmp_path / "my-policies"
-    folder.mkdir()
     for title, text in re.findall(r'^```\w+ title="(.+?)"\n(.*?)^```', ALL, re.M | re.S):
         (tmp_path / title).write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
@@ -98,15 +96,7 @@ def outside(tmp_path, monkeypatch):
     project = tomllib.loads(blocks(OWN_POLICY, "toml")[0])["project"]
     ((name, where),) = project["entry-points"]["dess.policies"].items()
     module = where.split(":")[0]
-    (folder / f"{module}.py").write_text(source)
-    metadata = folder / f"{module}-{project['version']}.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text(
-        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
-    )
-    (metadata / "entry_points.txt").write_text(f"[dess.policies]\n{name} = {where}\n")
-    monkeypatch.syspath_prepend(str(folder))
-    monkeypatch.delitem(sys.modules, module, raising=False)
+    install_package(tmp_path / "my-policies", monkeypatch, module, source, **{name: where})
     return name
 
 
