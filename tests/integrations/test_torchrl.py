@@ -18,6 +18,17 @@ SHORT = dess.load_scenario("paper", max_slots=12)
 fleets = pytest.mark.parametrize("scenario", [DRAWN, FIXED], ids=["drawn", "fixed"])
 
 
+def test_rows():
+    """Four missions in lockstep, with a row for each UAV."""
+    torch.manual_seed(0)
+    env = torchrl_envs.GymWrapper(dess.vector_env(DRAWN, 4, 1), categorical_action_encoding=True)
+    env = torchrl_envs.TransformedEnv(env, torchrl_envs.ActionMask())
+    torchrl_envs.check_env_specs(env)
+    flight = env.rollout(50)
+    allowed = flight["action_mask"]
+    assert allowed.gather(-1, flight["action"].unsqueeze(-1)).all() and not allowed.all()
+
+
 @fleets
 def test_contract(tmp_path, scenario):
     """Random allowed actions in whole missions, and the example as a policy."""

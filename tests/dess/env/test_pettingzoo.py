@@ -2,6 +2,7 @@
 
 import warnings
 from itertools import product
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,20 @@ def test_pettingzoos_tests_pass(choice):
         their.seed_test(lambda: parallel_to_aec(made(**choice)), num_cycles=20)
         their.state_test(parallel_to_aec(made(**choice)), made(**choice))
     their.api_test(parallel_to_aec(made(**choice)), num_cycles=100)
+
+
+@pytest.mark.parametrize(("uavs", "ended"), [(3, "leave"), (3, "stay"), ([1, 3], "stay")])
+def test_pettingzoos_max_cycles_test_passes(uavs, ended):
+    """``max_cycles`` is ``max_slots`` of the scenario; no UAV ends before in this mission."""
+
+    def mission(max_cycles: int) -> HarvestEnv:
+        scenario = dess.load_scenario("paper", uavs=uavs, max_slots=max_cycles)
+        return dess.parallel_env(scenario, ended=ended)
+
+    turns = SimpleNamespace(
+        parallel_env=mission, env=lambda max_cycles: parallel_to_aec(mission(max_cycles))
+    )
+    their.max_cycles_test(turns)
 
 
 @every_choice
