@@ -23,7 +23,7 @@ __all__ = ["installed"]  # a fixture
 HERE = Path(__file__).parent
 # Files and folders whose tests take less than half a minute together.
 QUICK = (
-    *("dess/test_scenario.py", "dess/sections/test_age.py", "dess/sections/test_failures.py"),
+    *("dess/test_scenario.py", "dess/sections/test_failures.py"),
     *("dess/test_errors.py", "dess/test_files.py"),
     *("dess/test_missions.py", "dess/test_rules.py", "dess/sea", "dess/test_streams.py"),
     *("policies/test_registry.py", "analysis/stats", "test_doors.py"),

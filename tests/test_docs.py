@@ -3,7 +3,6 @@
 import json
 import re
 import shlex
-import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ from dess.channel import world_of
 from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
 from dess.reports import cli
 from dess.reports.cli import commands, options
+from tests.outside import install_package
 
 ROOT = Path(__file__).parents[1]
 TOP = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
@@ -89,8 +89,6 @@ def outside(tmp_path, monkeypatch):
 
     The working folder has this policy, and the files that pages give a title.
     """
-    folder = tmp_path / "my-policies"
-    folder.mkdir()
     for title, text in re.findall(r'^```\w+ title="(.+?)"\n(.*?)^```', ALL, re.M | re.S):
         (tmp_path / title).write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
@@ -98,15 +96,7 @@ def outside(tmp_path, monkeypatch):
     project = tomllib.loads(blocks(OWN_POLICY, "toml")[0])["project"]
     ((name, where),) = project["entry-points"]["dess.policies"].items()
     module = where.split(":")[0]
-    (folder / f"{module}.py").write_text(source)
-    metadata = folder / f"{module}-{project['version']}.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text(
-        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
-    )
-    (metadata / "entry_points.txt").write_text(f"[dess.policies]\n{name} = {where}\n")
-    monkeypatch.syspath_prepend(str(folder))
-    monkeypatch.delitem(sys.modules, module, raising=False)
+    install_package(tmp_path / "my-policies", monkeypatch, module, source, **{name: where})
     return name
 
 
@@ -332,13 +322,6 @@ def test_the_sampling_of_ends_errs_as_the_page_says():
             onto = leaving = (onto + leaving) / 2  # the trapezoidal rule
         found = [[onto], [leaving], [onto - leaving]]
         assert np.round(found, 2).tolist() == numbers_of
-
-
-def test_the_limits_of_the_radio_are_those_of_the_page():
-    page, high, low = " ".join(PAGES["docs/concepts/left-out.md"].split()), 10.0, 1.0
-    turns = [4 * high * low / (299_792_458 / frequency) for frequency in (2.4e9, 868e6)]
-    assert f"this is {turns[0]:.0f} m; at 868 MHz it is {turns[1]:.0f} m" in page
-    assert f"{4.12 * (high**0.5 + low**0.5):.1f} km for 10 m and 1 m" in page
 
 
 def test_the_table_of_what_learning_needs_is_that_of_the_shipped_curves():

@@ -1,43 +1,15 @@
-"""The matrix of libraries: how it is made from reports, and that the page has the current one."""
+"""The matrix of libraries: the page has the current one."""
 
 import re
-from xml.etree import ElementTree
 
-import pytest
 from packaging.utils import canonicalize_name
 
 from tests.distributions import ROOT
-from tests.integrations.matrix import (
-    BEGIN,
-    CHECK,
-    END,
-    FAILED,
-    MISSING,
-    NO_ENVIRONMENT,
-    PAGE,
-    YES,
-    row,
-)
+from tests.integrations.matrix import BEGIN, END, NO_ENVIRONMENT, PAGE, YES
 from tests.test_packaging import pins
 
 OWN_PINS = sorted((ROOT / "examples" / "requirements").glob("*.txt"))
 TESTED = {path.stem.removeprefix("test_") for path in (ROOT / "tests/integrations").glob("test_*")}
-
-
-def suite(outcome: str) -> ElementTree.Element:
-    """The report of a library whose test had an outcome."""
-    case = "" if outcome == "absent" else f'<testcase name="{CHECK}">{outcome}</testcase>'
-    library = '<properties><property name="library" value="ray 2.60.0"/></properties>'
-    return ElementTree.fromstring(f"<testsuite>{library}{case}</testsuite>")
-
-
-OUTCOMES = [("", YES), ("<failure/>", FAILED), ("<error/>", FAILED)]
-OUTCOMES += [("<skipped/>", MISSING), ("absent", MISSING)]
-
-
-@pytest.mark.parametrize(("outcome", "cell"), OUTCOMES)
-def test_a_row_has_the_outcome_of_every_check(outcome, cell):
-    assert row(suite(outcome), "rllib") == ["`rllib` (`ray`)", "2.60.0", cell]
 
 
 def test_own_pins_are_exact_and_those_of_a_library_with_tests():

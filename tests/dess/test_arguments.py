@@ -1,9 +1,7 @@
 """What people pass: names, numbers of numpy and pandas, and what is neither."""
 
 from collections.abc import Callable
-from copy import deepcopy
 from pathlib import Path
-from pickle import dumps, loads
 from typing import Any
 
 import numpy as np
@@ -152,19 +150,3 @@ def test_a_policy_cannot_write_into_what_missions_share():
     env = dess.vector_env("paper", 2)
     arrays = [array for array in (*env.world[:-1], *env.world.chart) if array is not None]
     assert len(arrays) >= 8 and not any(array.flags.writeable for array in arrays)
-
-
-@pytest.mark.parametrize("copied", [deepcopy, lambda env: loads(dumps(env))])
-def test_a_copy_of_an_environment_needs_no_compilation(copied):
-    """To numba, an array that can be written to has another type."""
-    env = dess.vector_env("paper", 2, 1, guarded=True)
-    env.reset()
-    known = str(deepcopy(env.step(np.full(6, 4))))
-    from dess.env import stepper
-
-    count = len(stepper._step.signatures)
-    again = copied(dess.vector_env("paper", 2, 1, guarded=True))
-    again.reset()
-    assert str(again.step(np.full(6, 4))) == known
-    assert len(stepper._step.signatures) == count
-    assert not again.world.nodes.flags.writeable

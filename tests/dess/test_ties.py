@@ -4,11 +4,8 @@ import numpy as np
 import pytest
 
 from dess import channel, policies, simulate
-from dess.code.kernels import kernel
-from dess.policies import heuristics
 from dess.policies.planner import rates
 from dess.scenario import ScenarioSpace
-from dess.state import state_of
 
 CELLS = [[x, y] for x in range(13) for y in range(13)]
 SEA = {
@@ -47,19 +44,3 @@ def test_the_planner_expects_the_same_rate_at_the_same_distance(slots):
         first = np.zeros(places.max() + 1)
         first[places] = values
         assert (first[places] == values).all()
-
-
-def test_mirrored_nodes_are_as_stale_for_the_policy_age():
-    lattice = [[x, y] for x in range(0, 13, 3) for y in range(0, 13, 3)]
-    space = _sea(4, lattice)
-    state, data, nodes = state_of([space], 1), np.ones(25), np.array(lattice)
-    mirrored = ([0, 3], [3, 0], [9, 0], [0, 9], [12, 3], [3, 12], [12, 9], [9, 12])
-    assert (
-        len({_staleness(state, data, nodes, space.chart, lattice.index(c)) for c in mirrored}) == 1
-    )
-
-
-@kernel
-def _staleness(state, data, nodes, chart, k):
-    sensors = state.sensors[0]
-    return heuristics._staleness(state.missions[0], data, sensors, nodes, chart, k, 12)

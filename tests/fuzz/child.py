@@ -7,11 +7,11 @@ import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib
 
+from dess.reports.cli import main
 from tests.fuzz import kernel
 from tests.fuzz.case import CWD, HOME, LOG, TEMPORARY, Case
 
@@ -21,7 +21,7 @@ DATA = 1536 * 2**20  # bytes that a process may allocate, besides those of the l
 FILE = 2**30  # bytes of a file, if the case does not say
 
 
-def run(case: Case, box: Path, command: Callable[[], int]) -> None:
+def run(case: Case, box: Path) -> None:
     """Run the command of a case, in a session of its own, and exit with its code."""
     if "tests.fuzz.preload" not in sys.modules:  # multiprocessing does not say why
         raise RuntimeError("tests.fuzz.preload was not loaded: import it to see why")
@@ -40,7 +40,7 @@ def run(case: Case, box: Path, command: Callable[[], int]) -> None:
     _limit(resource.RLIMIT_CORE, 0)
     (box / LOG / STARTED).touch()
     _limit(resource.RLIMIT_FSIZE, case.file_size or FILE)
-    code = command()
+    code = main()
     # The end of an interpreter, which a process of multiprocessing has in another order: workers
     # are stopped before anything waits for them.
     threading._shutdown()

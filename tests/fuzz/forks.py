@@ -18,7 +18,6 @@ from pathlib import Path
 import psutil
 import pyarrow as pa
 
-from dess.reports.cli import main
 from tests.fuzz import child
 from tests.fuzz.case import FOLDERS, HOME, LOG, SECRET, SECRET_FILE, Case
 from tests.fuzz.snapshot import Snapshot, taken
@@ -33,8 +32,6 @@ _WATCH = 1  # seconds before a command is interrupted in which it has to do some
 # Errors of a step that does not fit what an earlier step has left; it does nothing then.
 _UNFIT = (OSError, ValueError, LookupError, TypeError, AttributeError, ZeroDivisionError)
 _UNFIT += (RecursionError, pa.ArrowException)
-
-Command = Callable[[], int]
 
 
 @dataclass(frozen=True)
@@ -74,14 +71,9 @@ class Outcome:
 class Forks:
     """Runs cases, a few at a time, below a folder."""
 
-    def __init__(self, folder: Path, command: Command = main) -> None:
-        """Load everything that commands need, once.
-
-        Args:
-            folder: The folder of the cases and of the ready inputs.
-            command: What is called, with the arguments of a case as those of the process.
-        """
-        self.cases, self.ready, self._command = folder / "cases", folder / "ready", command
+    def __init__(self, folder: Path) -> None:
+        """Load everything that commands need, once."""
+        self.cases, self.ready = folder / "cases", folder / "ready"
         self._context = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload(["tests.fuzz.preload", "tests.fuzz.child"])
 
@@ -103,7 +95,7 @@ class Forks:
                 entry.kill()
 
     def _process(self, case: Case, box: Path) -> BaseProcess:
-        return self._context.Process(target=child.run, args=(case, box, self._command))
+        return self._context.Process(target=child.run, args=(case, box))
 
     def _start(self, number: int, case: Case) -> "_Running":
         box = self.cases / str(number)

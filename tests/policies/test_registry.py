@@ -18,6 +18,7 @@ from dess.policies.learner.config import config_of
 from dess.policies.learner.trained import forms_of, observed, save_policy
 from dess.policies.registry import SHIPPED, Policy, TypedByUser, about
 from dess.scenario import Scenario, load_scenario, scenario_names
+from tests.outside import install_package
 from tests.policies.learner.tiny import refusal_of
 
 ROOT = Path(__file__).parents[2]
@@ -39,25 +40,13 @@ class Nothing:
     pass
 """
 
-ENTRY_POINTS = """
-[dess.policies]
-still = outside_policies:Still
-broken = outside_policies:Broken
-nothing = outside_policies:Nothing
-absent = outside_policies:Absent
-"""
-
 
 @pytest.fixture
 def outside(tmp_path, monkeypatch):
     """An installed package that adds policies through entry points."""
-    (tmp_path / "outside_policies.py").write_text(OUTSIDE)
-    metadata = tmp_path / "outside_policies-1.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: outside-policies\nVersion: 1")
-    (metadata / "entry_points.txt").write_text(ENTRY_POINTS)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.delitem(sys.modules, "outside_policies", raising=False)
+    names = ("still", "broken", "nothing", "absent")
+    classes = {name: f"outside_policies:{name.title()}" for name in names}
+    install_package(tmp_path, monkeypatch, "outside_policies", OUTSIDE, **classes)
 
 
 @pytest.mark.parametrize("text", ["gredy", "", "greedy,,tour", "Greedy"])

@@ -10,7 +10,6 @@ row. What is taken from the log must be possible.
     report["metrics"]["collected"], report["uavs"][0]["battery"]
 """
 
-from tests.dess.auditor.log import WrongLogError
 from tests.dess.auditor.mission import audit
 
-__all__ = ["WrongLogError", "audit"]
+__all__ = ["audit"]

@@ -11,8 +11,6 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import SyncVectorEnv
-from gymnasium.wrappers import FlattenObservation, RecordEpisodeStatistics
 
 import dess
 from dess import InputError
@@ -66,22 +64,6 @@ def test_a_lone_uav_flies_the_mission_of_simulate():
 
     record = dess.simulate(dess.load_scenario("paper", uavs=1), Hover(), 4, 2)
     assert env.mission.record().metrics == record.metrics and reward == record.reward
-
-
-def test_gymnasiums_vectors_and_wrappers_take_it():
-    short = dess.load_scenario("paper", max_slots=20)
-
-    def made() -> gymnasium.Env:
-        env = gymnasium.make(NAME, scenario=short, observation="maps")
-        return RecordEpisodeStatistics(FlattenObservation(env))
-
-    envs = SyncVectorEnv([made, made])
-    envs.reset(seed=[3, 4])
-    for _ in range(20):
-        *_, infos = envs.step(np.array([4, 4]))
-        if "episode" in infos:
-            return
-    pytest.fail("no mission has ended")
 
 
 # --- seeds ---

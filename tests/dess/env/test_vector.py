@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 from gymnasium.spaces import flatten
@@ -135,12 +134,6 @@ def test_missions_are_numbered_as_they_start(num_envs):
     for reset, low in (({}, len(started)), ({"options": {"replication": 40}}, 40)):
         assert numbers(env.reset(**reset)[1]) == [low + b for b in range(num_envs)]  # type: ignore
     assert data_equivalence(env.reset(seed=1)[0], first, exact=True)
-
-
-def test_gymnasium_makes_it_from_a_name_with_options():
-    env = gymnasium.make_vec("dess.env.vector:dess/Paper-v0", 2, observation="maps", guarded=True)
-    assert env.num_envs == 2 * PAPER.uavs[1]
-    assert set(env.single_observation_space.keys()) == {"local", "global", "battery"}
 
 
 def test_the_next_mission_can_start_in_the_next_step():

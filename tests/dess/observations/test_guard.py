@@ -5,38 +5,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import event, given
 
 from dess import policies
 from dess.batch import simulate_batch
 from dess.guard import guard
-from dess.mission import simulate
 from dess.observations.states import HOME, compact_states
-from dess.scenario import ScenarioSpace, load_scenario
+from dess.scenario import load_scenario
 from dess.state import BATTERY, HOVER
 from dess.view import View
 from tests import compiled
 from tests.dess.env.episodes import placed
-from tests.drawn import EAST, NORTH, SOUTH, WEST, random_actions, replications, seeds, spaces
-
-
-class Guarded:
-    """Any action that the guard allows, at random; on the way it checks the mask."""
-
-    name = "guarded"
-
-    def act(self, view: View) -> np.ndarray:
-        mask = guard(view)
-        assert mask.shape == (len(view), 5) and mask.any(1).all()
-        assert not (mask & ~view.legal).any()
-        return random_actions(view, mask)
-
-
-@given(spaces(uavs=1, initial_data=1e6), seeds, replications)
-def test_the_battery_of_a_guarded_lone_uav_is_never_depleted(space, seed, replication):
-    record = simulate(space, Guarded(), seed, replication)
-    assert (record.uavs["end"] != BATTERY).all()
-    event(f"charged {record.uavs['slots_charging'][0] > 0}")
+from tests.drawn import EAST, NORTH, SOUTH, WEST
 
 
 def _mask(*uavs: dict[str, Any], **scenario: Any) -> np.ndarray:
@@ -142,47 +121,9 @@ def test_the_battery_to_a_zone_farther_than_the_nearest_is_that_of_the_way_there
         assert states.uavs[0, 0, HOME] == needed
 
 
-ISLANDS = """
-    ...##...........
-    ...##...0000....
-    ........0000.##.
-    .###....00...##.
-    .#............#.
-    ......###.......
-    ..#...###....#..
-    ..#...........#.
-    ..##....1....##.
-    ........1.......
-    .##.......###...
-    """
-CORRIDORS = """
-    ....#....#.....
-    ....#....#.....
-    ....#....#.....
-    .000......1....
-    .000#....#.....
-    .000#....#.....
-    ....#.##.####.#
-    ....#....#.....
-    .........#.....
-    ....#..........
-    """
-
-
-@pytest.mark.parametrize("picture", [ISLANDS, CORRIDORS], ids=["islands", "corridors"])
-def test_hardly_any_guarded_uav_runs_dry_among_islands_and_no_lone_one_does(picture):
-    rows = picture.split()
-    cells = {(x, y): kind for y, row in enumerate(rows) for x, kind in enumerate(row)}
-    water = [cell for cell, kind in cells.items() if kind == "."]
-    zone = [1, 3, 3, 3] if picture == CORRIDORS else [8, 1, 4, 2]
-    further = [10, 3, 1, 1] if picture == CORRIDORS else [8, 8, 1, 2]
-    space = ScenarioSpace.of(
-        **{"grid": len(rows[0]), "rows": len(rows), "zone": zone, "nodes": water[::9]},
-        zones=[{"cells": further}],
-        no_fly=[cell for cell, kind in cells.items() if kind == "#"],
-        **{"uavs": [1, 4], "flying_time": [40, 60], "charge_start": [15, 30]},
-        **{"initial_data": 1e6, "max_slots": 300},
-    )
+@pytest.mark.parametrize("sea", ["archipelago:1", "corridor:7"])
+def test_hardly_any_guarded_uav_runs_dry_among_islands_and_no_lone_one_does(sea):
+    space = load_scenario(sea, uavs=[1, 4], initial_data=1e6, max_slots=300)
     records = simulate_batch(space, policies.load("random"), 3, 400)
     dry = (records.uavs["end"] == BATTERY).sum(1)
     assert dry.sum() <= 0.01 * records.missions["uavs"].sum()

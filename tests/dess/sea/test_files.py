@@ -16,21 +16,14 @@ from dess.sea.chart import Cell
 from dess.sea.no_fly import NoFlyFile, centres_in
 from dess.sea.nodes import NodesFile, NodesFound
 from dess.sea.places import Projection, Size
-
-# A cell is a hundredth of a degree of latitude and, at the equator, of longitude; 0, 0 is the
-# centre of the grid.
-EQUATOR = Projection((0.0, 0.0), (8, 6), 1111.95)
+from tests.dess.sea.shapes import EQUATOR, box, collection, feature
 
 
 def nodes_in(path: Path, size: Size, cell_size: float, **source: Any) -> tuple[Cell, ...]:
     """The cells of the nodes of a file, on a grid about their centre."""
-    return tuple(fields_in(path, size, cell_size, **source)["nodes"])
-
-
-def fields_in(path: Path, size: Size, cell_size: float, **source: Any) -> dict[str, Any]:
-    """The fields of a scenario that has these nodes."""
     found = NodesFound.read(path, NodesFile(file=path.name, **source))
-    return found.fields(size, found.projection(size, cell_size), np.zeros(size[::-1], np.bool_))
+    projection = found.projection(size, cell_size)
+    return tuple(found.fields(size, projection, np.zeros(size[::-1], np.bool_))["nodes"])
 
 
 def no_fly_in(
@@ -58,24 +51,14 @@ def write(tmp_path):
 
 
 def features(*geometries: tuple[str, Any]) -> dict[str, Any]:
-    shapes = [{"type": kind, "coordinates": coordinates} for kind, coordinates in geometries]
-    return {"type": "FeatureCollection", "features": [{"geometry": shape} for shape in shapes]}
+    return collection(*(feature(*geometry) for geometry in geometries))
 
 
 def points(*places: tuple[float, ...]) -> dict[str, Any]:
     return features(*(("Point", place) for place in places))
 
 
-def square(west: float, south: float, east: float, north: float) -> list[list[float]]:
-    return [[west, south], [east, south], [east, north], [west, north], [west, south]]
-
-
 # --- nodes ---
-
-
-def test_columns_x_and_y_are_cells(write):
-    path = write("buoys.csv", "\ufeffname, y ,x\na,3,1\n\nb,0,7\r\n")
-    assert nodes_in(path, (8, 8), 800.0) == ((1, 3), (7, 0))
 
 
 def test_degrees_are_projected_about_the_centre_of_their_box(write):
@@ -138,18 +121,7 @@ def test_a_table_lies_in_the_folder_of_its_scenario(key, name, tmp_path):
     assert "password" not in str(error.value)
 
 
-def test_the_shipped_bay_has_its_nodes_beside_it():
-    bay = load_scenario("bay")
-    assert (len(bay.nodes), bay.grid, bay.quota) == (36, 40, 600)
-    assert bay.nodes[0] == (2, 2)  # B01, in the north-west
-
-
 # --- no-fly cells ---
-
-
-def test_a_map_has_a_line_for_each_row_from_north_to_south(write):
-    path = write("islands.txt", "..#\r\n##.  \n\n")
-    assert no_fly_in(path, (3, 2), None) == ((2, 0), (0, 1), (1, 1))
 
 
 def test_a_table_has_cells_or_degrees(write):
@@ -161,7 +133,7 @@ def test_a_table_has_cells_or_degrees(write):
 
 def test_a_polygon_closes_the_cells_whose_centres_lie_in_it(write):
     """From 1.6 to 6.4 cells in the west-east, 0.6 to 5.4 in the north-south: 2..5 and 1..4."""
-    outer, hole = square(-0.024, -0.024, 0.024, 0.024), square(-0.011, -0.011, 0.011, 0.011)
+    outer, hole = box(-0.024, -0.024, 0.024, 0.024), box(-0.011, -0.011, 0.011, 0.011)
     path = write("island.geojson", features(("Polygon", [outer, hole])))
     ring = {(x, y) for x in range(2, 6) for y in range(1, 5)} - {(3, 2), (4, 2), (3, 3), (4, 3)}
     assert {*no_fly_in(path, (8, 6), EQUATOR)} == ring
@@ -169,8 +141,8 @@ def test_a_polygon_closes_the_cells_whose_centres_lie_in_it(write):
 
 def test_what_lies_beyond_the_grid_is_cut(write):
     """A polygon from beyond the north-western corner, and one of two islands, the other far off."""
-    corner = [square(-1, 0.0105, -0.0205, 1)]
-    far, near = [square(9, 9, 10, 10)], [square(0.0295, -0.0295, 0.035, -0.0205)]
+    corner = [box(-1, 0.0105, -0.0205, 1)]
+    far, near = [box(9, 9, 10, 10)], [box(0.0295, -0.0295, 0.035, -0.0205)]
     path = write("island.json", features(("Polygon", corner), ("MultiPolygon", [far, near])))
     assert no_fly_in(path, (8, 6), EQUATOR) == ((0, 0), (1, 0), (0, 1), (1, 1), (7, 5))
 
@@ -178,7 +150,7 @@ def test_what_lies_beyond_the_grid_is_cut(write):
 def test_polygons_share_the_projection_of_the_nodes(write):
     """At 60 degrees north a degree of longitude is half as long; the box is not that of land."""
     write("buoys.csv", "lon,lat\n9.91,60.045\n10.09,59.955\n")
-    write("land.geojson", features(("Polygon", [square(9.5, 60.0205, 10.041, 61)])))
+    write("land.geojson", features(("Polygon", [box(9.5, 60.0205, 10.041, 61)])))
     sea = write(
         "sea.toml",
         'nodes = "buoys.csv"\nno_fly = "land.geojson"\ngrid = 12\nzone = [9, 4, 2, 2]\n'
@@ -190,12 +162,6 @@ def test_polygons_share_the_projection_of_the_nodes(write):
         load_scenario(sea)
     assert {*load_scenario(sea, nodes=[[1, 9]]).no_fly} == land
     assert load_scenario(sea, no_fly=[]).nodes == ((1, 1), (10, 10))
-
-
-def test_polygons_on_both_sides_of_the_180th_meridian(write):
-    path = write("land.geojson", features(("Polygon", [square(179.99, -0.0105, 179.995, 0.0105)])))
-    projection = EQUATOR._replace(centre=(-179.995, 0.0))
-    assert no_fly_in(path, (8, 6), projection) == ((2, 2), (2, 3))
 
 
 @given(st.lists(st.tuples(*[st.integers(-3, 12)] * 2), min_size=3, max_size=9))
@@ -254,12 +220,12 @@ NODES: list[tuple[str, Any, str]] = [
     ("n.json", {"type": "Point"}, "features: is missing; allowed: a list"),
     ("n.json", LINE, "features.0.geometry.coordinates: has not two numbers; allowed: "),
     ("n.json", ODD, "features.0.geometry.type: 'Circle' is unknown; allowed: Point, "),
-    ("n.json", features(("Polygon", [square(0, 0, 1, 1)])), "has 0 nodes; allowed: 1..1024"),
+    ("n.json", features(("Polygon", [box(0, 0, 1, 1)])), "has 0 nodes; allowed: 1..1024"),
     ("n.json", points((8,)), "features.0.geometry.coordinates: has not two numbers; allowed: "),
     ("n.json", points((8, 91)), "features.0.geometry.coordinates: lat is 91; allowed: -90..90"),
     ("n.json", points((8, 54), (8, 54)), "features.0 and features.1 lie in one cell"),
 ]
-RING, SHAPE = square(0, 0, 1, 1), "features.0.geometry.coordinates.0"
+RING, SHAPE = box(0, 0, 1, 1), "features.0.geometry.coordinates.0"
 DEGREES = "has degrees, and the nodes are cells; allowed: cells, nodes from a file with degrees, or"
 # Of no-fly cells on a grid of 3 x 2 cells, or of 8 x 6 where the nodes have degrees.
 NO_FLY: list[tuple[str, Any, str]] = [

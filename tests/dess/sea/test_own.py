@@ -17,19 +17,17 @@ from PIL import Image
 from dess import InputError, load_scenario, simulate
 from dess.analysis.names import placing
 from dess.batch import simulate_batch
-from dess.code.kernels import kernel
 from dess.policies import load_team
 from dess.scenario import draft_scenario
 from dess.sea import no_fly
-from dess.sea.chart import chart_at, distance, spread
+from dess.sea.chart import chart_at, spread
 from dess.sea.no_fly import NoFlyFile
 from dess.sea.nodes import NodesFile, NodesFound
 from dess.sea.places import Projection
+from tests import compiled
+from tests.dess.sea.shapes import CELL, EQUATOR, box, collection, feature
 
 Sea = Callable[..., Path]
-# A cell is a hundredth of a degree of latitude and, at the equator, of longitude.
-CELL = 1111.95
-EQUATOR = Projection((0.0, 0.0), (8, 6), CELL)
 
 
 @pytest.fixture
@@ -48,19 +46,6 @@ def sea(tmp_path):
         return path
 
     return write
-
-
-def feature(kind: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
-    shape = {"type": kind, "coordinates": coordinates}
-    return {"type": "Feature", "geometry": shape, "properties": properties}
-
-
-def collection(*features: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "FeatureCollection", "features": [*features]}
-
-
-def box(west: float, south: float, east: float, north: float) -> list[list[float]]:
-    return [[west, south], [east, south], [east, north], [west, north], [west, south]]
 
 
 def closed(path: Path, projection: Projection, **source: Any) -> np.ndarray:
@@ -306,12 +291,6 @@ def test_maps_of_the_field(sea, tmp_path):
         closed(sea(d_png="no picture").with_name("d.png"), grid)
 
 
-@kernel
-def _distances(chart, pairs, out):
-    for n in range(len(pairs)):
-        out[n] = distance(chart, pairs[n, 0], pairs[n, 1], pairs[n, 2], pairs[n, 3])
-
-
 def test_ways_on_a_large_grid_are_the_shortest():
     """To parking cells and nodes, from them, and between any other cells."""
     wall = tuple((60, y) for y in range(100) if y != 7)
@@ -319,10 +298,9 @@ def test_ways_on_a_large_grid_are_the_shortest():
     assert chart.rows is not None and len(chart.ways) == 6
     ends = np.array([(0, 1), (110, 90), (30, 50), (5, 99), (90, 3), (60, 7)])
     pairs = np.array([(*a, *b) for a in ends for b in ends])
-    out = np.zeros(len(pairs), np.int64)
-    _distances(chart, pairs, out)
+    found = compiled.distances(chart, pairs[:, 0], pairs[:, 1], pairs[:, 2:])
     ways = [spread(chart.zones, np.array([end]))[0].reshape(100, 120) for end in ends]
-    assert out.tolist() == [way[y, x] for way in ways for x, y in ends]
+    assert found.tolist() == [way[y, x] for way in ways for x, y in ends]
 
 
 # --- what is wrong with a sea ---

@@ -4,20 +4,20 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import event, given
 from hypothesis import strategies as st
 
-from dess import policies, simulate
-from dess.policies.registry import HEURISTICS
+from dess import simulate
+from dess.guard import guard
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import parking_of
 from dess.sections.wind import Wind, reach_of, surcharges
 from dess.state import BATTERY, constants_of
+from dess.view import View
 from tests.dess.flights import batteries, flown
-from tests.drawn import reached, replications, seeds, spaces
+from tests.drawn import random_actions, reached, replications, seeds, spaces
 
 OPEN = {"grid": 9, "zone": [4, 4, 1, 1], "nodes": [[0, 0]], "uavs": 1, "flying_time": 60}
-GUARDED = st.sampled_from([name for name in HEURISTICS if name != "random-unguarded"])
 winds = st.builds(
     Wind,
     strength=st.floats(0, 6),
@@ -79,11 +79,27 @@ def test_the_way_home_costs_as_much_as_the_best_neighbour_and_the_move_there(spa
         assert reach[number, s - 1, y, x] == (0 if (x, y) == home else min(ways))
 
 
-@given(spaces(uavs=1, initial_data=1e6), winds, GUARDED, st.integers(1, 3), seeds, replications)
-def test_a_guarded_lone_uav_never_depletes_its_battery_in_wind(
-    space, wind, name, slots_per_cell, seed, replication
-):
-    fleet = [{"slots_per_cell": slots_per_cell}]
-    windy = ScenarioSpace.of(space, wind=wind.model_dump(), fleet=fleet)
-    record = simulate(windy, policies.load(name), seed, replication)
+class Guarded:
+    """Any action that the guard allows, at random; on the way it checks the mask."""
+
+    name = "guarded"
+
+    def act(self, view: View) -> np.ndarray:
+        mask = guard(view)
+        assert mask.shape == (len(view), 5) and mask.any(1).all()
+        assert not (mask & ~view.legal).any()
+        return random_actions(view, mask)
+
+
+# Without wind, with it, and with moves of several slots.
+WEATHER = st.just({}) | st.builds(
+    lambda wind, slots: {"wind": wind.model_dump(), "fleet": [{"slots_per_cell": slots}]},
+    *(winds, st.integers(1, 3)),
+)
+
+
+@given(spaces(uavs=1, initial_data=1e6), WEATHER, seeds, replications)
+def test_the_battery_of_a_guarded_lone_uav_is_never_depleted(space, weather, seed, replication):
+    record = simulate(ScenarioSpace.of(space, **weather), Guarded(), seed, replication)
     assert (record.uavs["end"] != BATTERY).all()
+    event(f"charged {record.uavs['slots_charging'][0] > 0}")

@@ -183,16 +183,3 @@ def test_the_checkpoint_of_a_scenario_that_has_changed_is_refused(tmp_path):
     save_training(tmp_path / CHECKPOINT, training)
     write_scenario(tmp_path, nodes=[[1, 1], [2, 2]])
     refusal_of(load_training, tmp_path / CHECKPOINT, training.config, CPU)
-
-
-@pytest.mark.parametrize("error", [OSError("disk full"), KeyboardInterrupt()])
-def test_a_failed_write_leaves_the_old_file(error, training, file, monkeypatch):
-    def fail_to_save(tensors: Any, path: Path, *_: Any) -> None:
-        path.write_bytes(b"half")
-        raise error
-
-    before = files_of(file.parent)
-    monkeypatch.setattr(trained, "save_file", fail_to_save)
-    with pytest.raises(InputError if isinstance(error, OSError) else KeyboardInterrupt):
-        save_training(file, training)
-    assert files_of(file.parent) == before

@@ -17,39 +17,6 @@ def _maps(rows: int) -> list[Tensor]:
     return [torch.rand(rows, *shape, generator=generator) for shape in SHAPES]
 
 
-def _convolve(image: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
-    """A convolution without padding and its ReLU, by the windows of the image."""
-    windows = image.unfold(2, 5, 1).unfold(3, 5, 1)
-    summed = torch.einsum("rcyxij,kcij->rkyx", windows, weight)
-    return (summed + bias[:, None, None]).clamp(min=0)
-
-
-def test_the_values_are_those_of_the_layers_in_turn():
-    torch.manual_seed(2)
-    network = PaperNetwork(SHAPES)
-    local, far, own = _maps(3)
-    w = list(network.parameters())
-    near = _convolve(_convolve(local, w[0], w[1]), w[2], w[3])
-    wide = _convolve(_convolve(far, w[4], w[5]), w[6], w[7])
-    hidden = torch.cat([near.flatten(1), wide.flatten(1), own], 1)
-    for weight, bias in ((w[8], w[9]), (w[10], w[11]), (w[12], w[13])):
-        hidden = (hidden @ weight.T + bias).clamp(min=0)
-    torch.testing.assert_close(network(local, far, own), hidden @ w[14].T + w[15])
-
-
-def test_advantages_have_mean_zero():
-    torch.manual_seed(3)
-    network = DuelingNetwork(30, [64, 32])
-    vector = torch.rand(7, 30)
-    values = network(vector)
-    hidden = network.hidden(vector)
-    # The value of the state is the mean of its actions' values; what they are apart is theirs.
-    torch.testing.assert_close(values.mean(1, keepdim=True), network.value(hidden))
-    advantage = network.advantage(hidden)
-    torch.testing.assert_close(values.diff(dim=1), advantage.diff(dim=1))
-    assert values.std(1).min() > 0
-
-
 @pytest.mark.parametrize("paper", [True, False])
 def test_bfloat16_is_near_float32(paper):
     torch.manual_seed(4)

@@ -1,1 +1,0 @@
-"""The queues of the simulator beside those that theory knows."""
