@@ -1,4 +1,6 @@
-"""Sets: values by hand, and what a mirrored, rotated or renamed sea changes."""
+"""Sets: the plain ones, values by hand, and what a mirrored, rotated or renamed sea changes."""
+
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +14,18 @@ from dess.observations.states import CompactStates, empty_states
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import NO_FLY
 from dess.state import HOVER, constants_of, starts_of, state_of
+from tests.dess.observations.any_teams import any_teams
+from tests.dess.observations.plain_sets import arrays_of
 from tests.dess.turns import Turn
-from tests.drawn import seas
+from tests.drawn import seas, spaces
 
 _OWN, ACTIONS, NODES, NODE_MOVES, MATES, MATE_MOVES, _ZONES, ZONE_MOVES = range(8)
+# Walls with a gap in the north or south, so that some ways are longer than the longest that counts.
+MAZE: dict[str, Any] = {
+    **{"grid": 81, "rows": 12, "nodes": ((0, 11), (40, 5), (78, 3), (80, 0)), "zone": (0, 4, 1, 2)},
+    "zones": [{"cells": (x, 2, 1, height)} for x, height in ((2, 1), (4, 1), (6, 1), (78, 10))],
+    "no_fly": [(x, y) for x in range(1, 80, 2) for y in range(12) if y != x % 4 // 2 * 11],
+}
 
 
 def _sets(space: ScenarioSpace) -> Sets:
@@ -28,27 +38,22 @@ def _encode(space: ScenarioSpace, states: CompactStates, uav: int) -> tuple[np.n
 
 @st.composite
 def _cases(draw: st.DrawFn) -> tuple[ScenarioSpace, CompactStates, int]:
-    """A sea, a team of up to twelve in any state on it, and a UAV that is active."""
+    """A sea, a team in any state on it, and a UAV that is active."""
     space = ScenarioSpace.of(uavs=1, edge_snr=-14.0, **draw(seas()))
-    cells, nodes = np.argwhere(space.chart.zones.T != NO_FLY), len(space.nodes)
-    rng, uavs = np.random.default_rng(draw(st.integers(0, 2**32 - 1))), draw(st.integers(1, 12))
-    states = empty_states(1, uavs, nodes)
-    states.missions[0, column.CHARGE_START] = rng.integers(10, 51)
-    states.missions[0, column.CHARGE_COMPLETE] = rng.integers(60, 101)
-    team = states.uavs[0]
-    # Some teams are on three cells, mostly neighbours; numbers lie on both sides of their bounds.
-    spots = rng.integers(0, rng.choice([3, len(cells)]), uavs) + rng.integers(0, len(cells))
-    team[:, [column.X, column.Y]] = cells[spots % len(cells)]
-    team[:, column.BATTERY] = rng.integers(0, 101, uavs)
-    team[:, column.NEEDED] = rng.integers(0, rng.choice([1, 12, 111, 400]), uavs)
-    team[:, column.HOME] = rng.integers(0, rng.choice([20, 80]), uavs)
-    flags = [column.ACTIVE, column.LATCH, column.CHARGING, column.MUST_CHARGE]
-    team[:, flags] = rng.random((uavs, 4)) < rng.random(4)
-    team[:, column.MASK] = rng.integers(1, 32, uavs)
-    states.residual[:] = rng.uniform(0, rng.choice([0.0, 0.01, 20.0], nodes, p=[0.4, 0.1, 0.5]))
-    uav = draw(st.integers(0, uavs - 1))
-    team[uav, column.ACTIVE] = 1
-    return space, states, uav
+    return space, *draw(_teams(space))
+
+
+@st.composite
+def _worlds(draw: st.DrawFn, **sea: Any) -> tuple[ScenarioSpace, CompactStates, int]:
+    """A space, some missions with teams in any state on it, and a UAV that is active in each."""
+    data = draw(st.sampled_from([(0.0, 0.0), (0.0, 40.0), (8.0, 12.0)]))
+    space = draw(spaces(**sea, initial_data=data))
+    return space, *draw(_teams(space, 10))
+
+
+def _teams(space: ScenarioSpace, count: int = 1) -> st.SearchStrategy[tuple[CompactStates, int]]:
+    open_cells = np.argwhere(space.chart.zones.T != NO_FLY).tolist()
+    return any_teams(open_cells, len(space.nodes), count)
 
 
 def _turned(states: CompactStates, turn: Turn) -> CompactStates:
@@ -58,6 +63,18 @@ def _turned(states: CompactStates, turn: Turn) -> CompactStates:
     team[..., column.X], team[..., column.Y] = turn.cell(x, y)
     team[..., column.MASK] = ((mask >> np.arange(5) & 1) << turn.actions).sum(-1)
     return states._replace(uavs=team)
+
+
+@pytest.mark.parametrize("sea", [{}, MAZE], ids=["drawn", "maze"])
+@given(st.data())
+def test_its_numbers_are_the_plain_ones(sea, data):
+    """Without a tolerance: both round at the same places."""
+    space, states, uav = data.draw(_worlds(**sea))
+    missions = np.arange(len(states.missions))
+    parts = _sets(space).encode(states, missions, np.full_like(missions, uav))
+    for b in missions:
+        for part, plain in zip(parts, arrays_of(space, states, b, uav), strict=True):
+            np.testing.assert_array_equal(part[b], plain)
 
 
 @given(_cases(), st.integers(1, 7))
