@@ -208,8 +208,7 @@ def mission_memory(space: ScenarioSpace) -> float:
     """The memory [bytes] of the packets, and the tables of ``dess.channel.World``, all filled."""
     nodes = len(space.nodes)
     steps = 5 * math.prod(space.size) * (8 * nodes * space.communication_slots + 2 * (nodes + 1))
-    ways = space.chart.ways
-    return PACKET_MEMORY * space.packets + steps + (0 if ways is None else ways.nbytes)
+    return PACKET_MEMORY * space.packets + steps + space.chart.ways.nbytes
 
 
 # The memory [bytes] of a design point and of a mission, measured on studies of many of either.

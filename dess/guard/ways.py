@@ -45,7 +45,7 @@ def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
             between += before + distance(chart, closed_x, closed_y, to_x, to_y) == length
     if between == 0:
         return length
-    if between == 1 and chart.ways is None and not ends_soon(mission, uavs[i]):
+    if between == 1 and chart.ways.size == 0 and not ends_soon(mission, uavs[i]):
         # without no-fly cells, a way that does not follow a line has others of the same length
         return length + 2 if x == to_x or y == to_y else length
     return _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y)

@@ -35,7 +35,7 @@ class Chart(NamedTuple):
         sizes: (Z,) how many cells each zone has.
         nearest: (H, W) the number of the parking cell that is nearest to a cell.
         ways: (W * H, W * H) cells on the shortest way between two cells, numbered row by row, or
-            ``FAR``; None without no-fly cells, so that the compiler leaves out the table.
+            ``FAR``; empty without no-fly cells.
         rows: (W * H,) the row of ``ways`` that a cell has, or -1: on a large grid, only parking
             cells and nodes have one; None where all cells have.
     """
@@ -44,7 +44,7 @@ class Chart(NamedTuple):
     parking: np.ndarray
     sizes: np.ndarray
     nearest: np.ndarray
-    ways: np.ndarray | None
+    ways: np.ndarray
     rows: np.ndarray | None
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Chart":
@@ -103,7 +103,7 @@ def chart_at(
     sizes = np.array([columns * rows for _, _, columns, rows in zones], np.int64)
     nearest = spread(cells, parking)[1].reshape(cells.shape)
     if not no_fly:
-        return _chart_of(cells, parking, sizes, nearest, None, None)
+        return _chart_of(cells, parking, sizes, nearest, np.empty((0, 0), np.int16), None)
     places, rows = [(x, y) for y, x in np.ndindex(cells.shape)], None
     if cells.size > MOST_CHARTED:
         places, rows = [*{*parking_of(zones), *nodes}], np.full(cells.size, -1, np.int64)
@@ -221,7 +221,7 @@ def length_around(zones, ways, rows, closed, x, y, to_x, to_y):
 @inlined
 def _at_least(ways, rows, width, x, y, to_x, to_y):
     """The cells on the way between two cells or, on a large grid, a lower bound of them."""
-    if ways is None or (rows is not None and rows[to_y * width + to_x] < 0):
+    if ways.size == 0 or (rows is not None and rows[to_y * width + to_x] < 0):
         return abs(x - to_x) + abs(y - to_y)
     to = to_y * width + to_x
     return np.int64(ways[to if rows is None else rows[to], y * width + x])
@@ -248,7 +248,7 @@ def distance(chart, x, y, to_x, to_y):
 
 @inlined
 def _distance(ways, rows, zones, x, y, to_x, to_y):
-    if ways is None:
+    if ways.size == 0:
         return abs(x - to_x) + abs(y - to_y)
     cell, to = y * zones.shape[1] + x, to_y * zones.shape[1] + to_x
     if rows is None:

@@ -403,7 +403,7 @@ def _towards(chart, v, x, y, turned):
     along_y = 2 if y > v.y else 0 if y < v.y else HOVER
     first, second = (along_y, along_x) if turned else (along_x, along_y)
     first = second if first == HOVER else first
-    if chart.ways is None or first == HOVER or _is_nearer(chart, v, x, y, first):
+    if chart.ways.size == 0 or first == HOVER or _is_nearer(chart, v, x, y, first):
         return first
     if _is_nearer(chart, v, x, y, second):
         return second
