@@ -116,14 +116,6 @@ def test_ci_runs_every_nox_session():
     assert sorted(" ".join(lines).split()) == sorted(defined)
 
 
-def test_the_lowest_version_of_every_library_is_said_as_the_session_reads_it():
-    (pattern,) = re.findall(r"re\.findall\(r'(.+?)', Path", (ROOT / "noxfile.py").read_text())
-    read = dict(re.findall(pattern, (ROOT / "pyproject.toml").read_text("utf-8")))
-    for name, requirement in requirements(*ASKED).items():
-        lowest = {canonicalize_name(n): version for n, version in read.items()}[name]
-        assert requirement.specifier.contains(lowest), name
-
-
 def test_the_hooks_before_a_commit_are_what_lint_runs():
     lint = (ROOT / "noxfile.py").read_text("utf-8").split("def lint(")[1].split("@nox")[0]
     commands = [words.replace('", "', " ") for words in re.findall(r'session\.run\("(.+)"\)', lint)]

@@ -78,10 +78,6 @@ def test_the_seed_can_be_set(dess):
     assert dess("train", "tiny.toml", "--out", "b")[0] == 0
     weights = [policies.load(name).weights for name in ("a", "b")]
     assert weights[0] != weights[1]
-    code, _, err = dess("train", "tiny.toml", "--out", "a", "--resume")
-    assert code == 2
-    assert "of another config (seed differ)" in err
-    assert dess("train", "tiny.toml", "--out", "a", "--resume", "--seed", 5)[0] == 0
 
 
 # Arguments, and what the line on stderr must name.
@@ -89,10 +85,7 @@ BAD = {
     "train tiny.toml": ["--out"],
     "train tiny.toml --out out --device tpu": ["--device", "'auto', 'cpu', 'cuda'"],
     "train tiny.toml --out out --device cuda": ["no CUDA device", "auto, cpu"],
-    "train tiny.toml --out out --resume": ["out/checkpoint.safetensors: no such file"],
     "evaluate --policy begun": ["begun is a training that has no weights yet", "--resume"],
-    "evaluate --policy broken": ["broken/config.json: format: is missing"],
-    "evaluate --policy empty": ["'empty' is unknown", "the folder of a trained policy"],
 }
 
 
@@ -101,9 +94,7 @@ def test_bad_input_gets_one_line_and_changes_nothing(
     arguments, dess, refusal, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
-    for name in ("begun", "broken", "empty"):
-        (tmp_path / name).mkdir()
-    (tmp_path / "broken" / "config.json").write_text("{}")
+    (tmp_path / "begun").mkdir()
     (tmp_path / "begun" / "checkpoint.safetensors").write_text("")
     line = refusal(*arguments.split(" "))
     for part in BAD[arguments]:
