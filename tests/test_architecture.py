@@ -37,6 +37,7 @@ FOREIGN = {"agilerl", "benchmarl", "pufferlib", "ray", "rliable", "sb3_contrib"}
 FOREIGN |= {"stable_baselines3", "supersuit", "tensordict", "torchrl"}
 # What a plain `dess --help` must not wait for.
 HEAVY = {"torch", "numba", "numpy", "pandas", "pyarrow", "pydantic", "scipy", "matplotlib"}
+HEAVY |= {"gymnasium"}
 # What makes a name that may be a Python file, which is code that runs, and the modules that use it.
 # These are the types and functions of the registry, and the functions to which users give names.
 MAY_RUN_FILES = {
@@ -241,20 +242,6 @@ def test_torch_is_loaded_only_for_trainings():
     script += "for line in ('policies', 'evaluate --policy ddqn --missions 1'):\n"
     script += "    assert main(line.split()) == 0\n"
     assert not LEARNING & loaded_by(script + "assert main(['train', 'none', '--out', 'none']) == 2")
-
-
-@pytest.mark.parametrize("package", ["dess", "dess.analysis"])
-def test_lazy_names_are_typed_for_editors(package):
-    block = next(node for node in SOURCES[package].body if isinstance(node, ast.If))
-    assert ast.unparse(block.test) == "TYPE_CHECKING"
-    typed = {
-        alias.asname: f"{node.module}.{alias.name}"
-        for node in block.body
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-    }
-    home = import_module(package)._HOME
-    assert typed == {name: f"{package}.{module}.{name}" for name, module in home.items()}
 
 
 @pytest.mark.parametrize("package", ["dess", "dess.policies", "dess.analysis"])
