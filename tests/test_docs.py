@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 import pytest
 import typer.main
-import yaml
 from PIL import Image
 
 import dess
@@ -175,20 +174,6 @@ def test_links_lead_somewhere(page):
 def test_a_clone_shows_no_placeholder_of_the_site():
     assert re.findall(r"^<!-- \[\[ commands \]\] -->$", ALL, re.M)
     assert not re.findall(r"^\[\[ \w.*\]\]$", ALL, re.M)
-
-
-def test_every_page_is_in_the_site():
-    def pages(entry: Any) -> list[str]:
-        if isinstance(entry, str):
-            return [f"docs/{entry}"]
-        return [
-            p
-            for part in (entry.values() if isinstance(entry, dict) else entry)
-            for p in pages(part)
-        ]
-
-    nav = yaml.safe_load((ROOT / "mkdocs.yml").read_text("utf-8"))["nav"]
-    assert sorted(pages(nav)) == sorted(page for page in PAGES if page.startswith("docs/"))
 
 
 @pytest.mark.parametrize("page", PAGES)

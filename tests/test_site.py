@@ -53,19 +53,3 @@ def test_pages_ask_nothing_from_elsewhere_and_fit_the_window(site, chromium):
         assert all(url.startswith(site.as_uri()) for url in visit.requests), path
         assert not visit.complaints, path
         visit.page.close()
-
-
-@pytest.mark.parametrize("width", WIDTHS)
-def test_the_search_finds_charging_pads(site, chromium, width):
-    visit = Visit(chromium, site / "index.html", width)
-    visit.page.keyboard.press("f")
-    visit.page.keyboard.type("charging pad")
-    found = visit.page.locator(".md-search-result__item a").first
-    found.wait_for(state="attached")
-    titles = visit.page.locator(".md-search-result__item h1").all_text_contents()
-    assert "The model" in titles
-    found.click()
-    visit.page.wait_for_url(lambda url: not url.endswith("/index.html"))
-    assert "pad" in visit.page.locator("article").inner_text()
-    assert not visit.complaints
-    visit.page.close()

@@ -105,13 +105,6 @@ def test_tour_visits_every_node_once_around():
 # --- how good they are ---
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_lone_uav_never_fails(name):
-    records = simulate_batch(load_scenario("paper", uavs=1), policies.load(name), 31, 100)
-    assert records.missions["success"].all()
-    assert (records.uavs["slots_charging"] > 0).all()  # eq. 6: it takes at least one charge
-
-
 def test_the_best_heuristic_is_as_good_as_the_readme_says():
     products = {}
     for name in NAMES:

@@ -1,6 +1,5 @@
 """From names to policies, the shipped ones and those of outside packages."""
 
-import os
 import pickle
 import subprocess
 import sys
@@ -187,17 +186,6 @@ def test_what_a_policy_is_and_can_simulate(file):
     assert greedy.code == "dess.policies.heuristics:Greedy"
     assert greedy.origin == f"shipped with dess {dess.__version__}"
     assert about(f"{file}:Eager").origin == f"the file {file}"
-
-
-def test_the_card_of_a_policy_is_a_regular_file(tmp_path):
-    folder = _trained(tmp_path / "novice")
-    assert about(str(folder)).card.startswith("A network as a policy.")
-    (folder / "README.md").write_text("# novice")
-    assert about(str(folder)).card == "# novice"
-    (folder / "README.md").unlink()
-    os.mkfifo(folder / "README.md")
-    with pytest.raises(InputError, match=r"README\.md: cannot be read: it is a pipe"):
-        about(str(folder))
 
 
 def test_which_policies_are_python_files_is_known_without_running_them(tmp_path, monkeypatch):

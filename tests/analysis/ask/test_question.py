@@ -179,7 +179,6 @@ def test_both_sides_measure_what_belongs_to_a_section(settings, baseline, measur
         ({"policies": []}, r"question: policies: .*is too short"),
         ({"policies": "greedy"}, r"question: policies: 'greedy' has the wrong form"),
         ({"seed": -1}, r"question: seed: .*-1"),
-        ({"scenario": "papr"}, r"papr: no such scenario .did you mean paper"),
     ],
 )
 def test_what_is_no_question_is_refused_in_one_line(values, message):

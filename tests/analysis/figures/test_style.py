@@ -1,8 +1,5 @@
 """Colours tell nodes and policies apart, and tick labels are signed."""
 
-import re
-from pathlib import Path
-
 import matplotlib as mpl
 import pandas as pd
 import pytest
@@ -44,8 +41,6 @@ def test_a_figure_has_the_look_and_leaves_no_state_behind():
         assert figure.axes and not mpl.rcParams["text.parse_math"]
         raise KeyError
     assert dict(mpl.rcParams) == before
-    for module in Path(style.__file__).parent.glob("*.py"):
-        assert not re.search(r"import pyplot|matplotlib\.pyplot", module.read_text("utf-8"))
 
 
 def test_an_axis_holds_all_intervals_and_has_a_least_length():

@@ -99,9 +99,6 @@ def test_another_study_is_refused(line, out, tmp_path):
 
 
 def test_the_scenario_counts_not_its_name(out, tmp_path):
-    write_scenario(tmp_path, quota=50)
-    with pytest.raises(InputError, match="holds other scenarios"):
-        run_study(load_study(tmp_path / "trial.toml"), out)
     write_scenario(tmp_path).rename(tmp_path / "renamed.toml")
     run_study(load_study(tmp_path / "trial.toml", scenario=str(tmp_path / "renamed.toml")), out)
 

@@ -9,7 +9,6 @@ from scipy import stats
 
 from dess.analysis.execution.evaluation import Asked, evaluate, means
 from dess.analysis.metrics import PRODUCT, RATIO, REWARD, SUCCESS
-from dess.analysis.stats import intervals
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import (
     bootstrap_interval,
@@ -171,27 +170,6 @@ def test_bootstrap_keeps_pairs_together():
     x = np.random.default_rng(3).exponential(size=30)
     ratio = bootstrap_interval((2 * x, x), lambda a, b: a.sum() / b.sum(), np.random.default_rng(1))
     assert ratio == pytest.approx((2.0, 2.0, 2.0))
-
-
-def test_bootstrap_of_many_resamples_at_once_is_that_of_one_by_one(monkeypatch):
-    sample, sizes = np.random.default_rng(3).exponential(size=300), []
-
-    def mean(values, axis=-1):
-        sizes.append(values.size)
-        return np.mean(values, axis=axis)
-
-    def interval(statistic):
-        generator = np.random.default_rng(1)
-        return bootstrap_interval(sample, statistic, generator, resamples=99)
-
-    one_by_one = interval(lambda values: np.mean(values))
-    assert interval(mean) == pytest.approx(one_by_one, rel=1e-12)
-    assert len(sizes) < 10
-    # What is in memory: three resamples.
-    monkeypatch.setattr(intervals, "_BATCH", 1000)
-    sizes.clear()
-    assert interval(mean) == pytest.approx(one_by_one, rel=1e-12)
-    assert max(sizes) <= 1000
 
 
 @pytest.mark.filterwarnings("error")

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from dess.analysis.study import selection
 from dess.analysis.study.selection import Selection
 
 METRIC = "collection_ratio"
@@ -124,23 +123,6 @@ def test_a_race_by_hand():
     level[7] = -0.5
     choice = chosen(by_hand, np.stack([np.zeros(9), level]))
     assert (choice.stage, choice.best, choice.survivors) == (9, 0, (0, 1))
-
-
-@pytest.mark.parametrize("procedure", ["kn", "kn-bounded"])
-def test_the_decision_does_not_depend_on_the_rounds(procedure, monkeypatch):
-    data = normal(2, np.linspace(0.0, 0.3, 8), correlation=0.5, spread=0.7)
-    race = rule(procedure, indifference=0.1, first=15)
-    whole = chosen(race, data)
-    assert whole.stage > 300
-    assert whole.rounds > 5
-    monkeypatch.setattr(selection, "_BLOCK", 7)
-    assert chosen(race, data) == whole
-    if procedure == "kn":
-        monkeypatch.setattr(selection, "_grown", lambda count: count + 3)
-        small = chosen(race, data)
-        assert (small.best, small.stage) == (whole.best, whole.stage)
-        assert small.stage <= max(small.counts) <= small.stage + 3
-        assert small.missions < whole.missions
 
 
 RULES = {

@@ -163,7 +163,6 @@ REFUSED: dict[str, Any] = {
     "num_envs: 2.0": lambda: dess.vector_env(PAPER, 2.0),  # type: ignore[arg-type]
     "autoreset_mode": lambda: dess.vector_env(PAPER, 2, autoreset_mode="Disabled"),
     "observation: 'pixels' is unknown": lambda: dess.vector_env(PAPER, 2, observation="pixels"),
-    "observation: 'x' is unknown": lambda: dess.parallel_env(PAPER, observation="x"),
     "mask: 'x' is unknown": lambda: dess.parallel_env(PAPER, mask="x"),
     "ended: 'x' is unknown": lambda: dess.parallel_env(PAPER, ended="x"),
     "render_mode: 'x' is unknown": lambda: dess.parallel_env(PAPER, render_mode="x"),

@@ -14,7 +14,7 @@ from dess import InputError, load_scenario
 from dess.scenario import ScenarioSpace, scenario_description, scenario_names
 from dess.sea import families
 from dess.sea.chart import parking_of, spread
-from dess.sea.families import FAMILIES, MOST_SEED, SETS, sea_of, seas_of
+from dess.sea.families import FAMILIES, MOST_SEED, sea_of, seas_of
 
 # What never changes: a sea of each family, as TOML.
 HASHES = {
@@ -48,13 +48,6 @@ def check(name: str) -> ScenarioSpace:
     assert 3 * space.pads >= space.uavs[1]
     assert 60 <= space.quota / space.communication_slots <= 150
     return space
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SETS)
-def test_all_seas_of_the_sets_are(name):
-    drawn = [check(sea) for sea in seas_of(name)]
-    assert len({*drawn}) == len(drawn)
 
 
 @pytest.mark.parametrize("name", HASHES)

@@ -18,7 +18,6 @@ from dess import InputError, load_scenario, simulate
 from dess.analysis.names import placing
 from dess.batch import simulate_batch
 from dess.policies import load_team
-from dess.scenario import draft_scenario
 from dess.sea import no_fly
 from dess.sea.chart import chart_at, spread
 from dess.sea.no_fly import NoFlyFile
@@ -319,14 +318,6 @@ def test_all_bad_nodes_are_named_at_once(sea):
         load_scenario(sea(lines.replace("8", "5"), n_csv=table))
 
 
-def test_a_sea_that_is_refused_can_be_drawn(sea):
-    path = sea("grid = 8\nzone = [7, 7, 4, 4]\nnodes = [[1, 1], [9, 9]]\nno_fly = [[1, 1]]\n")
-    with pytest.raises(InputError, match="zone: "):
-        load_scenario(path)
-    draft = draft_scenario(path)
-    assert (draft.zone, draft.nodes) == ((7, 7, 4, 4), ((1, 1), (9, 9)))
-
-
 def test_charging_zones_are_places_on_the_earth(sea):
     """A zone lies as near about its place as cells allow."""
     place = "{lon = 0.01, lat = 0.0, width = 2, height = 2}"
@@ -338,10 +329,3 @@ def test_charging_zones_are_places_on_the_earth(sea):
         load_scenario(sea(lines))
     with pytest.raises(InputError, match="sea.toml: zone: lat: 91 is out of range"):
         load_scenario(sea(lines.replace("lat = 0.0", "lat = 91")))
-
-
-def test_no_uav_waits_to_death_where_another_zone_is_free():
-    """Two UAVs and two zones with a pad each: no UAV has to wait for long."""
-    space = load_scenario("german-bight", uavs=2, pads=1, **{"zones.pads": 1})
-    records = simulate_batch(space, load_team("greedy"), 1, 16)
-    assert records.missions["success"].all()

@@ -19,7 +19,7 @@ from dess.policies.learner.config import CHECKPOINT, MODEL
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.trained import load_policy, save_policy
 from dess.state import MISSION, SENSOR, UAV
-from tests.analysis.small import files_of, write_scenario
+from tests.analysis.small import write_scenario
 from tests.policies.learner.tiny import CPU, assert_same, refusal_of, tiny
 
 
@@ -51,11 +51,6 @@ def test_a_pickle_is_refused_and_not_run(training, file, tmp_path):
     assert not trace.exists()
     torch.load(file.rename(tmp_path / "pickle"), weights_only=False)
     assert trace.exists()  # it would have
-
-
-def test_a_training_comes_back_as_it_was(training, file):
-    assert_same(load_training(file, training.config, CPU), training)
-    assert files_of(file.parent).keys() == {CHECKPOINT}
 
 
 def test_the_checkpoint_of_another_config_is_refused(training, file):

@@ -24,7 +24,6 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"short_ranges": 0.5}, "short_ranges: 0.5 has no effect with the observation vector; allow"),
     ({"phases": [PHASE | {"temperature": 1e-320}]}, "phases.0: temperature: 1e-320 is too low"),
     ({"name": "\x1b[2J"}, "name: '\\x1b[2J' has control characters; allowed: printable"),
-    ({"scenario": "nope"}, "scenario: nope: no such scenario; allowed: bay, "),
 ]
 
 

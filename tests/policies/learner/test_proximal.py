@@ -1,14 +1,14 @@
-"""Proximal policy optimization: advantages by hand, what a step does, and going on after a stop."""
+"""Proximal policy optimization: advantages by hand, and what a step does."""
 
 import numpy as np
 import pytest
 import torch
 
 from dess.observations.states import layout_of, masks
-from dess.policies.learner.checkpoint import load_training, new_training, save_training
+from dess.policies.learner.checkpoint import new_training
 from dess.policies.learner.ppo import CLIP, TRACE, WORTH, ProximalTraining, _advantages, _with_range
 from dess.scenario import load_scenario
-from tests.policies.learner.tiny import CPU, assert_same, tiny_on_seas, weights_of
+from tests.policies.learner.tiny import CPU, tiny_on_seas, weights_of
 
 
 def _training(ticks: int = 0, **changes: object) -> ProximalTraining:
@@ -16,22 +16,6 @@ def _training(ticks: int = 0, **changes: object) -> ProximalTraining:
     assert isinstance(training, ProximalTraining)
     training.run(ticks)
     return training
-
-
-@pytest.fixture(scope="module")
-def whole():
-    return _training(100)
-
-
-@pytest.mark.parametrize("stop", [pytest.param(2, marks=pytest.mark.slow), 6])
-def test_a_stopped_training_goes_on_as_if_nothing_had_been(stop, whole, tmp_path):
-    path, training = tmp_path / "checkpoint", _training(stop)
-    save_training(path, training)
-    torch.manual_seed(99)
-    resumed = load_training(path, training.config, CPU)
-    resumed.run(100)
-    assert resumed.done
-    assert_same(resumed, whole)
 
 
 def test_advantages_are_sums_of_what_the_critic_did_not_expect():

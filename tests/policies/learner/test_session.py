@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -119,21 +118,10 @@ def _twice() -> None:
     signal.raise_signal(signal.SIGINT)
 
 
-def _in_a_long_tick() -> None:
-    signal.raise_signal(signal.SIGTERM)
-    end = time.monotonic() + 60
-    while time.monotonic() < end:
-        pass
-
-
-@pytest.mark.parametrize(("stop", "tick_end"), [(_twice, session.TICK_END), (_in_a_long_tick, 0.1)])
-def test_a_second_signal_or_a_long_tick_ends_it_at_once(
-    stop, tick_end, whole, tmp_path, monkeypatch
-):
+def test_a_second_signal_ends_it_at_once(whole, tmp_path):
     before = signal.getsignal(signal.SIGINT)
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(session, "TICK_END", tick_end)
-        train(SHORT, tmp_path, progress=_at(7, stop))
+    with pytest.raises(KeyboardInterrupt):
+        train(SHORT, tmp_path, progress=_at(7, _twice))
     assert signal.getsignal(signal.SIGINT) == before
     assert_same(train(SHORT, tmp_path, resume=True), whole)  # from the last checkpoint
 

@@ -3,7 +3,6 @@
 import os
 import random
 import signal
-import time
 from contextlib import suppress
 from functools import partial
 from itertools import count
@@ -127,17 +126,3 @@ def test_a_report_that_is_terminated_leaves_no_page_no_process_and_no_file(resul
     command = a_page(tmp_path / "pages", results)
     assert command.kill(signal.SIGTERM, lambda: renderings(command) > 0, 0.5)
     assert not command.out.exists()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("number", SIGNALS)
-def test_reports_that_are_killed_equal_an_undisturbed_one(number, results, tmp_path):
-    undisturbed = a_page(tmp_path / "undisturbed", results)
-    begin = time.monotonic()
-    undisturbed.run()
-    longest = time.monotonic() - begin
-    whole = files_of(undisturbed.out)
-    commands = (a_page(tmp_path / f"killed-{n}", results) for n in count())
-    generator = seeded("report", number)
-    for killed in kill(commands, number, KILLS // 2, renderings, 0.6 * longest, generator):
-        assert files_of(killed.out) == whole

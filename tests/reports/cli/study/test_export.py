@@ -37,7 +37,6 @@ BAD = {
     "out --crate a.zip --license mine": "--license: 'mine' is unknown",
     "out --crate a.zip --page none.html": "none.html: no such file",
     "out --crate a.zip --page small.toml": "small.toml: does not show the results of this study",
-    "none --crate a.zip": "none/manifest.json: no such file",
 }
 
 
