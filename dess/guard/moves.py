@@ -9,7 +9,7 @@ from dess.guard.ways import battery_home, is_parked
 from dess.rules import data_left
 from dess.sea.chart import in_zone, is_open
 from dess.sections.landing import lands
-from dess.sections.wind import move_surcharge, reach_of
+from dess.sections.wind import is_calm, move_surcharge, reach_of
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 
@@ -106,9 +106,9 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         late = 0
         if charge:
             needed = battery_home(mission, uavs, i, chart, planned, x, y, home, reach)
-            needed += 1 if reach is None else _cost(mission, u, chart, action, x, y)
+            needed += 1 if is_calm(reach) else _cost(mission, u, chart, action, x, y)
             # The cheapest way in wind may lead through a parked teammate; a move must do as well.
-            if lands(mission) and reach is not None and home.cells > 0:
+            if lands(mission) and not is_calm(reach) and home.cells > 0:
                 needed = max(needed, fewest + 1) if action == HOVER else needed
                 fewest = min(fewest, needed)
             # One slot is the charging slot itself; the battery must not be depleted before it.

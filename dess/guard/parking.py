@@ -13,6 +13,7 @@ from dess.sections.charging import slots_to_charge
 from dess.sections.failures import working_pads
 from dess.sections.landing import lands
 from dess.sections.section import for_sections
+from dess.sections.wind import is_calm
 
 
 class Parking(NamedTuple):
@@ -77,7 +78,7 @@ def parking_cell(mission, uavs, i, chart, memory, reach):
     The UAVs choose one after another, as ``_plan`` says. If one of them would run empty and there
     are several zones, this one chooses before all others, except those that would lack more then.
     """
-    if mission.active == 1 and reach is None and mission.zones == 1 and mission.pad_rate == 0.0:
+    if mission.active == 1 and is_calm(reach) and mission.zones == 1 and mission.pad_rate == 0.0:
         return _nearest(mission, uavs[i], chart, memory)
     first = -1
     if mission.plans_waits and mission.zones > 1 and mission.uavs > 1:
@@ -242,7 +243,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     zone, slots = np.int64(chart.zones[y, x]), distance(chart, u.x, u.y, x, y)
     free = (slots == 0 or not memory.taken[cell]) and not _is_given_up(mission, zone)
     free = free and (mission.zones == 1 or not _waiting_time(mission, u, zone, slots, memory.free))
-    free = free and reach is None
+    free = free and is_calm(reach)
     if free and path_length(mission, uavs, i, chart, None, u.x, u.y, x, y) == slots:
         return cell, slots, max(slots + 1 - u.battery, 0)
     best, best_zone, way, least, fewest = -1, -1, -1, -1, -1
@@ -252,7 +253,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
         if (memory.taken[cell] and not (u.x == x and u.y == y)) or _is_given_up(mission, zone):
             continue
         # no detour and no wait makes a cell better than a nearer one of the same zone
-        if reach is None and zone == best_zone and distance(chart, u.x, u.y, x, y) >= way:
+        if is_calm(reach) and zone == best_zone and distance(chart, u.x, u.y, x, y) >= way:
             continue
         slots = path_length(mission, uavs, i, chart, None, u.x, u.y, x, y)
         wait = _waiting_time(mission, u, zone, slots, memory.free)

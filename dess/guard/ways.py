@@ -7,6 +7,7 @@ from dess.guard.battery import ends_soon, lasts
 from dess.sea.chart import distance, length_around
 from dess.sections.charging import slots_to_charge
 from dess.sections.landing import lands
+from dess.sections.wind import is_calm
 
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
 CELLS_PER_UAV = 4
@@ -99,7 +100,7 @@ def battery_home(mission, uavs, i, chart, planned, x, y, home, reach):
         reach: The table of ``reach_of``. A detour around parked teammates is not in it; each of
             its cells may cost the most.
     """
-    if reach is None and is_crowded(mission, chart, chart.zones[home.y, home.x]):
+    if is_calm(reach) and is_crowded(mission, chart, chart.zones[home.y, home.x]):
         return path_length(mission, uavs, i, chart, planned, x, y, home.x, home.y)
     cells = path_length(mission, uavs, i, chart, None, x, y, home.x, home.y)
     return battery_of_way(mission, uavs[i], chart, x, y, home.x, home.y, cells, reach)
@@ -108,7 +109,7 @@ def battery_home(mission, uavs, i, chart, planned, x, y, home, reach):
 @inlined
 def battery_of_way(mission, u, chart, x, y, home_x, home_y, cells, reach):
     """The battery [%] for a way home of so many cells, those of a detour included."""
-    if reach is None:
+    if reach is None or len(reach) == 0:
         return cells
     if lasts(mission, u):
         return cells * u.slots_per_cell
@@ -133,7 +134,7 @@ def round_trip(mission, u, chart, x, y, home, reach):
         cells = distance(chart, x, y, near[0], near[1])
         back = min(back, battery_of_way(mission, u, chart, x, y, near[0], near[1], cells, reach))
     cells = distance(chart, u.x, u.y, x, y)
-    if reach is None:
+    if reach is None or len(reach) == 0:
         return cells + back
     along_x = mission.wind_east if x > u.x else mission.wind_west
     along_y = mission.wind_south if y > u.y else mission.wind_north

@@ -19,7 +19,7 @@ from pydantic import Field
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
-from dess.sea.chart import NO_FLY, Chart
+from dess.sea.chart import NO_FLY, Chart, read_only
 from dess.sections.section import Integer, Number, Section, for_sections
 
 MOST = 10  # the largest surcharge of a move in the mean wind [%]
@@ -160,11 +160,22 @@ FAR = 2**15 - 1  # [%]: further than any cell
 _MOST_ENTRIES = 2**26  # 128 MB
 
 
+# The table of extended missions without wind and slow UAVs, which needs none.
+_CALM = read_only(np.zeros((0, 0, 0, 0), np.int16))
+
+
+@inlined
+def is_calm(reach):
+    """Whether every cell costs one percent, by the table of ``reach_of``."""
+    return reach is None or len(reach) == 0
+
+
 def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
     """(C, S, H, W) battery [%] to each of C parking cells, for 1 to S slots per cell.
 
-    None if every cell costs one percent; then the compiler leaves out the code for the table. A
-    table that would be larger than 128 MB is empty: then every cell may cost the most.
+    If every cell costs one percent, there is no C; in missions without sections it is None then, so
+    that the compiler leaves out the code for the table. A table that would be larger than 128 MB
+    has no S: then every cell may cost the most.
 
     Args:
         missions: (B,) ``MISSION`` records of one batch, which share wind and fleet.
@@ -173,7 +184,7 @@ def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
     if "is_plain" in (missions.dtype.names or ()):  # neither wind nor slow UAVs
         return None
     if missions[0]["wind_most"] == 0 and missions[0]["slowest"] == 1:
-        return None
+        return _CALM
     return _table(missions, chart, len(chart.parking))
 
 
@@ -199,15 +210,14 @@ def _filled(
 ) -> np.ndarray:
     cells = np.frombuffer(zones, np.int8).reshape(shape)
     if groups * slowest * cells.size > _MOST_ENTRIES:
-        return np.zeros((0, 0, 0, 0), np.int16)
+        return read_only(np.zeros((groups, 0, 0, 0), np.int16))
     table = np.full((groups, slowest, *shape), FAR, np.int16)
     extras = surcharges(shape[::-1], *wind)
     for group, homes in enumerate(np.frombuffer(parking, np.int64).reshape(groups, -1, 2)):
         table[group, :, homes[:, 1], homes[:, 0]] = 0
         for s in range(slowest):
             _relax(cells, extras, s + 1, table[group, s])
-    table.flags.writeable = False
-    return table
+    return read_only(table)
 
 
 @kernel

@@ -99,7 +99,7 @@ def _courses(view: View, planner: Planner) -> list[Course]:
     begin(mission, uavs, residual, flight)
     crafts, slots = [flight.team[0].copy()], min(mission["max_slots"] - mission["slot"], MOST_SLOTS)
     for slot in range(1, int(slots) + 1):
-        fly(mission, rates, plan, flight, 0, flight, slot)
+        fly(mission, rates, plan, flight, 0, flight, slot, np.inf)
         if flight.last[1] < slot:
             break
         crafts.append(flight.team[flight.last[0]].copy())

@@ -6,8 +6,8 @@ insert(plan, 0, 0, 26, 5, CHARGE, 0)    # UAV 0 charges in cell 26, 5
 The fluid model: what a plan collects if every rate is its mean and data arrive evenly.
 
     begin(mission, uavs, residual, flight)
-    value = fly(mission, rates, plan, flight, 0, flight, 500)   # the whole plan
-    value = fly(mission, rates, other, flight, 5, ahead, 500)   # again, from the sixth snapshot on
+    value = fly(mission, rates, plan, flight, 0, flight, 500, np.inf)   # the whole plan
+    value = fly(mission, rates, other, flight, 5, ahead, 500, np.inf)   # again, from the sixth one
 
 The model has the rules of ``dess.rules`` as far as they matter for a plan: a cell per move,
 batteries, the charging latch, pads and quotas. In each slot a UAV serves the node with the highest
@@ -212,7 +212,7 @@ def copy_snapshot(mission, source, first, target, second):
 
 
 @kernel
-def fly(mission, rates, plan, source, first, flight, slots, lag=math.inf):
+def fly(mission, rates, plan, source, first, flight, slots, lag):
     """Fly a plan from a snapshot on, and return its value.
 
     Args:

@@ -176,7 +176,7 @@ def _decide(
             else:
                 fluid.begin(mission, team, residual[b], workspace.flight)
             ahead = workspace.ahead
-            fluid.fly(mission, rates, plan, workspace.flight, 0, ahead, 1)
+            fluid.fly(mission, rates, plan, workspace.flight, 0, ahead, 1, np.inf)
             for k in range(mission.nodes):
                 memory.sea[b, k] = ahead.sea[ahead.last[0], k].base
             for j in range(mission.uavs):

@@ -91,7 +91,9 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
     slots, first = fluid.planned_slots(mission), int(course[TRIED])
     if first == 0:
         fluid.begin(mission, uavs, residual, flight)
-        course[VALUE] = course[BEST] = fluid.fly(mission, rates, plan, flight, 0, flight, slots)
+        course[VALUE] = course[BEST] = fluid.fly(
+            mission, rates, plan, flight, 0, flight, slots, np.inf
+        )
         course[HEAT] = hottest
         fluid.copy_plan(mission, plan, present)
         fluid.copy_plan(mission, plan, trial)

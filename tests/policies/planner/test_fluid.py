@@ -56,7 +56,7 @@ def _flown(view: View, plan: Plan, slots: int) -> tuple[list[np.ndarray], float,
     begin(mission, uavs, residual, flight)
     crafts, value = [flight.team[0].copy()], 0.0
     for slot in range(1, slots + 1):
-        value = fly(mission, rates, plan, flight, 0, flight, slot)
+        value = fly(mission, rates, plan, flight, 0, flight, slot, np.inf)
         crafts.append(flight.team[flight.last[0]].copy())
     return crafts, value, float(residual.sum() - flight.sea["base"][flight.last[0]].sum())
 
