@@ -38,6 +38,8 @@ def check_commands(dess: Path, folder: Path) -> None:
     assert str(ROOT) not in page.read_text("utf-8")
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_the_wheel_runs_without_the_repository(installed, tmp_path):
     check_commands(installed, tmp_path)
 
