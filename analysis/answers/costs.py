@@ -89,7 +89,7 @@ def front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
     Returns:
         The rows of ``priced`` with two more columns. ``on_front`` tells whether the setting is on
         the front of the estimates, under its condition. ``probability`` is the probability that it
-        is on the front of the true means (``stats.front.membership``).
+        is on the front of the true means (``stats.verdict.membership``).
 
     Raises:
         InputError: If the study has no prices, or there is no such metric.
