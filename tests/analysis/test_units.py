@@ -10,6 +10,7 @@ from dess.analysis.ask.assumptions import assumptions
 from dess.analysis.ask.question import sweep_question, what_if_question
 from dess.analysis.ask.what_if import WhatIf
 from dess.analysis.metrics import AGE, metric_of, told
+from dess.analysis.names import fields
 from dess.analysis.study.cheapest import Cheapest, Setting
 from tests.analysis.small import SHEET, write_scenario
 
@@ -138,6 +139,12 @@ def test_the_fleet_is_asked_about_with_one_more_and_in_harder_conditions(searche
         told = [metric_of(metric).change(mean - means[0], 0, 0).split()[0] for mean in means[1:]]
         assert [text.split()[0] for text in cells[f"Change of {name}"][1:]] == told
     assert data["lead"][1:].is_monotonic_increasing
+
+
+def test_fields_that_follow_from_the_sheet_are_marked(searched):
+    space = searched.scenario(0)
+    marked = {row.name for row in fields(space) if row.meaning.endswith(", from the data sheet")}
+    assert marked == set(space.data_sheet.fields()) and "cell_size" in marked
 
 
 def test_ten_lines_say_what_is_assumed(searched):

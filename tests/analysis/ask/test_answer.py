@@ -91,6 +91,15 @@ def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(t
     assert answers.loc["failures", "difference"] == pytest.approx(failed) and failed > 0
 
 
+def test_a_mean_per_uav_is_that_over_the_uavs_of_the_mission(answer):
+    mission = ["policy", "point", "replication"]
+    missions = found.missions_of(answer.results).set_index(mission)
+    of_uavs = answer.results.uavs.groupby(mission)[["slots_charging", "slots_waiting"]].mean()
+    for column, name in zip(of_uavs, ("charging_per_uav", "waiting_per_uav"), strict=True):
+        assert missions[name].any()
+        np.testing.assert_allclose(missions[name], of_uavs[column].reindex(missions.index))
+
+
 def test_what_one_side_measures_has_no_difference(tmp_path):
     answer = asked(tmp_path, 4, settings={"age.measured": True}, policies=["greedy"])
     answers = answer.table().set_index("metric")
