@@ -30,8 +30,10 @@ QUICK = (
 )
 # Files that compile most, each what those before it do not: two workers begin with them, so that
 # seldom both compile the same.
-COMPILING = ("reports/cli/test_evaluate.py", "reports/cli/study/test_diff.py")
-COMPILING += ("policies/learner/test_policy.py", "analysis/bound/test_optimum.py")
+COMPILING = ("reports/cli/study/test_diff.py", "analysis/bound/test_optimum.py")
+COMPILING += ("reports/cli/test_evaluate.py", "policies/learner/test_policy.py")
+# Between them some that compile nothing, until what the planner needs of others is compiled.
+COMPILING += ("reports/cli/test_interruptions.py", "reports/pages/test_render.py")
 COMPILING += ("policies/planner/test_policy.py",)
 # Files that take longest; they come next, so that workers end together.
 LONGEST = ("reports", "analysis/execution", "fuzz", "test_architecture.py", "test_docs.py")
