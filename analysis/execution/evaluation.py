@@ -156,7 +156,9 @@ def of_results(results: Results) -> list[Evaluation]:
     evaluations = []
     for team, rows in results.missions.groupby("policy", sort=False):
         metrics = {name: rows[name].to_numpy(float) for name in (SUCCESS, HOME, *ALWAYS)}
-        metrics |= {name: rows[name].to_numpy(float) for name in measured_in(rows)}
+        measured = [name for name in OPERATIONS.names or () if name in rows]
+        for name in (*measured, *measured_in(rows)):  # as they are measured, then in units
+            metrics[name] = rows[name].to_numpy(float)
         moments: ByFleet = {}
         _add(moments, metrics, rows["uavs"].to_numpy())
         over_space = _over_space(moments, results.scenario(), len(rows))

@@ -139,7 +139,7 @@ class MissionsJob(Job):
     def warm_up(self) -> None:
         """Compile the engine, with a heuristic, since it is unknown what other policies do.
 
-        Most studies have this one, so that it compiles nothing of which no worker has a use.
+        Most studies have greedy, so nothing is compiled that no worker needs.
         """
         replace(next(self.alone()), policy="greedy").run()
 

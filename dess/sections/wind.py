@@ -173,9 +173,9 @@ def is_calm(reach):
 def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
     """(C, S, H, W) battery [%] to each of C parking cells, for 1 to S slots per cell.
 
-    If every cell costs one percent, there is no C; in missions without sections it is None then, so
-    that the compiler leaves out the code for the table. A table that would be larger than 128 MB
-    has no S: then every cell may cost the most.
+    If every cell costs one percent, C is 0, or the table is None in missions without sections, so
+    that the compiler leaves out its code. If it would be larger than 128 MB, S is 0: then every
+    cell may cost the most.
 
     Args:
         missions: (B,) ``MISSION`` records of one batch, which share wind and fleet.

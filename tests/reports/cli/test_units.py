@@ -21,6 +21,10 @@ def test_single_missions_and_their_player_are_told_in_units(tmp_path, capsys):
         assert main([*command.split(), "--scenario", str(file), "--json"]) == 0
         shown[command] = json.loads(capsys.readouterr().out)
     mission, (mean,) = shown.values()
+    kept = [*command.split(), "--scenario", str(file), "--json", "--out", str(tmp_path / "kept")]
+    assert main(kept) == 0
+    (again,) = json.loads(capsys.readouterr().out)
+    assert again | {"seconds": 0} == mean | {"seconds": 0}
     assert mission["slots_h"] == pytest.approx(mission["slots"] * SLOT / 3600)
     assert mission["collected_MB"] == pytest.approx(mission["collected"] * UNIT / 8e6)
     measured = mission["operations"]
