@@ -26,18 +26,7 @@ from dess.analysis.execution.jobs import (
     Progress,
 )
 from dess.analysis.execution.workers import Cluster, Here, Pool
-from dess.analysis.results import tables
-from dess.analysis.results.chunks import (
-    Chunk,
-    Part,
-    Present,
-    bound_parts,
-    check_parts,
-    gaps,
-    missions_in,
-    parts_of,
-    split,
-)
+from dess.analysis.results import chunks, tables
 from dess.analysis.results.manifest import Selected
 from dess.analysis.results.store import Failure, Store, sources
 from dess.analysis.results.tables import Results, results_of
@@ -143,23 +132,24 @@ class _Run:
         manifest, teams = self.store.manifest, range(len(self.study.policies))
         points = len(self.study.points)
         before, wanted = [[0] * points for _ in teams], [[self.study.first] * points for _ in teams]
-        logs = [parts_of(manifest, team, [self.study.logged] * points) for team in teams]
-        asked: Present = defaultdict(list)
+        logs = [chunks.parts_of(manifest, team, [self.study.logged] * points) for team in teams]
+        asked: chunks.Present = defaultdict(list)
         while wanted != before:
-            parts = new_parts((parts_of(manifest, team, wanted[team]) for team in teams), asked)
+            of_teams = (chunks.parts_of(manifest, team, wanted[team]) for team in teams)
+            parts = new_parts(of_teams, asked)
             self._round(parts, new_parts(logs, defaultdict(list)))
             before, logs = wanted, []
             wanted = [self._more(team, wanted[team]) for team in teams]
         selected = [self._select(team, wanted[team]) for team in teams]
         chosen = manifest.model_copy(update={"selected": selected})
-        checks = [check_parts(chosen, team) for team in teams]
+        checks = [chunks.check_parts(chosen, team) for team in teams]
         self._round([part for of_team in checks for part in of_team])
         if self.study.rule and not manifest.accepted:  # files of other code may have other columns
             for team in teams:
-                all_of_team = parts_of(manifest, team, wanted[team]), checks[team]
+                all_of_team = chunks.parts_of(manifest, team, wanted[team]), checks[team]
                 parts = new_parts(all_of_team, defaultdict(list))
-                self.store.merge([*split(parts, CHUNK[self.study.engine])])
-        self._make((BoundsJob, new_parts([bound_parts(manifest, wanted)], asked)))
+                self.store.merge([*chunks.split(parts, CHUNK[self.study.engine])])
+        self._make((BoundsJob, new_parts([chunks.bound_parts(manifest, wanted)], asked)))
         self.store.finish(wanted, selected)
 
     def _more(self, team: int, counts: list[int]) -> list[int]:
@@ -175,9 +165,9 @@ class _Run:
     def _samples(self, team: int, counts: list[int]) -> tuple[Samples, Sequence[Setting]]:
         """The missions and the settings of all design points, by which a rule decides."""
         manifest = self.store.manifest
-        return self.store.samples(parts_of(manifest, team, counts)), manifest.settings
+        return self.store.samples(chunks.parts_of(manifest, team, counts)), manifest.settings
 
-    def _round(self, parts: Sequence[Part], logs: Sequence[Part] = ()) -> None:
+    def _round(self, parts: Sequence[chunks.Part], logs: Sequence[chunks.Part] = ()) -> None:
         """Simulate the missing missions of a round with these parts, then make the event logs."""
         if self.reuse and self.store.missing("missions", parts):
             for source in self._sources:
@@ -188,14 +178,16 @@ class _Run:
     def _sources(self) -> list[Store]:
         return sources(self.reuse, self.store.manifest)
 
-    def _make(self, *works: tuple[type[Job], Sequence[Part]]) -> None:
+    def _make(self, *works: tuple[type[Job], Sequence[chunks.Part]]) -> None:
         """One kind of work after the other: find what is missing of its parts, run and store it.
 
         Raises:
             ChunkError: If some could not be computed, after all others.
         """
         failures: dict[Path, Failure] = {}
-        needs = [(kind, missions_in(parts), [*self._jobs(kind, parts)]) for kind, parts in works]
+        needs = [
+            (kind, chunks.missions_in(parts), [*self._jobs(kind, parts)]) for kind, parts in works
+        ]
         for kind, needed, jobs in needs:
             if needed:
                 self._begin(needed, needed - sum(job.missions for job in jobs), kind.work)
@@ -203,15 +195,16 @@ class _Run:
         if failures:
             raise ChunkError(failures)
 
-    def _jobs(self, kind: type[Job], parts: Sequence[Part]) -> Iterator[Job]:
+    def _jobs(self, kind: type[Job], parts: Sequence[chunks.Part]) -> Iterator[Job]:
         """The jobs for what is missing of some parts, cut as if nothing were present."""
         study = self.study
         for team, of_team in groupby(parts, lambda part: part.cell.team):
             policy = "the upper bound" if kind is BoundsJob else study.policies[team]
-            for chunk in split(of_team, self._size(kind, policy)):
+            for chunk in chunks.split(of_team, self._size(kind, policy)):
                 if missing := tuple(self.store.missing(kind.kind, chunk.parts)):
                     spaces = tuple(study.scenarios[part.cell.point] for part in missing)
-                    yield kind(Chunk(team, missing), spaces, policy, study.seed, study.engine)
+                    kept = chunks.Chunk(team, missing)
+                    yield kind(kept, spaces, policy, study.seed, study.engine)
 
     def _size(self, kind: type[Job], policy: str) -> int:
         """The number of missions of a chunk."""
@@ -251,7 +244,7 @@ class _Run:
         return Failure(job.policy, job.missions, problem.error, command, problem.traceback)
 
 
-def new_parts(wanted: Iterable[Iterable[Part]], asked: Present) -> list[Part]:
+def new_parts(wanted: Iterable[Iterable[chunks.Part]], asked: chunks.Present) -> list[chunks.Part]:
     """The missions that are needed in addition to those asked for before, each once, in order.
 
     Args:
@@ -261,7 +254,7 @@ def new_parts(wanted: Iterable[Iterable[Part]], asked: Present) -> list[Part]:
     parts = []
     for part in (part for of_team in wanted for part in of_team):
         earlier = asked[part.cell.key]
-        new = gaps(part.replications, earlier)
-        parts += [Part(part.cell, gap) for gap in new]
+        new = chunks.gaps(part.replications, earlier)
+        parts += [chunks.Part(part.cell, gap) for gap in new]
         earlier += new
     return parts

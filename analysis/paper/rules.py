@@ -13,19 +13,8 @@ from dess.analysis.answers import main_effects
 from dess.analysis.answers.learning import Transfer
 from dess.analysis.answers.main_effects import Shape
 from dess.analysis.paper.values import CROSSING
+from dess.analysis.stats import verdict
 from dess.analysis.stats.intervals import Interval
-from dess.analysis.stats.verdict import (
-    ABOVE,
-    BELOW,
-    HOLDS,
-    IN_PART,
-    INCONCLUSIVE,
-    REFUTED,
-    above,
-    judged,
-    position,
-    position_by_test,
-)
 from dess.analysis.study.selection import Choice
 
 # A value is near a printed number if its interval is above that number - NEAR; a change is small if
@@ -40,7 +29,7 @@ MARGIN = 0.01
 
 def all_above(limits: Sequence[float], *intervals: Interval) -> str:
     """Whether all of some means, shares or differences are above their limits."""
-    return judged(*map(above, intervals, limits))
+    return verdict.judged(*map(verdict.above, intervals, limits))
 
 
 def reached(mean: Interval, printed: Interval) -> str:
@@ -48,8 +37,8 @@ def reached(mean: Interval, printed: Interval) -> str:
     difference = gap(mean, printed)
     near = difference.low > -NEAR
     if difference.high < 0:
-        return IN_PART if near else REFUTED
-    return HOLDS if near else INCONCLUSIVE
+        return verdict.IN_PART if near else verdict.REFUTED
+    return verdict.HOLDS if near else verdict.INCONCLUSIVE
 
 
 def gap(mean: Interval, printed: Interval) -> Interval:
@@ -67,34 +56,38 @@ def gap(mean: Interval, printed: Interval) -> Interval:
 def gained(difference: Interval, printed: Interval) -> str:
     """Whether a metric rises, and by as much as the paper prints."""
     near = difference.low > printed.mean - NEAR or None
-    return judged(above(difference), near if difference.high >= printed.mean else False)
+    return verdict.judged(
+        verdict.above(difference), near if difference.high >= printed.mean else False
+    )
 
 
 def lower(difference: Interval) -> str:
     """Whether a metric is lower."""
-    return {BELOW: HOLDS, ABOVE: REFUTED}.get(position(difference), INCONCLUSIVE)
+    return {verdict.BELOW: verdict.HOLDS, verdict.ABOVE: verdict.REFUTED}.get(
+        verdict.position(difference), verdict.INCONCLUSIVE
+    )
 
 
 def kept(difference: Interval, margin: float) -> str:
     """Whether a metric does not fall by more than the margin."""
-    return judged(above(difference, -margin))
+    return verdict.judged(verdict.above(difference, -margin))
 
 
 def slightly_lower(difference: Interval) -> str:
     """Whether a metric falls, but only slightly."""
     if difference.low > 0 or difference.high <= -NEAR:
-        return REFUTED
+        return verdict.REFUTED
     if difference.high >= 0:
-        return INCONCLUSIVE
-    return HOLDS if difference.low > -NEAR else IN_PART
+        return verdict.INCONCLUSIVE
+    return verdict.HOLDS if difference.low > -NEAR else verdict.IN_PART
 
 
 def never_all(ratio: Interval, whole: Interval) -> str:
     """Whether the collection ratio stays below 100 %, by the share of missions that reach it."""
     if whole.mean == 1:
-        return REFUTED
+        return verdict.REFUTED
     never = whole.mean == 0 and whole.high < NEAR
-    return judged(never or None, ratio.high < 1 or None)
+    return verdict.judged(never or None, ratio.high < 1 or None)
 
 
 # The values of a parameter. ``leads`` are rows of ``main_effects.changes``, with signs such that a
@@ -104,44 +97,44 @@ def never_all(ratio: Interval, whole: Interval) -> str:
 def best(leads: pd.DataFrame) -> str:
     """Whether the metric is highest at a value."""
     tests = zip(leads["difference"], leads["p_adjusted"], strict=True)
-    positions = {position_by_test(difference, p) for difference, p in tests}
-    if BELOW in positions:
-        return REFUTED
-    return HOLDS if positions == {ABOVE} else INCONCLUSIVE
+    positions = {verdict.position_by_test(difference, p) for difference, p in tests}
+    if verdict.BELOW in positions:
+        return verdict.REFUTED
+    return verdict.HOLDS if positions == {verdict.ABOVE} else verdict.INCONCLUSIVE
 
 
 def no_lower(leads: pd.DataFrame, margin: float) -> str:
     """Whether the metric at some values is not lower than at all others, up to a margin."""
     if (leads["wide_high"] < -margin).any():
-        return REFUTED
-    return HOLDS if (leads["low"] > -margin).all() else INCONCLUSIVE
+        return verdict.REFUTED
+    return verdict.HOLDS if (leads["low"] > -margin).all() else verdict.INCONCLUSIVE
 
 
 def alike(changes: pd.DataFrame, margin: float) -> str:
     """Whether the metric is the same at all values, up to a margin."""
     if ((changes["wide_low"] > margin) | (changes["wide_high"] < -margin)).any():
-        return REFUTED
+        return verdict.REFUTED
     within = (changes["low"] >= -margin) & (changes["high"] <= margin)
-    return HOLDS if within.all() else INCONCLUSIVE
+    return verdict.HOLDS if within.all() else verdict.INCONCLUSIVE
 
 
 def rises(shape: Shape) -> str:
     """Whether the metric rises along the values."""
-    verdicts = {main_effects.RISES: HOLDS, main_effects.LEVELS: INCONCLUSIVE}
-    return verdicts.get(shape.words, REFUTED)
+    verdicts = {main_effects.RISES: verdict.HOLDS, main_effects.LEVELS: verdict.INCONCLUSIVE}
+    return verdicts.get(shape.words, verdict.REFUTED)
 
 
 def peaks(shape: Shape, wanted: int) -> str:
     """Whether the metric rises up to a value and falls after it."""
     if wanted not in shape.peaks:
-        return REFUTED
-    return HOLDS if shape.words == main_effects.PEAK else INCONCLUSIVE
+        return verdict.REFUTED
+    return verdict.HOLDS if shape.words == main_effects.PEAK else verdict.INCONCLUSIVE
 
 
 def chosen(choice: Choice, wanted: Collection[int]) -> str:
     """Whether a selection has chosen one of the design points with these numbers."""
     left = {choice.best, *choice.survivors}
-    return judged(left <= {*wanted} or (None if left & {*wanted} else False))
+    return verdict.judged(left <= {*wanted} or (None if left & {*wanted} else False))
 
 
 # Learning curves, with transfer learning and without.
@@ -154,12 +147,12 @@ def passes(transfer: Transfer) -> str:
 
 def throughout(transfer: Transfer) -> str:
     """Whether the curve with transfer learning is above at every step."""
-    in_part = transfer.verdict == HOLDS and not transfer.throughout
-    return IN_PART if in_part else transfer.verdict
+    in_part = transfer.verdict == verdict.HOLDS and not transfer.throughout
+    return verdict.IN_PART if in_part else transfer.verdict
 
 
 def levels_off(settled: float, transfer: Transfer) -> str:
     """Whether training without transfer learning levels off early, and at a low value."""
     if transfer.length < CROSSING:
-        return INCONCLUSIVE
-    return judged(settled <= 0.5 or None, above(transfer.last))
+        return verdict.INCONCLUSIVE
+    return verdict.judged(settled <= 0.5 or None, verdict.above(transfer.last))

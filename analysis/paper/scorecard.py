@@ -15,17 +15,6 @@ from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.answers.learning import BAND
 from dess.analysis.paper import measures, rules, values
-from dess.analysis.paper.measures import (
-    FALLS_SHORT,
-    NO_RESULTS,
-    OUTCOMES,
-    EvidenceOfPolicy,
-    EvidenceOfTrainings,
-    Finding,
-    MissingError,
-    Quantity,
-    Unit,
-)
 from dess.analysis.paper.rules import MARGIN, NEAR
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import INCONCLUSIVE, position
@@ -85,9 +74,9 @@ class Claim(NamedTuple):
     text: str
     place: str
     rule: Rule
-    measure: Callable[..., Finding]
+    measure: Callable[..., measures.Finding]
     compared: Mapping[str, Any] | None = None
-    printed: Quantity | None = None
+    printed: measures.Quantity | None = None
     basis: str = ""
 
 
@@ -111,14 +100,14 @@ def _printed(
     less: str = "",
     missions: str = "",
     is_share: bool = False,
-    unit: Unit = "share",
+    unit: measures.Unit = "share",
     name: str = "",
-) -> Quantity:
+) -> measures.Quantity:
     """A number of the paper, with an interval if it is a share of a known number of missions."""
     n = _figure(missions) if missions else 0
     if is_share:
-        return Quantity(values.spread(_figure(figure), n), n)
-    return Quantity.exact(_figure(figure) - (_figure(less) if less else 0), n, unit, name)
+        return measures.Quantity(values.spread(_figure(figure), n), n)
+    return measures.Quantity.exact(_figure(figure) - (_figure(less) if less else 0), n, unit, name)
 
 
 def _figure(path: str) -> Any:
@@ -153,7 +142,7 @@ class Row:
 
     claim: Claim
     rule: str
-    findings: tuple[Finding, ...]
+    findings: tuple[measures.Finding, ...]
 
     @property
     def is_diagnostic(self) -> bool:
@@ -219,10 +208,10 @@ def departures(training: TrainingConfig) -> list[str]:
 
 def _evidence_of_policy(
     studies: Mapping[str, Results], study: str, column: str
-) -> EvidenceOfPolicy:
+) -> measures.EvidenceOfPolicy:
     """The results in a study of the policy of a column: the best one, of a learned column."""
     if study not in studies:
-        raise MissingError(f"the study {study} has not been run")
+        raise measures.MissingError(f"the study {study} has not been run")
     results, which = studies[study], f"policy {column}"
     learners = summary.learners(results)
     if column in NULLS:
@@ -232,21 +221,25 @@ def _evidence_of_policy(
     else:
         among = learners.get(column, [])
     if not among:
-        raise MissingError(f"the study {study} has no {which}")
+        raise measures.MissingError(f"the study {study} has no {which}")
     best = among[0] if len(among) == 1 else summary.best_policy(results.missions, among)
-    return EvidenceOfPolicy(results, best)
+    return measures.EvidenceOfPolicy(results, best)
 
 
-def _evidence_of_trainings(trainings: pd.DataFrame, column: str) -> EvidenceOfTrainings:
+def _evidence_of_trainings(trainings: pd.DataFrame, column: str) -> measures.EvidenceOfTrainings:
     """The trainings with transfer learning and without; only the best learned policy has them."""
     if column != COLUMNS[0]:
-        raise MissingError("no trainings of this policy with and without transfer learning")
+        raise measures.MissingError(
+            "no trainings of this policy with and without transfer learning"
+        )
     if trainings.empty or not {*VARIANTS} <= {*trainings["variant"]}:
-        raise MissingError(f"no trainings {' and '.join(VARIANTS)}")
-    return EvidenceOfTrainings(trainings, *VARIANTS)
+        raise measures.MissingError(f"no trainings {' and '.join(VARIANTS)}")
+    return measures.EvidenceOfTrainings(trainings, *VARIANTS)
 
 
-def _finding(claim: Claim, known: Mapping[str, Any], evidence: Callable[[], Any]) -> Finding:
+def _finding(
+    claim: Claim, known: Mapping[str, Any], evidence: Callable[[], Any]
+) -> measures.Finding:
     """What a policy's results say about a claim or, without results, why there are none."""
     printed, judge = claim.printed, claim.rule.judge
     if printed:
@@ -257,10 +250,12 @@ def _finding(claim: Claim, known: Mapping[str, Any], evidence: Callable[[], Any]
         judge = partial(judge, **{name: known[name] for name in takes})
         compared = claim.compared
         found = claim.measure(judge, of_study.pairs(**compared) if compared else of_study)
-    except MissingError as missing:
-        return Finding(NO_RESULTS, note=str(missing))
+    except measures.MissingError as missing:
+        return measures.Finding(measures.NO_RESULTS, note=str(missing))
     except InputError:  # a study of another design
-        return Finding(NO_RESULTS, note="the results come from a study of another design")
+        return measures.Finding(
+            measures.NO_RESULTS, note="the results come from a study of another design"
+        )
     if any(quantity.n == 1 for quantity in found.quantities):
         found = replace(found, verdict=INCONCLUSIVE)  # one mission or training shows nothing
     first, against = found.quantities[0], ""
@@ -273,7 +268,7 @@ def answer(rows: Sequence[Row]) -> str:
     """How many claims hold for the best learned policy, diagnostic ones and all, in words."""
     telling = [row for row in rows if row.is_diagnostic]
     held, all_held = (sum(row.findings[0].holds for row in of) for of in (telling, rows))
-    short = [f"“{r.claim.text}”" for r in telling if r.findings[0].outcome == FALLS_SHORT]
+    short = [f"“{r.claim.text}”" for r in telling if r.findings[0].outcome == measures.FALLS_SHORT]
     return (
         f"Of {len(rows)} claims, {len(telling)} are diagnostic: {numbers.words(NULLS)} do not pass "
         f"them. {names(rows)[0]} passes {held} of these {len(telling)}, and {all_held} of all."
@@ -298,7 +293,7 @@ def counts(rows: Sequence[Row]) -> pd.DataFrame:
     for claims, of in (("diagnostic", [row for row in rows if row.is_diagnostic]), ("all", rows)):
         for number, name in enumerate(names(rows)):
             given = Counter(row.findings[number].outcome for row in of)
-            counted = {outcome.capitalize(): given[outcome] for outcome in OUTCOMES}
+            counted = {outcome.capitalize(): given[outcome] for outcome in measures.OUTCOMES}
             table.append({"Claims": claims, "Policy": name, **counted})
     return pd.DataFrame(table)
 

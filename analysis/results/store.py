@@ -25,21 +25,7 @@ import pyarrow as pa
 from dess import InputError
 from dess.analysis.bound import Bound
 from dess.analysis.metrics import in_units
-from dess.analysis.results import chunks as files
-from dess.analysis.results import parquet
-from dess.analysis.results.chunks import (
-    FOLDERS,
-    LOCK,
-    MANIFEST,
-    Chunk,
-    Part,
-    Present,
-    absent,
-    gaps,
-    name_of,
-    rows_of,
-    stacked,
-)
+from dess.analysis.results import chunks, parquet
 from dess.analysis.results.manifest import NO_TEAM, Cell, Manifest, Selected
 from dess.analysis.study.study import Study
 from dess.files.reading import paths_in
@@ -89,7 +75,7 @@ class Store:
 
     def _clear(self) -> None:
         """Know of no missions, until the folder is scanned."""
-        self._present: dict[str, Present] = {kind: defaultdict(list) for kind in TABLES}
+        self._present: dict[str, chunks.Present] = {kind: defaultdict(list) for kind in TABLES}
         # By kind and key of a cell, the tables that contain it: missions and UAVs, or bounds alone.
         self._tables: dict[tuple[str, str], list[Sequence[pa.Table]]] = defaultdict(list)
         # The rows of several tables, until there are new ones: every round of a rule needs them.
@@ -113,9 +99,9 @@ class Store:
         folder = Path(out)
         manifest = Manifest.of(study)
         store = cls(folder, _extended(folder, manifest, accept_code))
-        files.check_places(folder)
+        chunks.check_places(folder)
         with ExitStack() as lock:
-            lock.enter_context(locked(folder / LOCK, _BUSY))
+            lock.enter_context(locked(folder / chunks.LOCK, _BUSY))
             # Read again under the lock, because another run may have ended in the meantime.
             store.manifest = _extended(folder, manifest, accept_code)
             store._prepare()
@@ -129,7 +115,7 @@ class Store:
         Raises:
             InputError: If it is not a results folder, or one of another version.
         """
-        store = cls(Path(out), Manifest.read(Path(out) / MANIFEST))
+        store = cls(Path(out), Manifest.read(Path(out) / chunks.MANIFEST))
         store._scan()
         return store
 
@@ -152,8 +138,8 @@ class Store:
 
     def _prepare(self) -> None:
         """Write the manifest, remove temporary files of a killed run, and scan the folder."""
-        write_file(self.folder / MANIFEST, self.manifest.text)
-        places = [self.folder / name for name in FOLDERS]
+        write_file(self.folder / chunks.MANIFEST, self.manifest.text)
+        places = [self.folder / name for name in chunks.FOLDERS]
         for place in places:
             make_folder(place)
         places += [self.folder, *paths_in(self.folder, "*/policy=*")]
@@ -183,8 +169,8 @@ class Store:
     def _places(self, kind: str, team: int) -> list[tuple[Path, str]]:
         """The folders of a team's tables of a kind of work, with their names in ``SCHEMAS``."""
         if team == NO_TEAM:
-            return [(self.folder / files.BOUNDS, files.BOUNDS)]
-        of_team = files.partition(self.manifest.policies[team].policy)
+            return [(self.folder / chunks.BOUNDS, chunks.BOUNDS)]
+        of_team = chunks.partition(self.manifest.policies[team].policy)
         return [(self.folder / name / of_team, name) for name in TABLES[kind]]
 
     def _examine(self, kind: str, team: int, name: str, tables: Sequence[pa.Table]) -> None:
@@ -209,19 +195,19 @@ class Store:
     @property
     def files(self) -> list[Path]:
         """The files of records, event logs and bounds, the damaged ones included."""
-        folders = [*paths_in(self.folder, "*/policy=*"), self.folder / files.BOUNDS]
+        folders = [*paths_in(self.folder, "*/policy=*"), self.folder / chunks.BOUNDS]
         return [path for folder in folders for path in parquet.files_in(folder)]
 
-    def missing(self, kind: str, parts: Iterable[Part]) -> list[Part]:
+    def missing(self, kind: str, parts: Iterable[chunks.Part]) -> list[chunks.Part]:
         """What of some parts is missing.
 
         Args:
             kind: ``missions``, ``bounds`` or ``events``.
             parts: The parts.
         """
-        return absent(parts, self._present[kind])
+        return chunks.absent(parts, self._present[kind])
 
-    def keep(self, kind: str, chunk: Chunk, tables: Sequence[pa.Table]) -> None:
+    def keep(self, kind: str, chunk: chunks.Chunk, tables: Sequence[pa.Table]) -> None:
         """Store the tables of a chunk."""
         places = self._places(kind, chunk.team)
         for (folder, _), table in [*zip(places, tables, strict=True)][::-1]:
@@ -235,7 +221,7 @@ class Store:
         path = parquet.write(folder, f"{cell.key}-{replication:06}", pa.table(columns))
         self._enter_log(cell.key, replication, path)
 
-    def take_over(self, other: "Store", parts: Iterable[Part]) -> None:
+    def take_over(self, other: "Store", parts: Iterable[chunks.Part]) -> None:
         """Copy missing missions of some parts from another folder, as far as it has them.
 
         Cells with equal keys have equal records, so this only saves time. Nothing is copied from a
@@ -251,58 +237,58 @@ class Store:
                     frames = other._frames(shared)
                 except InputError:
                     return
-                chunk = Chunk(team, tuple(shared))
+                chunk = chunks.Chunk(team, tuple(shared))
                 self.keep("missions", chunk, _tables_of(chunk, frames))
 
-    def merge(self, chunks: Sequence[Chunk]) -> None:
-        """Keep the missions of a team in the files of these chunks, in place of many small ones.
+    def merge(self, large: Sequence[chunks.Chunk]) -> None:
+        """Keep the missions of a team in the files of these large chunks, in place of small ones.
 
         A file that has other missions as well stays.
         """
-        parts, names = [part for chunk in chunks for part in chunk.parts], {c.name for c in chunks}
+        parts, names = [part for chunk in large for part in chunk.parts], {c.name for c in large}
         rows = [parquet.parts_in(tables[0]) for tables in self._tables_with("missions", parts)]
-        held = {name_of(of_file): of_file for of_file in rows}
+        held = {chunks.name_of(of_file): of_file for of_file in rows}
         if held.keys() == names:
             return
         frames, merged = self._frames(parts), defaultdict(list)
-        for chunk in (chunk for chunk in chunks if chunk.name not in held):
+        for chunk in (chunk for chunk in large if chunk.name not in held):
             self.keep("missions", chunk, _tables_of(chunk, frames))
         for part in parts:
             merged[part.cell.key].append(part.replications)
         gone = {
             name
             for name, of_file in held.items()
-            if not any(gaps(range(start, stop), merged[key]) for key, start, stop in of_file)
+            if not any(chunks.gaps(range(start, stop), merged[key]) for key, start, stop in of_file)
         }
-        for folder, _ in self._places("missions", chunks[0].team):
+        for folder, _ in self._places("missions", large[0].team):
             for path in parquet.files_in(folder):
                 if parquet.content_hash(path) in gone - names:
                     delete(path)
         self._scan()
 
-    def _frames(self, parts: Iterable[Part]) -> list[pd.DataFrame]:
+    def _frames(self, parts: Iterable[chunks.Part]) -> list[pd.DataFrame]:
         """The rows of the files with missions of some parts, and those of the files with UAVs."""
-        return [*map(stacked, zip(*self._tables_with("missions", parts), strict=True))]
+        return [*map(chunks.stacked, zip(*self._tables_with("missions", parts), strict=True))]
 
-    def _held(self, parts: Sequence[Part]) -> list[Part]:
+    def _held(self, parts: Sequence[chunks.Part]) -> list[chunks.Part]:
         """What of the missions of some parts is present."""
-        missing: Present = defaultdict(list)
+        missing: chunks.Present = defaultdict(list)
         for part in self.missing("missions", parts):
             missing[part.cell.key].append(part.replications)
-        return absent(parts, missing)
+        return chunks.absent(parts, missing)
 
     def count(self, other: "Store") -> None:
         """Count the missions of another folder as if they were here, to plan a run."""
         for key, present in other._present["missions"].items():
             self._present["missions"][key] += present
 
-    def write_failure(self, chunk: Chunk, failure: Failure) -> Path:
+    def write_failure(self, chunk: chunks.Chunk, failure: Failure) -> Path:
         """Store why a chunk could not be computed, and return the path of the file."""
         path = self._failure(chunk)
         write_file(path, json.dumps(asdict(failure), indent=2) + "\n")
         return path
 
-    def _failure(self, chunk: Chunk) -> Path:
+    def _failure(self, chunk: chunks.Chunk) -> Path:
         return self.folder / "failures" / f"{chunk.name}.json"
 
     def _failures(self) -> list[Path]:
@@ -312,11 +298,11 @@ class Store:
         """Write into the manifest that all missions are present, and how many there are."""
         update = {"missions": missions, "selected": selected, "complete": True}
         self.manifest = self.manifest.model_copy(update=update)
-        write_file(self.folder / MANIFEST, self.manifest.text)
+        write_file(self.folder / chunks.MANIFEST, self.manifest.text)
         for path in self._failures():
             delete(path)
 
-    def missions(self, parts: Sequence[Part]) -> pd.DataFrame:
+    def missions(self, parts: Sequence[chunks.Part]) -> pd.DataFrame:
         """The missions of some parts, with their ``point``, in the order of the parts.
 
         If the study has prices, the missions have a ``cost``; with a data sheet, what they
@@ -333,7 +319,7 @@ class Store:
             missions = missions.assign(**in_units(missions, units))
         return missions
 
-    def uavs(self, parts: Sequence[Part]) -> pd.DataFrame:
+    def uavs(self, parts: Sequence[chunks.Part]) -> pd.DataFrame:
         """The UAVs of these missions, in the same order.
 
         Raises:
@@ -341,7 +327,7 @@ class Store:
         """
         return self._rows("missions", parts, 1)
 
-    def bounds_of(self, parts: Sequence[Part]) -> dict[Place, Bound]:
+    def bounds_of(self, parts: Sequence[chunks.Part]) -> dict[Place, Bound]:
         """The bounds of some parts, by design point and replication.
 
         Raises:
@@ -359,7 +345,7 @@ class Store:
             for row in self._rows("bounds", parts).to_dict("records")
         }
 
-    def samples(self, parts: Sequence[Part]) -> list[dict[str, np.ndarray]]:
+    def samples(self, parts: Sequence[chunks.Part]) -> list[dict[str, np.ndarray]]:
         """For each part, the metrics of its missions.
 
         Raises:
@@ -370,7 +356,7 @@ class Store:
         columns = {name: np.split(missions[name].to_numpy(), ends[:-1]) for name in missions}
         return [{name: values[k] for name, values in columns.items()} for k in range(len(parts))]
 
-    def _rows(self, kind: str, parts: Sequence[Part], table: int = 0) -> pd.DataFrame:
+    def _rows(self, kind: str, parts: Sequence[chunks.Part], table: int = 0) -> pd.DataFrame:
         """The rows of some parts, all of which must be present, in the tables of their kind."""
         for gap in self.missing(kind, parts)[:1]:
             whole = next(part for part in parts if part.cell == gap.cell)
@@ -378,16 +364,16 @@ class Store:
         found = [tables[table] for tables in self._tables_with(kind, parts)]
         key = kind, table, *map(id, found)
         if key not in self._stacked:
-            self._stacked[key] = stacked(found)
-        rows = rows_of(parts, self._stacked[key])
+            self._stacked[key] = chunks.stacked(found)
+        rows = chunks.rows_of(parts, self._stacked[key])
         return rows.drop(columns="cell")
 
-    def _tables_with(self, kind: str, parts: Iterable[Part]) -> list[Sequence[pa.Table]]:
+    def _tables_with(self, kind: str, parts: Iterable[chunks.Part]) -> list[Sequence[pa.Table]]:
         """The tables that contain some parts."""
         found = (tables for part in parts for tables in self._tables[kind, part.cell.key])
         return [*{id(tables): tables for tables in found}.values()]
 
-    def _incomplete(self, part: Part, gap: range) -> str:
+    def _incomplete(self, part: chunks.Part, gap: range) -> str:
         team, values = part.cell.team, self.manifest.points[part.cell.point].values
         where = f" at {json.dumps(values)}" if values else ""
         present = f"the first {gap.start - part.replications.start} of {len(part.replications)}"
@@ -413,9 +399,9 @@ class Store:
         return parquet.read(path) if path else None
 
 
-def _tables_of(chunk: Chunk, frames: Iterable[pd.DataFrame]) -> list[pa.Table]:
+def _tables_of(chunk: chunks.Chunk, frames: Iterable[pd.DataFrame]) -> list[pa.Table]:
     """The tables of a chunk, from frames that have its missions and UAVs among others."""
-    rows = (rows_of(chunk.parts, frame) for frame in frames)
+    rows = (chunks.rows_of(chunk.parts, frame) for frame in frames)
     columns = ({str(name): of_kind[name].to_numpy() for name in of_kind} for of_kind in rows)
     return parquet.tables_with(chunk, *columns)
 
@@ -426,12 +412,12 @@ def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
     Raises:
         InputError: If the folder contains something else.
     """
-    path = folder / MANIFEST
+    path = folder / chunks.MANIFEST
     check_folder(folder)
     if not path.exists():
-        if any(not files.is_ours(other) for other in paths_in(folder)):
+        if any(not chunks.is_ours(other) for other in paths_in(folder)):
             raise InputError(
-                f"{folder}: holds other files and no {MANIFEST}; "
+                f"{folder}: holds other files and no {chunks.MANIFEST}; "
                 "allowed: a results folder, or a new or empty one (another --out)"
             )
         return manifest
@@ -451,7 +437,7 @@ def sources(folders: Iterable[Path], manifest: Manifest) -> list[Store]:
 
 def _source(folder: Path, keys: set[str]) -> Store | None:
     try:
-        manifest = Manifest.read(folder / MANIFEST)
+        manifest = Manifest.read(folder / chunks.MANIFEST)
         if manifest.accepted or not keys & _keys(manifest):
             return None
         return Store.read(folder)

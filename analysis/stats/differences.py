@@ -11,17 +11,7 @@ from scipy.special import stdtr, stdtrit
 
 from dess import InputError
 from dess.analysis.metrics import ALWAYS, EITHER, REWARD, metric_of
-from dess.analysis.stats.intervals import (
-    LEVEL,
-    Interval,
-    check_columns,
-    check_share,
-    column_intervals,
-    groups,
-    mean_interval,
-    rare_differences,
-    values_within,
-)
+from dess.analysis.stats import intervals
 
 Treatment = Literal["policy", "point"]
 
@@ -38,7 +28,7 @@ def metrics_by_treatment(
     """
     if of not in get_args(Treatment):
         raise InputError(f"of: {of!r}; allowed: {', '.join(get_args(Treatment))}")
-    check_columns(missions, [of, "replication", *metrics, *by])
+    intervals.check_columns(missions, [of, "replication", *metrics, *by])
     if of in by:
         raise InputError(f"by: {of} is what is compared; allowed: other columns")
     for metric in metrics:
@@ -52,9 +42,11 @@ def metrics_by_treatment(
         first = _first_row(missions.loc[twice, [of, *keys]])
         raise InputError(f"missions: {first} is there twice; allowed: every mission once")
     spaces = [of, *(key for key in keys if key in (*by, "policy", "point", "seed"))]
-    values = {metric: values_within(missions, metric, spaces) for metric in metrics}
+    values = {metric: intervals.values_within(missions, metric, spaces) for metric in metrics}
     table = missions[[of, *keys]].assign(**values)
-    return {name: part.set_index(keys)[[*values]] for (name,), part in groups(table, [of])}
+    return {
+        name: part.set_index(keys)[[*values]] for (name,), part in intervals.groups(table, [of])
+    }
 
 
 def select(tables: Mapping[Any, pd.DataFrame], of: str, name: str | int) -> pd.DataFrame:
@@ -90,7 +82,7 @@ def matched(
     names = tables[0].index.names
     unit = [name for name in names if name in (*by, "seed", "replication")]
     means = [table.groupby(level=unit, dropna=False).mean() for table in tables]
-    for group, part in groups(means[0].reset_index(), by):
+    for group, part in intervals.groups(means[0].reset_index(), by):
         yield group, [{metric: m[metric].to_numpy()[part.index] for metric in m} for m in means]
 
 
@@ -158,13 +150,13 @@ def differences_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.full_like(differences, first if abs(first) > rounding else 0.0)
 
 
-def t_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
+def t_test(differences: np.ndarray, level: float) -> tuple[intervals.Interval, float]:
     """The mean difference with Student's interval, and the p-value of "no difference".
 
     If all differences are equal, the interval is degenerate and p is that of the sign test. The
     interval of a single difference is nan.
     """
-    mean = mean_interval(differences, level)
+    mean = intervals.mean_interval(differences, level)
     if np.ptp(differences) == 0:
         return mean, sign_test(differences)
     t = abs(mean.mean) / scipy.stats.sem(differences)
@@ -173,7 +165,7 @@ def t_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
 
 def difference_test(
     a: np.ndarray, b: np.ndarray, metric: str, level: float
-) -> tuple[Interval, float]:
+) -> tuple[intervals.Interval, float]:
     """The mean difference A - B of pairs, the interval that suits the metric, and the p-value.
 
     Args:
@@ -183,7 +175,7 @@ def difference_test(
         level: Confidence level.
     """
     differences = differences_of(a, b)
-    rare = rare_differences(metric, a.mean(), b.mean())
+    rare = intervals.rare_differences(metric, a.mean(), b.mean())
     if rare is None or (metric == REWARD and differences.size == 1):
         return t_test(differences, level)
     smooth, p = t_test(smoothed(differences, rare), level)
@@ -191,7 +183,7 @@ def difference_test(
         p = mcnemar(int(np.sum(differences > 0)), int(np.sum(differences < 0)))
     limit = np.inf if metric == REWARD else 1.0
     mean = float(differences.mean())
-    return Interval(mean, max(smooth.low, -limit), min(smooth.high, limit)), p
+    return intervals.Interval(mean, max(smooth.low, -limit), min(smooth.high, limit)), p
 
 
 @cache
@@ -216,10 +208,10 @@ def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") ->
     constant = differences.max() - differences.min() <= _ROUNDING * size
     differences = differences.mask(differences.abs().le(_ROUNDING * size, axis=1), 0.0)
     present = differences.notna()
-    table = column_intervals(differences).rename(columns={"mean": "difference"})
+    table = intervals.column_intervals(differences).rename(columns={"mean": "difference"})
     n, mean = table["n"], table["difference"]
     own = values.where(present).mean()
-    rare = rare_differences(metric, own, own - mean)
+    rare = intervals.rare_differences(metric, own, own - mean)
     if rare is None:
         t = (mean / differences.sem()).abs()
         table["p"] = 2 * stdtr(np.maximum(n - 1, 1), -t)
@@ -233,7 +225,7 @@ def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") ->
     squares = n * (differences.var(ddof=0) + (mean - centre) ** 2)
     squares += (rare[0] - centre) ** 2 + (rare[1] - centre) ** 2
     error = np.sqrt(squares / (size - 1) / size)
-    half = -stdtrit(size - 1, (1 - LEVEL) / 2) * error
+    half = -stdtrit(size - 1, (1 - intervals.LEVEL) / 2) * error
     table["low"], table["high"] = centre - half, centre + half
     table["p"] = 2 * stdtr(size - 1, -(centre / error).abs())
     if metric == REWARD:
@@ -275,7 +267,9 @@ class Paired(NamedTuple):
     n: int
 
 
-def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str = "") -> Paired:
+def paired(
+    a: np.ndarray, b: np.ndarray, level: float = intervals.LEVEL, metric: str = ""
+) -> Paired:
     """Compare two samples pair by pair; differences are A - B.
 
     Args:
@@ -314,13 +308,13 @@ def unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Paired:
     """
     more = [] if metric == REWARD else [0.0, 1.0]
     test = scipy.stats.ttest_ind([*a, *more], [*b, *more], equal_var=False)
-    ends = test.confidence_interval(LEVEL)
+    ends = test.confidence_interval(intervals.LEVEL)
     p = 1.0 if np.isnan(test.pvalue) else float(test.pvalue)
     n, difference = min(len(a), len(b)), float(np.mean(a) - np.mean(b))
     return Paired(difference, float(ends.low), float(ends.high), p, np.nan, np.nan, n)
 
 
-def relative_change(values: np.ndarray, reference: np.ndarray) -> Interval:
+def relative_change(values: np.ndarray, reference: np.ndarray) -> intervals.Interval:
     """The change of a mean as a share of a reference mean, with the interval of a ratio of means.
 
     Source: W. G. Cochran, Sampling Techniques, 3rd edition, 1977, Section 6.3: the variance of the
@@ -332,10 +326,10 @@ def relative_change(values: np.ndarray, reference: np.ndarray) -> Interval:
     """
     ratio, n = float(values.mean() / reference.mean()), len(values)
     if n == 1:
-        return Interval(ratio - 1, np.nan, np.nan)
+        return intervals.Interval(ratio - 1, np.nan, np.nan)
     error = np.std(values - ratio * reference, ddof=1) / np.sqrt(n) / abs(reference.mean())
-    half = -float(stdtrit(n - 1, (1 - LEVEL) / 2) * error)
-    return Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
+    half = -float(stdtrit(n - 1, (1 - intervals.LEVEL) / 2) * error)
+    return intervals.Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
 
 
 def compare(
@@ -343,7 +337,7 @@ def compare(
     baseline: str | int,
     metrics: Sequence[str] = ALWAYS,
     by: Sequence[str] = (),
-    level: float = LEVEL,
+    level: float = intervals.LEVEL,
     correction: Correction | None = "holm",
     of: Treatment = "policy",
 ) -> pd.DataFrame:
@@ -374,7 +368,7 @@ def compare(
             the only one, a mission appears twice or only for one of a pair, or an argument is not
             allowed.
     """
-    check_share("level", level)
+    intervals.check_share("level", level)
     tables = metrics_by_treatment(missions, of, metrics, by)
     reference = select(tables, of, baseline)
     others = [name for name in tables if name != baseline]

@@ -9,16 +9,7 @@ import scipy
 
 from dess import InputError
 from dess.analysis.metrics import metric_of
-from dess.analysis.stats.intervals import (
-    LEVEL,
-    Interval,
-    bootstrap_interval,
-    bounded_interval,
-    check_columns,
-    check_share,
-    expanded_level,
-    groups,
-)
+from dess.analysis.stats import intervals
 
 # Views of ``distribution``: the quantiles, and the share of missions that counts as the worst.
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -34,7 +25,7 @@ def distribution(
     quantiles: Sequence[float] = QUANTILES,
     tail: float = TAIL,
     worst: Worst = "lowest",
-    level: float = LEVEL,
+    level: float = intervals.LEVEL,
     resamples: int = 9999,
 ) -> pd.DataFrame:
     """The distribution of a metric over groups of missions: quantiles, and the mean of the worst.
@@ -64,25 +55,27 @@ def distribution(
     Raises:
         InputError: If a column is missing, or an argument is not allowed.
     """
-    check_columns(missions, [metric, *by])
+    intervals.check_columns(missions, [metric, *by])
     if worst not in get_args(Worst):
         raise InputError(f"worst: {worst!r}; allowed: {', '.join(get_args(Worst))}")
     for name, share in [*(("quantiles", q) for q in quantiles), ("tail", tail), ("level", level)]:
-        check_share(name, share)
+        intervals.check_share(name, share)
     sign = 1 if worst == "lowest" else -1
 
     def worst_mean(values: np.ndarray, axis: int = -1) -> Any:
         return sign * tail_mean(sign * values, tail, axis)
 
     rows = []
-    for group, part in groups(missions, by):
+    for group, part in intervals.groups(missions, by):
         values = part[metric].to_numpy(float)
         views = [("quantile", q, quantile_interval(values, q, level)) for q in quantiles]
-        expanded = expanded_level(level, tail * len(values))
-        risk = bootstrap_interval(values, worst_mean, generator, expanded, resamples=resamples)
+        expanded = intervals.expanded_level(level, tail * len(values))
+        risk = intervals.bootstrap_interval(
+            values, worst_mean, generator, expanded, resamples=resamples
+        )
         if metric_of(metric).is_bounded and risk.low == risk.high:
             tail_values = np.full(max(int(tail * len(values)), 1), risk.mean)
-            risk = bounded_interval(tail_values, level)
+            risk = intervals.bounded_interval(tail_values, level)
         views.append(("worst mean", tail, risk))
         rows += [(*group, metric, view, q, *ends, len(part)) for view, q, ends in views]
     columns = [*by, "metric", "view", "share", "value", "low", "high", "n"]
@@ -90,8 +83,8 @@ def distribution(
 
 
 def quantile_interval(
-    values: Sequence[float] | np.ndarray, share: float, level: float = LEVEL
-) -> Interval:
+    values: Sequence[float] | np.ndarray, share: float, level: float = intervals.LEVEL
+) -> intervals.Interval:
     """A quantile with its distribution-free interval between two order statistics.
 
     Its coverage is at least its level for every distribution. If the sample is too small for an
@@ -105,7 +98,7 @@ def quantile_interval(
     sample = np.asarray(values, float)
     low, high = scipy.stats.quantile_test(sample, p=share).confidence_interval(level)
     ends = (-np.inf if np.isnan(low) else float(low), np.inf if np.isnan(high) else float(high))
-    return Interval(float(np.quantile(sample, share)), *ends)
+    return intervals.Interval(float(np.quantile(sample, share)), *ends)
 
 
 def tail_mean(values: np.ndarray, share: float = TAIL, axis: int = -1) -> Any:

@@ -14,18 +14,6 @@ from dess.code.libraries import missing
 from dess.errors import InputError, one_of, shown
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption, complete
-from dess.reports.cli.options import (
-    PAGES,
-    RESULTS,
-    SET,
-    JsonOption,
-    ScenarioOption,
-    SeedOption,
-    WorkersOption,
-    all_settings,
-    all_values,
-    command,
-)
 from dess.reports.cli.report import WHAT_IF, rendering
 from dess.reports.cli.studies import print_plan
 from dess.reports.pages import PREFIX, check_pages
@@ -46,7 +34,7 @@ SHARE = "a metric and its least mean, e.g. success=0.99"
 app = typer.Typer()
 
 
-@command(app)
+@options.command(app)
 def sweep(
     settings: Annotated[
         list[str] | None,
@@ -57,17 +45,17 @@ def sweep(
     ] = None,
     metric: str | None = None,
     missions: Annotated[int, typer.Option(min=1)] = 300,
-    scenario: ScenarioOption = "paper",
-    seed: SeedOption = 0,
-    workers: WorkersOption = 1,
+    scenario: options.ScenarioOption = "paper",
+    seed: options.SeedOption = 0,
+    workers: options.WorkersOption = 1,
     price: Annotated[list[str] | None, typer.Option(metavar="KEY=AMOUNT")] = None,
     require: Annotated[list[str] | None, typer.Option(metavar="METRIC=SHARE")] = None,
     name: str | None = None,
-    results: Annotated[Path, typer.Option(metavar="DIR")] = RESULTS,
-    out: Annotated[Path, typer.Option(metavar="DIR")] = PAGES,
+    results: Annotated[Path, typer.Option(metavar="DIR")] = options.RESULTS,
+    out: Annotated[Path, typer.Option(metavar="DIR")] = options.PAGES,
     dry_run: Annotated[bool, typer.Option("--dry-run")] = False,
     yes: YesOption = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Simulate every combination of values, write a page, and print the ranked settings.
 
@@ -97,13 +85,13 @@ def sweep(
     from dess.analysis.metrics import ALIASES, PRODUCT, told
 
     question = sweep_question(
-        all_values(settings or []),
+        options.all_values(settings or []),
         scenario,
         [name for text in policy for name in text.split(",")] if policy else None,
         missions,
         seed,
-        all_settings(map(_with_quotes, price or []), "--price", PRICE),
-        all_settings(map(_with_quotes, require or []), "--require", SHARE),
+        options.all_settings(map(_with_quotes, price or []), "--price", PRICE),
+        options.all_settings(map(_with_quotes, require or []), "--require", SHARE),
         name,
         results,
     )
@@ -128,10 +116,10 @@ def sweep(
     _tell(answer, answer.table(ranking), show, render, as_json, "sweep")
 
 
-@command(app, WHAT_IF)
+@options.command(app, WHAT_IF)
 def what_if(
     settings: Annotated[
-        list[str], typer.Option(SET, metavar="KEY=VALUE", autocompletion=options.fields)
+        list[str], typer.Option(options.SET, metavar="KEY=VALUE", autocompletion=options.fields)
     ],
     baseline: Annotated[
         list[str] | None, typer.Option(metavar="KEY=VALUE", autocompletion=options.fields)
@@ -140,15 +128,15 @@ def what_if(
         list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.policies)
     ] = None,
     missions: Annotated[int, typer.Option(min=2)] = 500,
-    scenario: ScenarioOption = "paper",
-    seed: SeedOption = 0,
-    workers: WorkersOption = 1,
+    scenario: options.ScenarioOption = "paper",
+    seed: options.SeedOption = 0,
+    workers: options.WorkersOption = 1,
     shown: Annotated[str | None, typer.Option(metavar="P[,P...]")] = None,
-    results: Annotated[Path, typer.Option(metavar="DIR")] = RESULTS,
-    out: Annotated[Path, typer.Option(metavar="DIR")] = PAGES,
+    results: Annotated[Path, typer.Option(metavar="DIR")] = options.RESULTS,
+    out: Annotated[Path, typer.Option(metavar="DIR")] = options.PAGES,
     dry_run: Annotated[bool, typer.Option("--dry-run")] = False,
     yes: YesOption = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Compare a variation with a baseline on the same missions, write a page, print the answer.
 
@@ -168,7 +156,10 @@ def what_if(
     from dess.analysis.ask.question import what_if_question
     from dess.analysis.ask.what_if import VARIATION, WhatIf, best_policy, check_shown
 
-    changes, fixed = all_settings(settings, SET), all_settings(baseline or [], "--baseline")
+    changes, fixed = (
+        options.all_settings(settings, options.SET),
+        options.all_settings(baseline or [], "--baseline"),
+    )
     question = what_if_question(changes, fixed, scenario, policy, missions, seed, results)
     check_shown(question, shown)
     found = _run(question, WHAT_IF, out, workers, dry_run, yes)

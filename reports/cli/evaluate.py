@@ -11,17 +11,6 @@ import typer
 
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption
-from dess.reports.cli.options import (
-    JsonOption,
-    ScenarioOption,
-    SeedOption,
-    SetOption,
-    WorkersOption,
-    command,
-    load_space,
-    note_departures,
-    setting,
-)
 
 if TYPE_CHECKING:
     from dess.analysis.execution.evaluation import Evaluation
@@ -29,18 +18,18 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 
-@command(app)
+@options.command(app)
 def evaluate(
     policy: Annotated[list[str], typer.Option(metavar="P[,P...]", autocompletion=options.policies)],
-    scenario: ScenarioOption = "paper",
-    settings: SetOption = None,
+    scenario: options.ScenarioOption = "paper",
+    settings: options.SetOption = None,
     missions: Annotated[int, typer.Option(min=1)] = 1000,
-    seed: SeedOption = 0,
+    seed: options.SeedOption = 0,
     engine: Literal["batch", "events"] | None = None,
-    workers: WorkersOption = 1,
+    workers: options.WorkersOption = 1,
     out: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     yes: YesOption = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Simulate many missions and print the means of their metrics with 95 % intervals.
 
@@ -57,17 +46,17 @@ def evaluate(
     from dess.policies.registry import typed
     from dess.record import measures_of
 
-    space, policy = load_space(scenario, settings), typed(policy)
+    space, policy = options.load_space(scenario, settings), typed(policy)
     engine = engine_of([space], engine)
     if out:
         study: dict[str, Any] = {"scenario": scenario, "policies": policy, "missions": missions}
-        study |= {"set": dict(map(setting, settings or [])), "seed": seed, "engine": engine}
+        study |= {"set": dict(map(options.setting, settings or [])), "seed": seed, "engine": engine}
         evaluations = _kept(study, out, workers, yes)
     else:
         asked = [Asked(space, team, missions, seed, engine, workers) for team in policy]
         with console.compile_notice():
             check_evaluation(asked, yes)
-        note_departures(policy, [space])
+        options.note_departures(policy, [space])
         with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
             evaluations = [means(of_team, bar.update) for of_team in asked]
     unknown = dict.fromkeys(("mean", "low", "high"), nan)
@@ -104,7 +93,7 @@ def _kept(data: dict[str, Any], out: Path, workers: int, yes: bool) -> "list[Eva
     study = study_from(data, "evaluate")
     with console.compile_notice():
         check_run(study, out, workers, yes=yes)
-    note_departures(study.policies, study.scenarios)
+    options.note_departures(study.policies, study.scenarios)
     return of_results(
         console.complete(
             study.name,

@@ -14,14 +14,6 @@ from dess.code.libraries import needs
 from dess.errors import InputError, one_of
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption, complete
-from dess.reports.cli.options import (
-    PAGES,
-    RESULTS,
-    JsonOption,
-    WorkersOption,
-    all_settings,
-    command,
-)
 from dess.reports.cli.report import rendering
 from dess.reports.pages import PREFIX, check_pages
 
@@ -40,7 +32,7 @@ app = typer.Typer(
 )
 
 
-@command(app)
+@options.command(app)
 def run(
     names: Annotated[
         list[str], typer.Argument(metavar="NAME|FILE...", autocompletion=options.studies)
@@ -50,10 +42,10 @@ def run(
         typer.Option(
             metavar="DIR",
             help="Results folder; of several studies, the folder of their results folders.  "
-            f"[default: {RESULTS}/NAME]",
+            f"[default: {options.RESULTS}/NAME]",
         ),
     ] = None,
-    workers: WorkersOption = 1,
+    workers: options.WorkersOption = 1,
     scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS")] = None,
     missions: Annotated[int | None, typer.Option(min=1)] = None,
     policy: Annotated[
@@ -62,7 +54,8 @@ def run(
     dry_run: Annotated[bool, typer.Option("--dry-run")] = False,
     accept_code: Annotated[bool, typer.Option("--accept-code")] = False,
     page: Annotated[
-        bool, typer.Option("--report", help=f"Also render the page of the study into {PAGES}.")
+        bool,
+        typer.Option("--report", help=f"Also render the page of the study into {options.PAGES}."),
     ] = False,
     yes: YesOption = False,
 ) -> None:
@@ -85,7 +78,7 @@ def run(
     if out and len(studies) == 1:
         folders = [out]
     else:
-        folders = [(out or RESULTS) / study.name for study in studies]
+        folders = [(out or options.RESULTS) / study.name for study in studies]
     runs = [*zip(studies, folders, strict=True)]
     if dry_run:
         for study, folder in runs:
@@ -94,7 +87,7 @@ def run(
         return
     if page:
         needs("reports", "--report")
-        check_pages(PAGES, *(f"{PREFIX}{study.name}" for study in studies))
+        check_pages(options.PAGES, *(f"{PREFIX}{study.name}" for study in studies))
     with console.compile_notice():
         for study, folder in runs:
             check_run(study, folder, workers, accept_code=accept_code, yes=yes)
@@ -105,7 +98,7 @@ def run(
 
         with rendering() as progress:
             for folder in folders:
-                console.say(render_study(folder, PAGES, progress))
+                console.say(render_study(folder, options.PAGES, progress))
 
 
 def _run(study: "Study", out: Path, workers: int, scheduler: str | None, accept: bool) -> None:
@@ -144,7 +137,7 @@ def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -
     )
 
 
-@command(app)
+@options.command(app)
 def show(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
     policy: Annotated[str | None, typer.Option(metavar="P[,P...]")] = None,
@@ -152,7 +145,7 @@ def show(
     target: Annotated[list[str] | None, typer.Option(metavar="METRIC=SHARE")] = None,
     everything: Annotated[bool, typer.Option("--all")] = False,
     as_csv: Annotated[bool, typer.Option("--csv")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show the results of a study: means, comparisons, selections, the worst missions.
 
@@ -199,8 +192,10 @@ def _results(folder: Path) -> "Results":
     """The results in a folder; a study that is kept elsewhere is named with its folder."""
     from dess.analysis.results.tables import load_results
 
-    if not folder.exists() and (RESULTS / folder).is_dir():
-        raise InputError(f"{folder}: no such folder; allowed: a results folder: {RESULTS / folder}")
+    if not folder.exists() and (options.RESULTS / folder).is_dir():
+        raise InputError(
+            f"{folder}: no such folder; allowed: a results folder: {options.RESULTS / folder}"
+        )
     return load_results(folder)
 
 
@@ -209,7 +204,7 @@ def _targets(texts: Iterable[str]) -> dict[str, float]:
     from dess.analysis.metrics import ALIASES, MEASURES, METRICS
 
     targets = {}
-    for name, share in all_settings(texts, "--target", TARGET).items():
+    for name, share in options.all_settings(texts, "--target", TARGET).items():
         if (metric := ALIASES.get(name, name)) not in METRICS | MEASURES:
             known = one_of(name, [*METRICS, *ALIASES, *MEASURES])
             raise InputError(f"--target: {name!r} is unknown{known}")
@@ -274,12 +269,12 @@ def _with_values(results: "Results", means: "pd.DataFrame") -> "pd.DataFrame":
     return table
 
 
-@command(app)
+@options.command(app)
 def diff(
     a: Annotated[Path, typer.Argument(metavar="A")],
     b: Annotated[Path, typer.Argument(metavar="B")],
     most: Annotated[int, typer.Option(min=0)] = 5,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Compare two results folders mission by mission, with the same random draws.
 
@@ -322,7 +317,7 @@ def _diff_document(found: "Diff", most: int) -> dict:
     }
 
 
-@command(app)
+@options.command(app)
 def export(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
     crate: Annotated[Path, typer.Option(metavar="FILE.zip")],
