@@ -25,7 +25,8 @@ from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of, to
 from dess.analysis.names import DECISIONS, parameter
 from dess.analysis.results.tables import Results, once
 from dess.analysis.stats.verdict import membership, on_front
-from dess.analysis.study.cheapest import PARTS, Answer, Cheapest, CheapestChoice, Costs
+from dess.analysis.study.cheapest import Answer, Cheapest, CheapestChoice
+from dess.analysis.study.costs import PARTS, Costs
 from dess.analysis.tables import CHECKED, INTERVALS, MOST_ROWS, Table, counts
 from dess.errors import one_of
 from dess.fields import ZONE_PADS

@@ -31,7 +31,8 @@ from dess.analysis.names import SWEEP, SWEEPS
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.provenance import engine_code, team_of
 from dess.analysis.results.tables import Results
-from dess.analysis.study.cheapest import Cheapest, Costs
+from dess.analysis.study.cheapest import Cheapest
+from dess.analysis.study.costs import Costs
 from dess.analysis.study.design import MAX_SIZE, Grid, Table
 from dess.analysis.study.study import Study, study_from
 from dess.errors import one_of, validation_line

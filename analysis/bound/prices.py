@@ -21,8 +21,7 @@ import numpy as np
 
 from dess import InputError, rules
 from dess.analysis.bound import paths
-from dess.analysis.bound.service import POINTS, rates_of, spread, step_values
-from dess.analysis.bound.slopes import add_slopes
+from dess.analysis.bound.service import POINTS, add_slopes, rates_of, spread, step_values
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.scenario import AnyScenario, ScenarioSpace

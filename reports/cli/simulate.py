@@ -266,7 +266,7 @@ def _animate(mission: _Mission, path: Path, kind: str) -> None:
 
 
 def _write_path(mission: _Mission, path: Path, kind: str) -> None:
-    from dess.analysis.results.flight import path_text
+    from dess.analysis.results.event_log import path_text
     from dess.files.writing import fill
 
     fill(path, path_text(mission.log, mission.scenario, kind).encode())

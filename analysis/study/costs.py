@@ -1,0 +1,83 @@
+"""What a fleet costs: the prices of a study, and the cost of a mission by what is paid for."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from dess import InputError
+from dess.analysis.study.stopping import MOST, Line, StrictTable
+from dess.scenario import ScenarioSpace
+from dess.sections.section import Integer, Number
+
+# A price; the sums of all missions that may be planned are still finite.
+Price = Annotated[float, Field(ge=0, le=10**12, allow_inf_nan=False)]
+
+PARTS = ("purchase", "charging", "hours", "losses")
+
+
+class Costs(StrictTable):
+    """Prices in one currency.
+
+    UAVs and pads are bought once. Charging, hours and lost UAVs are paid for in each of the
+    ``missions`` planned for the fleet.
+
+    Raises:
+        pydantic.ValidationError: If a price is below 0.
+    """
+
+    currency: Line = Field("EUR", min_length=1, max_length=16, description="name of the currency")
+    uav: Price = Field(0.0, description="price of a UAV")
+    pad: Price = Field(0.0, description="price of a charging pad")
+    charge: Price = Field(0.0, description="price of charging a battery from 0 to 100 %")
+    hour: Price = Field(0.0, description="price of an hour of a mission")
+    lost_uav: Price = Field(0.0, description="price of a UAV whose battery is depleted")
+    missions: Integer = Field(1, ge=1, le=MOST, description="missions that the fleet is to fly")
+    slot_seconds: Number | None = Field(
+        None,
+        ge=0.001,
+        le=1_000_000,
+        description="length of a mission slot [s]; needed for the price of an hour, unless there "
+        "is a data sheet",
+    )
+
+    def check(self, spaces: Sequence[ScenarioSpace]) -> None:
+        """Check that the length of a slot is known where hours have a price.
+
+        Raises:
+            InputError: If it is not, or is given although it follows from a data sheet.
+        """
+        follows, where = any(space.units for space in spaces), "costs.slot_seconds"
+        if follows and self.slot_seconds is not None:
+            raise InputError(f"{where}: follows from the data sheet; allowed: without this field")
+        if self.hour and self.slot_seconds is None and not follows:
+            raise InputError(f"{where}: is missing; allowed: with hour, the seconds of a slot")
+
+    def parts(
+        self, spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any], uavs: Mapping[str, Any]
+    ) -> dict[str, np.ndarray]:
+        """The parts of the cost of every mission, in the currency.
+
+        Args:
+            spaces: The scenario of every design point.
+            missions: (n,) columns of the missions: ``point`` and the fields of ``MISSION_RECORD``.
+            uavs: Columns of the UAVs of these missions, in the same order: ``slots_charging``, and
+                the name of ``end``.
+
+        Returns:
+            The (n,) amounts of each of ``PARTS``.
+        """
+        fleet, points = np.asarray(missions["uavs"]), np.asarray(missions["point"])
+        mission = np.repeat(np.arange(len(fleet)), fleet)
+        pads, rates = np.array([(space.charging_pads, space.charge_rate) for space in spaces]).T
+        slots = np.bincount(mission, np.asarray(uavs["slots_charging"]), len(fleet))
+        lost = np.bincount(mission, np.asarray(uavs["end"]) == "battery", len(fleet))
+        seconds = [space.units.slot if space.units else self.slot_seconds or 0 for space in spaces]
+        hours = np.asarray(missions["slots"]) * np.array(seconds)[points] / 3600
+        return {
+            "purchase": self.uav * fleet + self.pad * pads[points],
+            "charging": self.missions * self.charge * slots * rates[points] / 100,
+            "hours": self.missions * self.hour * hours,
+            "losses": self.missions * self.lost_uav * lost,
+        }
