@@ -16,17 +16,8 @@ from dess.env.stepper import MissionStepper
 from dess.errors import InputError
 from dess.observations import states as column
 from dess.observations.states import CompactStates, empty_states, masks
+from dess.policies.learner import training
 from dess.policies.learner.config import MISSION_SEED, TrainingConfig
-from dess.policies.learner.training import (
-    MISSIONS_PER_PHASE,
-    Learner,
-    Training,
-    acting,
-    between,
-    check_finite,
-    just_ended,
-    soft_update,
-)
 from dess.sea.chart import FAR, spread
 from dess.state import HOVER, STEP_X, STEP_Y
 
@@ -191,7 +182,7 @@ def double_dqn_target(
     return reward + discount * target.gather(1, choice).squeeze(1)
 
 
-class DQNLearner(Learner):
+class DQNLearner(training.Learner):
     """The networks of double DQN, and the optimizer Adam.
 
     Attributes:
@@ -228,9 +219,9 @@ class DQNLearner(Learner):
         loss.backward()
         norm = nn.utils.clip_grad_norm_(self.online.parameters(), self.config.gradient_norm)
         done = {"loss": loss.detach(), "value": chosen.detach().mean(), "gradient_norm": norm}
-        check_finite(done)
+        training.check_finite(done)
         self.step(learning_rate)
-        soft_update(self.target, self.online, self.config.target_rate)
+        training.soft_update(self.target, self.online, self.config.target_rate)
         return done
 
     def loss(self, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
@@ -253,7 +244,7 @@ class DQNLearner(Learner):
 _LOSSES = {"huber": nn.functional.smooth_l1_loss, "mse": nn.functional.mse_loss}
 
 
-class DQNTraining(Training):
+class DQNTraining(training.Training):
     """A training by double DQN in progress.
 
     Attributes:
@@ -272,7 +263,7 @@ class DQNTraining(Training):
         config, fleet, zones = self.config, self.space.uavs[1], self.space.chart.zones
         seed = MISSION_SEED + config.seed
         self.stepper = MissionStepper(self._in_phase(self.space), config.num_envs, seed)
-        self.stepper.start_at(seed, self.phase_index * MISSIONS_PER_PHASE)
+        self.stepper.start_at(seed, self.phase_index * training.MISSIONS_PER_PHASE)
         self.early = np.zeros((config.num_envs, fleet), bool)
         self.replay = ReplayMemory(config.replay, config.num_envs, fleet, len(self.space.nodes))
         home = spread(zones, self.space.chart.parking)[0].reshape(zones.shape)
@@ -281,12 +272,12 @@ class DQNTraining(Training):
 
     def _learn(self, share: float) -> None:
         config = self.config
-        epsilon = between(self.phase.epsilon, share / self.phase.epsilon_decay)
+        epsilon = training.between(self.phase.epsilon, share / self.phase.epsilon_decay)
         if self.replay.count == 0:
             for _ in range(config.learning_starts):
                 self._collect(1.0 if self.tick == 0 else epsilon)
         self._collect(epsilon)
-        rate = between(self.phase.learning_rate, share)
+        rate = training.between(self.phase.learning_rate, share)
         for _ in range(config.updates):
             batch = self.replay.sample(config.batch, config.n_step, config.discount, self.generator)
             self.losses.append(self.learner.update(batch, rate))
@@ -309,7 +300,7 @@ class DQNTraining(Training):
         """Run one slot of all environments with the exploring policy, and store it."""
         state = self.stepper.state
         over = np.nonzero(state.missions["active"] == 0)[0]
-        states, missions, uavs = acting(self.stepper, self.config.guard)
+        states, missions, uavs = training.acting(self.stepper, self.config.guard)
         actions = np.full(state.uavs.shape, HOVER)
         if len(missions):
             actions[missions, uavs] = self._explore(states, missions, uavs, epsilon)
@@ -319,7 +310,7 @@ class DQNTraining(Training):
             *(outcome[n] for n in ("acted", "terminated", "truncated")),
         )  # fmt: skip
         self.uav_slots += int(outcome["acted"].sum())
-        ended = just_ended(self.stepper, outcome)
+        ended = training.just_ended(self.stepper, outcome)
         if len(ended):
             self.finished.append(self.stepper.records(ended).missions)
         self._launch(over)

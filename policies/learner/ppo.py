@@ -25,18 +25,9 @@ from dess.errors import InputError
 from dess.observations.observer import encoder_of
 from dess.observations.sets import Sets
 from dess.observations.states import CompactStates, masks
+from dess.policies.learner import training
 from dess.policies.learner.config import MISSION_SEED, TrainingConfig, ranges_of
 from dess.policies.learner.network import SetNetwork
-from dess.policies.learner.training import (
-    MISSIONS_PER_PHASE,
-    SELECT_BY,
-    Learner,
-    Training,
-    acting,
-    between,
-    check_finite,
-    just_ended,
-)
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import spread
@@ -79,7 +70,7 @@ class Decisions(NamedTuple):
         return Decisions(self.encoder, self.states, *(part[rows] for part in self[2:]))
 
 
-class ProximalLearner(Learner):
+class ProximalLearner(training.Learner):
     """The networks of proximal policy optimization and their optimizers.
 
     The values of the network ``online`` are the logits of the actions.
@@ -142,7 +133,7 @@ class ProximalLearner(Learner):
             for network in (self.critic, self.online)[: 1 + decides]
         ]
         done = {"loss": loss, "value": mean, "gradient_norm": norms[-1]}
-        check_finite(done)
+        training.check_finite(done)
         self.optimizers["critic_optimizer"].step()
         if decides:
             self.step(rate)
@@ -173,7 +164,7 @@ class ProximalLearner(Learner):
         return torch.log_softmax(logits.masked_fill(~self.tensor(allowed), -1e9), 1)
 
 
-class ProximalTraining(Training):
+class ProximalTraining(training.Training):
     """A training in progress. Between two ticks there are no missions in progress.
 
     Attributes:
@@ -217,7 +208,7 @@ class ProximalTraining(Training):
         self.uav_slots += sum(int(records["uav_slots"].sum()) for _, records in simulated)
         spread = np.concatenate([decisions.advantages for decisions in shown]).std() + 1e-6
         shown = [d._replace(advantages=d.advantages / spread) for d in shown]
-        rate = between(self.phase.learning_rate, share)
+        rate = training.between(self.phase.learning_rate, share)
         decides = self.tick - self.phase_start >= config.learning_starts
         each = max(config.batch // len(shown), 1)
         for _ in range(config.updates):
@@ -238,22 +229,23 @@ class ProximalTraining(Training):
         if generator.random() < config.short_ranges:
             space = _with_range(space, generator.uniform(*RANGES))
         stepper = MissionStepper(space, config.num_envs, MISSION_SEED + config.seed)
-        first = (self.tick * config.seas_per_tick + place) * config.num_envs % MISSIONS_PER_PHASE
-        stepper.start_at(stepper.seed, self.phase_index * MISSIONS_PER_PHASE + first)
+        place_in_phase = self.tick * config.seas_per_tick + place
+        first = place_in_phase * config.num_envs % training.MISSIONS_PER_PHASE
+        stepper.start_at(stepper.seed, self.phase_index * training.MISSIONS_PER_PHASE + first)
         stepper.launch(stepper.indices)
         missions, records = stepper.state.missions, np.zeros(config.num_envs, MISSION_RECORD)
         collected = [np.zeros(config.num_envs)]
         seen: list[CompactStates] = []
         decided: list[tuple[np.ndarray, ...]] = []
         while missions["active"].any():
-            states, at, uavs = acting(stepper, config.guard)
+            states, at, uavs = training.acting(stepper, config.guard)
             actions = np.full(states.uavs.shape[:2], HOVER)
             actions[at, uavs], *known = self._drawn(encoder, states, at, uavs, generator)
             decided.append((np.full(len(at), len(seen)), at, uavs, actions[at, uavs], *known))
             seen.append(states)
             outcome = stepper.step(actions)
             collected.append(collected[-1] + outcome["team_collected"].max(1))
-            ended = just_ended(stepper, outcome)
+            ended = training.just_ended(stepper, outcome)
             records[ended] = stepper.records(ended).missions
         states = CompactStates(*(np.concatenate(parts) for parts in zip(*seen, strict=True)))
         columns = [np.concatenate(parts) for parts in zip(*decided, strict=True)]
@@ -279,7 +271,7 @@ class ProximalTraining(Training):
             records: (N,) the missions.
         """
         slots, missions, uavs, actions, likelihoods, values = columns
-        products, fleet = WORTH * records[SELECT_BY], states.uavs.shape[1]
+        products, fleet = WORTH * records[training.SELECT_BY], states.uavs.shape[1]
         so_far = earned[slots, missions]
         advantages = _advantages(missions, uavs, so_far, values, products, fleet)
         centred = (advantages - advantages.mean()).astype(np.float32)
