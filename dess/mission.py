@@ -45,7 +45,6 @@ from dess.state import (
     LANDED,
     LOST,
     QUOTA,
-    UAV,
     State,
     check_seed,
     spaces_of,
@@ -119,7 +118,13 @@ class ChargingZone(simpy.Resource):
 
 _NOBODY = np.zeros(0, np.int64)
 Process = Generator[simpy.Event, Any, None]
-_Uav: Any = namedtuple("_Uav", UAV.names or ())  # type: ignore[misc]
+# The fields of a UAV that the event log is written from.
+_LOGGED = [
+    *("x", "y", "from_x", "from_y", "battery", "communications", "quota", "end", "active"),
+    *("slots_per_cell", "slots_left", "action", "overruled", "overruled_by", "charging"),
+    *("served", "amount", "snr"),
+]
+_Uav: Any = namedtuple("_Uav", _LOGGED)  # type: ignore[misc]
 
 
 def simulate(
@@ -177,6 +182,7 @@ class MissionModel:
         self.sensors, self.teeth = self.state.sensors[0], self.state.teeth[0]
         self.packets = Packets(scenario, self.state, log) if scenario.needs_events else None
         self.fleet = range(int(self.mission["uavs"]))
+        self.logged = self.uavs[_LOGGED][: len(self.fleet)]  # of the same memory
         self.env = simpy.Environment()
         self.zones = [
             ChargingZone(self.env, self.mission, self.uavs, zone)
@@ -276,14 +282,14 @@ class MissionModel:
 
     def _team(self) -> list[Any]:
         """The UAVs as plain values, which Python reads faster than the fields of a record."""
-        return [_Uav(*values) for values in self.uavs[: len(self.fleet)].tolist()]
+        return [_Uav(*values) for values in self.logged.tolist()]
 
     def _log_uav(
         self, event: str, time: float, i: int, value: float | None = None, other: int = -1
     ) -> None:
         """Log an event of a UAV; its value is by default the battery."""
         if self.log is not None:
-            u: Any = _Uav(*self.uavs[i].item())
+            u: Any = _Uav(*self.logged[i].item())
             value = u.battery if value is None else value
             self.log.add(float(time), event, i, -1, value, u.x, u.y, u.battery, other)
 

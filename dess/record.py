@@ -231,7 +231,11 @@ class EventLog(list[Event]):
 
     def columns(self) -> dict[str, np.ndarray]:
         """The log as named columns."""
-        return {name: np.array(getattr(self, name), kind) for name, kind in EVENT_COLUMNS.items()}
+        columns = zip(*self, strict=True) if self else ([] for _ in EVENT_COLUMNS)
+        return {
+            name: np.array(column, kind)
+            for (name, kind), column in zip(EVENT_COLUMNS.items(), columns, strict=True)
+        }
 
 
 @dataclass(frozen=True)

@@ -63,10 +63,10 @@ class Constants(Fields):
         """Add the fields that follow from the data sheet, which may not be given as well."""
         sheet = values.get("data_sheet") if isinstance(values, dict) else None
         try:
-            found = DataSheet.model_validate(sheet or {})
+            found = DataSheet.model_validate(sheet) if sheet else None
         except ValidationError:  # it is told where the field is validated
             return values
-        if not found.is_on:
+        if not (found and found.is_on):
             return values
         values = {n: dict(of) if isinstance(of, Section) else of for n, of in values.items()}
         for name in sorted(found.fields().keys() & dotted(values).keys() - {*OPEN}):
@@ -116,7 +116,7 @@ class Constants(Fields):
         Raises:
             InputError: If the field does not exist, or holds no numbers.
         """
-        if field not in self.numeric:
+        if field not in SAMPLED and field not in self.numeric:
             raise InputError(f"field: {field!r} is not a number{one_of(field, self.numeric)}")
         between = {
             "uavs": (1, min(self.zone_cells, MOST_UAVS)),

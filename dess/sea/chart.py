@@ -108,9 +108,9 @@ def chart_at(
     if cells.size > MOST_CHARTED:
         places, rows = [*{*parking_of(zones), *nodes}], np.full(cells.size, -1, np.int64)
         rows[[y * width + x for x, y in places]] = np.arange(len(places))
-    ways = np.empty((len(places), cells.size), np.int16)
-    for number, place in enumerate(places):
-        ways[number] = spread(cells, np.array([place]))[0]
+    ways = np.full((len(places), cells.size), FAR, np.int16)
+    numbers = np.array([y * width + x for x, y in places])
+    _fill_ways(cells.reshape(-1), _neighbours(cells), numbers, ways)
     return _chart_of(cells, parking, sizes, nearest, ways, rows)
 
 
@@ -141,32 +141,45 @@ def spread(zones: np.ndarray, sources: np.ndarray) -> tuple[np.ndarray, np.ndarr
         nearest source, the lowest on a tie.
     """
     lengths, nearest = np.full(zones.size, FAR, np.int16), np.zeros(zones.size, np.int32)
-    _spread(zones, sources, lengths, nearest)
+    cells = sources[:, 1] * zones.shape[1] + sources[:, 0]
+    is_open = zones.reshape(-1)[cells] != NO_FLY
+    nearest[cells[is_open]] = np.flatnonzero(is_open)
+    _spread(_neighbours(zones), cells[is_open], lengths, nearest)
     return lengths, nearest
 
 
+def _neighbours(zones: np.ndarray) -> np.ndarray:
+    """(H * W, 4) the numbers of the cells north, east, south and west of a cell; -1 where none."""
+    cells = np.full(np.add(zones.shape, 2), -1, np.int32)
+    cells[1:-1, 1:-1] = np.where(zones == NO_FLY, -1, np.arange(zones.size).reshape(zones.shape))
+    around = cells[:-2, 1:-1], cells[1:-1, 2:], cells[2:, 1:-1], cells[1:-1, :-2]
+    return np.stack(around, -1).reshape(-1, 4)
+
+
 @kernel
-def _spread(zones, sources, lengths, nearest):
-    height, width = zones.shape
-    queue = np.empty(zones.size, np.int64)
-    first = last = 0
-    for number in range(len(sources)):
-        x, y = sources[number, 0], sources[number, 1]
-        if zones[y, x] != NO_FLY:
-            cell = y * width + x
-            queue[last], lengths[cell], nearest[cell] = cell, 0, number
-            last += 1
+def _spread(neighbours, sources, lengths, nearest):
+    queue = np.empty(len(lengths), np.int32)
+    first, last = 0, len(sources)
+    queue[:last] = sources
+    for cell in sources:
+        lengths[cell] = 0
     while first < last:
         cell = queue[first]
         first += 1
-        for step_x, step_y in ((0, -1), (1, 0), (0, 1), (-1, 0)):
-            x, y = cell % width + step_x, cell // width + step_y
-            if not (0 <= x < width and 0 <= y < height) or zones[y, x] == NO_FLY:
-                continue
-            to = y * width + x
-            if lengths[to] == FAR:
+        for side in range(4):
+            to = neighbours[cell, side]
+            if to >= 0 and lengths[to] == FAR:
                 queue[last], lengths[to], nearest[to] = to, lengths[cell] + 1, nearest[cell]
                 last += 1
+
+
+@kernel
+def _fill_ways(zones, neighbours, places, ways):
+    """Write the ways from these cells to all others, where ``FAR`` stands before, row by row."""
+    nearest = np.zeros(len(zones), np.int32)
+    for number in range(len(places)):
+        if zones[places[number]] != NO_FLY:
+            _spread(neighbours, places[number : number + 1], ways[number], nearest)
 
 
 @kernel

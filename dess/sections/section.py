@@ -1,6 +1,7 @@
 """The base of all sections, and the types of their fields."""
 
 from collections.abc import Callable
+from functools import cache
 from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
@@ -56,7 +57,12 @@ class Section(Strict):
     @property
     def is_on(self) -> bool:
         """Whether a field differs from its default."""
-        return any(value != type(self).model_fields[name].default for name, value in self)
+        return vars(self) != self._defaults()
+
+    @classmethod
+    @cache
+    def _defaults(cls) -> dict[str, Any]:
+        return {name: field.default for name, field in cls.model_fields.items()}
 
     @classmethod
     def off(cls) -> Self:
