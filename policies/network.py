@@ -209,8 +209,15 @@ def _convolved(maps: np.ndarray, first: Layer, second: Layer) -> np.ndarray:
     rows, columns = (width - KERNEL_SIZE + 1 for width in maps.shape[2:])
     seen = np.empty((len(maps), rows, columns * KERNELS), maps.dtype)
     _convolve(maps, *first, seen.reshape(len(maps), rows, columns, KERNELS))
-    windows = sliding_window_view(seen, (KERNEL_SIZE, KERNEL_SIZE * KERNELS), axis=(1, 2))
-    out = _through([second], windows[:, :, ::KERNELS].reshape(-1, len(second[0])))
+    matrix, bias = second
+    windows = sliding_window_view(seen, KERNEL_SIZE * KERNELS, axis=2)[:, :, ::KERNELS]
+    height, width = rows - KERNEL_SIZE + 1, windows.shape[2]
+    windows = windows.reshape(len(maps), rows * width, -1)
+    # Of a window only a row is copied; the five products are added.
+    out = np.zeros((len(maps) * height * width, KERNELS), maps.dtype)
+    for row, part in enumerate(np.split(matrix, KERNEL_SIZE)):
+        out += (windows[:, row * width : (row + height) * width] @ part).reshape(out.shape)
+    _rectify(out, bias[None], 1)
     return out.reshape(len(maps), -1, KERNELS).swapaxes(1, 2).reshape(len(maps), -1)
 
 
