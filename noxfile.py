@@ -16,7 +16,8 @@ nox.options.sessions = ["tests"]
 # The studies that the reports read, and the options of those whose default budget takes long. The
 # pages say what their studies were made with.
 STUDIES = {
-    "table4 fig1 fig4 sensitivity failures verification fig5-paper sweet-spot-paper": "",
+    "table4 fig1 sensitivity failures verification fig5-paper sweet-spot-paper": "",
+    "fig4": "--missions 200",
     "pads": "--missions 300",
     "fig5": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
     "sweet-spot": "--policy ddqn --policy greedy",
@@ -24,7 +25,8 @@ STUDIES = {
     "explorer age": "--missions 50",
     "gap": "--missions 12",
     "seas": "--missions 1 --policy any --policy greedy --policy planner",
-    "seas-landing seas-horizon": "--missions 1",
+    "seas-landing": "--missions 1",
+    "seas-horizon": "--missions 1 --policy any --policy greedy",
 }
 # Runs commands in one process, since each would start workers and import libraries for seconds.
 ONE_AFTER_THE_OTHER = """
