@@ -16,14 +16,14 @@ nox.options.sessions = ["tests"]
 # The studies that the reports read, and the options of those whose default budget takes long. The
 # pages say what their studies were made with.
 STUDIES = {
-    "table4 fig1 sensitivity failures verification fig5-paper sweet-spot-paper": "",
-    "fig4": "--missions 200",
-    "pads": "--missions 300",
+    "table4 fig1 sensitivity verification sweet-spot-paper": "",
+    "fig4 pads": "--missions 200",
+    "comparison failures": "--missions 500",
     "fig5": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
+    "fig5-paper": "--missions 20",
     "sweet-spot": "--policy ddqn --policy greedy",
-    "comparison": "--missions 1000",
     "explorer age": "--missions 50",
-    "gap": "--missions 12",
+    "gap": "--missions 8",
     "seas": "--missions 1 --policy any --policy greedy --policy planner",
     "seas-landing": "--missions 1",
     "seas-horizon": "--missions 1 --policy any --policy greedy",
