@@ -3,12 +3,14 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 from scipy import stats
 
 from dess import InputError
 from dess.analysis import load_results, load_study, run_study
-from dess.analysis.answers.diff import at_hand, diff, effects, most_changed, origins
+from dess.analysis.answers.diff import _differs, at_hand, diff, effects, most_changed, origins
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.results import provenance
 from dess.analysis.results.store import Store
@@ -70,6 +72,11 @@ def test_a_record_of_a_uav_that_differs_is_found(field, value, results):
     (mission,) = found.changed.itertuples()
     assert (mission.policy_a, mission.point_a, mission.replication) == ("random", 1, 6)
     assert mission.fields == f"uav {field}"
+
+
+def test_a_field_that_one_side_has_not_measured_differs():
+    pairs = pd.DataFrame({"age_a": [1.0, np.nan, 1.0], "age_b": [np.nan, np.nan, 1.0]})
+    assert _differs(pairs, "age").tolist() == [True, False, False]
 
 
 def test_design_points_are_matched_by_their_scenarios(results, tmp_path):

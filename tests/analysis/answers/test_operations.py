@@ -52,6 +52,7 @@ def test_the_fewest_pads_with_which_and_above_which_little_is_lost(pads):
     found = operations.enough_pads(planted(pads, PRODUCT, value), 0.1)
     assert found[["uavs", "pads"]].to_numpy().tolist() == [[2, 2], [4, 4]]
     assert found["too_few"].tolist() == [1, 3]
+    assert operations.short_of_pads(planted(pads, PRODUCT, value), 0.1) == [0, 4, 6]
     text = operations.pads(planted(pads, PRODUCT, value), 0.1)
     assert text.startswith(
         "Of charging pads, 2 are enough for 2 UAVs, 1 is too few; 4 are enough for 4 UAVs, 3 are"
