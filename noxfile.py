@@ -18,13 +18,15 @@ nox.options.sessions = ["tests"]
 STUDIES = {
     "table4 fig1 sensitivity verification sweet-spot-paper": "",
     "fig4 pads": "--missions 200",
-    "comparison failures": "--missions 500",
-    "fig5": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
+    "fig5": (
+        "--missions 200 --policy ddqn --policy greedy --policy random --policy random-unguarded"
+    ),
+    "comparison failures": "--missions 400",
     "fig5-paper": "--missions 20",
     "sweet-spot": "--policy ddqn --policy greedy",
-    "explorer age": "--missions 50",
+    "explorer age": "--missions 40",
     "gap": "--missions 8",
-    "seas": "--missions 1 --policy any --policy greedy --policy planner",
+    "seas": "--missions 1 --policy any --policy greedy --policy planner-short",
     "seas-landing": "--missions 1",
     "seas-horizon": "--missions 1 --policy any --policy greedy",
 }

@@ -29,7 +29,8 @@ from dess.scenario import SEA
 _NODES = (15, 30, 60)
 _NODES_IN_WORDS = ("1 to 15", "16 to 30", "31 to 60", "61 and more")
 ALL = "all"
-REFERENCES = ("planner", "planner-long")  # the slow policies that others are compared with
+# The slow policies that others are compared with.
+REFERENCES = ("planner", "planner-long", "planner-short")
 GROUPS = {"family": "Family", "nodes": "Nodes", "uavs": "UAVs"}
 _ENDS = ["mean", "low", "high"]
 
@@ -81,6 +82,11 @@ def gains(results: Results, baseline: str, by: str = ALL) -> pd.DataFrame:
         return column_tests(values.drop(columns=baseline), values[baseline])
 
     return _of_groups(results, by, PRODUCT, compared)
+
+
+def reference_of(results: Results) -> str:
+    """The slow policy of a study that others are compared with."""
+    return next((name for name in REFERENCES if name in results.policies), REFERENCES[0])
 
 
 def shares(results: Results, reference: str, by: str = ALL) -> pd.DataFrame:

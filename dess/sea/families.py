@@ -17,10 +17,11 @@ from itertools import count, product
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from dess import streams
 from dess.errors import InputError, check_known, one_of, shown
-from dess.sea.chart import FAR, OPEN, Cell, Rectangle, parking_of, spread, zones_of
+from dess.sea.chart import FAR, NO_FLY, OPEN, Cell, Rectangle, parking_of, spread, zones_of
 
 T = TypeVar("T")
 
@@ -264,7 +265,7 @@ def _number(draws: Draws, land: np.ndarray, least: int, most: int) -> int:
 
 
 def _cells(mask: np.ndarray) -> list[Cell]:
-    return [(int(x), int(y)) for y, x in np.argwhere(mask)]
+    return [*map(tuple, np.argwhere(mask)[:, ::-1].tolist())]
 
 
 # --- a sea with its zones, nodes and limits ---
@@ -313,8 +314,7 @@ def _attempt(draws: Draws, family: Family, seed: int) -> dict[str, Any]:
 
 def _ways(land: np.ndarray, cells: list[Cell]) -> np.ndarray:
     """(H, W) the cells on the way to the nearest of some cells."""
-    rows, columns = land.shape
-    zones = zones_of(columns, rows, (), _cells(land))
+    zones = np.where(land, NO_FLY, OPEN).astype(np.int8)
     return spread(zones, np.array(cells))[0].reshape(land.shape)
 
 
@@ -335,11 +335,11 @@ def _zones(draws: Draws, land: np.ndarray, uavs: int, reach: int) -> list[Rectan
         ways = _ways(land, parking_of(zones))
         from_start = _ways(land, parking_of(zones[:1]))
         width, height = draws.one_of(sides)
+        nearest = sliding_window_view(ways, (height, width)).min((2, 3))
         fit = [
             (x, y)
             for x, y in _places(land, width, height)
-            if ways[y : y + height, x : x + width].min() >= min(reach, min(land.shape) // 2)
-            and from_start[y, x] <= 2 * reach
+            if nearest[y, x] >= min(reach, min(land.shape) // 2) and from_start[y, x] <= 2 * reach
         ]
         if not fit:
             return []
@@ -349,7 +349,7 @@ def _zones(draws: Draws, land: np.ndarray, uavs: int, reach: int) -> list[Rectan
 
 def _places(land: np.ndarray, width: int, height: int) -> list[Cell]:
     """The cells whose rectangle of this size, to the east and south, has no land."""
-    windows = np.lib.stride_tricks.sliding_window_view(land, (height, width))
+    windows = sliding_window_view(land, (height, width))
     return _cells(windows.sum((2, 3)) == 0)
 
 

@@ -16,7 +16,7 @@
 # %% tags=["parameters"]
 results = "../../results"  # folder that holds the results folders seas, seas-landing, seas-horizon
 policy = "any"  # the learned policy for any sea
-reference = "planner"  # a slow policy that is hard to beat
+reference = None  # a slow policy that is hard to beat; None for a planner of the study
 heuristic = "greedy"  # a fast policy without learning
 
 # %%
@@ -29,6 +29,7 @@ from dess.reports.pages import html
 study, landing, horizon = (
     load_results(f"{results}/{name}") for name in ("seas", "seas-landing", "seas-horizon")
 )
+reference = reference or seas.reference_of(study)
 for name in (policy, reference, heuristic):
     study.check_policy(name)
 times = comparison.read(results, study)
