@@ -86,6 +86,8 @@ def plain(folder):
     return runs(folder, set(), *ANSWERED, *MISSED)
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_a_plain_installation_has_the_simulator_and_its_commands(folder, plain):
     for line in ANSWERED:
         code, out, err = plain[line]
@@ -96,6 +98,8 @@ def test_a_plain_installation_has_the_simulator_and_its_commands(folder, plain):
     assert (folder / "log.parquet").exists()
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_a_sweep_answers_without_its_page(plain):
     _, out, err = plain[ANSWERED[-1]]
     assert "rank" in out and "page: " not in out
@@ -103,6 +107,8 @@ def test_a_sweep_answers_without_its_page(plain):
     assert err.endswith(": pip install 'dess[reports]'")
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_what_an_extra_adds_is_missed_in_one_line(folder, plain):
     for line, (what, extra) in MISSED.items():
         code, out, err = plain[line]

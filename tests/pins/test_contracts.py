@@ -60,6 +60,8 @@ def test_every_help_is_the_kept_one():
     pinned("help.txt", helps())
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_python_without_docstrings_has_the_same_help_and_so_has_h():
     code = "from tests.pins import test_contracts; print(test_contracts.helps('-h'), end='')"
     command = [sys.executable, "-OO", "-c", code]
