@@ -17,14 +17,13 @@ nox.options.sessions = ["tests"]
 # pages say what their studies were made with.
 STUDIES = {
     "table4 fig1 sensitivity verification sweet-spot-paper": "",
-    "fig4 pads": "--missions 200",
-    "fig5": (
-        "--missions 200 --policy ddqn --policy greedy --policy random --policy random-unguarded"
-    ),
+    "fig4": "--missions 150",
+    "pads": "--missions 200",
+    "fig5": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
     "comparison failures": "--missions 400",
     "fig5-paper": "--missions 20",
     "sweet-spot": "--policy ddqn --policy greedy",
-    "explorer age": "--missions 40",
+    "explorer age": "--missions 30",
     "gap": "--missions 8",
     "seas": "--missions 1 --policy any --policy greedy --policy planner-short",
     "seas-landing": "--missions 1",
