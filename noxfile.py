@@ -16,18 +16,15 @@ nox.options.sessions = ["tests"]
 # The studies that the reports read, and the options of those whose default budget takes long. The
 # pages say what their studies were made with.
 STUDIES = {
-    "table4 fig1 sensitivity verification sweet-spot-paper": "",
-    "fig4": "--missions 150",
+    "table4 fig1 fig4 sensitivity verification fig5-paper sweet-spot-paper": "",
     "pads": "--missions 200",
     "fig5": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
     "comparison failures": "--missions 400",
-    "fig5-paper": "--missions 20",
     "sweet-spot": "--policy ddqn --policy greedy",
     "explorer age": "--missions 30",
     "gap": "--missions 8",
     "seas": "--missions 1 --policy any --policy greedy --policy planner-short",
-    "seas-landing": "--missions 1",
-    "seas-horizon": "--missions 1 --policy any --policy greedy",
+    "seas-landing seas-horizon": "--missions 1 --policy any --policy greedy",
 }
 # Runs commands in one process, since each would start workers and import libraries for seconds.
 ONE_AFTER_THE_OTHER = """

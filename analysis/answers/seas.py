@@ -113,7 +113,6 @@ def by_group(results: Results, reference: str) -> list[Drawing]:
         with style.panels(4.2) as (figure, ax):
             style.along(style.placed(table, by), looks, "%", ax, linestyle="")
             ax.set(ylabel=f"product, share of {reference}")
-            ax.legend(loc="lower left", ncols=4)
         alt = f"The product as a share of that of {reference}, by {name.lower()}"
         caption = f"n = {table['n'].min()} seas and more per dot; bars are 95 % intervals."
         drawings.append(Drawing(figure, alt, caption, table))
