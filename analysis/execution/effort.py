@@ -317,19 +317,19 @@ def check_run(
 
 
 def _check_policies(study: Study) -> None:
-    """Check that every policy can act on layouts of the design, in the first mission slot.
+    """Check that every policy can act on two layouts of the design, in the first mission slot.
 
-    A layout is the zones, no-fly cells and nodes. The first one and the one with the most nodes and
-    cells are enough: a policy that knows one layout refuses one of them, and a policy that takes
-    too much memory refuses the largest.
+    A layout is the zones, no-fly cells and nodes. The first one and the largest of the others are
+    enough: a policy that knows a single layout refuses one of the two, and a policy that needs too
+    much memory refuses the largest.
 
     Errors other than ``InputError`` are ignored here, because the run records them as failures.
     """
     places = {(s.size, s.rectangles, s.no_fly, s.nodes): s for s in study.scenarios}
     loaded = cache(partial(load_team, uavs=max(space.uavs[1] for space in places.values())))
-    spaces = [*places.values()]
-    largest = max(spaces[1:] or spaces, key=lambda space: len(space.nodes) * math.prod(space.size))
-    for number, space in enumerate((spaces[0], largest)):
+    first, *others = places.values()
+    by_size = sorted(others, key=lambda space: len(space.nodes) * math.prod(space.size))
+    for number, space in enumerate([first, *by_size[-1:]]):
         first_slot = space.model_copy(update={"max_slots": 1})
         for policy in study.policies:
             try:
