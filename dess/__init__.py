@@ -12,6 +12,7 @@ of the environments.
 """
 
 from importlib import import_module, metadata
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dess.env.registration import register
@@ -44,6 +45,11 @@ _HOME = {
 _FLOORS = ("policies", "analysis")  # above this one, imported by name alone
 
 __all__ = ["__version__", *_HOME, *_FLOORS]
+
+# In a checkout, dess/policies, dess/analysis and dess/reports are links to the folders beside dess.
+# An archive that was unpacked without links has text files in their places.
+if not Path(__file__).with_name("reports").is_dir():
+    __path__.append(str(Path(__file__).parents[1]))
 
 register()
 

@@ -4,16 +4,18 @@ import gc
 import os
 import sys
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+
+FOLDERS = ("policies", "analysis", "reports")  # beside this one in the repository
 
 
 def main() -> int:
     """Run the command; the exit code."""
-    if Path(__file__).with_name("reports").is_file():
+    if missing := [name for name in FOLDERS if find_spec(f"dess.{name}") is None]:
         print(
-            "dess: the folders dess/policies, dess/analysis and dess/reports of this checkout are "
-            "text files; allowed: links, which git makes with: "
-            "git config core.symlinks true && git checkout -- dess (on Windows in developer mode)",
+            f"dess: {Path(__file__).parent} is a part of the package, without "
+            f"{' and '.join(missing)}; allowed: an installation with pip, or the whole repository",
             file=sys.stderr,
         )
         return 2

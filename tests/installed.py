@@ -11,6 +11,7 @@ import sys
 import sysconfig
 import venv
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 
@@ -18,11 +19,24 @@ ROOT = Path(__file__).parents[1]
 
 
 def built(kind: str, folder: Path, source: Path = ROOT) -> Path:
-    """A ``wheel`` or ``sdist`` of a source tree, built into a folder."""
+    """A ``wheel``, ``wheel:editable`` or ``sdist`` of a source tree, built into a folder."""
     command = [sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", str(folder)]
     subprocess.run(command, cwd=source, check=True, capture_output=True)
-    [file] = folder.glob("*.whl" if kind == "wheel" else "*.tar.gz")
+    [file] = folder.glob("*.whl" if kind.startswith("wheel") else "*.tar.gz")
     return file
+
+
+def unpacked(folder: Path, source: Path = ROOT) -> Path:
+    """A source tree as an unpacked archive of git has it, where links have become text files."""
+    git = ["git", "--git-dir", str(folder / "git"), "--work-tree", str(source)]
+    archive, tree = folder / "dess.zip", folder / "dess-main"
+    subprocess.run([*git, "init", "--quiet"], check=True)
+    subprocess.run([*git, "add", "--all"], check=True, cwd=source)
+    files = subprocess.check_output([*git, "write-tree"], text=True).strip()
+    subprocess.run([*git, "archive", "--format=zip", "-o", str(archive), files], check=True)
+    with ZipFile(archive) as zipped:
+        zipped.extractall(tree)
+    return tree
 
 
 def environment(home: Path) -> dict[str, str]:

@@ -2,6 +2,8 @@
 
 import ast
 import re
+import shutil
+import subprocess
 import sys
 from importlib.metadata import distributions
 from pathlib import Path
@@ -14,7 +16,7 @@ from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 from tests.distributions import EXTRAS, PROJECT, ROOT, asked, closure, homes, requirements
-from tests.installed import built
+from tests.installed import built, environment, unpacked
 
 CONSTRAINTS = ROOT / "constraints.txt"
 # The folders of the product, and what is before their names where they are installed.
@@ -29,6 +31,10 @@ def pins(path: Path) -> dict[str, str]:
     pairs = [re.fullmatch(r"([\w.-]+)(?:\[[\w,]+\])?==([^\s=*]+)", line) for line in lines]
     assert all(pairs), path
     return {canonicalize_name(pair[1]): pair[2] for pair in pairs if pair}
+
+
+def contents(archive: ZipFile) -> dict[str, bytes]:
+    return {name: archive.read(name) for name in archive.namelist()}
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +54,55 @@ def test_the_wheel_holds_the_packages_with_all_their_files_and_nothing_else(whee
     assert held == files
     assert {name.split("/")[0] for name in held} == {"dess"}
     assert "dess/py.typed" in held
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory):
+    """This source tree as an unpacked archive."""
+    return unpacked(tmp_path_factory.mktemp("archive"))
+
+
+def test_an_unpacked_archive_gives_the_same_wheel(tree, wheel, tmp_path):
+    assert (tree / "dess/policies").read_text("utf-8") == "../policies"
+    theirs = ZipFile(built("wheel", tmp_path, tree))
+    assert contents(theirs) == contents(wheel)
+
+
+USE = """
+from dess.code.sources import code_of
+from dess.reports.pages import kernels
+
+print(kernels.PACKAGES, "dess.policies.network" in code_of("dess.policies.registry"))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.brief
+def test_an_unpacked_archive_runs_in_place(tree, tmp_path):
+    """Its folders are found without the links, also in an editable installation."""
+    editable = contents(ZipFile(built("wheel:editable", tmp_path, tree)))
+    [path] = [name for name in editable if ".dist-info/" not in name]
+    assert path.endswith(".pth") and editable[path].decode() == str(tree)
+    variables = environment(tmp_path) | {"PYTHONPATH": str(tree)}
+    for command in (("-m", "dess", "policies"), ("-c", USE)):
+        done = subprocess.run(
+            [sys.executable, *command], cwd=tmp_path, env=variables, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == [str(tree), "True"]
+
+
+def test_a_copy_of_dess_alone_is_not_built(tmp_path):
+    for name in ("pyproject.toml", "hatch_build.py", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tmp_path)
+    shutil.copytree(ROOT / "dess", tmp_path / "dess", symlinks=True)
+    for kind in ("wheel", "sdist"):
+        command = [sys.executable, "-m", "hatchling", "build", "-t", kind]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 1
+        assert "no policies and no analysis and no reports; allowed: the whole" in done.stderr
+        assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "dist").exists() or not [*(tmp_path / "dist").iterdir()]
 
 
 def test_every_library_that_is_imported_is_asked_for():

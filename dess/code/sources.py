@@ -12,6 +12,7 @@ not found this way and does not count.
 
 import ast
 import re
+import sys
 from collections.abc import Iterator, Mapping
 from functools import cache, lru_cache
 from hashlib import sha256
@@ -101,6 +102,7 @@ def path_of(module: str) -> Path | None:
         found = PathFinder.find_spec(".".join(names[: end + 1]), places)
         if found is None:
             return None
-        places = found.submodule_search_locations or []
+        imported = sys.modules.get(".".join(names[: end + 1]))  # may have added a folder
+        places = getattr(imported, "__path__", None) or found.submodule_search_locations or []
     origin = found.origin if found else None
     return Path(origin) if origin and origin.endswith(".py") else None

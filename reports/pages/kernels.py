@@ -13,6 +13,7 @@ from typing import IO, Any
 
 from nbformat import from_dict
 
+import dess
 from dess import InputError
 from dess.analysis.results.tables import load_results
 from dess.files.writing import temporary_folder
@@ -26,7 +27,7 @@ log = logging.getLogger(__name__)
 Progress = Callable[[int, int, str], None]
 
 HOME = "dess-pages-"  # beginning of the name of the folder in which the notebooks run
-PACKAGES = Path(__file__).parents[3]  # the folder from which this package was imported
+PACKAGES = Path(dess.__file__).parents[1]  # the folder from which this package was imported
 
 
 def run(

@@ -23,7 +23,9 @@ from typing import Any
 import nbformat
 from markupsafe import Markup
 
+import dess
 from dess import InputError
+from dess.__main__ import FOLDERS
 from dess.analysis.results.chunks import MANIFEST
 from dess.analysis.results.manifest import Manifest
 from dess.files.documents import LIMIT
@@ -115,7 +117,7 @@ def pages_in(out: Path, but: Container[str] = ()) -> dict[str, Page]:
 
 log = logging.getLogger(__name__)
 
-PACKAGE = Path(__file__).parents[2]  # dess
+PACKAGE = Path(dess.__file__).parent
 
 
 def key_of(report: notebook.Report, studies: Mapping[str, Path]) -> str:
@@ -144,13 +146,16 @@ def has_key(page: Path, key: str) -> bool:
 @lru_cache
 def _software() -> str:
     """A hash of the files of this package and of the versions of all libraries."""
-    # In a checkout, the folders in it are links, which ``**`` does not follow.
-    folders = [PACKAGE, *(path for path in paths_in(PACKAGE) if path.is_symlink())]
-    paths = [path for folder in folders for path in paths_in(folder, "**/*.*") if path.is_file()]
+    # In a checkout, folders of the package lie beside it, and ``**`` does not follow links to them.
+    folders = [PACKAGE]
+    for name in FOLDERS:
+        if (PACKAGE / name).is_symlink() or not (PACKAGE / name).is_dir():
+            folders.append(PACKAGE.parent / name)
     files = sorted(
-        (path.relative_to(PACKAGE).as_posix(), _hash(path))
-        for path in paths
-        if path.parent.name != "__pycache__"
+        (path.relative_to(folder).as_posix(), _hash(path))
+        for folder in folders
+        for path in paths_in(folder, "**/*.*")
+        if path.is_file() and path.parent.name != "__pycache__"
     )
     versions = sorted(f"{library.name} {library.version}" for library in metadata.distributions())
     return repr([sys.version, versions, files])

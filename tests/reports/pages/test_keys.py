@@ -83,6 +83,18 @@ def test_other_code_and_libraries_change_all_pages(folder, tmp_path, monkeypatch
     render._software.cache_clear()
 
 
+def test_code_beside_the_package_counts_without_links_to_it(tmp_path, monkeypatch):
+    (tmp_path / "dess").mkdir()
+    monkeypatch.setattr(render, "PACKAGE", tmp_path / "dess")
+    (tmp_path / "dess/policies").write_text("../policies")
+    (tmp_path / "policies").mkdir()
+    (tmp_path / "policies/planner.py").write_text("before = 1")
+    before = render._software.__wrapped__()
+    assert render._software.__wrapped__() == before
+    (tmp_path / "policies/planner.py").write_text("after = 1")
+    assert render._software.__wrapped__() != before
+
+
 def test_pages_that_are_altered_or_gone_are_rendered_again(folder):
     page = folder.out / "mission.html"
     page.write_text(page.read_text("utf-8").replace("A trial", "A trail"), "utf-8")
