@@ -20,14 +20,21 @@ from pandas.api.types import is_numeric_dtype
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.answers.settings import edge, ends, points, ranked, words_of
+from dess.analysis.answers.settings import (
+    edge,
+    ends,
+    intervals_in_words,
+    points,
+    ranked,
+    words_of,
+)
 from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of, told
 from dess.analysis.names import DECISIONS, parameter
 from dess.analysis.results.tables import Results, once
 from dess.analysis.stats.verdict import membership, on_front
 from dess.analysis.study.cheapest import Answer, Cheapest, CheapestChoice
 from dess.analysis.study.costs import PARTS, Costs
-from dess.analysis.tables import CHECKED, INTERVALS, MOST_ROWS, Table, counts
+from dess.analysis.tables import CHECKED, MOST_ROWS, Table, counts
 from dess.errors import one_of
 from dess.fields import ZONE_PADS
 
@@ -138,12 +145,31 @@ def checks(results: Results) -> pd.DataFrame:
     return priced(replace(results, missions=results.checks))
 
 
+@once
+def quoted(results: Results) -> pd.DataFrame:
+    """The settings with the estimates that answers quote.
+
+    A search gives most missions to a setting whose results were good so far. The check had no part
+    in the search, so its means are unbiased.
+
+    Returns:
+        The rows of ``judged``. The metrics, the cost and ``n`` of settings that were checked are
+        those of ``checks``.
+    """
+    table, setting = judged(results), ["policy", "point"]
+    if results.checks.empty:
+        return table
+    rows, checked = table.set_index(setting), checks(results).set_index(setting)
+    rows.loc[checked.index, checked.columns] = checked
+    return rows.reset_index()[[*table]]
+
+
 def everywhere(results: Results, table: pd.DataFrame) -> pd.DataFrame:
     """The fleets under all conditions together; empty if there is only one condition.
 
     Args:
         results: The study.
-        table: The result of ``judged``.
+        table: The result of ``judged``, or of ``quoted``.
 
     Returns:
         A row per policy and fleet that the design has under every condition, the cheapest first:
@@ -164,7 +190,7 @@ def everywhere(results: Results, table: pd.DataFrame) -> pd.DataFrame:
 
 def sentences(results: Results) -> list[str]:
     """In words: the cheapest setting of all policies, then that of each policy and condition."""
-    lines = answers(results, judged(results))
+    lines = answers(results, quoted(results))
     return lines if len(results.policies) == 1 else [answer(results), *lines]
 
 
@@ -173,7 +199,7 @@ def answers(results: Results, table: pd.DataFrame, policies: int = 1) -> list[st
 
     Args:
         results: The study.
-        table: The result of ``judged``.
+        table: The result of ``quoted``, or of ``judged``.
         policies: Of how many policies the answer is the cheapest, for its confidence.
     """
     currency, wanted = _prices(results).currency, required(results)
@@ -195,7 +221,7 @@ def answer(results: Results) -> str:
 
     If there are several conditions, it is the setting for all of them together.
     """
-    table, best, count = judged(results), best_policy(results), len(results.policies)
+    table, best, count = quoted(results), best_policy(results), len(results.policies)
     return " ".join(
         [answers(results, table[table["policy"] == best], count)[-1], *dependence(results)]
     )
@@ -259,7 +285,7 @@ def _answer(rows: pd.DataFrame, wanted: Mapping[Any, float], currency: str, trus
     """The answer for one policy under one condition.
 
     Args:
-        rows: The rows of ``judged`` or ``everywhere``, the cheapest first.
+        rows: The rows of ``quoted`` or ``everywhere``, the cheapest first.
         wanted: The requirements, for what the rows have of their metrics.
         currency: The currency of the costs.
         trust: What else is to be said about the answer.
@@ -333,7 +359,7 @@ def _told(row: pd.Series, wanted: Mapping[Any, float], currency: str) -> str:
         for of, least in ((metric_of(metric), least) for metric, least in wanted.items())
     ]
     text = f"**{row['fleet']}** for {numbers.money(row[COST], currency)}"
-    return f"{text} with {numbers.words(metrics)}" if metrics else text
+    return f"{text} with {numbers.words(metrics)}, n = {row['n']:,}" if metrics else text
 
 
 def _prices(results: Results) -> Costs:
@@ -439,7 +465,7 @@ def front_table(results: Results) -> Table:
         shown[head] = shares.loc[top.index, metric].map(numbers.percent)
     caption = (
         f"Settings that may be on a front: mean cost [{_prices(results).currency}] and metrics "
-        f"with {INTERVALS}, and the probability that they are on it"
+        f"with {intervals_in_words(results)}, and the probability that they are on it"
     )
     data = first.drop(columns=["on_front", "probability"])
     return Table(shown, caption, data.join(shares.add_prefix("on_front_of_")))
@@ -464,7 +490,8 @@ def judged_table(results: Results) -> Table:
     shown["Requirements"] = top["verdict"].map(VERDICTS)
     shown["Selected"] = top["selected"].map({True: "yes", False: ""})
     shown["Missions"] = counts(top["n"])
-    return Table(shown, f"The settings, the cheapest first; means with {INTERVALS}", rows)
+    caption = f"The settings, the cheapest first; means with {intervals_in_words(results)}"
+    return Table(shown, caption, rows)
 
 
 def checked_table(results: Results) -> Table:

@@ -21,7 +21,12 @@ from dess.analysis.metrics import COST, METRICS, PRODUCT, metric_of, metrics_in,
 from dess.analysis.names import parameter, value_text
 from dess.analysis.results.tables import Results, once
 from dess.analysis.stats.differences import column_tests, with_adjusted
-from dess.analysis.stats.intervals import by_replication, column_intervals, stratified
+from dess.analysis.stats.intervals import (
+    by_replication,
+    column_intervals,
+    level_after,
+    stratified,
+)
 from dess.analysis.stats.verdict import may_be_best, within_reach
 from dess.analysis.tables import INTERVALS, MOST_ROWS, YES, Table, counts
 from dess.errors import one_of
@@ -204,7 +209,7 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
     Returns:
         A row per policy and design point: ``rank``, ``policy``, ``point``, the varied fields, for
         every metric ``METRIC``, ``METRIC_low`` and ``METRIC_high`` (95 % intervals as in
-        ``dess.analysis.summary``), ``n`` missions, and ``tied``: whether the setting may be the
+        ``dess.analysis.summary``, which allow for a search), ``n`` missions, and ``tied``: whether the setting may be the
         best, by ``may_be_best`` and ``within_reach`` over all rows. Of equal settings, the first
         in the study has the lower rank.
 
@@ -214,14 +219,16 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
     missions, cell = _missions(results, metric, policy), ["policy", "point"]
     table = missions.groupby(cell, sort=False).size().rename("n").reset_index()
     table = table.join(points(results), on="point")
+    looks = {policy: results.looks(policy) for policy in missions["policy"].unique()}
+    seen = np.array([looks[row.policy][row.point] for row in table.itertuples()])
     others = [name for name in metrics_in(missions) if name != metric]
     for name in (*others, metric):
         wide = by_replication(missions, name, cell)
         wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[cell]))
-        ends = column_intervals(wide, name)
+        ends = column_intervals(wide, name, level_after(seen))
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
     # By the ranking metric, which was computed last.
-    table["tied"] = may_be_best(wide.to_numpy(float), metric)
+    table["tied"] = may_be_best(wide.to_numpy(float), metric, seen)
     table["tied"] &= within_reach(table[f"{metric}_low"], table[f"{metric}_high"], metric)
     less = metric_of(metric).less_is_better
     table = table.sort_values(metric, ascending=less, kind="stable", ignore_index=True)
@@ -425,6 +432,12 @@ def _binned(values: pd.Series) -> pd.Series:
     return places.map(dict(enumerate(names))).astype(pd.CategoricalDtype(names, ordered=True))
 
 
+def intervals_in_words(results: Results) -> str:
+    """What the intervals of the means of a study's settings are called."""
+    is_search = any(results.looks(policy).any() for policy in results.policies)
+    return f"{INTERVALS} that allow for the search" if is_search else INTERVALS
+
+
 def best_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
     """The best settings.
 
@@ -439,7 +452,7 @@ def best_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
     cells.insert(1, "May be the best", top["tied"].map(YES))
     caption = (
         f"The first {len(top)} of {len(rows):,} settings by {metric_of(metric).within}: "
-        f"means with {INTERVALS}"
+        f"means with {intervals_in_words(results)}"
     )
     return Table(cells, caption, rows)
 

@@ -18,7 +18,13 @@ from dess.analysis.results.chunks import parts_of
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare, for_choice
 from dess.analysis.stats.distribution import distribution
-from dess.analysis.stats.intervals import LEVEL, by_replication, summary, values_within
+from dess.analysis.stats.intervals import (
+    LEVEL,
+    by_replication,
+    level_after,
+    summary,
+    values_within,
+)
 from dess.analysis.stats.learners import compare_learners
 from dess.analysis.stats.verdict import MARKS, may_be_best, position, within_reach
 from dess.analysis.study.cheapest import Cheapest
@@ -146,9 +152,17 @@ def means(results: Results) -> pd.DataFrame:
     """Means with intervals of every policy at every design point.
 
     Returns:
-        A row per policy, design point and metric, as ``dess.analysis.summary`` returns it.
+        A row per policy, design point and metric, as ``dess.analysis.summary`` returns it. After a
+        search, the intervals allow for it (``stats.intervals.level_after``).
     """
-    return summary(results.missions, by=["policy", "point"])
+    cell, looks = ["policy", "point"], {of: results.looks(of) for of in results.policies}
+    if not any(of_policy.any() for of_policy in looks.values()):
+        return summary(results.missions, by=cell)
+    tables = [
+        summary(missions, cell, float(level_after(looks[policy][point])))
+        for (policy, point), missions in results.missions.groupby(cell, sort=False)
+    ]
+    return pd.concat(tables, ignore_index=True)
 
 
 def meeting(means: pd.DataFrame, targets: Mapping[str, float]) -> pd.DataFrame:
@@ -189,7 +203,8 @@ def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
         if len(rows) > 1:
             missions = results.missions[results.missions["point"] == point]
             wide = by_replication(missions, str(metric), "policy")
-            may_be = may_be_best(wide[rows["policy"]].to_numpy(float), str(metric))
+            looks = np.array([results.looks(policy)[point] for policy in rows["policy"]])
+            may_be = may_be_best(wide[rows["policy"]].to_numpy(float), str(metric), looks)
             may_be &= within_reach(rows["low"], rows["high"], str(metric)).to_numpy()
             best = TIED if may_be.sum() > 1 else BEST
             verdicts[rows.index] = np.where(may_be, best, WORSE)

@@ -213,6 +213,18 @@ class Results:
         parts = parts_of(manifest, self.policies.index(policy))
         return rule.choice(self.store.samples(parts), manifest.settings)
 
+    def looks(self, policy: str) -> np.ndarray:
+        """How often a search could have ended the missions of each design point of a policy.
+
+        Returns:
+            (points,) numbers; 0 where the number of missions does not depend on their results: in a
+            study that selects nothing, and of the check of a selection.
+        """
+        found = self.choice(policy) or self.cheapest(policy)
+        if found is None or self.missions is self.checks:
+            return np.zeros(len(self.store.manifest.points), int)
+        return np.array(found.looks)
+
     def check_policy(self, policy: str) -> None:
         """Refuse a policy that is not in the study.
 

@@ -20,12 +20,29 @@ from dess.errors import one_of
 from dess.scenario import ScenarioSpace
 
 LEVEL = 0.95
+
+
+def level_after(looks: Any, level: float = LEVEL) -> Any:
+    """The level of each interval so that it covers at ``level`` after a search.
+
+    A search ends the missions of a setting after a look at their results, so an interval at the
+    plain level covers too seldom: the search stops where the results are extreme. After look k, the
+    interval has the error (1 - level) / (k (k + 1)). These errors add up to 1 - level over all
+    looks, so the interval covers at ``level``, whichever look was the last (the union bound).
+
+    Args:
+        looks: (...) numbers of looks; 0 where the number of missions was fixed.
+        level: The level after the search.
+    """
+    return 1 - (1 - level) / np.maximum(looks * (looks + 1), 1)
+
+
 # What a failure costs: the reward of a filled quota is not earned, that of an empty battery is.
 _FIELDS = ScenarioSpace.model_fields
 FAILURE_COST = _FIELDS["reward_quota"].default - _FIELDS["reward_depleted"].default
 
 
-def bounded_ends(mean: Any, variance: Any, n: Any, level: float = LEVEL) -> tuple[Any, Any]:
+def bounded_ends(mean: Any, variance: Any, n: Any, level: Any = LEVEL) -> tuple[Any, Any]:
     """The ends of the confidence intervals of means of values from 0 to 1.
 
     At levels other than 95 %, not one 0 and one 1 are added but ``ndtri((1 + level) / 2)**2 / 4``
@@ -36,12 +53,12 @@ def bounded_ends(mean: Any, variance: Any, n: Any, level: float = LEVEL) -> tupl
         mean: (...) means of the samples.
         variance: (...) mean squared deviations of the samples from these means.
         n: (...) numbers of values, above 0; not whole where it is an effective number.
-        level: Confidence level.
+        level: Confidence level, or (...) levels.
 
     Returns:
         (...) lower and (...) upper ends, with 0 <= low <= mean <= high <= 1 and low < high.
     """
-    added = float(ndtri((1 + level) / 2) ** 2 / 4)
+    added = ndtri((1 + level) / 2) ** 2 / 4
     size = n + 2 * added
     centre = (n * mean + added) / size
     squares = n * (variance + (mean - centre) ** 2) + added * (centre**2 + (1 - centre) ** 2)
@@ -284,29 +301,34 @@ def summary(
     return pd.DataFrame(rows, columns=[*by, "metric", "mean", "low", "high", "n"])
 
 
-def column_intervals(values: pd.DataFrame, metric: str = "") -> pd.DataFrame:
+def column_intervals(
+    values: pd.DataFrame, metric: str = "", levels: float | np.ndarray = LEVEL
+) -> pd.DataFrame:
     """Means of columns with their intervals (``interval_of``), for many columns at once.
 
     Args:
         values: (R, K) a row per replication, a column per group; nan where a group lacks one.
         metric: The metric; Student's t, if not given. Values of ``success`` that are no outcomes 0
             or 1, but means of such, have the interval of bounded values.
+        levels: The confidence level, or (K,) levels.
 
     Returns:
         (K, 4): ``mean``, ``low``, ``high``, ``n``, with the columns as index; nan without values.
     """
     n, mean = values.count(), values.mean()
-    half = -values.sem() * stdtrit(np.maximum(n - 1, 1), (1 - LEVEL) / 2)
+    level = pd.Series(levels, index=values.columns)
+    half = -values.sem() * stdtrit(np.maximum(n - 1, 1), (1 - level) / 2)
     table = pd.DataFrame({"mean": mean, "low": mean - half, "high": mean + half, "n": n})
     if metric_of(metric).is_bounded:
         some = n > 0
-        ends = bounded_ends(mean[some], values.var(ddof=0)[some], n[some])
+        ends = bounded_ends(mean[some], values.var(ddof=0)[some], n[some], level[some])
         table.loc[some, ["low", "high"]] = np.transpose(ends)
     if metric_of(metric).is_outcome:
         rows = ((values.isin((0, 1)) | values.isna()).all() & (n > 0)).to_numpy()
-        pairs = [*zip((mean * n)[rows].round().astype(int), n[rows], strict=True)]
-        known = {pair: wilson(*pair)[1:] for pair in {*pairs}}  # each takes its time
-        table.loc[rows, ["low", "high"]] = np.array([known[p] for p in pairs]).reshape(-1, 2)
+        successes = (mean * n)[rows].round().astype(int)
+        samples = [*zip(successes, n[rows], level[rows], strict=True)]
+        known = {sample: wilson(*sample)[1:] for sample in {*samples}}  # each takes its time
+        table.loc[rows, ["low", "high"]] = np.array([known[s] for s in samples]).reshape(-1, 2)
     return table
 
 

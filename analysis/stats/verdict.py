@@ -14,7 +14,7 @@ import pandas as pd
 from scipy.special import stdtrit
 
 from dess.analysis.metrics import metric_of
-from dess.analysis.stats.intervals import LEVEL, Interval, rare_differences
+from dess.analysis.stats.intervals import LEVEL, Interval, level_after, rare_differences
 
 ABOVE, INCONCLUSIVE, BELOW = POSITIONS = ("above", "inconclusive", "below")
 MARKS = {ABOVE: "▲", INCONCLUSIVE: "≈", BELOW: "▼"}  # in tables
@@ -164,21 +164,26 @@ _BLOCK = 512  # settings that are compared with all others at once, which limits
 _ROUNDING = 1e-12  # variances and differences below this, relative to the values, count as 0
 
 
-def may_be_best(values: np.ndarray, metric: str = "") -> np.ndarray:
+def may_be_best(
+    values: np.ndarray, metric: str = "", looks: np.ndarray | None = None
+) -> np.ndarray:
     """The settings that no other setting is significantly better than.
 
     With probability ``LEVEL``, the setting with the highest true mean is among them, for all
     variances and correlations. A setting is ruled out if any other one is better by a one-sided
     paired t test at the level (1 - LEVEL) / (K - 1). This is the subset selection of Gupta (1965,
     Technometrics; see also Hsu 1984, Annals of Statistics) with Bonferroni's bound for settings
-    that share their random numbers (Nelson, Swann, Goldsman and Song 2001, Operations Research). It
-    assumes that the number of missions does not depend on their results.
+    that share their random numbers (Nelson, Swann, Goldsman and Song 2001, Operations Research).
+    After a search, whose numbers of missions depend on their results, each pair is tested at the
+    error of its look (``intervals.level_after``).
 
     Args:
         values: (R, K) values of K settings in R replications; nan means that a setting lacks a
             replication. Two settings are compared on the replications of both.
         metric: The metric, by default one of which more is better. Its rare differences are
             added, as in ``dess.analysis.compare``.
+        looks: (K,) how often a search could have ended the missions of each setting; by default
+            their number is fixed.
 
     Returns:
         (K,) of bool. A setting that has fewer than two replications in common with every other one
@@ -190,10 +195,17 @@ def may_be_best(values: np.ndarray, metric: str = "") -> np.ndarray:
     # What a replication adds to all settings cancels in their differences.
     centre = np.nanmean(np.where(present.any(1, keepdims=True), values, 0.0), axis=1, keepdims=True)
     centred, mask = np.where(present, values - centre, 0.0), present.astype(float)
-    alpha = (1 - LEVEL) / max(values.shape[1] - 1, 1)
+    looks = np.zeros(values.shape[1], int) if looks is None else looks
+    each = (1 - LEVEL) / max(values.shape[1] - 1, 1)
     blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
     rare = [rare_differences(metric, means, means[block, None]) for block in blocks]
-    parts = [_unbeaten(*of, centred, mask, alpha) for of in zip(blocks, rare, strict=True)]
+    # The missions that a pair shares end with those of the setting that has fewer.
+    shared = [np.minimum(looks[block, None], looks) for block in blocks]
+    alphas = [1 - level_after(of_pairs, 1 - each) for of_pairs in shared]
+    parts = [
+        _unbeaten(block, added, centred, mask, alpha)
+        for block, added, alpha in zip(blocks, rare, alphas, strict=True)
+    ]
     return np.concatenate(parts) if parts else np.zeros(0, bool)
 
 
@@ -202,11 +214,12 @@ def _unbeaten(
     rare: tuple[np.ndarray, np.ndarray] | None,
     values: np.ndarray,
     mask: np.ndarray,
-    alpha: float,
+    alpha: np.ndarray,
 ) -> np.ndarray:
     """Which settings of a block are not ruled out by any other setting.
 
-    ``rare`` has the differences that are added, of the other settings minus those of the block.
+    ``rare`` has the differences that are added, of the other settings minus those of the block, and
+    ``alpha`` the errors of the tests.
     """
     own, here = values[:, block], mask[:, block]
     n = here.T @ mask
@@ -221,8 +234,10 @@ def _unbeaten(
         constant = deviations <= _ROUNDING * squares
         t = lead / np.sqrt(n * deviations / (n - 1))
         ahead = lead > np.sqrt(_ROUNDING * squares * n)
-    counts, places = np.unique(n, return_inverse=True)
-    critical = -stdtrit(np.maximum(counts - 1, 1), alpha)[places].reshape(n.shape)
+    counts, of_count = np.unique(n, return_inverse=True)
+    errors, of_error = np.unique(alpha, return_inverse=True)
+    quantiles = -stdtrit(np.maximum(counts - 1, 1)[:, None], errors)
+    critical = quantiles[of_count.reshape(n.shape), of_error.reshape(n.shape)]
     # Use the sign test where all differences are equal.
     beaten = np.where(constant, ahead & (0.5**n <= alpha), t > critical)
     return ~(beaten & (n > 1)).any(axis=1)

@@ -373,6 +373,7 @@ class Cheapest(StrictTable):
         search = _Search(self, samples, settings)
         return CheapestChoice(
             counts=based_on(search.points.counts, samples),
+            looks=tuple(search.points.looks.tolist()),
             rounds=search.rounds,
             done=search.done,
             guarantee=self._guarantee(search),
@@ -409,10 +410,12 @@ class Cheapest(StrictTable):
             return "none yet: the procedure needs more missions"
         low, high = (self._in_words(shift) for shift in (-self.tolerance, self.tolerance))
         words = (
-            f"with probability at least {self.confidence:g}, all of this holds: a setting that was "
-            f"found to meet the requirements has {low}; one that was found to miss them does not "
-            f"have {high}; a selected setting costs at most {self.indifference:g} more than any "
-            f"that has {high}"
+            f"for each policy by itself, with probability at least {self.confidence:g}, all of "
+            f"this holds: a setting that was found to meet the requirements has {low}; one that "
+            f"was found to miss them does not have {high}; a selected setting costs at most "
+            f"{self.indifference:g} more than any that has {high}. The statement on costs takes "
+            "the differences of costs as nearly normal, apart from the losses of UAVs; where a "
+            "rare mission is much more expensive than the others, it holds less often"
         )
         if all(question.answer.settled for question in search.questions):
             return words

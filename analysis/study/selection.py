@@ -56,12 +56,14 @@ class Chosen:
 
     Attributes:
         counts: Number of missions per design point that the selection is based on.
+        looks: Number of rounds per design point after each of which it could have got no more.
         rounds: Number of rounds of simulation.
         done: Whether the procedure needs no more missions.
         guarantee: What is guaranteed about the selection, in words.
     """
 
     counts: tuple[int, ...]
+    looks: tuple[int, ...]
     rounds: int
     done: bool
     guarantee: str
@@ -187,6 +189,7 @@ class Selection(StrictTable):
         race = _Race(self, self._values(samples))
         return Choice(
             counts=based_on(race.counts, samples),
+            looks=tuple(race.looks.tolist()),
             rounds=race.rounds,
             done=race.done,
             guarantee=self._guarantee(race),
@@ -247,6 +250,7 @@ class _Race:
         values: For each design point its values. Nothing is done before all points have the
             missions of the first round.
         counts: (k,) missions that each point needs so far.
+        looks: (k,) the number of rounds for which each had missions.
         alive: The points that are not ruled out, in order.
         stage: The last stage carried out.
         rounds: Number of rounds carried out.
@@ -257,7 +261,7 @@ class _Race:
     def __init__(self, rule: Selection, values: list[np.ndarray]):
         self.rule, self.values = rule, values
         self.is_bounded = rule.procedure == "kn-bounded"
-        self.counts = np.full(len(values), rule.first)
+        self.counts, self.looks = np.full(len(values), rule.first), np.ones(len(values), int)
         self.alive = np.arange(len(values))
         self.stage, self.rounds = rule.first - 1, 1
         self.over = self.done = False
@@ -298,6 +302,7 @@ class _Race:
                 self.done = True
                 return
             self.counts[self.alive] += step
+            self.looks[self.alive] += 1
             self.rounds += 1
 
     def _renew_margins(self, stage: int) -> None:

@@ -16,8 +16,15 @@ from scipy import stats
 from dess.analysis.metrics import PRODUCT, REWARD
 from dess.analysis.stats.differences import paired
 from dess.analysis.stats.distribution import quantile_interval
-from dess.analysis.stats.intervals import bounded_ends, mean_interval, stratified
+from dess.analysis.stats.intervals import (
+    bounded_ends,
+    level_after,
+    mean_interval,
+    stratified,
+    wilson,
+)
 from dess.analysis.stats.learners import crossed
+from dess.analysis.study.cheapest import Cheapest, Setting
 
 Drawing = tuple[Callable[[np.random.Generator, tuple[int, int]], np.ndarray], float]
 
@@ -151,6 +158,31 @@ def test_stratified_intervals_cover_the_mean_over_the_points(shared, trials):
 
     intervals = (stratified(values(), PRODUCT)[1:] for _ in range(trials))
     assert covered(intervals, 0.9 * means.mean()) >= 0.95 - max(0.02, error(trials))
+
+
+# After a search
+
+
+@pytest.mark.parametrize("trials", QUICK)
+def test_intervals_cover_after_a_search_has_decided_how_many_missions_there_are(trials):
+    """Also near the requirement, where a search stops as soon as the results are extreme."""
+    shares = np.array([0.8, 0.88, 0.9, 0.92, 1.0])
+    rule = Cheapest(
+        procedure="cheapest", requirements={"success": 0.9}, tolerance=0.03, indifference=300.0,
+        budget=6000,
+    )  # fmt: skip
+    settings = [Setting({"uavs": number}, 0.0) for number in range(len(shares))]
+    covers = np.zeros((trials, len(shares)))
+    for trial in range(trials):
+        generator = rng(31, trial)
+        success = (generator.random((len(shares), 6000)) < shares[:, None]).astype(float)
+        costs = generator.normal(1000.0 * np.arange(len(shares)), 300.0, (6000, len(shares))).T
+        samples = [{"success": s, "cost": c} for s, c in zip(success, costs, strict=True)]
+        choice = rule.choice(samples, settings)
+        for point, (n, looks) in enumerate(zip(choice.counts, choice.looks, strict=True)):
+            _, low, high = wilson(int(success[point][:n].sum()), n, float(level_after(looks)))
+            covers[trial, point] = low <= shares[point] <= high
+    assert (covers.mean(axis=0) >= 0.95 - max(0.02, error(trials) / 2)).all()
 
 
 # Distributions

@@ -5,6 +5,7 @@ import pytest
 from dess import InputError
 from dess.analysis import run_study
 from dess.analysis.answers import costs, summary
+from dess.analysis.stats.intervals import level_after, wilson
 from dess.analysis.stats.verdict import on_front
 from dess.analysis.study.study import CHECK
 from tests.analysis.small import small_study
@@ -33,6 +34,9 @@ def fixed(studied):
 def searched(studied):
     """A study that looks for the cheapest setting."""
     return studied(selection=RULE, design=DESIGN, costs=PRICES)
+
+
+ASKED = (costs.judged, costs.quoted, costs.checks)
 
 
 @pytest.mark.parametrize("metric", ["success", "collection_ratio"])
@@ -64,6 +68,27 @@ def test_a_search_is_kept_told_and_checked(searched):
     assert len(costs.checks(searched)) == len(searched.checks) / 6
     assert searched.choice("greedy") is None
     assert "All conditions together, `greedy`" in "\n".join(costs.answers(searched, table))
+
+
+def test_an_answer_quotes_the_check_and_a_table_allows_for_the_search(searched):
+    found, quoted, checks = map(lambda ask: ask(searched).set_index(["policy", "point"]), ASKED)
+    others = found.index.difference(checks.index)
+    assert quoted.loc[checks.index, checks.columns].equals(checks)
+    assert quoted.loc[others].equals(found.loc[others])
+    assert "intervals that allow for the search" in costs.judged_table(searched).caption
+    assert "n = 6" in " ".join(costs.sentences(searched))
+    for (policy, point), row in found.iterrows():
+        missions = searched.missions.query("policy == @policy and point == @point")
+        level = float(level_after(searched.looks(policy)[point]))
+        assert level > 0.95
+        _, *ends = wilson(int(missions["success"].sum()), len(missions), level)
+        assert [row["success_low"], row["success_high"]] == pytest.approx(ends)
+
+
+def test_the_guarantee_is_of_each_policy_and_says_what_it_takes_of_costs(searched):
+    guarantee = searched.cheapest("greedy").guarantee
+    assert guarantee.startswith("for each policy by itself, with probability at least 0.95")
+    assert "takes the differences of costs as nearly normal" in guarantee
 
 
 def test_bad_questions_get_one_line(fixed, studied):

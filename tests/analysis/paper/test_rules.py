@@ -95,7 +95,7 @@ def leads_of(
 
 
 def chosen(best: int, *left: int) -> Choice:
-    return Choice((), 0, True, "", best, left, guaranteed=True, stage=0)
+    return Choice((), (), 0, True, "", best, left, guaranteed=True, stage=0)
 
 
 @pytest.mark.parametrize(

@@ -175,6 +175,14 @@ def test_it_is_the_paired_t_test_of_every_two_settings():
     assert may_be_best(values).tolist() == expected.tolist()
 
 
+def test_after_a_search_the_tests_have_the_errors_of_their_looks():
+    """Look k of a setting has the share 1 / (k (k + 1)) of the error of each pair."""
+    values = np.random.default_rng(4).normal(size=(15, 8)) + np.linspace(0, 1.5, 8)
+    later = np.full(8, 2)
+    assert may_be_best(values, looks=later).tolist() == by_hand(values, 1 - 0.05 / 6).tolist()
+    assert may_be_best(values, looks=later).sum() > may_be_best(values).sum()
+
+
 def test_blocks_of_settings_are_judged_like_all_at_once(monkeypatch):
     values = np.random.default_rng(1).normal(size=(12, 40)) + np.linspace(0, 2, 40)
     whole = may_be_best(values)
