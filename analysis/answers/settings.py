@@ -209,9 +209,9 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
     Returns:
         A row per policy and design point: ``rank``, ``policy``, ``point``, the varied fields, for
         every metric ``METRIC``, ``METRIC_low`` and ``METRIC_high`` (95 % intervals as in
-        ``dess.analysis.summary``, which allow for a search), ``n`` missions, and ``tied``: whether the setting may be the
-        best, by ``may_be_best`` and ``within_reach`` over all rows. Of equal settings, the first
-        in the study has the lower rank.
+        ``dess.analysis.summary``, which allow for a search), ``n`` missions, and ``tied``: whether
+        the setting may be the best, by ``may_be_best`` and ``within_reach`` over all rows. Of equal
+        settings, the first in the study has the lower rank.
 
     Raises:
         InputError: If there is no such metric or policy.
