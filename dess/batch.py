@@ -23,6 +23,7 @@ from dess.code.kernels import kernel
 from dess.errors import InputError, shown
 from dess.record import Records, empty_records, write_record
 from dess.scenario import AnyScenario, ScenarioSpace
+from dess.sections.landing import is_over
 from dess.sections.wind import ways_home
 from dess.state import check_seed, spaces_of, starts_of, state_of, teeth_lengths
 from dess.view import decide, team_of
@@ -204,11 +205,14 @@ def _advance(job_of, queue, source, state, world, scratch, ways, records):
         if job_of[b] < 0:
             continue
         mission, team, data = missions[b], uavs[b], residual[b]
-        rules.advance(
-            mission, team, data, sensors[b], teeth[b], arrivals,
-            nodes, mean_snr, order, means, chart, batches, search,
-        )  # fmt: skip
-        if mission.active == 0:
+        if not rules.advance_without_uavs(
+            mission, team, data, sensors[b], arrivals, batches, search
+        ):
+            rules.advance(
+                mission, team, data, sensors[b], teeth[b], arrivals,
+                nodes, mean_snr, order, means, chart, batches, search,
+            )  # fmt: skip
+        if is_over(mission):
             job = job_of[b]
             write_record(mission, team, data, sensors[b], teeth[b], ways, records, job)
             queue[1] += 1

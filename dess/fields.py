@@ -172,7 +172,7 @@ class Fields(Strict):
         ge=0,
         le=1_000_000,
         description="communication slots that a UAV must fill (U_C); 0, with landing, for none: "
-        "UAVs work until max_slots",
+        "UAVs work, and the mission lasts, until max_slots",
     )
 
     # Reward (Table III)

@@ -211,8 +211,10 @@ class MissionModel:
         m = int(self.mission["communication_slots"])
         has_failures = bool(self.mission["has_failures"])
         pads_fail = bool(self.mission["pad_rate"] > 0)
+        # Without a quota, data arrive and things fail until the horizon, though no UAV is active.
+        shortest = 0 if self.mission["quota"] else int(self.mission["max_slots"])
         slot, active, allowed = 0, len(self.fleet), 0
-        while active:
+        while active or slot < shortest:
             decide(self.team, self.state, shown)
             may_charge, granted = _resolve(missions, uavs, self.world.chart), _NOBODY
             if may_charge != allowed or pads_fail:

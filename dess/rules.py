@@ -12,6 +12,9 @@ The batch engine runs a slot in the order of Section III-C (see ``advance``):
     arrive(mission, residual, ...)       # new data
     settle(mission, uavs)                # rewards, operational status
     strike(mission, uavs, ...)           # failures and repairs (dess.sections.failures)
+
+With ``quota = 0`` a mission lasts until ``max_slots``: after its last UAV has ended, only the last
+three go on (see ``advance_without_uavs``).
 """
 
 import math
@@ -22,7 +25,14 @@ from dess.sea.chart import is_open
 from dess.sections import age, fleet, wind
 from dess.sections.charging import gain, is_before, share_power
 from dess.sections.failures import strike_if_on, take_pad, working_pads
-from dess.sections.landing import flies, has_filled, has_landed, lands, stands
+from dess.sections.landing import (
+    flies,
+    has_filled,
+    has_landed,
+    is_over,
+    lands,
+    stands,
+)
 from dess.sections.section import for_sections
 from dess.state import (
     ACTIVE,
@@ -456,4 +466,22 @@ def advance(
     _communicate_all(mission, uavs, residual, sensors, teeth, order, means, batches, search)
     arrive(mission, residual, sensors, arrivals, batches, search)
     settle(mission, uavs)
+    strike_if_on(mission, uavs, residual, sensors, LOST)
+
+
+@for_sections
+def advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, search):
+    """Run a slot of a mission that waits for its horizon; return whether it does (``is_over``)."""
+    if mission.active > 0 or is_over(mission):
+        return False
+    _advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, search)
+    return True
+
+
+@kernel
+def _advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, search):
+    """New data arrive, and pads and nodes fail and are repaired; nothing else happens."""
+    mission.slot_collected = 0.0
+    arrive(mission, residual, sensors, arrivals, batches, search)
+    mission.slot += 1
     strike_if_on(mission, uavs, residual, sensors, LOST)

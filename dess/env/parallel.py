@@ -37,7 +37,8 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
 
     With ``ended="leave"``, ``reset`` sets ``agents`` to the fleet of the episode. In the step in
     which a UAV ends, its ``terminated`` is true (quota filled or battery depleted) or its
-    ``truncated`` is true (``max_slots`` reached), and the UAV is removed from ``agents``.
+    ``truncated`` is true (``max_slots`` reached), and the UAV is removed from ``agents``. Without
+    a quota, the step in which the last UAV ends also runs the rest of the mission.
 
     With ``ended="stay"``, ``agents`` are all possible agents until the mission is over; then all of
     them are terminated or truncated at once, each as it has ended. A UAV that has ended before, or

@@ -193,6 +193,11 @@ def _step(
                 terms = rules.reward_terms(mission, u, u.slots_charging > charged[i])
                 for t in range(len(terms)):
                     to.reward_terms[t] = terms[t]
+        # The rest of a mission whose last UAV has ended belongs to the step.
+        while rules.advance_without_uavs(
+            mission, team, residual[b], sensors[b], arrivals, batches, search
+        ):
+            pass
 
 
 def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:

@@ -33,7 +33,8 @@ class HarvestVectorEnv(VectorEnv):
     zeros with a mask of Hover alone, and their actions are ignored.
 
     The episode of a row is its mission: ``terminated`` (quota filled or battery depleted) or
-    ``truncated`` (``max_slots`` reached) of all its UAVs come in the last slot of the mission. By
+    ``truncated`` (``max_slots`` reached) of all its UAVs come in the slot in which the last one
+    ends; without a quota, this step also runs the rest of the mission, until ``max_slots``. By
     default the next mission starts in the same step (``metadata["autoreset_mode"]``), and its first
     observations are returned; the last ones are in ``info["final_obs"]``. With ``NextStep`` the
     last ones are returned; in the step after that the actions of these rows are ignored, the next

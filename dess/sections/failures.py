@@ -6,7 +6,7 @@ from pydantic import Field
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
-from dess.sections.landing import stands
+from dess.sections.landing import is_over, stands
 from dess.sections.section import Probability, Section, Slots, for_sections
 
 MOST_PADS = 64  # charging pads that can fail: as many as the largest fleet has UAVs
@@ -84,7 +84,7 @@ def strike(mission, uavs, residual, sensors, lost):
     if mission.node_rate > 0.0:
         for k in range(mission.nodes):
             _strike_node(mission, residual, sensors[k], k)
-            if mission.active == 0:  # the mission is over: what is hidden is left over
+            if is_over(mission):  # what is hidden is left over
                 residual[k] += sensors[k].hidden
                 sensors[k].hidden = 0.0
 

@@ -41,3 +41,15 @@ def has_landed(mission, u):
     if not (u.charging or stands(mission, u)):
         return False
     return has_filled(u) or (u.quota == 0 and mission.slot >= mission.max_slots)
+
+
+@for_sections
+def waits_for_horizon(mission):
+    """Whether a mission without a quota goes on, since its last slot has not been reached."""
+    return mission.quota == 0 and mission.slot < mission.max_slots
+
+
+@inlined
+def is_over(mission):
+    """Whether a mission is over: no UAV is active, and without a quota the horizon is reached."""
+    return mission.active == 0 and not waits_for_horizon(mission)

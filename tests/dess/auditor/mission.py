@@ -46,7 +46,8 @@ class _Auditor:
 
     def replay(self) -> None:
         self._begin()
-        while self.fleet.active:
+        shortest = 0 if self.c["quota"] else self.c["max_slots"]
+        while self.fleet.active or self.log.slot < shortest:
             self._replay_slot()
         for i in range(len(self.fleet.uavs)):
             self.fleet.take("mission_end", self.log.slot, i)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 import dess
 from dess.state import END_NAMES, HOVER
-from tests.dess.env.episodes import PAPER, masks_of, play
-from tests.drawn import Commuter, Recorder, Wanderer, replications, seeds, spaces
+from tests.dess.env.episodes import PAPER, masks_of, play, small
+from tests.drawn import Commuter, Recorder, Script, Wanderer, replications, seeds, spaces
 
 
 def test_a_seed_repeats_a_sequence_of_whole_episodes():
@@ -66,6 +66,22 @@ def test_the_same_actions_give_the_record_of_simulate(space, seed, replication, 
     assert list(rewards.values()) == record.uavs["reward"].tolist()
     assert list(ends.values()) == [END_NAMES[end] for end in record.uavs["end"]]
     assert team_collected == record.collected
+
+
+@pytest.mark.parametrize("ended", ["leave", "stay"])
+def test_the_step_of_the_last_uav_runs_the_mission_to_its_horizon(ended):
+    """The record is that at the horizon, and the rewards are those until the last UAV ended."""
+    scenario = small(landing=True, quota=0, max_slots=90, uavs=2, arrival_rate=0.4, flying_time=3)
+    env, steps, rewards = dess.parallel_env(scenario, 6, ended=ended), 0, 0.0
+    env.reset()
+    while env.agents:
+        _, gained, terminated, truncated, infos = env.step(dict.fromkeys(env.agents, 3))
+        steps, rewards = steps + 1, rewards + sum(gained.values())
+    assert steps <= 4 and all(terminated.values()) and not any(truncated.values())
+    assert all(info["reward_terms"].sum() == gained[a] for a, info in infos.items())
+    record = dess.simulate(scenario, Script("W" * 9, "W" * 9), 6)
+    assert env.record().slots == 90 and env.record().metrics == record.metrics
+    assert rewards == pytest.approx(record.reward)
 
 
 @given(spaces(), seeds, st.integers(0, 9))

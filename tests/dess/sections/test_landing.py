@@ -1,13 +1,25 @@
 """Missions that end on the ground: what standing costs, when a UAV lands, what the guard does."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from hypothesis import given
 
 from dess import InputError, load_scenario, policies, simulate, simulate_batch
 from dess.scenario import ScenarioSpace
 from dess.sea.families import FAMILIES
 from dess.state import BATTERY, LANDED
-from tests.drawn import Script
+from tests.dess.flights import flown
+from tests.drawn import (
+    Commuter,
+    Script,
+    Wanderer,
+    continuous_spaces,
+    extended_spaces,
+    replications,
+    seeds,
+)
 
 # A zone of two cells, and one node with data without end beside it.
 SEA = {
@@ -57,6 +69,52 @@ def test_without_a_quota_a_uav_works_to_the_last_slot_and_must_be_on_the_ground_
     record = simulate(space, Script(route), 1)
     assert record.slots == 6 and record.uav_rows()[0]["end"] == end
     assert record.success == (end == "landed")
+
+
+LOSING: list[tuple[dict[str, Any], list[str], str]] = [
+    # An empty battery in the fourth slot, a failure at the end of the first one.
+    ({"flying_time": 4}, ["SSSS"], "battery"),
+    ({"failures": {"uav_rate": 1.0, "node_rate": 0.3, "node_repair": 2.0}}, ["SSSS"], "lost"),
+]
+
+
+@pytest.mark.parametrize(("values", "routes", "end"), LOSING)
+def test_without_a_quota_a_mission_whose_uavs_are_lost_lasts_until_its_horizon(values, routes, end):
+    """By hand: the node is never emptied, so its age grows from 0 to 40, and is 20 on average."""
+    sea = SEA | {"quota": 0, "max_slots": 40, "arrival_rate": 0.5, "age": {"measured": True}}
+    record, log = flown(ScenarioSpace.of(**sea | values), *routes)
+    assert [row["end"] for row in record.uav_rows()] == [end] and record.slots == 40
+    assert (record.age, record.age_p99) == (20.0, pytest.approx(39.6))
+    arrivals = log["value"][log["event"] == "arrival"]
+    assert record.arrived == arrivals.sum() and max(log["time"][log["event"] == "arrival"]) > 30
+    # It is what arrives while a UAV stands in the zone to the end.
+    assert record.arrived == simulate(ScenarioSpace.of(**sea), Script(""), 0).arrived
+    # What a silent node has at the end of the mission is left over.
+    left = record.initial + record.arrived - record.collected
+    assert record.residual == pytest.approx(left) and record.uav_slots <= 4
+
+
+def test_a_fleet_that_is_lost_early_does_not_have_younger_data_than_one_that_works():
+    values = {"landing": True, "quota": 0, "max_slots": 480, "age": {"measured": True}}
+    space = load_scenario("bay", **values)
+    drowned, working = (
+        simulate_batch(space, policies.load(name), 1, 10) for name in ("random-unguarded", "greedy")
+    )
+    slots_flown = drowned.uavs["slots_flying"].max()
+    assert not drowned.missions["home"].any() and slots_flown < 200
+    assert (drowned.missions["slots"] == 480).all()
+    assert drowned.operations["age"].min() > 200 > working.operations["age"].max()
+
+
+@given(
+    extended_spaces(landing=True, quota=0) | continuous_spaces(landing=True, quota=0),
+    seeds,
+    replications,
+)
+def test_without_a_quota_all_policies_meet_the_same_data_until_the_horizon(space, seed, number):
+    one, other = (simulate(space, flown_by, seed, number) for flown_by in (Wanderer(), Commuter()))
+    assert one.slots == other.slots == space.max_slots
+    assert (one.initial, one.arrived) == (other.initial, other.arrived)
 
 
 def test_an_empty_battery_in_the_air_ends_a_mission_and_the_quota_is_paid_on_landing():
