@@ -186,7 +186,7 @@ def overall(results: Results, pair: Pair) -> pd.DataFrame:
     """The policy compared with the baseline in every metric, over all missions.
 
     Returns:
-        A row per metric, as ``stats.paired.compare`` returns it; ``p_adjusted`` also corrects for
+        A row per metric, as ``dess.analysis.compare`` returns it; ``p_adjusted`` also corrects for
         the choice of the pair.
     """
     missions = results.missions[results.missions["policy"].isin(pair[:2])]
@@ -241,7 +241,7 @@ def most_lost(missions: pd.DataFrame, count: int) -> pd.DataFrame:
 
 
 def depleted(results: Results, policy: str, replications: Iterable[int]) -> int:
-    """The number of UAVs of a policy whose battery is depleted before their quota is filled."""
+    """The number of UAVs of a policy whose battery is depleted in the air."""
     return int(_ends(results, policy, replications)["battery"].sum())
 
 
@@ -255,7 +255,12 @@ def commands(results: Results, policy: str, replications: Iterable[int]) -> list
 
 
 def outcome_table(missions: pd.DataFrame, results: Results, pair: Pair) -> pd.DataFrame:
-    """Missions of ``duels`` as a table to print: parameters, and the outcome of both policies."""
+    """Missions of ``duels`` as a table to print: parameters, and the outcome of both policies.
+
+    The column that tells how many UAVs ended well has what they had to do as its head: to fill
+    their quota, or to land.
+    """
+    done = results.scenario().aim.capitalize()
     table = missions.reset_index(drop=True)
     columns = {("", "Mission"): table["replication"].astype(str)}
     for field in PARAMETERS:
@@ -263,9 +268,9 @@ def outcome_table(missions: pd.DataFrame, results: Results, pair: Pair) -> pd.Da
     columns["", "Points"] = table["difference"].map(lambda gap: numbers.difference(gap, 0))
     for policy, end in ((pair.policy, ""), (pair.baseline, OF_BASELINE)):
         ends = _ends(results, policy, table["replication"])
-        filled = [f"{quota} of {n}" for quota, n in ends[["quota", "all"]].to_numpy()]
+        ended_well = [f"{count} of {n}" for count, n in ends[["quota", "all"]].to_numpy()]
         columns[policy, "Success"] = table[SUCCESS + end].map({1: "yes", 0: "no"})
-        columns[policy, "Quotas"] = pd.Series(filled, dtype=object)
+        columns[policy, done] = pd.Series(ended_well, dtype=object)
         columns[policy, "Collected"] = table[RATIO + end].map(numbers.percent)
     return pd.DataFrame(columns)
 
@@ -485,7 +490,7 @@ def read(folder: str | Path, results: Results) -> Times:
     Raises:
         InputError: If there are none, or they are damaged.
     """
-    return Times.load(_file(folder, results), "allowed: what is made by: dess report")
+    return Times.load(_file(folder, results), "what is made by: dess report")
 
 
 def _file(folder: str | Path, results: Results) -> Path:

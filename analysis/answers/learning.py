@@ -616,7 +616,7 @@ def trained_policies(folder: Path) -> list[Trained]:
 
 
 def curves_by_learner(policies: Iterable[Trained]) -> pd.DataFrame:
-    """The curves of trainings, as in ``learning.curves``.
+    """The curves of trainings, as ``read_curves`` returns them.
 
     A variant is a learner, the trainings that differ in their seed alone, by its policies' names.
     """

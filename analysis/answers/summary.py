@@ -186,7 +186,7 @@ def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
     """Rows of ``means`` with a column ``verdict``: how the policy compares with the others there.
 
     Compared are the policies of the table at the same design point, by each metric, on the
-    replications that they have in common, by ``stats.screening.may_be_best``: at every design point
+    replications that they have in common, by ``stats.verdict.may_be_best``: at every design point
     by itself, the truly best policy is ``BEST`` or ``TIED`` with a probability of 95 %.
 
     Args:
@@ -542,7 +542,7 @@ def sensitivities(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per policy, metric and parameter: ``policy``, and the columns of
-        ``answers.summary``. Empty if the design is not of the kind ``saltelli``.
+        ``sensitivity``. Empty if the design is not of the kind ``saltelli``.
     """
     design = results.study.design
     if not isinstance(design, Saltelli):

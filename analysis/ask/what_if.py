@@ -35,7 +35,7 @@ from dess.analysis.stats.intervals import LEVEL, by_replication
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position
 from dess.errors import one_of
 from dess.fields import fields_of
-from dess.scenario import ScenarioSpace
+from dess.scenario import Scenario, ScenarioSpace
 
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.figure import Figure
@@ -101,8 +101,8 @@ def answers(results: Results) -> pd.DataFrame:
         A row per policy and metric (those of ``METRICS``, what is ``measured``, then those of
         ``MEASURES``): ``policy``, the means ``before`` and ``after``, and the columns of
         ``dess.analysis.compare``. Every interval has its own level of 95 %; see
-        ``stats.paired.paired``. Of what only one side measures, ``n`` is 0 and all else nan but the
-        mean of this side.
+        ``stats.differences.paired``. Of what only one side measures, ``n`` is 0 and all else nan
+        but the mean of this side.
     """
     missions = missions_of(results)
     metrics = [*METRICS, *measured(results), *(told(name, missions) for name in MEASURES)]
@@ -420,20 +420,32 @@ class Example:
         mission = resimulate(results, shown, point, self.replication)
         figure = mission_figure(mission.events, mission.scenario)
         ends = [uav["end"] for uav in mission.record.uav_rows()]
-        fates = {"battery": "deplete their battery", "truncated": "run out of time"}
-        fates |= {"lost": "are lost"}
-        failures = [
-            f"{ends.count(end)} of {len(ends)} UAVs {fate}"
-            for end, fate in fates.items()
-            if end in ends
-        ]
-        fate = f"but {numbers.words(failures)}: it counts 0" if failures else "all quotas filled"
         caption = (
             f"{SIDES[point].capitalize()} ({', '.join(self.answer.sides[point])}): collection "
-            f"ratio {numbers.percent(mission.record.collection_ratio)}, {fate}. "
+            f"ratio {numbers.percent(mission.record.collection_ratio)}, "
+            f"{fate(ends, mission.scenario)}. "
             f"{lasting(mission.record.slots, mission.scenario.units)}. n = 1."
         )
         return figure, "Map of the mission; battery, residual data and charging", caption
+
+
+def fate(ends: Sequence[str], scenario: Scenario) -> str:
+    """How the UAVs of a mission ended, as a part of a sentence.
+
+    Args:
+        ends: The end of every UAV, as in a record.
+        scenario: The scenario of the mission.
+    """
+    fates = {"battery": "deplete their battery", "truncated": "run out of time"}
+    fates |= {"lost": "are lost"}
+    failures = [
+        f"{ends.count(end)} of {len(ends)} UAVs {fate_of_uav}"
+        for end, fate_of_uav in fates.items()
+        if end in ends
+    ]
+    if failures:
+        return f"but {numbers.words(failures)}: it counts 0"
+    return f"all UAVs {scenario.aim}"
 
 
 def check_shown(question: Question, policy: str | None) -> None:

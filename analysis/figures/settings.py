@@ -570,7 +570,7 @@ def decision_times(table: pd.DataFrame) -> Figure:
     """Decision time against the product of all policies, and their Pareto front.
 
     Args:
-        table: Rows of ``optimality.planner.front``.
+        table: Rows of ``answers.comparison.front``.
     """
     looks = style.policy_colours(table["policy"])
     best = table[table["on_front"]].sort_values("seconds")

@@ -249,9 +249,10 @@ def paths_of(events: Events, scenario: Scenario) -> pd.DataFrame:
     """Where every UAV was at the start of every mission slot, and at its end.
 
     Returns:
-        One row per UAV and time, in that order: ``uav``; ``time`` [mission slots]; ``x, y``, the
-        place on the grid [cells], where a whole number is the middle of a cell; ``lon, lat``
-        [degrees], if the sea has them; ``altitude`` [m]; ``battery`` [%].
+        One row per UAV and time, in that order: ``uav``; ``time`` [mission slots]; ``seconds``, the
+        same time [s], if the scenario has a data sheet; ``x, y``, the place on the grid [cells],
+        where a whole number is the middle of a cell; ``lon, lat`` [degrees], if the sea has them;
+        ``altitude`` [m]; ``battery`` [%].
     """
     table, slots = battery_levels(events), uav_slots(events)
     for axis in ("x", "y"):
@@ -267,6 +268,8 @@ def paths_of(events: Events, scenario: Scenario) -> pd.DataFrame:
         projection = Projection(scenario.centre, scenario.size, scenario.cell_size)
         table[["lon", "lat"]] = projection.degrees(table[["x", "y"]].to_numpy() + 0.5)
     table.insert(len(table.columns), "altitude", scenario.altitude)
+    if scenario.units:
+        table.insert(2, "seconds", table["time"] * scenario.units.slot)
     return table[[*table.columns.drop("battery"), "battery"]]
 
 
@@ -282,17 +285,19 @@ def path_text(events: Events, scenario: Scenario, kind: str) -> str:
     if kind == "csv":
         return table.to_csv(index=False)
     axes = ["lon", "lat"] if scenario.centre else ["x", "y"]
-    paths = {uav: of[[*axes, "altitude", "time", "battery"]] for uav, of in table.groupby("uav")}
+    others = table.columns.intersection(["time", "seconds", "battery"])
+    paths = {uav: of[[*axes, "altitude", *others]] for uav, of in table.groupby("uav")}
     return (_kml if kind == "kml" else _geojson)(paths)
 
 
 def _geojson(paths: dict[int, pd.DataFrame]) -> str:
-    """A line for each UAV, with the time and the battery at each of its places."""
+    """A line for each UAV, with the times and the battery at each of its places."""
+    names = {"time": "times", "seconds": "seconds", "battery": "battery"}
     features = [
         {
             "type": "Feature",
             "geometry": {"type": "LineString", "coordinates": of.iloc[:, :3].to_numpy().tolist()},
-            "properties": {"uav": uav, "times": [*of["time"]], "battery": [*of["battery"]]},
+            "properties": {"uav": uav} | {names[name]: [*of[name]] for name in of.columns[3:]},
         }
         for uav, of in paths.items()
     ]
@@ -300,10 +305,14 @@ def _geojson(paths: dict[int, pd.DataFrame]) -> str:
 
 
 def _kml(paths: dict[int, pd.DataFrame]) -> str:
-    """A track for each UAV; a mission slot is a second, from 1970 on, as KML has no other times."""
+    """A track for each UAV, with times from 1970 on, as KML has no others.
+
+    Without a data sheet, a mission slot is a second.
+    """
     marks = []
     for uav, of in paths.items():
-        times = pd.to_datetime(of["time"], unit="s")
+        times = pd.to_datetime(of["seconds"] if "seconds" in of else of["time"], unit="s")
+        times = times.dt.round("s")
         track = [f"<when>{time:%Y-%m-%dT%H:%M:%SZ}</when>" for time in times]
         track += ["<gx:coord>{} {} {}</gx:coord>".format(*at) for at in of.iloc[:, :3].to_numpy()]
         track.insert(0, "<altitudeMode>relativeToGround</altitudeMode>")

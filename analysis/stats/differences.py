@@ -193,7 +193,7 @@ def mcnemar(gains: int, losses: int) -> float:
 
 
 def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") -> pd.DataFrame:
-    """Paired comparisons of many columns with a baseline, as ``stats.paired.paired`` makes them.
+    """Paired comparisons of many columns with a baseline, as ``paired`` makes them.
 
     Args:
         values: (R, K) a row per replication; nan where a column lacks one.
@@ -350,7 +350,7 @@ def compare(
         metrics: Columns of numbers.
         by: Columns whose values form groups of missions, compared one by one.
         level: Confidence level of each interval.
-        correction: Correction of the p-values over all rows, as for ``correction.adjust``.
+        correction: Correction of the p-values over all rows, as for ``adjust``.
         of: What is compared: ``policy`` or ``point``.
 
     Returns:

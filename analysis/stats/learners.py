@@ -125,7 +125,7 @@ def compare_learners(
         metrics: Columns of numbers.
         by: Columns whose values form groups of missions, compared one by one.
         level: Confidence level of each interval.
-        correction: Correction of the p-values over all rows, as for ``correction.adjust``.
+        correction: Correction of the p-values over all rows, as for ``differences.adjust``.
 
     Returns:
         A row per learner, group and metric: ``learner``, ``baseline``, the columns ``by``,

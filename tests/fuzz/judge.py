@@ -80,6 +80,8 @@ def _output(outcome: Outcome) -> Iterator[str]:
 def _errors(outcome: Outcome) -> Iterator[str]:
     lines = [line for line in re.split(r"[\n\r]+", outcome.text(STDERR)) if line.strip()]
     for line in lines:
+        if "allowed: allowed:" in line:
+            yield f"a line that says twice that something is allowed: {line[:LINE]}"
         if "not enough memory" in line:
             yield "the memory did not suffice; a refusal has to come first"
         if len(line) > LINE:

@@ -1,11 +1,14 @@
 """What commands tell of missions with a data sheet is in its units."""
 
+import io
 import json
 
+import pandas as pd
 import pytest
 
 from dess import load_scenario, simulate
 from dess.analysis.metrics import lasting
+from dess.analysis.results.event_log import path_text
 from dess.reports.cli import main
 from dess.reports.player import Playback
 from dess.state import sample_scenario
@@ -37,3 +40,13 @@ def test_single_missions_and_their_player_are_told_in_units(tmp_path, capsys):
     assert playback.status(playback.end).startswith(f"{lasting(record.slots, scenario.units)} of")
     assert f" · {left:,.3g} MB left · " in playback.status(playback.end)
     assert playback.data["units"]["length"] == ("km", pytest.approx(0.315))
+    table, features, tracks = (
+        path_text(record.events.columns(), scenario, kind) for kind in ("csv", "geojson", "kml")
+    )
+    rows = pd.read_csv(io.StringIO(table)).query("uav == 0")
+    assert rows["seconds"].tolist() == (SLOT * rows["time"]).tolist()
+    times = json.loads(features)["features"][0]["properties"]
+    assert times["times"] == rows["time"].tolist()
+    assert times["seconds"] == rows["seconds"].tolist()
+    assert "<when>1970-01-01T00:02:06Z</when>" in tracks  # the start of slot 6, after 126 s
+    assert "<when>1970-01-01T00:00:01Z</when>" not in tracks
