@@ -2,7 +2,7 @@
 
 It shows the estimates of ``answers.summary.means`` for one design point at a time. A page can
 contain one explorer. It needs only a browser with JavaScript; without JavaScript it shows the
-middle setting.
+setting at which the sliders start.
 
     explorer(load_results("results/explorer"))
 """
@@ -17,7 +17,7 @@ from IPython.display import HTML
 from dess import InputError
 from dess.analysis import metrics, names, numbers
 from dess.analysis.answers import summary
-from dess.analysis.answers.settings import points, varied
+from dess.analysis.answers.settings import in_words, points, varied
 from dess.analysis.figures import style
 from dess.analysis.results.tables import Results
 from dess.reports.pages.html import rendered
@@ -51,7 +51,7 @@ class Grid:
 
     @property
     def start(self) -> int:
-        """The design point in the middle of all sliders."""
+        """The design point at which the sliders start: in the middle of three values or more."""
         middle = [len(values) // 2 for values in self.values.values()]
         return int(self._places.index[(self._places == middle).all(axis=1)][0])
 
@@ -71,11 +71,12 @@ class Grid:
         return self.means[self.means["point"] == self.start]
 
     def answer(self) -> str:
-        """The policies at the design point ``start``, the best first."""
+        """The policies at the design point ``start``, which it names, the best first."""
         rows = self.at_start()
         best = rows[rows["metric"] == metrics.PRODUCT].sort_values("mean", ascending=False)
         parts = [f"{row.policy} {numbers.percent(row.mean)}" for row in best.itertuples()]
-        return f"In the middle of all ranges the product is {numbers.words(parts)}; move a slider."
+        setting = in_words(self.results)[self.start]
+        return f"With {setting}, the product is {numbers.words(parts)}; move a slider."
 
     def table(self) -> pd.DataFrame:
         """The means of all settings: the fields, then the columns of ``dess.analysis.summary``."""

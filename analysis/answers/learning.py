@@ -43,6 +43,12 @@ LADDER = {
     "and early returns (quick)": BASELINE,
     f"{SHIPPED}, trained longer": SHIPPED,
 }
+# Variants that lack one of these methods, by what they lack.
+ONE_LESS = {
+    "no guard": "without the guard",
+    "no low-battery starts": "without low-battery starts",
+    "no early returns": "without early returns",
+}
 
 
 def finals(curves: pd.DataFrame) -> pd.DataFrame:
@@ -160,8 +166,37 @@ def _variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> "Figure
     return figure
 
 
+def without_each(last: pd.DataFrame) -> str:
+    """How many trainings that lack one of the methods learn to charge, in a sentence.
+
+    What a method adds depends on those that are there before it. So the steps of ``ladder`` do not
+    say which method matters most; this says whether any single one is needed.
+
+    Args:
+        last: Rows of ``finals``.
+    """
+    learned = (last[f"final_{SUCCESS}"] > LEARNED).groupby(last["variant"], sort=False)
+    counts = learned.agg(learning="sum", trainings="size")
+    counts = counts.loc[[variant for variant in ONE_LESS if variant in counts.index]]
+    if counts.empty:
+        return ""
+    parts = [
+        f"{row.learning} of {row.trainings} {ONE_LESS[row.Index]}" for row in counts.itertuples()
+    ]
+    text = f"Of the trainings that lack one method, {numbers.words(parts)} learn to charge"
+    if (counts["learning"] == counts["trainings"]).all():
+        return f"{text}: no single method is needed for it."
+    return f"{text}."
+
+
+def learning_to_charge(last: pd.DataFrame, variant: str) -> str:
+    """How many trainings of a variant learn to charge, as ``1 of 3``."""
+    successes = last.loc[last["variant"] == variant, f"final_{SUCCESS}"]
+    return f"{(successes > LEARNED).sum()} of {len(successes)}"
+
+
 def answer(rungs: pd.DataFrame) -> str:
-    """What the methods add up to, and which adds most, in a sentence.
+    """What the methods add up to, in a sentence.
 
     Args:
         rungs: Rows of ``ladder``.
@@ -177,9 +212,8 @@ def answer(rungs: pd.DataFrame) -> str:
         for rung, count, n in zip(means.index, learned, by_rung.size(), strict=True)
     ]
     return (
-        f"The product rises from {reached[0]} to {reached[-1]}; the largest step: "
-        f"{means.diff().idxmax()}. "
-        f"Trainings that learn to charge: {numbers.words(counts[:3])}."
+        f"Trainings reach a mean product of {reached[0]} and of {reached[-1]}. "
+        f"Of them learn to charge: {numbers.words(counts[:3])}."
     )
 
 

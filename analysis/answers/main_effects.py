@@ -8,7 +8,7 @@ of a parameter are simulated in the same replications, so they are compared miss
     shape(pairs).words  # "rises"
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -168,25 +168,33 @@ def leading_policies(
     return [policy for policy in (learned, heuristic) if policy]
 
 
-def answer(table: pd.DataFrame, policy: str) -> str:
-    """Which parameters change the product of a policy most, in a sentence.
+def answer(table: pd.DataFrame, policies: Sequence[str]) -> str:
+    """Which parameters change the product of every policy most, in a sentence for each.
+
+    A parameter may help one policy and hurt another one, so none of them stands for the others.
 
     Args:
         table: The ``effects``.
-        policy: The policy.
+        policies: The policies.
     """
-    rows = table[(table["metric"] == PRODUCT) & (table["policy"] == policy)]
-    by_field = rows.sort_values("mean", kind="stable").groupby("field", sort=False)
-    ends = [
-        f"{parameter(str(field)).within} ({numbers.percent(low['mean'])} at {low['value']}, "
-        f"{numbers.percent(high['mean'])} at {high['value']})"
-        for field in strongest(table, policy)
-        for low, high in [(by_field.get_group(field).iloc[0], by_field.get_group(field).iloc[-1])]
-    ]
-    return (
-        f"The product of {policy} depends most on the {' and on the '.join(ends)}; "
-        f"n = {numbers.span(rows['n'])} missions per value."
-    )
+    sentences = []
+    for policy in policies:
+        rows = table[(table["metric"] == PRODUCT) & (table["policy"] == policy)]
+        by_field = rows.sort_values("position", kind="stable").groupby("field", sort=False)
+        courses = []
+        for field in strongest(table, policy):
+            values = by_field.get_group(field)
+            extremes = [values["mean"].idxmin(), values["mean"].idxmax()]
+            ends = values.loc[extremes].sort_values("position", kind="stable")
+            first, last = [
+                f"{numbers.percent(row.mean)} at {row.value}" for row in ends.itertuples()
+            ]
+            courses.append(f"{parameter(str(field)).within} (from {first} to {last})")
+        sentences.append(
+            f"The product of {policy} depends most on the {' and on the '.join(courses)}."
+        )
+    counts = table.loc[table["policy"].isin(policies), "n"]
+    return f"{' '.join(sentences)} n = {numbers.span(counts)} missions per value."
 
 
 def strongest(table: pd.DataFrame, policy: str, count: int = 2) -> list[str]:

@@ -16,12 +16,13 @@ from dess.analysis.answers import settings
 from dess.analysis.figures import Drawing
 from dess.analysis.figures.missions import courses
 from dess.analysis.figures.settings import lines
-from dess.analysis.metrics import AGE, PRODUCT, metric_of
+from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, metric_of
 from dess.analysis.names import value_text
 from dess.analysis.results.event_log import duration
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import column_tests, relative_change
 from dess.analysis.stats.intervals import LEVEL, by_replication, check_share
+from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
 
 # The published changes of the average age of information, from one UAV to this number, in another
 # model of the same kind (Mathematics 13(21) 3564).
@@ -161,7 +162,7 @@ def short_of_pads(results: Results, margin: float) -> list[int]:
 
 def pads(results: Results, margin: float) -> str:
     """How many pads are enough for every fleet, by the first policy of the study."""
-    found = enough_pads(results, margin)
+    found, most = enough_pads(results, margin), max(settings.varied(results).get("pads", [0]))
     parts = []
     for row in found[found["policy"] == results.policies[0]].itertuples():
         part = f"{row.pads} {'are' if row.pads > 1 else 'is'} enough for {row.uavs} UAVs"
@@ -170,8 +171,33 @@ def pads(results: Results, margin: float) -> str:
         parts.append(part + f", {numbers.words([*map(str, row.open)])} open" * bool(row.open))
     return (
         f"Of charging pads, {'; '.join(parts)} (policy {results.policies[0]}, at most "
-        f"{numbers.margin(margin)} of the product lost)."
+        f"{numbers.margin(margin)} of the product lost, n = "
+        f"{numbers.span(changes(results, 'pads', most, PRODUCT)['n'])} missions)."
     )
+
+
+def few_pads(results: Results) -> str:
+    """What the fewest pads cost every fleet against the most, in success and in collected data.
+
+    The policy is the first of the study. The means are those of ``means``, the differences those of
+    ``changes``.
+    """
+    pads = settings.varied(results).get("pads", [0])
+    fewest, most, lines = min(pads), max(pads), []
+    for metric in (SUCCESS, RATIO):
+        shares = means(results, [metric]).set_index(["policy", "uavs", "pads"])["mean"]
+        lost = changes(results, "pads", most, metric)
+        lost = lost[(lost["policy"] == results.policies[0]) & (lost["pads"] == fewest)]
+        for row in lost.itertuples():
+            with_fewest, with_most = (
+                numbers.percent(shares[row.policy, row.uavs, count]) for count in (fewest, most)
+            )
+            lines.append(
+                f"- The {metric_of(metric).within} of {numbers.counted(row.uavs, 'UAV')} is "
+                f"{with_fewest} with {numbers.counted(fewest, 'pad')} and {with_most} with {most}: "
+                f"{numbers.points(row.mean, row.low, row.high)} points, n = {row.n:,}."
+            )
+    return "\n".join(lines)
 
 
 def age_changes(results: Results) -> pd.DataFrame:
@@ -185,21 +211,38 @@ def age_changes(results: Results) -> pd.DataFrame:
 
 
 def age(results: Results) -> str:
-    """The mean age with the smallest and the third fleet, at the extreme arrival rates."""
+    """The mean age with the smallest and the third fleet, at the extreme arrival rates.
+
+    Whether it falls is said by the interval of the change.
+    """
     table = means(results, [AGE])
     table = table[table["policy"] == results.policies[0]].sort_values("uavs")
     few, more = table["uavs"].unique()[:3][[0, -1]]
     ends = table[table["uavs"].isin([few, more])].set_index("arrival_rate")[_ENDS]
-    parts = [
-        f"from {' to '.join(ages)} slots at an arrival rate of {value_text(rate)}"
-        for rate in dict.fromkeys([ends.index.min(), ends.index.max()])
-        for rows in [ends.loc[[rate]].to_numpy()]
-        for ages in [[numbers.decimals(mean, low, high, 1) for mean, low, high in rows]]
-    ]
+    changed = changes(results, "uavs", few, AGE)
+    changed = changed[(changed["policy"] == results.policies[0]) & (changed["uavs"] == more)]
+    verbs = {ABOVE: "rises", BELOW: "falls", INCONCLUSIVE: "does not surely change,"}
+    parts = []
+    for rate in dict.fromkeys([ends.index.min(), ends.index.max()]):
+        (change,) = changed[changed["arrival_rate"] == rate].itertuples()
+        ages = [numbers.decimals(*row, 1) for row in ends.loc[[rate]].to_numpy()]
+        parts.append(
+            f"{verbs[position(change)]} from {' to '.join(ages)} slots at an arrival rate of "
+            f"{value_text(rate)}"
+        )
     return (
-        f"From {few} to {more} UAVs the mean age of the data falls {numbers.words(parts)} "
-        f"(policy {results.policies[0]})."
+        f"From {few} to {more} UAVs the mean age of the data {numbers.words(parts)} "
+        f"(policy {results.policies[0]}, n = {numbers.span(changed['n'])} missions)."
     )
+
+
+def lengths(results: Results) -> str:
+    """How many mission slots the missions last, in a sentence."""
+    slots, longest = results.missions["slots"], results.scenario().max_slots
+    whole = int((slots == longest).sum())
+    if whole == len(slots):
+        return f"Every mission lasts to its last slot, {longest:,}."
+    return f"{whole:,} of {len(slots):,} missions last to the last slot, {longest:,}."
 
 
 def failures(results: Results) -> str:
@@ -215,7 +258,7 @@ def failures(results: Results) -> str:
     return (
         f"If a UAV fails in each slot with probability {value_text(rows[RATE].iloc[0])}, the "
         f"product of {rows['uavs'].iloc[0]} UAVs changes {numbers.words(parts)} "
-        f"(policy {results.policies[0]})."
+        f"(policy {results.policies[0]}, n = {numbers.span(rows['n'])} missions)."
     )
 
 

@@ -280,6 +280,63 @@ class WhatIf:
             for policy, of_policy in gaps.items()
         )
 
+    def contrasts(self) -> str:
+        """In words: the policies that are better in most missions and worse on average, or so.
+
+        A failed mission counts 0 in the product, so that a few of them can outweigh many small
+        gains. Empty if the variation does this to no policy.
+        """
+        successes = self.results.missions.groupby(["policy", "point"])[SUCCESS]
+        failures = (successes.size() - successes.sum()).astype(int)
+        sentences = []
+        for policy in self.results.missions["policy"].unique():
+            gaps = differences(self.results, policy)
+            mostly = np.sign((gaps > 0).sum() - (gaps < 0).sum())
+            if mostly * gaps.mean() >= 0:
+                continue
+            sides = "higher", "lower"
+            often, on_average = sides if mostly > 0 else sides[::-1]
+            before, after = (failures[policy, point] for point in (BASELINE, VARIATION))
+            why = ""
+            if mostly * (after - before) > 0:
+                why = f": a failed mission counts 0, and {after} fail in place of {before}"
+            sentences.append(
+                f"With {policy}, the product is {often} in more missions than it is {on_average}, "
+                f"and {on_average} on average{why}."
+            )
+        return " ".join(sentences)
+
+    def reading(self) -> str:
+        """How the intervals and marks that occur in the answer are read, in sentences."""
+        table = self.table()
+        table = table[table["metric"].isin([*METRICS])]
+        verdicts = [verdict(row) for row in table.itertuples()]
+        sentences = []
+        if INCONCLUSIVE in verdicts:
+            sentences.append("A difference is inconclusive (≈) if its interval contains 0.")
+        if any(self._overlap(row.policy, row.metric) for row in self._clear(table, verdicts)):
+            sentences.append(
+                "Intervals of the means may overlap although the paired difference is clear."
+            )
+        if summary.learners(self.results):
+            sentences.append(
+                "A learned policy is used as it was trained; in a setting far from its training, "
+                "a new training may do better."
+            )
+        return " ".join(sentences)
+
+    @staticmethod
+    def _clear(table: pd.DataFrame, verdicts: Sequence[str]) -> list[Any]:
+        """The rows with a verdict."""
+        rows = zip(table.itertuples(), verdicts, strict=True)
+        return [row for row, of_row in rows if of_row != INCONCLUSIVE]
+
+    def _overlap(self, policy: str, metric: str) -> bool:
+        """Whether the intervals of the means of both sides overlap."""
+        rows = means(self.results)
+        rows = rows[(rows["policy"] == policy) & (rows["metric"] == metric)]
+        return bool(rows["low"].max() <= rows["high"].min())
+
     @property
     def _changed(self) -> dict[str, Any]:
         """The fields that the variation sets."""
@@ -322,6 +379,9 @@ class WhatIf:
         """How much common random numbers narrow the intervals, as a table to print."""
         table, lines = self.table(), []
         for row in table[table["metric"].isin([*METRICS])].itertuples():
+            if np.isnan(row.variance_reduction):  # the same in all missions
+                lines.append((row.policy, _SHORT[row.metric], "no variance", *"–––"))
+                continue
             left = 1 - row.variance_reduction
             narrower = numbers.percent(1 - left**0.5) if left < 1 else "none"
             worth = f"{row.n / left:,.0f}" if left else "any number"

@@ -16,7 +16,13 @@ from dess.analysis.names import parameter, value_text
 from dess.analysis.paper import values
 from dess.analysis.paper.rules import MARGIN
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.intervals import Interval, bounded_interval, mean_interval, wilson
+from dess.analysis.stats.intervals import (
+    LEVEL,
+    Interval,
+    bounded_interval,
+    mean_interval,
+    wilson,
+)
 from dess.analysis.stats.intervals import summary as means_of
 from dess.analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 
@@ -49,7 +55,10 @@ class Pairs(NamedTuple):
         shape = self.shape
         tops = [value for value, position in self.positions.items() if position in shape.peaks]
         peak = f", highest at {' or '.join(tops)}" if shape.words == main_effects.PEAK else ""
-        return f"it {shape.words}{peak}"
+        differ = self.changes["p_adjusted"] <= 1 - LEVEL
+        sure = self.changes.loc[differ, "difference"]
+        counts = f"{(sure > 0).sum()} rises and {(sure < 0).sum()} falls"
+        return f"it {shape.words}{peak}: of {len(differ)} pairs of values, {counts} are sure"
 
     def position(self, value: str) -> int:
         """The position of a value."""
@@ -152,13 +161,16 @@ class EvidenceOfTrainings(NamedTuple):
 
 NO_RESULTS = "no results"
 VERDICTS = (HOLDS, IN_PART, INCONCLUSIVE, REFUTED, NO_RESULTS)
-# The verdicts as pages write them: of claims that hold, those with an interval above the paper's
-# number exceed it; what holds in part without such a number is inconclusive.
+# The verdicts as pages write them. What holds matches the paper's number if the interval of the
+# difference from it reaches 0, and exceeds it if all of it is above 0; without a number, or if all
+# of it is below 0, it holds. What holds in part without such a number is inconclusive.
 EXCEEDS, MATCHES, FALLS_SHORT = "exceeds", "matches", "falls short"
+# A claim that something is lost is no merit: a policy has this weakness as well, or lacks it.
+SHARED, ABSENT = "has it too", "does not have it"
 NOT_APPLICABLE = "does not apply"
-OUTCOMES = (EXCEEDS, MATCHES, FALLS_SHORT, INCONCLUSIVE, NOT_APPLICABLE)
+OUTCOMES = (EXCEEDS, MATCHES, HOLDS, FALLS_SHORT, SHARED, ABSENT, INCONCLUSIVE, NOT_APPLICABLE)
 
-Unit = Literal["share", "points", "reward", "steps", "number"]
+Unit = Literal["share", "points", "reward", "steps", "number", "p"]
 
 # Number of random permutations of the nodes, for the share that is expected by chance.
 SHUFFLES = 100
@@ -171,7 +183,7 @@ class Quantity(NamedTuple):
         interval: The value and its interval, in its unit; without one, the ends are the value.
         n: Number of missions or trainings that it is computed from; 0 if it is not known.
         unit: ``share``, ``points`` (for a difference of shares), ``reward``, ``steps`` (of a
-            training) or ``number``.
+            training), ``number`` or ``p`` (of a test).
         name: What the quantity is, if the claim does not say so.
     """
 
@@ -200,6 +212,8 @@ class Quantity(NamedTuple):
                 return numbers.with_ends(_reward, value, low, high) if spread else _reward(value)
             case "steps":
                 return f"{value:,.0f} steps"
+            case "p":
+                return numbers.p_value(value)
         return f"{value:g}"
 
 
@@ -217,8 +231,9 @@ class Finding:
             paper's number.
         note: A remark in words, or the reason why there are no results.
         policy: The policy; empty for a claim about trainings.
-        against: Where the interval of the first quantity lies relative to the paper's number
+        against: Where the interval of the difference from the paper's number lies relative to 0
             (``stats.verdict.position``); empty if they cannot be compared.
+        weakness: Whether the claim is that something is lost.
     """
 
     verdict: str
@@ -226,20 +241,27 @@ class Finding:
     note: str = ""
     policy: str = ""
     against: str = ""
+    weakness: bool = False
 
     @property
-    def holds(self) -> bool:
-        """Whether the policy passes the claim."""
-        return self.verdict == HOLDS
+    def passes(self) -> bool:
+        """Whether the policy passes the claim; nobody passes one about a weakness."""
+        return self.verdict == HOLDS and not self.weakness
+
+    @property
+    def fails(self) -> bool:
+        """Whether the policy is shown to fail the claim."""
+        return self.outcome == FALLS_SHORT
 
     @property
     def outcome(self) -> str:
         """The verdict as pages write it: one of ``OUTCOMES``."""
-        if self.holds:
-            return EXCEEDS if self.against == ABOVE else MATCHES
-        short = self.verdict == REFUTED or (self.verdict == IN_PART and self.against == BELOW)
-        if short:
-            return FALLS_SHORT
+        if self.verdict == HOLDS:
+            if self.weakness:
+                return SHARED
+            return {ABOVE: EXCEEDS, INCONCLUSIVE: MATCHES}.get(self.against, HOLDS)
+        if self.verdict == REFUTED or (self.verdict == IN_PART and self.against == BELOW):
+            return ABSENT if self.weakness else FALLS_SHORT
         return NOT_APPLICABLE if self.verdict == NO_RESULTS else INCONCLUSIVE
 
 
@@ -281,8 +303,9 @@ def single_charges(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
 def ignored_nodes(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     """The shares of nodes that a lone UAV ignores, on the far edges and elsewhere."""
     far, others = np.transpose([_left_behind(*log) for log in evidence.logs(uavs=1)])
-    shares = _mean_share(far, "ignored of these nodes"), _mean_share(others, "of the others")
-    return Finding(judge(shares[0].interval, mean_interval(far - others)), shares)
+    ignored = _mean_share(far, "ignored of these nodes")
+    more = Quantity(mean_interval(far - others), len(far), "points", "more than of the others")
+    return _found(judge, ignored, more)
 
 
 def reached_nodes(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
@@ -302,11 +325,11 @@ def sectors(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     if not rows:
         raise MissingError("no data was collected")
     sides, chance, most = np.transpose(rows)
-    own = _mean_share(sides, "data collected on the own side")
-    by_chance = Quantity.exact(float(np.mean(chance)), name="by chance")
+    own = Quantity.exact(float(sides.mean()), name="data collected on the own side")
+    by_chance = Quantity.exact(float(chance.mean()), name="by chance")
+    more = Quantity(mean_interval(sides - chance), len(rows), "points", "more than by chance")
     division = _mean_share(most, "data by the UAV that serves the node most")
-    verdict = judge(mean_interval(sides - chance), division.interval)
-    return Finding(verdict, (own, by_chance, division))
+    return Finding(judge(more.interval, division.interval), (own, by_chance, more, division))
 
 
 def _left_behind(events: pd.DataFrame, nodes: np.ndarray) -> tuple[float, float]:
@@ -338,23 +361,40 @@ def change(judge: Judge, pairs: Pairs, first: str, second: str) -> Finding:
     return _found(judge, _points(pairs.change(first, second)))
 
 
-def lead(judge: Judge, pairs: Pairs, values: Sequence[str], name: str = "") -> Finding:
-    """How much higher the metric is at some values than at all others."""
-    leads = pairs.leads(*values)
-    name = name or f"{setting(pairs.field, values[0])} above the next best"
-    return Finding(judge(leads), (_least(leads, name),))
+def lead(judge: Judge, pairs: Pairs, value: str) -> Finding:
+    """How much higher the metric is at a value than at all others."""
+    return _tested(judge, pairs.leads(value), f"{setting(pairs.field, value)} above the next best")
 
 
 def lag(judge: Judge, pairs: Pairs, value: str) -> Finding:
     """How much lower the metric is at a value than at all others."""
-    lags = negated(pairs.leads(value))
-    return Finding(judge(lags), (_least(lags, "the next lowest is higher by"),))
+    return _tested(judge, negated(pairs.leads(value)), "the next lowest is higher by")
+
+
+def _tested(judge: Judge, leads: pd.DataFrame, name: str) -> Finding:
+    """The lead that decides: the surest one below 0, or else the least sure one."""
+    below = leads[leads["difference"] < 0]
+    order = (leads if below.empty else below).sort_values("p_adjusted", kind="stable")
+    row = order.iloc[-1 if below.empty else 0]
+    p = Quantity.exact(float(row["p_adjusted"]), unit="p", name="its p (Holm)")
+    return Finding(judge(leads), (_points(row, name), p))
+
+
+def least_lead(judge: Judge, pairs: Pairs, values: Sequence[str]) -> Finding:
+    """How much higher the metric is at some values than at all others: the lowest intervals."""
+    leads = pairs.leads(*values)
+    lowest = leads.loc[leads["low"].idxmin()]
+    widened = _widened(leads.loc[leads["wide_high"].idxmin()])
+    return Finding(judge(leads), (_points(lowest, "lowest interval"), widened))
 
 
 def spread(judge: Judge, pairs: Pairs) -> Finding:
-    """The differences between all values."""
-    largest = pairs.changes.loc[pairs.changes["difference"].abs().idxmax()]
-    return Finding(judge(pairs.changes), (_points(largest, "largest difference"),))
+    """The differences between all values: the intervals that reach farthest."""
+    changes = pairs.changes.reset_index(drop=True)
+    farthest = changes[["low", "high"]].abs().max(axis="columns").idxmax()
+    nearest = np.maximum(changes["wide_low"], -changes["wide_high"]).idxmax()
+    quantity = _points(changes.loc[farthest], "farthest interval")
+    return Finding(judge(pairs.changes), (quantity, _widened(changes.loc[nearest])))
 
 
 def course(judge: Judge, pairs: Pairs) -> Finding:
@@ -366,7 +406,9 @@ def course(judge: Judge, pairs: Pairs) -> Finding:
 
 def peak(judge: Judge, pairs: Pairs, value: str) -> Finding:
     """How the metric changes along the values, with the lead of a value over all others."""
-    ahead = _least(pairs.leads(value), f"{setting(pairs.field, value)} above the best other")
+    leads = pairs.leads(value)
+    name = f"{setting(pairs.field, value)} above the best other"
+    ahead = _points(leads.loc[leads["difference"].idxmin()], name)
     return Finding(judge(pairs.shape, pairs.position(value)), (ahead,), pairs.course)
 
 
@@ -380,6 +422,9 @@ def selected_uavs(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     best = points[choice.best].values
     uavs = Quantity.exact(best["uavs"], choice.missions, "number", "UAVs")
     note = ", ".join(setting(field, value_text(value)) for field, value in best.items())
+    left = {choice.best, *choice.survivors}
+    fleets = sorted({points[n].values["uavs"] for n in left})
+    note += f"; settings not ruled out: {len(left)}, UAVs {numbers.words([*map(str, fleets)])}"
     return Finding(judge(choice, wanted), (uavs,), note)
 
 
@@ -444,5 +489,7 @@ def _points(row: pd.Series, name: str = "") -> Quantity:
     return Quantity(interval, int(row["n"]), "points", name)
 
 
-def _least(leads: pd.DataFrame, name: str) -> Quantity:
-    return _points(leads.sort_values("difference", kind="stable").iloc[0], name)
+def _widened(row: pd.Series) -> Quantity:
+    """The interval of a row of ``main_effects.changes`` that holds for all rows at once."""
+    interval = Interval(*map(float, row[["difference", "wide_low", "wide_high"]]))
+    return Quantity(interval, int(row["n"]), "points", "widened for their number")

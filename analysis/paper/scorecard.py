@@ -67,6 +67,7 @@ class Claim(NamedTuple):
         compared: The parameter whose values are compared, and the metric, if it is about such.
         printed: The paper's number, if it prints one.
         basis: What is measured, in words, if the text does not say so.
+        weakness: Whether the claim is that something is lost, so that no policy passes it.
     """
 
     page: str
@@ -78,6 +79,7 @@ class Claim(NamedTuple):
     compared: Mapping[str, Any] | None = None
     printed: measures.Quantity | None = None
     basis: str = ""
+    weakness: bool = False
 
 
 def _claim(
@@ -136,6 +138,16 @@ COLUMNS = ("the best learned policy", PAPERS_NETWORK, *NULLS)
 VARIANTS = ("quick", "no transfer")
 
 
+# The kinds of claims, by what is known of the policies that have learned nothing.
+DIAGNOSTIC, PASSED, OPEN, WEAKNESS = "diagnostic", "passed without learning", "open", "weakness"
+KINDS = {
+    DIAGNOSTIC: "The diagnostic claims: every policy without learning is shown to fail them",
+    PASSED: "Claims that a policy passes that has learned nothing",
+    OPEN: "Claims that no policy without learning passes, nor is each shown to fail them",
+    WEAKNESS: "Weaknesses that the paper names: a policy has them too, or does not have them",
+}
+
+
 @dataclass(frozen=True)
 class Row:
     """A claim of the paper, its rule in words, and the findings of each policy."""
@@ -145,9 +157,22 @@ class Row:
     findings: tuple[measures.Finding, ...]
 
     @property
-    def is_diagnostic(self) -> bool:
-        """Whether no policy passes the claim that has learned nothing."""
-        return not any(finding.holds for finding in self.findings[-len(NULLS) :])
+    def kind(self) -> str:
+        """One of ``KINDS``.
+
+        A claim is diagnostic if every policy that has learned nothing, and to which it applies, is
+        shown to fail it. A policy that is inconclusive is not.
+        """
+        if self.claim.weakness:
+            return WEAKNESS
+        nulls = [
+            finding
+            for finding in self.findings[-len(NULLS) :]
+            if finding.outcome != measures.NOT_APPLICABLE
+        ]
+        if any(finding.passes for finding in nulls):
+            return PASSED
+        return DIAGNOSTIC if nulls and all(finding.fails for finding in nulls) else OPEN
 
 
 def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[Row]:
@@ -258,23 +283,43 @@ def _finding(
         )
     if any(quantity.n == 1 for quantity in found.quantities):
         found = replace(found, verdict=INCONCLUSIVE)  # one mission or training shows nothing
-    first, against = found.quantities[0], ""
-    if printed and first.unit == printed.unit and first.unit in ("share", "points"):
-        against = position(first.interval, printed.interval.mean)
-    return replace(found, policy=of_study.policy, against=against)
+    found = replace(found, policy=of_study.policy, weakness=claim.weakness)
+    first, *others = found.quantities
+    if not printed or first.unit != printed.unit or first.unit not in ("share", "points"):
+        return found
+    beyond = rules.gap(first.interval, printed.interval)
+    shown = first, measures.Quantity(beyond, 0, "points", "minus the paper's"), *others
+    return replace(found, quantities=shown, against=position(beyond))
+
+
+def of_kind(rows: Iterable[Row], kind: str) -> list[Row]:
+    """The claims of one of ``KINDS``."""
+    return [row for row in rows if row.kind == kind]
 
 
 def answer(rows: Sequence[Row]) -> str:
-    """How many claims hold for the best learned policy, diagnostic ones and all, in words."""
-    telling = [row for row in rows if row.is_diagnostic]
-    held, all_held = (sum(row.findings[0].holds for row in of) for of in (telling, rows))
-    short = [f"“{r.claim.text}”" for r in telling if r.findings[0].outcome == measures.FALLS_SHORT]
-    return (
-        f"Of {len(rows)} claims, {len(telling)} are diagnostic: {numbers.words(NULLS)} do not pass "
-        f"them. {names(rows)[0]} passes {held} of these {len(telling)}, and {all_held} of all."
-        + f" It falls short of {numbers.words(short)}; open: {len(telling) - held - len(short)}."
-        * bool(short)
+    """How many claims hold for the best learned policy, by kinds of claims, in words.
+
+    A weakness that the policy shares with the paper's is no claim that it passes.
+    """
+    telling, passed, undecided, weaknesses = (of_kind(rows, kind) for kind in KINDS)
+    policy = names(rows)[0]
+    held = sum(row.findings[0].passes for row in telling)
+    short = [f"“{row.claim.text}”" for row in telling if row.findings[0].fails]
+    without = sum(row.findings[0].passes for row in (*passed, *undecided))
+    shared = sum(row.findings[0].outcome == measures.SHARED for row in weaknesses)
+    sentences = [
+        f"Of {len(rows)} claims, {len(telling)} are diagnostic: {numbers.words(NULLS)}, as far as "
+        f"they were simulated, are shown to fail them. {policy} passes {held} of these "
+        f"{len(telling)}."
+    ]
+    if short:
+        sentences.append(f"It falls short of {numbers.words(short)}.")
+    sentences.append(
+        f"It passes {without} of {len(passed) + len(undecided)} claims that say nothing about "
+        f"learning, and has {shared} of {len(weaknesses)} weaknesses that the paper names."
     )
+    return " ".join(sentences)
 
 
 def names(rows: Sequence[Row]) -> list[str]:
@@ -288,14 +333,15 @@ def names(rows: Sequence[Row]) -> list[str]:
 
 
 def counts(rows: Sequence[Row]) -> pd.DataFrame:
-    """The number of verdicts of each kind, for every policy, of diagnostic claims and of all."""
+    """The number of verdicts, for every policy and kind of claims; without those never given."""
     table = []
-    for claims, of in (("diagnostic", [row for row in rows if row.is_diagnostic]), ("all", rows)):
+    for kind in KINDS:
         for number, name in enumerate(names(rows)):
-            given = Counter(row.findings[number].outcome for row in of)
+            given = Counter(row.findings[number].outcome for row in of_kind(rows, kind))
             counted = {outcome.capitalize(): given[outcome] for outcome in measures.OUTCOMES}
-            table.append({"Claims": claims, "Policy": name, **counted})
-    return pd.DataFrame(table)
+            table.append({"Claims": kind, "Policy": name, **counted})
+    frame = pd.DataFrame(table)
+    return frame.loc[:, [bool(frame[column].any()) for column in frame]]
 
 
 def against_paper(rows: Iterable[Row]) -> pd.DataFrame:

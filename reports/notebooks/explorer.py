@@ -48,7 +48,7 @@ html.say(
 )
 
 # %% [markdown]
-# ## The setting in the middle
+# ## The setting at which the sliders start
 
 # %%
 table = numbers.wide(start, "policy").rename(columns=metrics.METRICS).reset_index(names="Policy")

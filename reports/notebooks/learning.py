@@ -40,22 +40,39 @@ html.lead(*answers.methods(rungs))
 # %% [markdown]
 # ## Why: the effect of each method
 #
-# Every variant is the config `quick` with one change and the same number of updates. The **guard**
-# masks actions after which it is too late to return for charging. With **low-battery starts** some
-# missions begin in the zone with little battery, and with **early returns** some UAVs return as
-# soon as they may. **Transfer**: phase I, without battery decrease, comes first. **maps** is the
-# paper's network.
+# Every variant is the config `quick` with the changes of its name, and as many updates. The
+# **guard** masks actions after which it is too late to return for charging. With **low-battery
+# starts** some missions begin in the zone with little battery, and with **early returns** some UAVs
+# return as soon as they may. **Transfer**: phase I, without battery decrease, comes first. **maps**
+# is the paper's network.
 
 # %%
 table = answers.ablation(equal, baseline)
 html.figure(*answers.variants(table, equal, baseline, "The product that every variant reaches"))
 
 # %% [markdown]
+# What a method adds depends on the methods that are there before it.
+
+# %%
+html.say("{text}", text=answers.without_each(last))
+
+# %% [markdown]
 # ## <a id="fig-3"></a>Transfer learning: the paper's Fig. 3
 #
-# The paper claims a higher reward at every step, and a higher product in the end. With its methods
-# alone most trainings do not learn to charge: hardly a UAV enters the zone with a low battery and
-# waits there, so the replay memory has no transition that shows what a charge is worth.
+# The paper claims a higher reward at every step, and a higher product in the end. A training learns
+# to charge from transitions in which a UAV enters the zone with a low battery and waits there.
+
+# %%
+html.say(
+    "How many trainings learn to charge: {counts}.",
+    counts=numbers.words(
+        [
+            f"{name} with transfer {answers.learning_to_charge(last, using)}, without "
+            f"{answers.learning_to_charge(last, without)}"
+            for name, (using, without) in answers.pairs_in(trainings).items()
+        ]
+    ),
+)
 
 # %%
 html.gallery(answers.transfer_drawings(trainings), answers.TRAININGS)

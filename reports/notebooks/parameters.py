@@ -40,7 +40,7 @@ ratios = main_effects.changes_by_field(fig5, effects, metrics.RATIO)
 level, checks = numbers.level(LEVEL), summary.checks(sweet)
 
 # %%
-html.answer(main_effects.answer(effects, leading))
+html.answer(main_effects.answer(effects, policies))
 
 # %%
 most = effects[effects["field"].isin(main_effects.strongest(effects, leading))]

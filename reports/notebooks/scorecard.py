@@ -39,7 +39,6 @@ smaller = paths_in(Path(results), f"*{scorecard.SMALLER}/{MANIFEST}")
 names = ("table4", "fig4", "fig5", "sweet-spot", *(path.parent.name for path in smaller))
 studies = {name: load_results(Path(results) / name) for name in names}
 rows = scorecard.scorecard(studies, read_curves(folder / "curves.parquet"))
-telling = [row for row in rows if row.is_diagnostic]
 against = scorecard.against_paper(rows)
 
 # %%
@@ -58,13 +57,20 @@ html.lead(
 # %% [markdown]
 # ## Why
 #
-# A claim is *diagnostic* if no policy passes it that has learned nothing. Only such claims say
-# something about learning; the others follow from the model or from the return guard. A number is
-# *matched* if our interval reaches it, *exceeded* if the whole interval is above it.
+# A claim is *diagnostic* if every policy that has learned nothing is shown to fail it: only such
+# claims say something about learning. An inconclusive result shows no failure. A number is
+# *matched* if the interval of our number minus the paper's reaches 0, and *exceeded* if all of it
+# is above. A claim that something is lost is a *weakness*: to have it too is no merit.
+
 
 # %%
-caption, columns = "The diagnostic claims", scorecard.names(telling)
-html.rendered("scorecard.html", rows=telling, columns=columns, caption=caption)
+def table(kind: str) -> None:
+    if claims_of_kind := scorecard.of_kind(rows, kind):
+        values = {"columns": scorecard.names(rows), "caption": scorecard.KINDS[kind]}
+        display(html.rendered("scorecard.html", rows=claims_of_kind, **values))
+
+
+table(scorecard.DIAGNOSTIC)
 
 # %% [markdown]
 # ## How far to trust it
@@ -80,9 +86,8 @@ html.table(scorecard.counts(rows), "Verdicts by policy")
 # ## Tables
 
 # %%
-others = [row for row in rows if not row.is_diagnostic]
-caption, columns = "Claims that a policy passes that has learned nothing", scorecard.names(others)
-html.rendered("scorecard.html", rows=others, columns=columns, caption=caption)
+for kind in (scorecard.PASSED, scorecard.OPEN, scorecard.WEAKNESS):
+    table(kind)
 
 # %% [markdown]
 # ## How this page was made

@@ -53,9 +53,8 @@ html.lead(asked.plot(), "Paired differences of the metrics", f"{pairs}; bars are
 # %%
 html.say("Of the pairs, {better}.", better=html.composed(asked.winners()))
 
-# %% [markdown]
-# A failed mission counts 0 in the product: a policy that gains a little in most missions and fails
-# in a few more can be better in most of them and worse on average.
+# %%
+html.say("{contrasts}", contrasts=html.composed(asked.contrasts()))
 
 # %%
 extended = [metric for metric in measured(found) if found.missions[metric].any()]
@@ -86,13 +85,14 @@ html.gallery([drawing for example in examples for drawing in example.drawings()]
 
 # %% [markdown]
 # ## How far to trust it
-#
-# A difference is inconclusive (≈) if its interval contains 0. Intervals of the means may overlap
-# although the paired difference is clear. A learned policy is used as it was trained; in a setting
-# far from its training, a new training may do better.
 
 # %%
-html.say("{answer}\n\n{notes}", answer=html.composed(asked.answer()), notes=page.notes(found))
+html.say(
+    "{answer}\n\n{reading}\n\n{notes}",
+    answer=html.composed(asked.answer()),
+    reading=html.composed(asked.reading()),
+    notes=page.notes(found),
+)
 
 # %%
 html.table(

@@ -8,7 +8,7 @@ from dess import InputError
 from dess.analysis.metrics import METRICS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.intervals import interval_of
-from dess.reports.explorer import explorer
+from dess.reports.explorer import Grid, explorer
 from tests.analysis.small import grid
 
 DESIGN = {"uavs": [1, 2, 3], "charge_complete": [40, 60], "initial_data": [[1, 2], 5]}
@@ -106,6 +106,14 @@ def test_moving_a_slider_shows_the_figures_of_the_grid(visit, results, document)
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     assert opened.complaints == []
     assert opened.requests == [document.as_uri()]
+
+
+def test_the_answer_names_the_setting_at_which_the_sliders_start(results):
+    """Two of them start at an end of their values, not in the middle of a range."""
+    said = Grid(results).answer()
+    assert said.startswith("With ") and "middle" not in said
+    assert "2 UAVs" in said.partition(", the product is ")[0]
+    assert "60" in said.partition(", the product is ")[0]
 
 
 def test_policies_are_chosen(visit, document):

@@ -37,8 +37,8 @@ html.lead(*lead)
 # %% [markdown]
 # ## Why
 #
-# The age of a node grows until a UAV empties it. A node without new data cannot be emptied, so at
-# low rates no fleet can keep the age below the mean time between arrivals.
+# The age of a node grows until a UAV empties it. A node without new data cannot be emptied: its age
+# grows until data arrive and are collected.
 
 # %%
 html.gallery(others)
@@ -71,10 +71,13 @@ html.table(
 # %% [markdown]
 # ## How this page was made
 #
-# No UAV can fill its quota, so every mission lasts to its last slot. The zone is in the middle of
-# the grid of 25 nodes; the rest is the paper's scenario. The age of a mission is the mean over time
-# and nodes, the peak age that just before nodes are emptied. `greedy` weighs the data of nodes
-# against the distance, `age` their age.
+# The quota is larger than what a UAV can fill. The zone is in the middle of the grid of 25 nodes;
+# the rest is the paper's scenario. The age of a mission is the mean over time and nodes, the peak
+# age that just before nodes are emptied. `greedy` weighs the data of nodes against the distance,
+# `age` their age.
+
+# %%
+html.say("{lengths}", lengths=operations.lengths(study))
 
 # %%
 html.provenance([study])

@@ -41,9 +41,11 @@ html.lead(*drawn[PRODUCT])
 # %% [markdown]
 # ## Why
 #
-# All UAVs take off together, so they come home to charge in waves. Pads are given in the order of
-# requests; a UAV that waits flies in place and uses its battery. The return guard plans for waits
-# and sends UAVs home earlier, so few pads cost data rather than success.
+# Pads are given in the order of requests; a UAV that waits flies in place and uses its battery. The
+# return guard plans for waits and sends UAVs home earlier. What the fewest pads cost:
+
+# %%
+html.say("{lines}", lines=html.composed(operations.few_pads(study)))
 
 # %%
 html.figure(*operations.waits(study, margin))

@@ -13,6 +13,7 @@ from dess import InputError
 from dess.analysis import marl_eval_data, rliable_scores
 from dess.analysis.answers import learning
 from dess.analysis.answers.learning import CURVE, CURVES, FINAL, difference, read_curve, read_curves
+from dess.analysis.metrics import SUCCESS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess.policies.registry import TRAINED
@@ -230,3 +231,23 @@ def test_trainings_that_differ_in_their_seed_are_of_one_learner():
     trained = [learning.Trained(name, config, curve) for name, config in configs.items()]
     sizes = learning.curves_by_learner(trained).groupby(["variant", "seed"]).size()
     assert sizes.to_dict() == {("one and two", 1): 2, ("one and two", 2): 2, ("other", 1): 2}
+
+
+def test_the_answer_names_no_largest_step_and_counts_what_is_needed():
+    """The order of the methods decides the steps: what is needed is seen where one is missing."""
+
+    def of(products: dict[str, list[float]]) -> pd.DataFrame:
+        rows = [(name, p, float(p > 0)) for name, values in products.items() for p in values]
+        return pd.DataFrame(rows, columns=["variant", FINAL, f"final_{SUCCESS}"])
+
+    one_less = {"no guard": [0.6] * 3, "no low-battery starts": [0.7] * 3}
+    one_less["no early returns"] = [0.7] * 3
+    last = of({"none of the three": [0.0] * 3, **one_less, "quick": [0.7, 0.7, 0.8]})
+    said = learning.answer(learning.ladder(last))
+    assert "step" not in said and "rises" not in said
+    assert "0 of 3 (the paper's methods)" in said
+    assert "3 of 3 without the guard" in learning.without_each(last)
+    assert learning.without_each(last).endswith("no single method is needed for it.")
+    failing = of(one_less | {"no guard": [0.6, 0.0, 0.0]})
+    assert "1 of 3 without the guard" in learning.without_each(failing)
+    assert "needed" not in learning.without_each(failing)

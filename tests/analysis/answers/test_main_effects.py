@@ -92,3 +92,18 @@ def test_changes_are_paired_by_replication(results, table):
     columns = ["difference", "wide_low", "wide_high"]
     assert pairs.loc[2, columns].tolist() == pytest.approx([*wide[:3]])
     assert pairs["p_adjusted"].tolist() == adjust(pairs["p"].to_numpy(), "holm").tolist()
+
+
+def test_the_answer_says_of_every_policy_where_a_parameter_leads():
+    """A large quota may hurt one policy and help another one."""
+    means = {"learned": (0.9, 0.785), "greedy": (0.6, 0.69)}
+    table = pd.DataFrame(
+        {"field": "quota", "position": position, "value": value, "policy": policy,
+         "metric": PRODUCT, "mean": of_policy[position], "n": 300}
+        for policy, of_policy in means.items()
+        for position, value in enumerate(("440", "600"))
+    )  # fmt: skip
+    said = main_effects.answer(table, ["learned", "greedy"])
+    assert "of learned depends most on the quota (from 90.0 % at 440 to 78.5 % at 600)." in said
+    assert "of greedy depends most on the quota (from 60.0 % at 440 to 69.0 % at 600)." in said
+    assert said.endswith("n = 300 missions per value.")

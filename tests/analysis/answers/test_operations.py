@@ -8,7 +8,7 @@ import pytest
 
 from dess import InputError
 from dess.analysis.answers import operations
-from dess.analysis.metrics import AGE, PRODUCT
+from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS
 from dess.analysis.stats.differences import relative_change
 from tests.analysis.small import grid
 
@@ -76,6 +76,17 @@ def test_the_lower_end_decides_and_one_pad_may_be_enough(pads):
     assert found["too_few"].tolist() == [0, 0]
 
 
+def test_what_the_fewest_pads_cost_is_computed(pads):
+    """One pad may cost the success of a large fleet and hardly any data."""
+    failing = planted(pads, SUCCESS, lambda row: float(row["uavs"] == 2 or row["pads"] > 1))
+    failing = planted(failing, RATIO, lambda row: 0.97 - 0.06 * (row["pads"] == 1))
+    lines = operations.few_pads(failing).splitlines()
+    assert lines[0].startswith("- The success of 2 UAVs is 100.0 % with 1 pad and 100.0 % with 4: ")
+    assert lines[1].startswith("- The success of 4 UAVs is 0.0 % with 1 pad and 100.0 % with 4: ")
+    assert "−100.0 [" in lines[1] and lines[1].endswith(" points, n = 40.")
+    assert "2 UAVs is 91.0 % with 1 pad and 97.0 % with 4: −6.0 [" in lines[2]
+
+
 def test_a_relative_change_is_that_of_the_means():
     reference = np.array([100.0, 110.0, 90.0, 100.0])
     assert relative_change(0.5 * reference, reference) == pytest.approx((-0.5, -0.5, -0.5))
@@ -102,6 +113,10 @@ def test_the_age_is_compared_with_the_published_effect(studied):
     # By hand: 80 to 84 in five missions, so half a width of t * sqrt(2.5 / 5) with t = 2.776.
     assert "From 1 to 3 UAVs the mean age of the data falls from 82.0 [80.0, 84.0] to" in text
     assert "to 27.3 [26.7, 28.0] slots at an arrival rate of 0.5" in text
+    grown = planted(results, AGE, lambda row: (80 + row["replication"]) * row["uavs"])
+    assert "From 1 to 3 UAVs the mean age of the data rises from 82.0 [" in operations.age(grown)
+    level = planted(results, AGE, lambda row: 80 + row["replication"] % (2 + row["uavs"]))
+    assert "the mean age of the data does not surely change, from" in operations.age(level)
 
 
 def test_failures_are_compared_with_none(studied):
@@ -144,3 +159,11 @@ def test_the_queue_of_the_logs_is_that_of_the_records(pads):
     waited = (missions["queue"] * missions["slots"]).sum() / 2
     assert table["mean"].sum() == pytest.approx(waited) and waited > 0
     assert (table["low"] <= table["high"]).all()
+
+
+def test_how_long_missions_last_is_counted(pads):
+    longest = pads.scenario().max_slots
+    lasting = planted(pads, "slots", lambda row: longest - (row["replication"] == 0))
+    assert operations.lengths(lasting) == f"312 of 320 missions last to the last slot, {longest:,}."
+    lasting = planted(pads, "slots", lambda row: longest)
+    assert operations.lengths(lasting) == f"Every mission lasts to its last slot, {longest:,}."

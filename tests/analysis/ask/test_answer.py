@@ -168,6 +168,38 @@ def test_the_typical_mission_has_the_median_difference_and_the_worst_the_least_l
     assert (even.typical().replication, even.worst().replication) == (2, 1)
 
 
+def test_what_contradicts_the_mean_is_said_only_where_it_occurs(answer):
+    """Better in most missions and worse on average, because of failed missions."""
+
+    def contrasts(before, after):
+        made = with_missions(answer, before, after, [0.5] * 4)
+        missions = made.results.missions
+        missions = missions.assign(success=(missions[PRODUCT] > 0).astype(float))
+        return replace(made, results=replace(made.results, missions=missions)).contrasts()
+
+    said = contrasts([0.5, 0.5, 0.5, 0.5], [0.6, 0.6, 0.6, 0.0])
+    assert said.startswith("With greedy, the product is higher in more missions than it is lower, ")
+    assert said.endswith("lower on average: a failed mission counts 0, and 1 fail in place of 0.")
+    assert contrasts([0.5] * 4, [0.6] * 4) == ""
+    assert contrasts([0.5, 0.5, 0.5, 0.5], [0.6, 0.6, 0.6, 0.1]).endswith("lower on average.")
+
+
+def test_what_is_explained_occurs(answer, monkeypatch):
+    """Intervals that overlap, marks that are used, and learned policies."""
+    assert "learned policy" not in answer.reading()
+    monkeypatch.setattr(found, "verdict", lambda _: ABOVE)
+    assert "≈" not in answer.reading()
+    monkeypatch.setattr(found, "verdict", lambda _: INCONCLUSIVE)
+    assert "≈" in answer.reading() and "overlap" not in answer.reading()
+
+
+def test_a_metric_that_is_equal_in_all_missions_has_no_correlation(answer, monkeypatch):
+    table = answer.table().assign(variance_reduction=np.nan, correlation=np.nan)
+    monkeypatch.setattr(found, "answers", lambda _: table)
+    assert set(answer.pairing()["Correlation"]) == {"no variance"}
+    assert "nan" not in answer.pairing().to_string()
+
+
 def test_the_best_policy_of_each_side_is_found(answer):
     table = found.means(answer.results)
     for point in (BASELINE, VARIATION):

@@ -12,19 +12,26 @@ from dess.analysis import load_study, run_study
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.paper import values as paper
 from dess.analysis.paper.measures import (
+    ABSENT,
     EXCEEDS,
     FALLS_SHORT,
     MATCHES,
     NO_RESULTS,
     NOT_APPLICABLE,
+    SHARED,
     VERDICTS,
     Finding,
 )
 from dess.analysis.paper.scorecard import (
+    DIAGNOSTIC,
     NULLS,
+    OPEN,
+    PASSED,
     TRAININGS,
     VARIANTS,
+    WEAKNESS,
     Row,
+    answer,
     scorecard,
 )
 from dess.analysis.results.tables import Results
@@ -123,29 +130,62 @@ def test_every_claim_is_judged_by_the_learned_policy_alone(rows):
         assert [null.policy for null in nulls] == ([""] * 3 if learning else [*NULLS])
 
 
-@pytest.mark.parametrize("null", [NULLS[0], pytest.param(NULLS[1], marks=pytest.mark.slow)])
-def test_in_the_place_of_the_learned_policy_a_null_passes_no_diagnostic_claim(null, studies):
-    posing = {}
-    for name in ("table4", "fig5"):
-        missions = studies[name].missions
-        others = missions[missions["policy"] != "ddqn"]
-        copied = missions[missions["policy"] == null].assign(policy="ddqn")
-        together = pd.concat([others, copied], ignore_index=True)
-        posing[name] = replace(studies[name], missions=together)
-    found = [row for row in scorecard(posing, NONE) if row.is_diagnostic]
-    assert found and sum(row.findings[0].holds for row in found) <= 2
-
-
 def test_what_holds_above_the_papers_number_exceeds_it():
+    """And what holds below it, such as +2.1 [+1.2, +3.0] for +4.4, does not match it."""
     outcomes = {
         Finding(HOLDS, against=ABOVE): EXCEEDS,
         Finding(HOLDS, against=INCONCLUSIVE): MATCHES,
+        Finding(HOLDS, against=BELOW): HOLDS,
+        Finding(HOLDS): HOLDS,
+        Finding(HOLDS, against=ABOVE, weakness=True): SHARED,
+        Finding(REFUTED, weakness=True): ABSENT,
         Finding(IN_PART, against=BELOW): FALLS_SHORT,
         Finding(REFUTED): FALLS_SHORT,
         Finding(IN_PART): INCONCLUSIVE,
         Finding(NO_RESULTS): NOT_APPLICABLE,
     }
     assert all(finding.outcome == outcome for finding, outcome in outcomes.items())
+
+
+@pytest.mark.parametrize(
+    ("of_nulls", "weakness", "kind"),
+    [
+        ((REFUTED, REFUTED, REFUTED), False, DIAGNOSTIC),
+        ((REFUTED, NO_RESULTS, NO_RESULTS), False, DIAGNOSTIC),
+        ((REFUTED, INCONCLUSIVE, REFUTED), False, OPEN),
+        ((NO_RESULTS, NO_RESULTS, NO_RESULTS), False, OPEN),
+        ((INCONCLUSIVE, HOLDS, REFUTED), False, PASSED),
+        ((REFUTED, REFUTED, REFUTED), True, WEAKNESS),
+    ],
+)
+def test_a_claim_is_diagnostic_if_policies_without_learning_are_shown_to_fail(
+    rows, of_nulls, weakness, kind
+):
+    verdicts = (HOLDS, NO_RESULTS, *of_nulls)
+    findings = tuple(Finding(verdict, weakness=weakness) for verdict in verdicts)
+    claim = rows[0].claim._replace(weakness=weakness)
+    row = Row(claim, "a rule", findings)
+    assert row.kind == kind
+    passed = "the best learned policy passes 1 of these 1."
+    assert (passed in answer([row])) == (kind == DIAGNOSTIC)
+    assert f"has {weakness:d} of {weakness:d} weaknesses" in answer([row])
+
+
+def test_a_verdict_uses_the_intervals_that_are_shown(rows):
+    """That on sectors is about the share above chance, that on ignored nodes about a difference."""
+    sectors = learned(rows, "divide the nodes into two sectors")
+    own, by_chance, more, _ = sectors.quantities
+    assert more.interval.mean == pytest.approx(own.interval.mean - by_chance.interval.mean)
+    assert more.interval.low < more.interval.mean < more.interval.high
+    ignored = learned(rows, "ignores the leftmost")
+    assert [quantity.unit for quantity in ignored.quantities] == ["share", "points"]
+    for row in rows:
+        for finding in row.findings:
+            if row.claim.printed and finding.against:
+                first, beyond = finding.quantities[:2]
+                assert beyond.name == "minus the paper's"
+                gap = first.interval.mean - row.claim.printed.interval.mean
+                assert beyond.interval.mean == pytest.approx(gap)
 
 
 def test_without_results_there_are_no_verdicts(rows):
