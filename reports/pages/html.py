@@ -60,7 +60,7 @@ _MARKUP = re.compile(
 _BARE = dict.fromkeys(("name", "alt", "source", "narrow", "player", "caption", "links"), "")
 # The coordinates in a figure, a number with many decimals, the space around a command of a path.
 _PLACES, _DIGITS = re.compile(rb' (?:d|x|y)="[^"]*"'), re.compile(rb"(\.\d)\d+")
-_EMPTY_HEADER = re.compile(r"<th[^>]*></th>")  # which is no header for a screen reader
+_EMPTY_HEADER = re.compile(r"<th([^>]*)></th>")  # which is no header for a screen reader
 _BREAKS = re.compile(rb"\s+([LCQz]) ?")
 _INDEX = re.compile(r"\bC_([SC])\b")  # as in C_S, a threshold of charging
 # What a file says of its origin, without the time.
@@ -261,7 +261,7 @@ def table(
     """
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
-    html = str(indexed(Markup(_EMPTY_HEADER.sub("<td></td>", html))))
+    html = str(indexed(Markup(_EMPTY_HEADER.sub(r"<td\1></td>", html))))
     caption = ". ".join(filter(None, [caption, numbers.why_nan(frame.to_numpy().flat)]))
     if caption:
         html = html.replace(">", f"><caption>{indexed(caption)}</caption>", 1)
