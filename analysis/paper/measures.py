@@ -245,7 +245,7 @@ class Finding:
 
     @property
     def passes(self) -> bool:
-        """Whether the policy passes the claim; nobody passes one about a weakness."""
+        """Whether the policy passes the claim; no policy passes one about a weakness."""
         return self.verdict == HOLDS and not self.weakness
 
     @property

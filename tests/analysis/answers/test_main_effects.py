@@ -104,6 +104,12 @@ def test_the_answer_says_of_every_policy_where_a_parameter_leads():
         for position, value in enumerate(("440", "600"))
     )  # fmt: skip
     said = main_effects.answer(table, ["learned", "greedy"])
-    assert "of learned depends most on the communication quota (from 90.0 % at 440 to 78.5 % at 600)." in said
-    assert "of greedy depends most on the communication quota (from 60.0 % at 440 to 69.0 % at 600)." in said
+    assert (
+        "of learned depends most on the communication quota (from 90.0 % at 440 to 78.5 % at 600)."
+        in said
+    )
+    assert (
+        "of greedy depends most on the communication quota (from 60.0 % at 440 to 69.0 % at 600)."
+        in said
+    )
     assert said.endswith("n = 300 missions per value.")

@@ -1,0 +1,27 @@
+"""Tables on pages: every head stands over its columns."""
+
+import re
+
+import pandas as pd
+
+from dess.reports.pages import html
+
+_CELL = re.compile(r"<(th|td)([^>]*)>(.*?)</\1>")
+
+
+def heads_over(row: str) -> list[str]:
+    """The head over each column, of a row of heads."""
+    cells = _CELL.findall(row)
+    spans = [int((re.findall(r'colspan="(\d+)"', look) or ["1"])[0]) for _, look, _ in cells]
+    return [text for (*_, text), span in zip(cells, spans, strict=True) for _ in range(span)]
+
+
+def test_the_head_of_a_group_stands_over_its_columns():
+    """Also beside columns that belong to no group."""
+    columns = [("", "Mission"), ("", "Points"), ("ddqn", "Success"), ("ddqn", "Collected")]
+    frame = pd.DataFrame([["7", "−3", "yes", "91.0 %"]], columns=pd.MultiIndex.from_tuples(columns))
+    heads = re.findall(r"<tr[^>]*>(.*?)</tr>", html.table(frame).data.partition("<tbody>")[0], re.S)
+    assert [heads_over(row.replace("\n", "")) for row in heads] == [
+        ["", "", "ddqn", "ddqn"],
+        ["Mission", "Points", "Success", "Collected"],
+    ]
