@@ -4,7 +4,9 @@ A page contains ``library()`` once, before its first ``player``; then it needs n
 drawn is in ``templates/player.js``.
 
     display(library())
-    display(player(log, scenario, "player-1", "One UAV"))
+    display(player([Shown(log, scenario, "One UAV")], "player-1"))
+
+Without JavaScript, and on paper, a player is a map with the paths of the UAVs.
 
 A file is a GIF, or a video in MP4, which needs the program ffmpeg. Its frames show what the player
 shows, drawn by matplotlib.
@@ -12,10 +14,10 @@ shows, drawn by matplotlib.
     write_animation(log, scenario, "mission.gif", GIF)
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from subprocess import CalledProcessError
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -35,6 +37,37 @@ from dess.reports.pages.html import Part, figures, template
 from dess.scenario import Scenario
 
 TRAIL = 12  # number of last moves that are drawn behind a UAV
+# The events that a player jumps to, in words; of a pad, the text has no number.
+JUMPS = {
+    "charge_start": "UAV {} starts to charge",
+    "charge_end": "UAV {} stops charging",
+    "quota_filled": "UAV {} has filled its quota",
+    "landing": "UAV {} has landed",
+    "battery_empty": "the battery of UAV {} is empty",
+    "uav_failure": "UAV {} fails",
+    "uav_repair": "UAV {} can fly again",
+    "pad_failure": "a charging pad fails",
+    "pad_repair": "a charging pad can be used again",
+    "node_failure": "node {} falls silent",
+    "node_repair": "node {} answers again",
+}
+AT_START = {"charge_start"}  # events at the start of a slot; the state after it shows them
+
+
+class Shown(NamedTuple):
+    """A mission that a player shows.
+
+    Attributes:
+        events: The event log (a data frame, or the columns, of ``dess.record.EventLog``).
+        scenario: The scenario of the mission.
+        title: The text above the map.
+        choice: The text of the mission where several can be chosen from.
+    """
+
+    events: event_log.Events
+    scenario: Scenario
+    title: str = ""
+    choice: str = ""
 
 
 class Playback:
@@ -89,6 +122,42 @@ class Playback:
             return f"{now} of {end} · {left * data:,.3g} MB left · {used}"
         return f"slot {slot} of {self.end} · {left:.1f} data units left · {used}"
 
+    def jumps(self) -> Iterator[tuple[int, str]]:
+        """The slots at which something notable is seen, in their order, and what it is in words."""
+        by_slot: dict[int, list[str]] = {}
+        log = self._log[self._log["event"].isin([*JUMPS])]
+        for row in log.itertuples():
+            slot = int(row.time) + (row.event in AT_START)
+            by_slot.setdefault(slot, []).append(JUMPS[row.event].format(self._name(row)))
+        for slot in sorted(by_slot):
+            yield slot, ", ".join(by_slot[slot])
+
+    def _name(self, row: Any) -> str | int:
+        """The number of the UAV of an event, or the name of its node."""
+        if row.uav >= 0:
+            return int(row.uav) + 1
+        names = self.scenario.names
+        return names[int(row.node)] if names else int(row.node)
+
+    @property
+    def unit(self) -> float:
+        """The length of a 32nd of the longer side of the map [cells], by which marks are scaled."""
+        return max(self.scenario.size) / 32
+
+    @property
+    def radii(self) -> list[tuple[float, float]]:
+        """For every node the radii of its most and of its last data on the map [cells]."""
+        largest = max(self.residual.max(), 1e-9)
+        data = np.column_stack([self.residual.max(axis=0), self.residual[-1]])
+        radii = 0.8 * self.unit * np.sqrt(data / largest)
+        return [(most, last) for most, last in radii.round(2).tolist()]
+
+    @property
+    def paths(self) -> list[list[tuple[int, int]]]:
+        """For every UAV the corners of its path, from its start to where its mission ended."""
+        return [_corners(self.fleet["x"][:, uav], self.fleet["y"][:, uav])
+                for uav in range(self.scenario.uavs)]  # fmt: skip
+
     @property
     def data(self) -> dict[str, Any]:
         """All that a player in a page shows, as JSON; lists of states are in the order of slots."""
@@ -108,9 +177,19 @@ class Playback:
             "fleet": {name: (1 * values).tolist() for name, values in self.fleet.items()},
             "residual": self.residual.round(2).tolist(),
             "status": [self.status(slot) for slot in range(self.end + 1)],
+            "events": [*self.jumps()],
             "ages": event_log.ages(log).round(2).to_numpy().tolist() if aged else None,
             "meanAge": event_log.mean_age(log).round(2).to_numpy().tolist() if aged else None,
         }
+
+
+def _corners(x: np.ndarray, y: np.ndarray) -> list[tuple[int, int]]:
+    """The cells at which a path begins, turns and ends."""
+    cells = np.column_stack([x, y])
+    moves = np.diff(cells, axis=0)
+    cells, moves = cells[np.r_[True, moves.any(axis=1)]], moves[moves.any(axis=1)]
+    turns = np.r_[True, (moves[1:] != moves[:-1]).any(axis=1), True] if len(moves) else [True]
+    return [(int(x), int(y)) for x, y in cells[turns]]
 
 
 def units_of(scenario: Scenario) -> dict[str, tuple[str, float]]:
@@ -138,7 +217,9 @@ READING = (
     "is a UAV, with its last moves and a line to the node that it serves most; it turns pale when "
     "its mission is over. A full square is a UAV that charges, an empty one a UAV that waits for a "
     "pad. A tick means that the quota was filled, or that the UAV has landed. A click in the "
-    "panels goes to another slot; space plays and pauses, the arrows, Home and End change the slot."
+    "panels goes to another slot, and one on the map tells about a UAV or a node. Space plays and "
+    "pauses; the arrows, Home and End change the slot; Page Up and Page Down go to the previous "
+    "and the next event: a charge, an end, a failure."
 )
 
 AGE_READING = (
@@ -163,24 +244,23 @@ def together(players: Iterable[Part]) -> Part:
     return figures([player.values["figures"][0] for player in players], "gallery together")
 
 
-def player(
-    events: event_log.Events, scenario: Scenario, name: str, title: str = "", caption: str = ""
-) -> Part:
-    """A player of a mission: it can be played, paused and shown slot by slot.
+def player(missions: Sequence[Shown], name: str, caption: str = "") -> Part:
+    """A player: a mission can be chosen, played, paused and shown slot by slot.
 
     Args:
-        events: The event log (a data frame, or the columns, of ``dess.record.EventLog``).
-        scenario: The scenario of the mission.
+        missions: The missions, of which the first is shown at first.
         name: The id of the player, unique in its page: letters, digits and hyphens.
-        title: The text above the map.
         caption: The text below the figure; ``READING`` explains how to read it.
 
     Raises:
-        InputError: If the log is not that of a complete mission of this scenario.
+        InputError: If a log is not that of a complete mission of its scenario.
     """
-    playback = Playback(events, scenario)
-    shown = {"name": name, "title": title, "end": playback.end}
-    drawn = template("player.html").render(data=playback.data, **shown)
+    playbacks = [Playback(shown.events, shown.scenario) for shown in missions]
+    texts = [{"title": shown.title, "choice": shown.choice} for shown in missions]
+    data = [played.data | text for played, text in zip(playbacks, texts, strict=True)]
+    drawn = template("player.html").render(
+        name=name, missions=data, first=playbacks[0], style=style
+    )
     return figures([{"name": name, "player": drawn, "caption": caption}])
 
 

@@ -5,7 +5,7 @@ Each function of a panel takes the event log of the mission (a data frame, or th
 them together. Nothing touches pyplot's state.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import matplotlib as mpl
 import numpy as np
@@ -25,6 +25,8 @@ from dess.scenario import Scenario, ScenarioSpace
 
 # Width [cells] over which UAVs on the same path are drawn side by side.
 SPREAD = 0.4
+# The size of the names of nodes, the radius of nodes, and about the width of a map [points].
+NAME_SIZE, NODE_RADIUS, MAP_WIDTH = 10.0, 5.5, 340.0
 _ARROW: dict = {
     **{"angles": "xy", "scale_units": "xy", "units": "xy", "scale": 1, "width": 0.15},
     **{"headwidth": 3.8, "headlength": 3.4, "headaxislength": 3.2},
@@ -63,9 +65,9 @@ def trajectories(events: event_log.Events, scenario: Scenario, ax: Axes) -> None
             (end, "o", colour, "white", "end"),
         ):
             x, y = spot
-            ax.scatter(x, y, marker=marker, s=62, facecolor=face, edgecolor=colour, linewidth=1.6,
+            ax.scatter(x, y, marker=marker, s=130, facecolor=face, edgecolor=colour, linewidth=1.6,
                         zorder=8, gid=f"{name}-{uav}")  # fmt: skip
-            ax.annotate(str(uav + 1), (x, y), ha="center", va="center", fontsize=6.5,
+            ax.annotate(str(uav + 1), (x, y), ha="center", va="center", fontsize=9,
                         color=text, fontweight="bold", zorder=9)  # fmt: skip
 
 
@@ -75,7 +77,8 @@ def chart(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
     ax.set_facecolor(style.SEA)
     ax.grid(False)
     for x, y in scenario.no_fly:
-        ax.add_patch(Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=style.LAND, zorder=1))
+        ax.add_patch(Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=style.LAND,
+                               edgecolor=style.LAND, zorder=1))  # fmt: skip
     for x, y, width, height in scenario.rectangles:
         ax.add_patch(Rectangle((x - 0.5, y - 0.5), width, height, facecolor=style.ZONE,
                                edgecolor=style.ZONE_EDGE, zorder=1))  # fmt: skip
@@ -225,9 +228,65 @@ def _grid(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
     nodes = np.array(scenario.nodes)
     ax.scatter(nodes[:, 0], nodes[:, 1], c=style.node_colours(len(nodes)), s=95,
                edgecolors="white", linewidths=1.2, zorder=3, gid="nodes")  # fmt: skip
-    for (x, y), name in zip(scenario.nodes, scenario.names, strict=False):
-        ax.annotate(name, (x, y), (4, 4), textcoords="offset points", fontsize=5.5, zorder=3,
-                    color=style.INK, annotation_clip=True)  # fmt: skip
+    places = name_places(scenario.nodes, scenario.names, scenario.size)
+    for node, name, (x, y) in zip(scenario.nodes, scenario.names, places, strict=False):
+        ax.annotate(name, node, (x, y), textcoords="offset points", fontsize=NAME_SIZE, zorder=7,
+                    color=style.INK, va="center", annotation_clip=True,
+                    **style.OUTLINED)  # fmt: skip
+
+
+def name_places(
+    nodes: Sequence[tuple[int, int]], names: Sequence[str], size: tuple[int, int]
+) -> list[tuple[float, float]]:
+    """Where the names of nodes begin, so that they cover little of each other, nodes and edges.
+
+    Args:
+        nodes: The cells x, y of the nodes; y grows south.
+        names: Their names.
+        size: The columns and rows of the grid.
+
+    Returns:
+        For each name the place of the middle of its left end relative to its node [points, y up].
+    """
+    scale = MAP_WIDTH / max(size)
+    centres = np.array(nodes) * (scale, -scale)
+    discs = [_box(x - NODE_RADIUS, y, 2 * NODE_RADIUS, 2 * NODE_RADIUS) for x, y in centres]
+    map_box = np.array([-scale / 2, (0.5 - size[1]) * scale, (size[0] - 0.5) * scale, scale / 2])
+    taken, places = [*discs], []
+    for (x, y), name in zip(centres, names, strict=False):
+        width = 0.62 * NAME_SIZE * len(name)
+        beside, above = NODE_RADIUS + 1, NODE_RADIUS + 0.55 * NAME_SIZE
+        choices = [
+            (beside, 0.0),
+            (beside, above - 4),
+            (-beside - width, 0.0),
+            (-width / 2, above),
+            (-width / 2, -above),
+            (beside, 4 - above),
+            (-beside - width, above - 4),
+            (-beside - width, 4 - above),
+        ]
+        boxes = [_box(x + dx, y + dy, width, 1.1 * NAME_SIZE) for dx, dy in choices]
+        covered = [sum(_overlap(box, other) for other in taken) for box in boxes]
+        outside = [_area(box) - _overlap(box, map_box) for box in boxes]
+        best = int(np.argmin(np.add(covered, outside).round(6)))
+        taken.append(boxes[best])
+        places.append(choices[best])
+    return places
+
+
+def _box(left: float, middle: float, width: float, height: float) -> np.ndarray:
+    """The ends of a box: left, lower, right, upper."""
+    return np.array([left, middle - height / 2, left + width, middle + height / 2])
+
+
+def _area(box: np.ndarray) -> float:
+    return float(np.prod(np.clip(box[2:] - box[:2], 0, None)))
+
+
+def _overlap(box: np.ndarray, other: np.ndarray) -> float:
+    """The area that two boxes have in common."""
+    return _area(np.r_[np.maximum(box[:2], other[:2]), np.minimum(box[2:], other[2:])])
 
 
 @mpl.rc_context({"text.parse_math": True})  # an arrow is a symbol in TeX

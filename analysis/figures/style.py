@@ -72,6 +72,36 @@ class Picture(Figure):
     Jupyter shows other figures so only once pyplot is imported, which it has a hook for.
     """
 
+    def place_legend(self, columns: int, heading: str | None = None) -> None:
+        """Put a legend of all that has a label below the axes, no wider than the figure.
+
+        Args:
+            columns: The largest number of its columns; there are fewer where they do not fit.
+            heading: The title of the legend.
+        """
+        entries = [zip(*ax.get_legend_handles_labels(), strict=True) for ax in self.axes]
+        handles = {label: handle for pairs in entries for handle, label in pairs}
+        if not handles:
+            return
+        self._legend_options = (columns, heading)
+        place: dict[str, Any] = {"loc": "outside lower center", "title": heading}
+        for count in range(min(columns, len(handles)), 0, -1):
+            below = self.legend(handles.values(), handles, ncols=count, **place)
+            below.get_title().set_parse_math(True)
+            if count == 1 or below.get_window_extent().width <= self.bbox.width:
+                return
+            below.remove()
+
+    def resize(self, width: float, height: float) -> None:
+        """Give the figure another size [inches], and its legend the columns that fit there."""
+        self.set_size_inches(width, height)
+        if not self.legends:
+            return
+        for legend in [*self.legends]:
+            legend.remove()
+        with look():
+            self.place_legend(*self._legend_options)
+
     def _repr_png_(self) -> bytes:
         """The picture, as IPython asks for it."""
         buffer = BytesIO()
@@ -106,7 +136,7 @@ def panels(
         height: The height of the figure [inches].
         rows: The number of axes.
         values: The axes that have grid lines.
-        legend: The number of columns of the legend.
+        legend: The largest number of columns of the legend.
         heading: The title of the legend.
         options: Further arguments of ``Figure.subplots``.
     """
@@ -116,11 +146,7 @@ def panels(
         for ax in np.ravel(axes):
             grid_of(values, ax)
         yield figure, axes
-        entries = [zip(*ax.get_legend_handles_labels(), strict=True) for ax in figure.axes]
-        if handles := {label: handle for pairs in entries for handle, label in pairs}:
-            place = {"loc": "outside lower center", "ncols": legend, "title": heading}
-            below = figure.legend(handles.values(), handles, **place)
-            below.get_title().set_parse_math(True)
+        figure.place_legend(legend, heading)
 
 
 def grid_of(values: Values, ax: Axes) -> None:

@@ -279,7 +279,8 @@ def _write_page(mission: _Mission, path: Path) -> None:
     from dess.reports.pages.html import fill
 
     caption = player.reading(mission.scenario)
-    played = player.player(mission.log, mission.scenario, "mission", caption=caption)
+    shown = player.Shown(mission.log, mission.scenario)
+    played = player.player([shown], "mission", caption)
     parts = {"library": player.library().data, "player": played.data}
     title, outcome = mission.title, mission.outcome
     page = fill("mission.html", scripts=True, title=title, outcome=outcome, **parts)

@@ -28,9 +28,11 @@ from dess.analysis.metrics import RATIO
 from dess.analysis.paper import values
 from dess.analysis.results.resimulate import Mission
 from dess.reports.pages import html
-from dess.reports.player import READING, library, player, together
+from dess.reports.player import READING, Shown, library, player, together
 
 # %%
+CHOICES = 5  # missions that the first player offers at most; each is 35 kB of the page
+
 fig1, fig4 = (load_results(f"{results}/{name}") for name in ("fig1", "fig4"))
 ranked, best = summary.ranked_policies(fig4.missions), summary.best_policy(fig1.missions)
 shown_policy, seed = policy or ranked[0], fig4.manifest["seed"]
@@ -46,17 +48,29 @@ library()
 
 
 # %%
+def told(mission: Mission) -> Shown:
+    title = f"{mission.fleet}, {mission.policy}: {numbers.percent(mission.record[RATIO])} collected"
+    choice = f"replication {mission.replication}"
+    return Shown(mission.events, mission.scenario, title, choice)
+
+
 def played(mission: Mission, name: str) -> html.Part:
-    policy_name = mission.policy
-    title = f"{mission.fleet}, {policy_name}: {numbers.percent(mission.record[RATIO])} collected"
     caption = (
-        f"n = 1 mission of {policy_name}, replication {replication} of seed {seed}, "
+        f"n = 1 mission of {mission.policy}, replication {replication} of seed {seed}, "
         f"{mission.record.slots} mission slots. {mission.causes}"
     )
-    return player(mission.events, mission.scenario, name, title, caption)
+    return player([told(mission)], name, caption)
 
 
-played(shown[-1], "player")
+# %%
+stored = range(min(fig4.study.logged, CHOICES))
+others = [number for number in stored if number != replication]
+choices = [Mission.of(fig4, shown_policy, points[-1], number) for number in others]
+caption = (
+    f"n = 1 mission of {shown_policy}: replication {replication} of seed {seed} or, by choice, "
+    f"another of {len(choices) + 1}. {shown[-1].causes}"
+)
+player([told(shown[-1]), *map(told, choices)], "player", caption)
 
 # %% [markdown]
 # ## How to read it

@@ -36,6 +36,7 @@ TERMS = {
     "Holm": "a correction of p-values for the number of comparisons",
 }
 _TERM = re.compile(rf"\b({'|'.join(TERMS)})\b")
+_TERM_LINK = re.compile(r'(<a class="term"[^>]*>([^<]*)</a>)')
 _HEADING = re.compile(r"## (.*)\n*")
 
 
@@ -44,14 +45,25 @@ class _Writer(IPythonRenderer):
 
     def __init__(self) -> None:
         super().__init__(escape=False, exclude_anchor_links=True)
-        self._left = dict(TERMS)
+        self.explained_terms: dict[str, str] = {}
 
     def explained(self, text: object) -> Markup:
         return Markup(_TERM.sub(self._with_meaning, str(Markup.escape(text))))
 
     def _with_meaning(self, found: re.Match[str]) -> str:
-        meaning = self._left.pop(found[0], None)
-        return f'<abbr title="{meaning}">{found[0]}</abbr>' if meaning else found[0]
+        """A link to the meaning, which stands at the end of the page for everybody to read."""
+        term = found[0]
+        if term in self.explained_terms:
+            return term
+        self.explained_terms[term] = TERMS[term]
+        return f'<a class="term" href="#{term_anchor(term)}" title="{TERMS[term]}">{term}</a>'
+
+    def link(self, text: str, url: str, title: str | None = None) -> str:
+        """A link; a term within it is not explained there, since no link contains another one."""
+        for link, term in _TERM_LINK.findall(text):
+            text = text.replace(link, term)
+            del self.explained_terms[term]
+        return super().link(text, url, title)
 
     def markdown(self, source: str) -> Markup:
         return Markup(MarkdownWithMath(self).render(source))
@@ -70,7 +82,9 @@ def page_of(report: Report) -> Page:
     exporter = TemplateExporter(
         template_file="report.html",
         template_paths=[str(TEMPLATES)],
-        filters=filters | {"anchor": anchor, "is_beside": is_beside, "sections": sections},
+        filters=filters
+        | {"anchor": anchor, "is_beside": is_beside}
+        | {"sections": sections, "term_anchor": term_anchor},
     )
     for option, value in JINJA.items():
         setattr(exporter.environment, option, value)
@@ -84,6 +98,7 @@ def page_of(report: Report) -> Page:
         "code": Markup(writer.block_code("\n\n\n".join(report.code), "python")),
         "folded": FOLDED,
         "part_type": PART,
+        "terms": writer.explained_terms,
     }
     return Page(exporter.from_notebook_node(report.notebook)[0]).sealed
 
@@ -123,6 +138,11 @@ def sections(cells: Iterable[NotebookNode]) -> list[tuple[Markup, list[NotebookN
 def anchor(heading: Markup) -> str:
     """The anchor of a section."""
     return re.sub(r"\W+", "-", heading.striptags()).strip("-")
+
+
+def term_anchor(term: str) -> str:
+    """The anchor of the meaning of a term."""
+    return f"term-{anchor(Markup(term)).lower()}"
 
 
 def is_beside(cells: Sequence[NotebookNode]) -> bool:

@@ -60,6 +60,12 @@ _MARKUP = re.compile(
 _BARE = dict.fromkeys(("name", "alt", "source", "narrow", "player", "caption", "links"), "")
 # The coordinates in a figure, a number with many decimals, the space around a command of a path.
 _PLACES, _DIGITS = re.compile(rb' (?:d|x|y)="[^"]*"'), re.compile(rb"(\.\d)\d+")
+_CELL = re.compile(r"<td>(.*?)</td>", re.S)
+# In a cell: the number at its beginning up to the decimal point; a number before its unit; an
+# interval.
+_NUMBER = re.compile(r"[-+−]?\d[\d,]*(?![\w–/-])")
+_UNIT = re.compile(r"(\d) (?=[%▲▼≈]|[^\W\d]+ \[|[^\W\d]+$)")
+_BRACKETS = re.compile(r"\[[^\[\]]*\]")
 _EMPTY_HEADER = re.compile(r"<th([^>]*)></th>")  # which is no header for a screen reader
 _BREAKS = re.compile(rb"\s+([LCQz]) ?")
 _INDEX = re.compile(r"\bC_([SC])\b")  # as in C_S, a threshold of charging
@@ -189,15 +195,13 @@ def provenance(studies: Iterable[Results]) -> HTML:
     return carrying([Evidence.of(results) for results in studies])
 
 
-def carrying(evidence: Sequence[Evidence], files: Iterable[str] = ()) -> HTML:
-    """A table of what studies were made with, a column for each, and hidden elements with evidence.
+def carrying(evidence: Sequence[Evidence]) -> HTML:
+    """A table of what studies were made with, a column for each, and hidden elements with it all.
 
     Args:
         evidence: The evidence of the studies.
-        files: Lists of files, as JSON, which become hidden elements as well.
     """
     inside = [hidden(STUDY, json.dumps(of_study.data)) for of_study in evidence]
-    inside += [hidden(FILES, text) for text in files]
     return HTML((_origins(evidence).data if evidence else "") + "".join(inside))
 
 
@@ -261,6 +265,8 @@ def table(
     """
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
+    if not wrap:
+        html = _aligned(html, len(frame.columns))
     html = str(indexed(Markup(_EMPTY_HEADER.sub(r"<td\1></td>", html))))
     caption = ". ".join(filter(None, [caption, numbers.why_nan(frame.to_numpy().flat)]))
     if caption:
@@ -270,6 +276,40 @@ def table(
     return HTML(
         f'<div class="scroll" role="region" tabindex="0" aria-label="{label}">{html}</div>{below}'
     )
+
+
+def _aligned(table: str, columns: int) -> str:
+    """A table in HTML with the numbers that begin its cells aligned at their decimal points.
+
+    A cell breaks between an estimate and its interval, but within neither.
+    """
+    cells = _CELL.findall(table)
+    indents = [0.0] * len(cells)
+    for column in range(columns):
+        places = range(column, len(cells), columns)
+        widths = {
+            place: _width(found[0]) for place in places if (found := _NUMBER.match(cells[place]))
+        }
+        for place, width in widths.items():
+            indents[place] = max(widths.values()) - width
+    aligned = (
+        f'<td style="--indent:{indent:g}">{_kept_together(cell)}</td>'
+        if indent
+        else f"<td>{_kept_together(cell)}</td>"
+        for cell, indent in zip(cells, indents, strict=True)
+    )
+    return _CELL.sub(lambda _: next(aligned), table)
+
+
+def _width(digits: str) -> float:
+    """The width of a number before its decimal point, in digits; a comma is half as wide."""
+    return len(digits) - 0.5 * digits.count(",")
+
+
+def _kept_together(cell: str) -> str:
+    """The text of a cell without breaks before a unit and within an interval."""
+    together = _UNIT.sub("\\1\N{NO-BREAK SPACE}", cell)
+    return _BRACKETS.sub(lambda found: found[0].replace(" ", "\N{NO-BREAK SPACE}"), together)
 
 
 def answer(sentence: str, number: str = "") -> Part:
@@ -306,10 +346,16 @@ def lead(
     Narrow windows show ``narrow`` in its place, or the same figure drawn for their width.
     """
     on_phone = narrow or drawing
-    on_phone.set_size_inches(LEAD_ON_PHONE[0], max(LEAD_ON_PHONE[1], on_phone.get_figheight()))
+    _resize(on_phone, LEAD_ON_PHONE[0], max(LEAD_ON_PHONE[1], on_phone.get_figheight()))
     source = _source(on_phone)
-    drawing.set_size_inches(LEAD)
+    _resize(drawing, *LEAD)
     return figures([_figure(drawing, alt, caption, data) | {"narrow": source}], "lead")
+
+
+def _resize(drawing: "Figure", width: float, height: float) -> None:
+    """Give a figure another size [inches]; one of ours fits its legend to it."""
+    resize = getattr(drawing, "resize", drawing.set_size_inches)
+    resize(width, height)
 
 
 def gallery(drawings: Iterable[tuple[Any, ...]], note: str = "") -> Part:

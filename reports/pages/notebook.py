@@ -9,6 +9,7 @@ its page has scripts. One of its cells is tagged ``parameters``:
 """
 
 import ast
+import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -34,6 +35,7 @@ GROUPS = {
     "Is it right?": ("verification",),
 }
 NAMES = tuple(name for names in GROUPS.values() for name in names)
+LARGEST = 512 * 2**20  # bytes of a notebook with its outputs
 PARAMETERS = "parameters"  # the tag of the cell with the parameters
 
 # jupytext has a plugin for Jupyter's server, which takes longer to import than the rest of it.
@@ -44,6 +46,10 @@ import jupytext  # noqa: E402
 for _name in _UNUSED:
     del sys.modules[_name]
 
+_HINT = """
+
+*To ask another question, change the values in the next cell, then run all cells (in the menu Run).
+Below are the outputs of the page beside this file.*"""
 _KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}
 
 
@@ -116,16 +122,49 @@ class Report:
         _set(self.notebook, values)
 
     def for_jupyter(self, results: Path, out: Path, values: Mapping[str, Any]) -> str:
-        """The notebook as a file that Jupyter opens in ``out``, with the values it ran with."""
+        """The notebook, after its cells have been run, as a file that Jupyter opens in ``out``.
 
-        def write(path: str) -> str:
-            return Path(os.path.relpath(path, out)).as_posix()
-
+        It has the values and the outputs of that run, but neither counters nor times. Its first
+        text says what may be changed.
+        """
         notebook = deepcopy(self.original)
-        moved = {name: with_paths(value, write) for name, value in values.items()}
-        _set(notebook, {**moved, "results": write(str(results))})
+        moved = {
+            name: with_paths(v, lambda path: _relative(path, out)) for name, v in values.items()
+        }
+        _set(notebook, {**moved, "results": _relative(str(results), out)})
+        outputs = {cell.id: cell.outputs for cell in self.cells}
+        for cell in notebook.cells:
+            if cell.cell_type == "code":
+                cell.outputs = [*filter(None, map(_for_jupyter, outputs.get(cell.id, [])))]
+        notebook.cells[0].source += _HINT
         notebook.metadata = {"kernelspec": _KERNEL}
         return nbformat.writes(notebook) + "\n"
+
+    def is_in(self, out: Path, results: Path) -> bool:
+        """Whether the notebook for Jupyter is in ``out``, and names the folder of the results."""
+        try:
+            text = read_text(out / f"{self.name}.ipynb", LARGEST)
+        except InputError:
+            return False
+        cell = _parameters_cell(self.original).source
+        expected = with_values(cell, {"results": _relative(str(results), out)})
+        line = next(line for line in expected.splitlines() if line.startswith("results"))
+        return json.dumps(line, ensure_ascii=False)[1:-1] in text
+
+
+def _relative(path: str, out: Path) -> str:
+    """A path as a notebook in the folder ``out`` names it."""
+    return Path(os.path.relpath(path, out)).as_posix()
+
+
+def _for_jupyter(output: NotebookNode) -> NotebookNode | None:
+    """An output of a cell as Jupyter shows it; none for a warning."""
+    if output.get("name") == "stderr":
+        return None
+    shown = deepcopy(output)
+    if "text/html" in shown.get("data", {}):
+        shown.data = NotebookNode({"text/html": shown.data["text/html"]})
+    return shown
 
 
 def names_in(folder: Path = SHIPPED) -> list[str]:

@@ -21,7 +21,6 @@ from types import MappingProxyType
 from typing import Any
 
 import nbformat
-from markupsafe import Markup
 
 import dess
 from dess import InputError
@@ -31,10 +30,10 @@ from dess.analysis.results.manifest import Manifest
 from dess.files.documents import LIMIT
 from dess.files.reading import Missing, paths_in, read_bytes
 from dess.files.writing import delete, locked, write_files
-from dess.reports.pages import INDEX, LOCK, PREFIX, check_pages, html, kernels, notebook
+from dess.reports.pages import INDEX, LOCK, PREFIX, check_pages, kernels, notebook
 from dess.reports.pages.html import fill, template
 from dess.reports.pages.kernels import Progress
-from dess.reports.pages.page import FILES, Page
+from dess.reports.pages.page import Page
 from dess.reports.pages.study import report_of
 
 TILES = {  # pages whose number has a tile, and what it is
@@ -56,7 +55,6 @@ def index_of(
     """
     cards = {name: pages[name].card for name in in_order(pages)}
     scorecard = cards.get(f"{notebook.SCORECARD}.html")
-    shown = Page("".join(pages[name].text for name in cards))
     return fill(
         INDEX,
         cards=cards,
@@ -64,9 +62,8 @@ def index_of(
             (text, page) for page, text in TILES.items() if page in cards and cards[page].number
         ],
         picture=scorecard and scorecard.picture,
-        groups=[(head, names) for head in notebook.GROUPS if (names := in_order(pages, head))],
+        groups=groups_of(pages),
         left_out=left_out,
-        origins=Markup(html.carrying(shown.evidence, shown.hidden(FILES)).data),
     )
 
 
@@ -83,15 +80,22 @@ def in_order(pages: Iterable[str], group: str | None = None) -> list[str]:
     return [name for name in order if name in known]
 
 
+def groups_of(pages: Iterable[str]) -> list[tuple[str, list[str]]]:
+    """The headings of the groups that have a page, each with the file names of its pages."""
+    names = {heading: in_order(pages, heading) for heading in notebook.GROUPS}
+    return [(heading, of_group) for heading, of_group in names.items() if of_group]
+
+
 def with_bars(pages: Mapping[str, Page]) -> dict[str, Page]:
-    """The pages of a folder, with the links to all of them in their bars."""
-    links = {}
+    """The pages of a folder, with the links to all of them, by group, in their bars."""
+    labels = {}
     for name in in_order(pages):
-        links[name] = name.removesuffix(".html").replace("-", " ").capitalize()
+        labels[name] = name.removesuffix(".html").replace("-", " ").capitalize()
         if _OF_STUDY.fullmatch(name):
-            links[name] = pages[name].card.title
+            labels[name] = pages[name].card.title
+    shown = {"groups": groups_of(pages), "labels": labels}
     bar = template("bar.html")
-    return {n: page.with_bar(bar.render(links=links, page=n)) for n, page in pages.items()}
+    return {n: page.with_bar(bar.render(page=n, **shown)) for n, page in pages.items()}
 
 
 def pages_in(out: Path, but: Container[str] = ()) -> dict[str, Page]:
@@ -291,7 +295,7 @@ def _write(
         made = {report.page: page_of(report) for report in changed}
     complete = [report for report in reports if not report.failure]
     files: dict[str, str | bytes] = {
-        f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete
+        f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete if not r.is_current
     }
     for report in complete:
         files |= {f"{report.folder}/{name}": picture for name, picture in _pictures(report)}
@@ -323,7 +327,8 @@ def _look_up(report: notebook.Report, results: Path, out: Path, values: Mapping[
         return
     with suppress(InputError):  # there are none, or ``_lacking`` finds out what is wrong with them
         report.key = key_of(report, _folders(report, results))
-        report.is_current = not report.formats and has_key(out / report.page, report.key)
+        kept = not report.formats and has_key(out / report.page, report.key)
+        report.is_current = kept and report.is_in(out, results)
 
 
 def _folders(report: notebook.Report, results: Path) -> dict[str, Path]:

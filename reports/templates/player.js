@@ -1,15 +1,12 @@
-// Shows a mission slot by slot on a canvas: a map, and curves over time whose cursor is the slot.
-// What it shows is computed in Python (reports/player/playback.py); this file only draws it.
-function playMission(id, mission) {
+// Draws a mission slot by slot on a canvas: a map, and curves over time whose cursor is the slot.
+// What it shows is computed in Python (reports/player.py); this file only draws it.
+function sceneOf(mission, canvas) {
     "use strict";
     const INK = "{{ style.INK }}", MUTED = "{{ style.MUTED }}", GRID = "{{ style.GRID }}";
     const SEA = "{{ style.SEA }}", ZONE = "{{ style.ZONE }}", ZONE_EDGE = "{{ style.ZONE_EDGE }}";
     const LAND = "{{ style.LAND }}";
     const WIDE = 720; // width [px] from which the curves are beside the map, and not below it
     const NODE = 12.5, UAV = 8, PAD = 10.5; // radii of the largest disc and of a UAV, half a square
-    const figure = document.getElementById(id), canvas = figure.querySelector("canvas");
-    const button = figure.querySelector("button"), slider = figure.querySelector("input");
-    const speed = figure.querySelector("select"), status = figure.querySelector("output");
     const fleet = mission.fleet, residual = mission.residual, end = residual.length - 1;
     const uavs = mission.colours.uavs, nodes = mission.nodes;
     const range = (n) => [...Array(n).keys()];
@@ -18,7 +15,7 @@ function playMission(id, mission) {
     const largest = Math.max(...most, 1e-9);
     const sums = residual.map((row) => row.reduce((a, b) => a + b, 0));
     const pen = canvas.getContext("2d", { willReadFrequently: true });
-    let slot = 0, timer = null, panels = [];
+    let panels = [];
 
     // A panel is a box of the canvas with its own scales, and functions that draw into it.
     function panel(title, box, x, y, draw, move, ticks = {}) {
@@ -212,11 +209,10 @@ function playMission(id, mission) {
         canvas.height = Math.round(height * scale);
         pen.setTransform(scale, 0, 0, scale, 0, 0);
         still = null;
-        draw();
     }
 
     let still = null; // the picture of all that does not move
-    function draw() {
+    function draw(slot) {
         pen.clearRect(0, 0, canvas.width, canvas.height);
         if (still) {
             pen.putImageData(still, 0, 0);
@@ -230,42 +226,16 @@ function playMission(id, mission) {
             still = pen.getImageData(0, 0, canvas.width, canvas.height);
         }
         for (const p of panels) p.move(slot);
-        status.textContent = mission.status[slot];
-        slider.value = slot;
     }
 
-    // Players in the same element that is marked so show the same slot.
-    const together = figure.closest(".together");
-    function show(next) {
-        slot = Math.max(0, Math.min(end, Math.round(next)));
-        draw();
-        if (together) together.dispatchEvent(new CustomEvent("shown", { detail: { id, next } }));
-    }
-
-    function join({ detail }) {
-        if (detail.id === id) return;
-        pause();
-        slot = Math.max(0, Math.min(end, Math.round(detail.next)));
-        draw();
-    }
-
-    function pause() {
-        clearInterval(timer);
-        timer = null;
-        button.textContent = "Play";
-    }
-
-    function play() {
-        if (slot === end) show(0);
-        button.textContent = "Pause";
-        timer = setInterval(() => slot < end ? show(slot + 1) : pause(), 1000 / Number(speed.value));
-    }
-
-    const toggle = () => timer === null ? play() : pause();
-    const KEYS = {
-        " ": toggle, ArrowRight: () => show(slot + 1), ArrowLeft: () => show(slot - 1),
-        Home: () => show(0), End: () => show(end),
-    };
+    // The UAVs and nodes that a reader can ask about: a name, and what there is to tell in a slot.
+    const things = [
+        ...uavs.map((_, i) => ({ name: `UAV ${i + 1}`, tell: (t) => `battery ${fleet.battery[t][i]} %` })),
+        ...nodes.map((_, k) => ({
+            name: mission.names[k] ?? `node ${k}`,
+            tell: (t) => `${(residual[t][k] * perUnit).toLocaleString("en", { maximumFractionDigits: 1 })} ${amount}`,
+        })),
+    ];
 
     // The panel at a place of the canvas, if there is one.
     function under(event) {
@@ -274,34 +244,130 @@ function playMission(id, mission) {
         return [p, x, y];
     }
 
-    button.addEventListener("click", toggle);
+    // The slot of a place on a curve, or undefined.
+    function slotAt(event) {
+        const [p, x] = under(event);
+        if (p && !p.isMap && p.x[0] === 0) return (x - p.box.x) / p.box.w * p.x[1];
+    }
+
+    // The number of the thing at a place on the map, -1 for the sea between, or undefined.
+    function thingAt(event, slot) {
+        const [p, x, y] = under(event), reach = Math.max(NODE, event.pointerType === "touch" ? 22 : 0);
+        if (!p || !p.isMap) return undefined;
+        const places = [...uavs.map((_, i) => [fleet.x[slot][i], fleet.y[slot][i]]), ...nodes];
+        const gaps = places.map(([a, b]) => Math.hypot(p.px(a) - x, p.py(b) - y));
+        const nearest = gaps.indexOf(Math.min(...gaps));
+        return gaps[nearest] <= reach ? nearest : -1;
+    }
+
+    return { end, things, arrange, draw, slotAt, thingAt };
+}
+
+// Plays one of several missions in the figure with this id.
+function playMission(id, missions) {
+    "use strict";
+    const figure = document.getElementById(id), find = (selector) => figure.querySelector(selector);
+    const canvas = find("canvas"), slider = find("input"), status = find("output"), title = find(".subject");
+    const speed = find("[name=speed]"), choice = find("[name=mission]"), about = find("[name=about]");
+    const button = (name) => find(`[data-go=${name}]`), playing = button("play");
+    let mission, scene, slot = 0, timer = null;
+
+    function draw() {
+        scene.draw(slot);
+        const event = mission.events.find(([time]) => time === slot), thing = scene.things[about.value];
+        const told = thing ? `${thing.name}: ${thing.tell(slot)}` : "";
+        status.textContent = [mission.status[slot], event ? event[1] : "", told].filter(Boolean).join(" · ");
+        slider.value = slot;
+    }
+
+    // Shows another mission, at the same slot.
+    function choose(number) {
+        mission = missions[number];
+        scene = sceneOf(mission, canvas);
+        slider.max = scene.end;
+        title.textContent = mission.title;
+        title.hidden = !mission.title;
+        const option = (name, n) => new Option(name, n);
+        const before = about.value;
+        about.replaceChildren(option("nothing", -1), ...scene.things.map(({ name }, n) => option(name, n)));
+        about.value = before in scene.things ? before : -1;
+        scene.arrange();
+        show(slot);
+    }
+
+    // Players in the same element that is marked so show the same slot.
+    const together = figure.closest(".together");
+    function show(next) {
+        slot = Math.max(0, Math.min(scene.end, Math.round(next)));
+        draw();
+        if (together) together.dispatchEvent(new CustomEvent("shown", { detail: { id, next } }));
+    }
+
+    function join({ detail }) {
+        if (detail.id === id) return;
+        pause();
+        slot = Math.max(0, Math.min(scene.end, Math.round(detail.next)));
+        draw();
+    }
+
+    function pause() {
+        clearInterval(timer);
+        timer = null;
+        playing.textContent = "Play";
+    }
+
+    function play() {
+        if (slot === scene.end) show(0);
+        playing.textContent = "Pause";
+        timer = setInterval(() => slot < scene.end ? show(slot + 1) : pause(), 1000 / Number(speed.value));
+    }
+
+    // The times of the events before and after the slot.
+    const before = () => mission.events.map(([time]) => time).filter((time) => time < slot);
+    const after = () => mission.events.map(([time]) => time).filter((time) => time > slot);
+    const GO = {
+        "play": () => timer === null ? play() : pause(),
+        "slot-back": () => show(slot - 1),
+        "slot-on": () => show(slot + 1),
+        "event-back": () => show(Math.max(0, ...before())),
+        "event-on": () => show(Math.min(scene.end, ...after())),
+    };
+    const KEYS = {
+        " ": GO.play, ArrowRight: GO["slot-on"], ArrowLeft: GO["slot-back"],
+        PageUp: GO["event-back"], PageDown: GO["event-on"], Home: () => show(0), End: () => show(scene.end),
+    };
+
+    for (const [name, go] of Object.entries(GO)) button(name).addEventListener("click", go);
     slider.addEventListener("input", () => show(Number(slider.value)));
     speed.addEventListener("change", () => { if (timer !== null) { pause(); play(); } });
+    about.addEventListener("change", draw);
+    if (choice) choice.addEventListener("change", () => choose(Number(choice.value)));
     figure.addEventListener("keydown", (event) => {
-        if (!(event.key in KEYS) || event.target === button || event.target === speed) return;
+        if (!(event.key in KEYS) || event.target.matches("button, select, a")) return;
         event.preventDefault();
         KEYS[event.key]();
     });
     canvas.addEventListener("click", (event) => {
-        const [p, x] = under(event);
-        if (p && p.y !== p.x && p.x[0] === 0) show((x - p.box.x) / p.box.w * p.x[1]);
+        const time = scene.slotAt(event), thing = scene.thingAt(event, slot);
+        if (time !== undefined) show(time);
+        if (thing === undefined) return;
+        about.value = thing;
+        draw();
     });
     canvas.addEventListener("mousemove", (event) => {
-        const [p, x, y] = under(event), near = ([a, b]) => Math.hypot(p.px(a) - x, p.py(b) - y) <= NODE;
-        canvas.title = "";
-        if (!p || !p.isMap) return;
-        const i = uavs.findIndex((_, i) => near([fleet.x[slot][i], fleet.y[slot][i]])), k = nodes.findIndex(near);
-        if (i >= 0) canvas.title = `UAV ${i + 1}: battery ${fleet.battery[slot][i]} %`;
-        else if (k >= 0) canvas.title = `${mission.names[k] ?? `node ${k}`}: ${residual[slot][k].toFixed(1)} data units`;
+        const thing = scene.things[scene.thingAt(event, slot)];
+        canvas.title = thing ? `${thing.name}: ${thing.tell(slot)}` : "";
     });
     function follow() {
         const asked = location.hash.match(/^#slot=(\d+)$/);
         if (asked) show(Number(asked[1]));
     }
     canvas.style.width = "100%";
+    find(".still").classList.add("replaced");
+    find(".played").hidden = false;
     if (together) together.addEventListener("shown", join);
-    window.addEventListener("resize", arrange);
+    window.addEventListener("resize", () => { scene.arrange(); draw(); });
     window.addEventListener("hashchange", follow);
-    arrange();
+    choose(0);
     follow();
 }

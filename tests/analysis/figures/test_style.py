@@ -60,3 +60,16 @@ def test_a_notebook_shows_a_figure_though_nothing_has_imported_pyplot():
     for drawn in (figure, sea_figure(load_scenario("fig1"))):
         picture, _ = shown(drawn)
         assert picture["image/png"].startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("width", [style.WIDTH, 4.3])
+def test_a_legend_is_no_wider_than_its_figure(width):
+    with style.panels(3.0, legend=5) as (figure, ax):
+        for name in ("random-unguarded", "ddqn-paper", "greedy", "nearest", "tour"):
+            ax.plot([0, 1], label=name)
+    figure.resize(width, 3.0)
+    figure.canvas.draw()
+    (legend,) = figure.legends
+    box = legend.get_window_extent()
+    assert box.x0 >= 0 and box.x1 <= figure.bbox.width
+    assert len(legend.get_texts()) == 5

@@ -3,6 +3,7 @@
 import re
 
 import nbformat
+import pandas as pd
 from IPython.display import HTML, DisplayObject
 from matplotlib.figure import Figure
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
@@ -43,9 +44,13 @@ def gallery() -> Part:
 
 def test_the_answer_stands_in_the_header_and_on_the_card():
     found = page("text", html.answer("The **product** is 4 % & more.", "4 %"))
-    explained = f'<abbr title="{TERMS["product"]}">product</abbr>'
+    meaning = TERMS["product"]
+    explained = f'<a class="term" href="#term-product" title="{meaning}">product</a>'
     assert f'<p class="lead">The {explained} is 4 % &amp; more.</p>' in found.text
-    assert "more" not in found.text.split("<main>")[1]
+    main = found.text.split("<main>")[1]
+    assert "more" not in main
+    # A reader without a mouse follows the link, and one of the paper finds it at the end.
+    assert f'<div id="term-product"><dt>product</dt><dd>{meaning}</dd></div>' in main
     assert (found.card.finding, found.card.number) == ("The product is 4 % & more.", "4 %")
     without = page("text")
     assert without.card.finding == "About it." and '<p class="lead">About it.</p>' in without.text
@@ -57,7 +62,7 @@ def test_figures_have_numbers_and_anchors_on_the_page_alone():
     assert re.findall(r'href="#(figure-.)">Figure (.)</a> n = .', found) == [
         ("figure-1", "1"), ("figure-2", "2"), ("figure-3", "3"),
     ]  # fmt: skip
-    assert '<p class="note">A note.</p>' in found
+    assert '</div>\n<p class="note">A note.</p>' in found
     in_jupyter = gallery().data
     assert in_jupyter.count("<figcaption>n = 4.") == 2 and "Figure" not in in_jupyter
 
@@ -83,8 +88,24 @@ def test_the_text_of_a_section_stands_beside_its_only_figure():
 def test_a_term_is_explained_once_and_only_in_text():
     text = "text: the return guard, the return guard, a `product`"
     found = main_of(text, HTML("<pre>product</pre>"))
-    assert found.count(f'<abbr title="{TERMS["return guard"]}">return guard</abbr>') == 1
-    assert found.count("<abbr") == 1
+    meaning = TERMS["return guard"]
+    explained = f'<a class="term" href="#term-return-guard" title="{meaning}">return guard</a>'
+    assert found.count(explained) == 1
+    assert found.count("<a ") == 1
+    assert found.count("<dt>") == 1
+
+
+def test_no_link_contains_another():
+    found = main_of("[the product](other.html), then a product")
+    assert '<a href="other.html">the product</a>, then a <a class="term"' in found
+
+
+def test_numbers_stand_on_their_decimal_points_and_intervals_do_not_break():
+    means = ["100.0 % [99.1, 100.0]", "8.5 % [8, 9] +1.0 ▲", "1,000", "none", "−8.5"]
+    shown = html.table(pd.DataFrame({"policy": ["a"] * 5, "mean": means})).data
+    indents = [style or "0" for style in re.findall('<td(?: style="--indent:([\\d.]+)")?>', shown)]
+    assert indents[1::2] == ["1.5", "3.5", "0", "0", "2.5"]
+    assert "8.5\xa0% [8,\xa09] +1.0\xa0▲" in shown
 
 
 def test_thresholds_have_indices_but_in_code():

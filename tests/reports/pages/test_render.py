@@ -18,7 +18,7 @@ from dess.analysis import run_study
 from dess.reports.cli import main
 from dess.reports.pages import kernels
 from dess.reports.pages.body import page_of
-from dess.reports.pages.notebook import Report, read
+from dess.reports.pages.notebook import PARAMETERS, Report, read
 from dess.reports.pages.render import ReportError, render
 from tests.analysis.small import small_study
 from tests.reports.small import Links, words_of
@@ -191,6 +191,11 @@ def test_the_index_has_a_card_per_page_and_every_page_a_bar(files):
         linked = ["index.html", "mission.html", "scorecard.html"]
         assert re.findall('href="([^"]*)"', bar) == linked
         assert f'href="{name}.html" aria-current="page"' in bar
+        # A group folds the links to its pages; that of this page is marked.
+        assert re.findall('<summary( aria-current="true")?>(.*)</summary>', bar) == [
+            (' aria-current="true"' * (name == "mission"), "The policies"),
+            (' aria-current="true"' * (name == "scorecard"), "The paper"),
+        ]
 
 
 @pytest.mark.usefixtures("files")
@@ -222,7 +227,14 @@ def test_a_notebook_runs_in_jupyter_and_shows_what_the_page_shows(
     folder = another_environment(results, out, tmp_path, monkeypatch)
     notebook = nbformat.read(folder / "mission.ipynb", as_version=4)
     nbformat.validate(notebook)
-    assert notebook.cells.pop(0).source.startswith("# ")
+    first = notebook.cells.pop(0).source
+    assert first.startswith("# ") and "run all cells" in first
+    assert PARAMETERS in notebook.cells[0].metadata.tags
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    kept = "".join(output.data["text/html"] for output in outputs)
+    assert kept.count("<img ") == 1 and "Slots of every mission" in kept and "<table" in kept
+    assert all(cell.get("execution_count") is None for cell in notebook.cells)
+    assert {key for output in outputs for key in output.data} == {"text/html"}
     NotebookClient(notebook, resources={"metadata": {"path": str(folder)}}).execute()
     assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
     report = read("mission", notebooks)
@@ -306,6 +318,25 @@ def test_a_path_is_relative_in_the_notebook_and_a_name_on_the_page(
     assert cell.source == f"results = {folder!r}\npolicy = '../sea.toml'"
     page = Path("out/mission.html").read_text("utf-8")
     assert str(tmp_path) not in page and "sea.toml" in page
+
+
+def test_a_notebook_that_is_missing_or_of_other_results_is_written_again(
+    results, notebooks, tmp_path, progress
+):
+    """And one that is there, with the changes of its reader, is left as it is."""
+    render(["mission"], results, tmp_path, notebooks=notebooks)
+    file = tmp_path / "mission.ipynb"
+    written = file.read_text("utf-8")
+    changed = written.replace("# A trial", "# My trial")
+    file.write_text(changed, "utf-8")
+    render(["mission"], results, tmp_path, notebooks=notebooks)
+    assert file.read_text("utf-8") == changed
+    for wrong in (written.replace("results = ", "results = 'a' + "), "{}", None):
+        file.unlink()
+        if wrong is not None:
+            file.write_text(wrong, "utf-8")
+        render(["mission"], results, tmp_path, notebooks=notebooks)
+        assert file.read_text("utf-8") == written
 
 
 # --- processes ---

@@ -65,7 +65,8 @@ def test_there_are_a_page_a_notebook_and_an_index_with_a_card(page, out):
     for text in (page, index):
         assert "Which number of UAVs and number of charging pads for small.toml?" in text
         assert "The best setting is " in text
-        assert len(Page(text).hidden(STUDY)) == 1
+    assert len(Page(page).hidden(STUDY)) == 1
+    assert Page(index).hidden(STUDY) == []  # it stands on the page
 
 
 def test_every_figure_and_table_has_its_data(page, downloads):
