@@ -1,7 +1,7 @@
 """What MkDocs builds into the site besides the pages of this folder.
 
 - A line ``<!-- [[ NAME ]] -->`` of a page becomes a part made from the code: the commands, the
-  fields of a scenario, the public names of a package, the changelog.
+  fields of a scenario, the public names of a package, the changelog, a section of the README.
 - A link from a page to a file of the repository outside of ``docs/`` leads to a page of the site
   that shows this file. So the same link works in the repository and in the site.
 """
@@ -26,7 +26,8 @@ from dess.reports.cli.commands import app
 
 ROOT = Path(__file__).parents[1]
 LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)")
-PART = re.compile(r"^<!-- \[\[ (\w+)(?: (\w+))? \]\] -->$", re.M)
+PART = re.compile(r"^<!-- \[\[ (\w+)(?: ([\w ]+))? \]\] -->$", re.M)
+README = "README.md"
 
 
 # --- parts made from the code ---
@@ -68,8 +69,28 @@ def changelog() -> str:
     return (ROOT / "CHANGELOG.md").read_text("utf-8").split("\n", 1)[1]
 
 
+def readme(heading: str) -> str:
+    """A section of the README, with its links as a page in the root of the site has them."""
+    text = LINK.sub(lambda link: place(link[0]), section_of_readme(heading))
+    # A paragraph of a list item, which GitHub takes from three spaces on, and MkDocs from four on.
+    return f"## {heading}\n{re.sub(r'^ {3}(?=[^ ])', ' ' * 4, text, flags=re.M)}"
+
+
+def section_of_readme(heading: str) -> str:
+    """The text below a heading of the README.
+
+    Raises:
+        ValueError: If there is no such heading.
+    """
+    text = (ROOT / README).read_text("utf-8")
+    _, found, below = text.partition(f"\n## {heading}\n")
+    if not found:
+        raise ValueError(f"{README}: has no heading {heading!r}")
+    return below.partition("\n## ")[0] + "\n"
+
+
 PARTS: dict[str, Callable[..., str]] = {
-    part.__name__: part for part in (commands, scenario_fields, names, changelog)
+    part.__name__: part for part in (commands, scenario_fields, names, changelog, readme)
 }
 
 
@@ -113,7 +134,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         path = pending.pop()
         if path.endswith(".md"):
             text = (ROOT / path).read_text("utf-8")
-            new = {t for t in linked(path, text).values() if (ROOT / t).is_file()} - seen
+            targets = {*linked(path, text).values()}
+            for part, heading in PART.findall(text):
+                if part == readme.__name__:
+                    targets |= {*linked(README, section_of_readme(heading)).values()}
+            new = {target for target in targets if (ROOT / target).is_file()} - seen
             seen |= new
             pending += new
     for path in sorted(seen):

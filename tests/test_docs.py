@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 import typer.main
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 import dess
 from benchmarks import learning_curves
@@ -22,6 +23,7 @@ from dess.channel import world_of
 from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
 from dess.reports import cli
 from dess.reports.cli import commands, options
+from docs import hooks, pictures
 from tests.outside import install_package
 
 ROOT = Path(__file__).parents[1]
@@ -155,6 +157,46 @@ def test_the_moving_picture_is_of_the_command_beside_it(tmp_path):
     assert cli.main([*arguments, str(tmp_path / "again.gif")]) == 0
     with Image.open(picture) as shown, Image.open(tmp_path / "again.gif") as again:
         assert (again.size, again.n_frames) == (shown.size, shown.n_frames)
+
+
+def test_the_pictures_of_the_model_are_those_of_their_command():
+    drawn = dict(pictures.draw_model())
+    assert {path.name for path in pictures.MODEL.iterdir()} == {*drawn}
+    for name, content in drawn.items():
+        assert (pictures.MODEL / name).read_bytes() == content, name
+        assert f"](../model/{name})" in PAGES["docs/concepts/model.md"]
+
+
+def test_a_picture_that_is_older_than_its_page_is_found(tmp_path, monkeypatch):
+    monkeypatch.setattr(pictures, "GALLERY", tmp_path)
+    monkeypatch.setattr(pictures, "finding_of", lambda _: "Two pads are enough.")
+    kept = PngInfo()
+    kept.add_text(pictures.FINDING, "Two pads are enough.")
+    kept.add_text(pictures.LOOKED, pictures.look())
+    Image.new("RGB", (2, 2)).save(tmp_path / "mission.png", pnginfo=kept)
+    assert pictures.is_current("mission", tmp_path)
+    assert not pictures.is_current("learning", tmp_path)
+    monkeypatch.setattr(pictures, "finding_of", lambda _: "Three pads are enough.")
+    assert not pictures.is_current("mission", tmp_path)
+    monkeypatch.setattr(pictures, "finding_of", lambda _: "")
+    monkeypatch.setattr(pictures, "look", lambda: "another look")
+    assert not pictures.is_current("mission", tmp_path)
+
+
+def test_the_site_groups_the_how_tos_as_their_page_does():
+    nav = (ROOT / "mkdocs.yml").read_text("utf-8").partition("- How-to:")[2]
+    in_nav = re.findall(r"^ {6}- ([^:\n]+):$|^ {10}- .*: how-to/(.*)$", nav, re.M)
+    on_page = re.findall(r"^\*\*(.*)\*\*$|^- \[.*\]\((.*)\)$", PAGES["docs/how-to/index.md"], re.M)
+    assert in_nav == on_page
+
+
+def test_the_first_page_of_the_site_has_the_start_and_the_results_of_the_readme():
+    found = hooks.PART.findall(PAGES["docs/index.md"])
+    assert found == [("readme", "Start"), ("readme", "Three results")]
+    start, results = (hooks.readme(heading) for _, heading in found)
+    assert "pip install" in start and "dess sweep" in start
+    assert "](how-to/own-sea.md)" in start and "](source/CONTRIBUTING.md)" in start
+    assert len(re.findall(r"^\d\. ", results, re.M)) == 3
 
 
 # --- links and names ---

@@ -53,3 +53,41 @@ def test_pages_ask_nothing_from_elsewhere_and_fit_the_window(site, chromium):
         assert all(url.startswith(site.as_uri()) for url in visit.requests), path
         assert not visit.complaints, path
         visit.page.close()
+
+
+CONTRASTS = """(() => {
+    const parts = (colour) => colour.match(/[\\d.]+/g).map(Number);
+    const over = ([r, g, b, a = 1], ground) =>
+        [r, g, b].map((part, n) => a * part + (1 - a) * ground[n]);
+    const ground = (element) => {
+        if (!element) return [255, 255, 255];
+        const colour = parts(getComputedStyle(element).backgroundColor);
+        const behind = ground(element.parentElement);
+        return colour[3] === 0 ? behind : over(colour, behind);
+    };
+    const light = (colour) => {
+        const [r, g, b] = colour.map((part) => part / 255)
+            .map((c) => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    };
+    const texts = ".md-content a:not(.headerlink), .md-header__title, .md-nav__link";
+    return [...document.querySelectorAll(texts)]
+        .filter((element) => element.checkVisibility() && element.textContent.trim())
+        .map((element) => {
+            const behind = ground(element);
+            const ink = over(parts(getComputedStyle(element).color), behind);
+            const [a, b] = [light(ink), light(behind)].sort((a, b) => b - a);
+            return [(a + 0.05) / (b + 0.05), element.textContent.trim()];
+        });
+})()"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_links_and_titles_are_readable(site, chromium, scheme):
+    """The contrast with their ground is at least 4.5 to 1 (WCAG 2.1, 1.4.3)."""
+    page = chromium.new_page(color_scheme=scheme, viewport={"width": WIDTHS[0], "height": 900})
+    page.goto((site / "index.html").as_uri())
+    found = page.evaluate(CONTRASTS)
+    assert len(found) > 30
+    assert [pair for pair in found if pair[0] < 4.5] == []
+    page.close()
