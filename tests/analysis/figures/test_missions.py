@@ -1,6 +1,7 @@
 """What figures show is what happened."""
 
 from collections import Counter
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -108,3 +109,20 @@ def test_a_course_is_a_line_per_value_in_the_panel_of_its_rows():
     drawing = missions.courses(pd.DataFrame(rows), "policy", "%", {1: "One", 2: "Two"})
     drawn = {ax.get_title(loc="left"): ax.lines[0].get_ydata().tolist() for ax in drawing.axes}
     assert drawn == {"One": [1.0, 0.5], "Two": [1.0, 0.0]}
+
+
+@pytest.mark.parametrize("name", ["bay", "jade-bight"])
+def test_names_of_nodes_are_readable_and_keep_clear_of_each_other(name):
+    sea = dess.load_scenario(name)
+    (ax,) = missions.sea_figure(sea).axes
+    assert {text.get_fontsize() for text in ax.texts} == {missions.NAME_SIZE}
+    assert missions.NAME_SIZE >= 9
+    places = missions.name_places(sea.nodes, sea.names, sea.size)
+    scale = missions.MAP_WIDTH / max(sea.size)
+    boxes = []
+    for (x, y), (left, middle), text in zip(sea.nodes, places, sea.names, strict=True):
+        start = x * scale + left
+        boxes.append((start, start + missions.NAME_SIZE / 2 * len(text), middle - y * scale))
+    for (left, right, middle), (other_left, other_right, other) in combinations(boxes, 2):
+        side_by_side = right <= other_left or other_right <= left
+        assert side_by_side or abs(middle - other) >= missions.NAME_SIZE

@@ -32,6 +32,15 @@ BEYOND = """[...document.querySelectorAll("main *")].filter(
     e => e.checkVisibility() && e.getBoundingClientRect().right > {} + 1
 ).map(e => e.outerHTML.slice(0, 80))"""
 
+# Sections of which only the heading is there; tables that are wider than their place.
+EMPTY = """[...document.querySelectorAll("main section")].filter(
+    (section) => section.checkVisibility() && section.offsetHeight
+        < 1.5 * section.querySelector("h2")?.offsetHeight
+).map((section) => section.id)"""
+HIDING = """[...document.querySelectorAll(".scroll")].filter(
+    (place) => place.scrollWidth > place.clientWidth + 1
+).map((place) => place.ariaLabel)"""
+
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
@@ -142,7 +151,14 @@ def test_pages_fit_the_window_and_request_nothing(visit, pages, out, width):
 
 
 def test_pages_fit_the_paper(visit, pages, out):
+    """And below every heading on it there is something."""
     for name in pages:
         page = visit(out / name, A4).page
         page.emulate_media(media="print")
         assert page.evaluate(BEYOND.format(A4)) == [], name
+        assert page.evaluate(EMPTY) == [], name
+
+
+def test_no_table_hides_a_column_on_a_usual_screen(visit, pages, out):
+    for name in pages:
+        assert visit(out / name, 1280).page.evaluate(HIDING) == [], name
