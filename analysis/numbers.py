@@ -7,6 +7,8 @@ import pandas as pd
 
 # What a spreadsheet takes as the beginning of a formula.
 _FORMULA = re.compile(r"^[=+\-@\t\r]")
+# The rounding errors of sums and differences are smaller than this, and no quantity is.
+_ROUNDING = 1e-12
 _NAN = re.compile(r"\bnan\b")
 
 
@@ -53,9 +55,11 @@ def decimals(value: float, low: float, high: float, digits: int = 3) -> str:
 
 
 def quantity(value: float) -> str:
-    """A number with about four digits, as ``1,042`` or ``12.35``."""
+    """A number with about four digits, as ``1,042`` or ``12.35``; 0 if it is but rounding of 0."""
+    if abs(value) < _ROUNDING:
+        return "0"
     text = f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
-    return text.replace("-", "−") if value else "0"
+    return text.replace("-", "−")
 
 
 def quantities(mean: float, low: float, high: float) -> str:

@@ -34,6 +34,9 @@ UAV_RECORD = np.dtype(
         *fields(np.int64, "quota battery slots_flying slots_charging slots_waiting end"),
         *fields(np.float64, "collected reward"),
         ("way_home", np.int64),  # the battery for its shortest way to a zone cell [%]
+        ("charged", np.int64),  # the battery that its charges have added [%]
+        # 1 if it is lost: its battery was empty, it failed for good, or it floats out at sea.
+        ("down", np.int64),
     ]
 )
 
@@ -183,8 +186,9 @@ def write_record(mission, uavs, residual, sensors, teeth, ways, records, row):
             record.success = 0
         way = ways[u.slots_per_cell - 1, u.y, u.x] + u.slots_left
         out.way_home = mission.flight_cost * way
-        is_down = u.end == BATTERY or u.end == LOST or (u.grounded and way > 0)
-        if is_down or u.battery < out.way_home:
+        out.charged = u.charged
+        out.down = u.end == BATTERY or u.end == LOST or (u.grounded and way > 0)
+        if out.down or u.battery < out.way_home:
             record.home = 0
     total = record.initial + record.arrived
     # Rounding may put the ratio a little below 0 or above 1; without any data it is 1.
@@ -218,6 +222,9 @@ class EventLog(list[Event]):
 
     Every column is also an attribute, as in ``log.time``.
     """
+
+    def __repr__(self) -> str:
+        return f"EventLog of {len(self)} events"
 
     def add(self, *values: Any, **others: Any) -> None:
         """Append one event; the arguments are those of ``Event``."""
@@ -260,6 +267,12 @@ class MissionRecord:
         if name in (OPERATIONS.names or ()) and self.operations is not None:
             return self.operations[name].item()
         raise AttributeError(name)
+
+    def __repr__(self) -> str:
+        """The metrics of the paper in a line, without the rows of the UAVs and the log."""
+        shown = ("seed", "replication", "slots", "success", "collection_ratio", "home")
+        metrics = [f"{name}={self.metrics[name].item()!r}" for name in shown]
+        return f"MissionRecord({', '.join(metrics)}, events={self.events!r})"
 
     @property
     def measured(self) -> dict[str, float]:

@@ -286,7 +286,9 @@ def spend(mission, uavs):
             u.charge_slots += 1
             if not limited:
                 added = gain(mission, u.charge_slots)
-                u.battery = min(u.battery + added, mission.charge_complete)
+                added = min(added, mission.charge_complete - u.battery)
+                u.battery += added
+                u.charged += added
             u.slots_charging += 1
         elif u.grounded:
             mission.slots_grounded += 1

@@ -109,6 +109,7 @@ UAV = np.dtype(
         ("zone", np.int64),  # number of the charging zone that it is in, negative for none
         *fields(np.int64, "slots_flying slots_charging slots_waiting"),
         ("charge_slots", np.int64),  # of the present charge
+        ("charged", np.int64),  # the battery that all charges of the mission have added [%]
         ("overruled_by", np.int64),  # if overruled: the UAV in its way, -1 at the edge of the grid
         ("served", np.int64),  # node served in the present communication slot, -1 for none
         # ``latch`` is the charging latch iota; who is ``charging`` holds a pad, and who is

@@ -89,8 +89,7 @@ class Playback:
         """
         self._log, self.scenario = pd.DataFrame(events), scenario
         _check(self._log, scenario)
-        # Residual data may be -1e-16.
-        self.residual = event_log.residual_data(self._log).clip(lower=0).to_numpy()
+        self.residual = event_log.residual_data(self._log).to_numpy()
         self.end = len(self.residual) - 1
         self.fleet = self._fleet()
         self.uav_colours = uav_colours(scenario.uavs)

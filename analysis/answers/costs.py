@@ -33,7 +33,7 @@ from dess.analysis.names import DECISIONS, parameter
 from dess.analysis.results.tables import Results, once
 from dess.analysis.stats.verdict import membership, on_front
 from dess.analysis.study.cheapest import Answer, Cheapest, CheapestChoice
-from dess.analysis.study.costs import PARTS, Costs
+from dess.analysis.study.costs import PARTS, Costs, stranded
 from dess.analysis.tables import CHECKED, MOST_ROWS, Table, counts
 from dess.errors import one_of
 from dess.fields import ZONE_PADS
@@ -75,15 +75,22 @@ def parts(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per policy and design point: ``policy``, ``point``, ``purchase``, ``charging``,
-        ``hours``, ``losses``, and ``cost``, their sum.
+        ``hours``, ``losses``, and ``cost``, their sum; ``stranded``, the mean number of UAVs of a
+        mission that cannot fly home, beyond those that ``losses`` pays for.
 
     Raises:
         InputError: If the study has no prices.
     """
-    prices, missions = _prices(results), results.missions
-    amounts = prices.parts(results.store.manifest.scenarios, missions, results.uavs)
+    prices, missions, uavs = _prices(results), results.missions, results.uavs
+    amounts = prices.parts(results.store.manifest.scenarios, missions, uavs)
     table = missions[["policy", "point", COST]].assign(**amounts)
-    return table.groupby(["policy", "point"], sort=False, as_index=False)[[*PARTS, COST]].mean()
+    means = table.groupby(["policy", "point"], sort=False, as_index=False)[[*PARTS, COST]].mean()
+    is_recorded = "down" in uavs and uavs["down"].notna().all()  # results of before are not
+    count = stranded(uavs) if is_recorded else np.nan
+    number = uavs[["policy", "point"]].assign(stranded=count)
+    sums = number.groupby(["policy", "point"], sort=False)["stranded"].sum(min_count=1)
+    per_setting = missions.groupby(["policy", "point"], sort=False).size()
+    return means.join((sums / per_setting).rename("stranded"), on=["policy", "point"])
 
 
 @once

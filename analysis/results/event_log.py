@@ -13,6 +13,8 @@ from dess.sea.chart import spread
 from dess.sea.places import Projection
 from dess.sections.fleet import type_of
 
+_ROUNDING = 1e-9  # less than this is no part of a packet [data units]
+
 Events: TypeAlias = pd.DataFrame | Mapping[str, Any]
 
 
@@ -56,14 +58,15 @@ def battery_levels(events: Events) -> pd.DataFrame:
 def residual_data(events: Events) -> pd.DataFrame:
     """Residual data [data units] at every mission slot's start (rows) and node (columns).
 
-    The last row is the end of the mission.
+    The last row is the end of the mission. What rounding leaves of the data of packets is 0.
     """
     log = pd.DataFrame(events)
     flows = _node_flows(log)
     times = range(duration(log) + 1)
-    changes = flows["change"].groupby([np.ceil(flows["time"]).astype(int), flows["node"]]).sum()
-    table = changes.unstack(fill_value=0.0).reindex(index=times, fill_value=0.0)
-    return table.cumsum().rename_axis(index="time", columns="node")
+    held = _held(flows).groupby([np.ceil(flows["time"]).astype(int), flows["node"]]).last()
+    table = held.unstack().reindex(index=times).ffill()
+    table = table.where(table > _ROUNDING, 0.0)
+    return table.rename_axis(index="time", columns="node")
 
 
 def age_falls(events: Events) -> pd.DataFrame:
@@ -81,9 +84,7 @@ def age_falls(events: Events) -> pd.DataFrame:
         falls, newest = falls[newest > before], newest[newest > before]
     else:
         flows = _node_flows(log)
-        # Summed in the order of the simulation, which finds a node empty where exactly 0 is left.
-        left = flows["change"].groupby(flows["node"]).transform(lambda c: np.cumsum(c.to_numpy()))
-        falls = flows[(flows["event"] == "communication") & (left == 0.0)]
+        falls = flows[(flows["event"] == "communication") & (_held(flows) == 0.0)]
         newest = falls["time"]
     return falls[["time", "node"]].assign(newest=newest).reset_index(drop=True)
 
@@ -126,6 +127,14 @@ def _node_flows(log: pd.DataFrame) -> pd.DataFrame:
     gains, losses = ("mission_start", "arrival"), ("communication", "data_lost", "loss")
     flows = log[log["event"].isin(gains + losses) & (log["node"] >= 0)]
     return flows.assign(change=flows["value"].where(flows["event"].isin(gains), -flows["value"]))
+
+
+def _held(flows: pd.DataFrame) -> pd.Series:
+    """What each node holds after every row of ``_node_flows`` [data units].
+
+    Summed in the order of the simulation, which finds a node empty where exactly 0 is left.
+    """
+    return flows["change"].groupby(flows["node"]).transform(lambda c: np.cumsum(c.to_numpy()))
 
 
 def _of_uavs(log: pd.DataFrame, event: str) -> pd.DataFrame:

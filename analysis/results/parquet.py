@@ -72,16 +72,20 @@ EVENTS = pa.schema(
 )
 
 
-def _without(schema: pa.Schema, name: str) -> pa.Schema:
-    return schema.remove(schema.get_field_index(name))
+def _without(schema: pa.Schema, *names: str) -> pa.Schema:
+    return pa.schema([field for field in schema if field.name not in names])
 
 
 # The schemas that files may have; those of version 0.2 have no ways home, and fewer columns of the
-# event log.
+# event log, and earlier ones of version 0.3 do not say what was charged and which UAVs are down.
 SCHEMAS = {
     "missions": [MISSIONS, EXTENDED_MISSIONS]
     + [_without(schema, "home") for schema in (MISSIONS, EXTENDED_MISSIONS)],
-    "uavs": [UAVS, _without(UAVS, "way_home")],
+    "uavs": [
+        UAVS,
+        _without(UAVS, "charged", "down"),
+        _without(UAVS, "way_home", "charged", "down"),
+    ],
     "bounds": [BOUNDS],
     "events": [EVENTS, pa.schema([EVENTS.field(name) for name in EVENTS.names[:7]])],
 }

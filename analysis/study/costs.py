@@ -32,7 +32,11 @@ class Costs(StrictTable):
     pad: Price = Field(0.0, description="price of a charging pad")
     charge: Price = Field(0.0, description="price of charging a battery from 0 to 100 %")
     hour: Price = Field(0.0, description="price of an hour of a mission")
-    lost_uav: Price = Field(0.0, description="price of a UAV whose battery is depleted")
+    lost_uav: Price = Field(
+        0.0,
+        description="price of a lost UAV: its battery is depleted, it has failed for good, or it "
+        "floats out at sea at the end",
+    )
     missions: Integer = Field(1, ge=1, le=MOST, description="missions that the fleet is to fly")
     slot_seconds: Number | None = Field(
         None,
@@ -62,22 +66,49 @@ class Costs(StrictTable):
         Args:
             spaces: The scenario of every design point.
             missions: (n,) columns of the missions: ``point`` and the fields of ``MISSION_RECORD``.
-            uavs: Columns of the UAVs of these missions, in the same order: ``slots_charging``, and
-                the name of ``end``.
+            uavs: Columns of the UAVs of these missions, in the same order: ``charged`` and ``down``
+                of ``UAV_RECORD``.
 
         Returns:
             The (n,) amounts of each of ``PARTS``.
+
+        Raises:
+            InputError: If charging or lost UAVs have a price, and results of before lack what was
+                charged and lost.
         """
         fleet, points = np.asarray(missions["uavs"]), np.asarray(missions["point"])
         mission = np.repeat(np.arange(len(fleet)), fleet)
-        pads, rates = np.array([(space.charging_pads, space.charge_rate) for space in spaces]).T
-        slots = np.bincount(mission, np.asarray(uavs["slots_charging"]), len(fleet))
-        lost = np.bincount(mission, np.asarray(uavs["end"]) == "battery", len(fleet))
+        pads = np.array([space.charging_pads for space in spaces])
+        charged = self._sum_of(uavs, "charged", mission, len(fleet), self.charge)
+        lost = self._sum_of(uavs, "down", mission, len(fleet), self.lost_uav)
         seconds = [space.units.slot if space.units else self.slot_seconds or 0 for space in spaces]
         hours = np.asarray(missions["slots"]) * np.array(seconds)[points] / 3600
         return {
             "purchase": self.uav * fleet + self.pad * pads[points],
-            "charging": self.missions * self.charge * slots * rates[points] / 100,
+            "charging": self.missions * self.charge * charged / 100,
             "hours": self.missions * self.hour * hours,
             "losses": self.missions * self.lost_uav * lost,
         }
+
+    @staticmethod
+    def _sum_of(
+        uavs: Mapping[str, Any], field: str, mission: np.ndarray, missions: int, price: float
+    ) -> np.ndarray:
+        """(n,) sums of a field over the UAVs of every mission; 0 if it has no price."""
+        if not price:
+            return np.zeros(missions)
+        if field not in uavs or np.isnan(np.asarray(uavs[field], float)).any():
+            raise InputError(
+                f"costs: the records of an earlier version have no {field}, which has a price; "
+                "allowed: results of this version, of a run with another --out"
+            )
+        return np.bincount(mission, np.asarray(uavs[field]), missions)
+
+
+def stranded(uavs: Mapping[str, Any]) -> np.ndarray:
+    """(u,) whether UAVs that are not lost have no battery for their way home, by ``UAV_RECORD``.
+
+    Where missions do not end on the ground, this is not paid for.
+    """
+    is_short = np.asarray(uavs["battery"]) < np.asarray(uavs["way_home"])
+    return is_short & (np.asarray(uavs["down"]) == 0)

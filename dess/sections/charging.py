@@ -109,6 +109,7 @@ def _share_power(mission, uavs, zone):
         u = uavs[first]
         added = min(gain(mission, u.charge_slots + 1), mission.charge_complete - u.battery, left)
         u.battery += added
+        u.charged += added
         left -= added
         charged[first] = True
 

@@ -19,6 +19,11 @@ def test_differences_are_in_points_with_a_sign():
     assert numbers.points(0.01, -0.002, 0.0222) == "+1.0 [−0.2, +2.2]"
 
 
+def test_what_rounding_leaves_of_0_is_0():
+    assert numbers.quantities(0.1 + 0.2 - 0.3, -(2.0**-52), 0.0) == "0 [0, 0]"
+    assert numbers.quantity(-1e-9) == "−1e−09"
+
+
 @pytest.mark.parametrize(
     ("values", "text"), [([300, 300], "300"), ([1200, 20, 300], "20 to 1,200"), ([7], "7")]
 )

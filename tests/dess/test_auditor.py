@@ -30,7 +30,7 @@ def test_an_auditor_finds_the_record_in_the_log(space, policy, seed, replication
     assert known - NOT_ALWAYS <= {*measured} <= known
     for u, row, found in zip(record.uavs, record.uav_rows(), report["uavs"], strict=True):
         assert (found["end"], found["communications"]) == (row["end"], row["quota"])
-        for name in ("battery", "slots_flying", "slots_charging", "slots_waiting"):
+        for name in ("battery", "slots_flying", "slots_charging", "slots_waiting", "charged"):
             assert found[name] == u[name]
         for name in ("collected", "reward"):
             assert found[name] == pytest.approx(u[name], abs=1e-6)

@@ -61,3 +61,46 @@ def test_a_mission_is_home_if_its_uav_has_the_battery_for_the_way(battery, home)
     space = ScenarioSpace.of(**sea, quota=12, flying_time=battery, charge_start=10)
     record = simulate(space, Script("SSS"), 1)
     assert record.success and record.home == home and record.uavs["way_home"].tolist() == [3]
+
+
+# A zone of two cells, where two UAVs may charge from the first slot on.
+CHARGING = {"grid": 8, "zone": [2, 2, 2, 1], "nodes": [[2, 6]], "charge_complete": 80}
+
+
+def test_a_record_has_the_percent_that_charging_has_added():
+    """From 27 to 80 % at 10 % a slot, the sixth slot adds 3 %, and both share 7 % a slot."""
+    alone = ScenarioSpace.of(**CHARGING, uavs=1, flying_time=27, charge_start=30, max_slots=8)
+    record = simulate(alone, Script(""), 1)
+    assert record.uavs[["slots_charging", "charged"]].tolist() == [(6, 53)]
+    assert (record.uavs["battery"] == 78).all()  # two slots of hovering later
+    shared = ScenarioSpace.of(alone, uavs=2, charging={"power": 7})
+    both = simulate(shared, Script("", ""), 1)
+    assert both.uavs["slots_charging"].tolist() == [8, 8]
+    assert both.uavs["charged"].sum() == 7 * 8
+    assert (both.uavs["charged"] == both.uavs["battery"] - 27).all()
+
+
+DOWN = [
+    ({}, "SSSS", "truncated", 0),
+    ({"flying_time": 4}, "SSSS", "battery", 1),
+    ({"failures": {"uav_rate": 1.0}}, "SSSS", "lost", 1),
+    # It fails in the first slot, out at sea or in its zone, and is never repaired in time.
+    ({"failures": {"uav_rate": 1.0, "uav_repair": 1e6}}, "SSSS", "truncated", 1),
+    ({"failures": {"uav_rate": 1.0, "uav_repair": 1e6}}, "....", "truncated", 0),
+]
+
+
+@pytest.mark.parametrize(("values", "route", "end", "is_down"), DOWN)
+def test_a_uav_is_down_if_it_is_empty_lost_or_floats_at_sea(values, route, end, is_down):
+    fields = {"uavs": 1, "flying_time": 50, "charge_start": 10, "max_slots": 4}
+    record = simulate(ScenarioSpace.of(**CHARGING | fields | values), Script(route), 1)
+    assert record.uav_rows()[0]["end"] == end and record.uavs["down"].tolist() == [is_down]
+
+
+def test_a_record_and_its_log_are_printed_in_a_line():
+    record = simulate(ScenarioSpace.of(), Commuter(), 3, 4, events=True)
+    for shown in (repr(record), str(record), repr(record.events)):
+        assert len(shown) < 400 and "\n" not in shown
+    assert repr(record).startswith("MissionRecord(seed=3, replication=4, ")
+    assert f"events={record.events!r}" in repr(record)
+    assert repr(record.events) == f"EventLog of {len(record.events or [])} events"

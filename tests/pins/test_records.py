@@ -25,7 +25,8 @@ TEAMS = ["greedy", "age", "planner-short", "ddqn", "any"]
 
 def bytes_of(table: np.ndarray) -> bytes:
     """The bytes of a table without the columns that are younger than the pins."""
-    names = [name for name in table.dtype.names or () if name not in ("home", "way_home")]
+    younger = ("home", "way_home", "charged", "down")
+    names = [name for name in table.dtype.names or () if name not in younger]
     return repack_fields(table[names]).tobytes()
 
 

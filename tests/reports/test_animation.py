@@ -28,7 +28,7 @@ def mission(**fields: Any) -> tuple[pd.DataFrame, dess.Scenario]:
 
 def test_a_film_draws_what_the_player_shows():
     log, scenario = mission()
-    slots, residual = uav_slots(log), residual_data(log).clip(lower=0)
+    slots, residual = uav_slots(log), residual_data(log)
     assert slots["waiting"].any() and slots["charging"].any()
     with style.look():
         film = Film(log, scenario)

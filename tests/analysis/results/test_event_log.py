@@ -34,8 +34,15 @@ def assert_agree(record: Any, log: pd.DataFrame) -> None:
     assert of_uav["battery"].last().tolist() == record.uavs["battery"].tolist()
     assert not (slots["charging"] & (slots["waiting"] | slots["moved"])).any()
     assert duration(log) == record.slots == slots["slot"].max() + 1
-    end = log[(log["event"] == "mission_end") & (log["node"] >= 0)]
-    assert np.allclose(residual_data(log).iloc[-1], end["value"], atol=1e-9, rtol=0)
+    assert_residual(log)
+
+
+def assert_residual(log: pd.DataFrame) -> None:
+    """The data of nodes end as the log has it, are never below 0, and 0 where nothing is left."""
+    end = log[(log["event"] == "mission_end") & (log["node"] >= 0)]["value"].to_numpy()
+    residual = residual_data(log)
+    assert np.allclose(residual.iloc[-1], end, atol=1e-9, rtol=0)
+    assert (residual >= 0).all(axis=None) and not residual.iloc[-1].to_numpy()[end == 0].any()
 
 
 @given(drawn.spaces(), drawn.seeds)
@@ -69,6 +76,7 @@ def test_ages_of_a_log_are_those_of_the_record_and_those_that_policies_see(space
     area = ((age[1:] + age[:-1]) / 2 * np.diff(time)).sum()
     assert area / duration(log) == pytest.approx(record.age, rel=1e-9)
     assert of_nodes.loc[duration(log)].mean() == pytest.approx(age[-1], abs=1e-9)
+    assert_residual(log)
 
 
 def test_the_node_of_a_slot_is_the_one_served_most_and_last():

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from dess import InputError
 from dess.analysis import load_study
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.study.cheapest import Cheapest, MeanTest, Setting, _Search
-from dess.analysis.study.costs import PARTS, Costs
+from dess.analysis.study.costs import PARTS, Costs, stranded
 from dess.scenario import ScenarioSpace, load_scenario
 from tests.analysis.study.test_selection import check_that_interruptions_leave_no_trace
 
@@ -26,17 +27,31 @@ def space(**fields: Any) -> ScenarioSpace:
 
 
 def test_the_cost_of_missions_by_hand():
-    # Point 0: 2 UAVs, 16 pads; point 1: 1 UAV, 3 pads, and batteries that gain 20 % in a slot.
-    spaces = [space(uavs=2), space(uavs=1, pads=3, charge_rate=20)]
+    # Point 0: 2 UAVs, 16 pads; point 1: 1 UAV, 3 pads. The last UAV floats out at sea.
+    spaces = [space(uavs=2), space(uavs=1, pads=3)]
     missions = {"point": [1, 0], "uavs": [1, 2], "slots": [90, 30]}
-    uavs = {"slots_charging": [4, 5, 3], "end": ["quota", "battery", "truncated"]}
+    uavs = {"charged": [53, 40, 0], "down": [0, 1, 1]}
     prices = Costs(uav=100, pad=10, charge=2, hour=60, lost_uav=50, missions=7, slot_seconds=120)
     parts = prices.parts(spaces, missions, uavs)
     assert [*parts] == [*PARTS]
     assert parts["purchase"].tolist() == [100 + 3 * 10, 2 * 100 + 16 * 10]
-    assert parts["charging"] == pytest.approx([7 * 2 * 4 * 0.20, 7 * 2 * 8 * 0.10])
+    assert parts["charging"] == pytest.approx([7 * 2 * 0.53, 7 * 2 * 0.40])
     assert parts["hours"] == pytest.approx([7 * 60 * 3, 7 * 60 * 1])
-    assert parts["losses"].tolist() == [0, 7 * 50]
+    assert parts["losses"].tolist() == [0, 7 * 50 * 2]
+
+
+def test_results_of_before_are_priced_if_charging_and_losses_have_no_price():
+    missions, uavs = {"point": [0], "uavs": [1], "slots": [90]}, {"battery": [27]}
+    assert Costs(uav=100).parts([space(uavs=1)], missions, uavs)["purchase"].tolist() == [100]
+    for price, field in (({"charge": 2}, "charged"), ({"lost_uav": 2}, "down")):
+        for known in (uavs, uavs | {field: [np.nan]}):  # a folder with older and newer files
+            with pytest.raises(InputError, match=f"^costs: .* no {field}, .*; allowed: .*--out$"):
+                Costs(**price).parts([space(uavs=1)], missions, known)
+
+
+def test_a_uav_that_cannot_fly_home_is_stranded_unless_it_is_lost():
+    uavs = {"battery": [5, 6, 0, 3], "way_home": [6, 6, 9, 9], "down": [0, 0, 1, 1]}
+    assert stranded(uavs).tolist() == [True, False, False, False]
 
 
 ERROR = 0.05

@@ -78,6 +78,7 @@ class Pads:
                 added = math.floor(u.charge_slots * rate) - math.floor((u.charge_slots - 1) * rate)
                 gain = min(added, self.complete - u.battery, left)
                 u.battery += gain
+                u.charged += gain
                 left -= gain
                 u.slots_charging += 1
 

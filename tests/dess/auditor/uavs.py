@@ -14,7 +14,7 @@ HOVER = 4
 LARGEST_DEVIATE = 6.34  # of a gust, and of the shadowing, in standard deviations
 # Counters of a UAV, and the slots that its move takes after the present one.
 _ZEROS = ("communications", "slots_flying", "slots_charging", "slots_waiting", "slots_grounded")
-_ZEROS += ("collected", "reward", "slots_left", "charge_slots")
+_ZEROS += ("collected", "reward", "slots_left", "charge_slots", "charged")
 
 
 class Uav(SimpleNamespace):
