@@ -22,7 +22,8 @@ STUDIES = {
     "comparison failures": "--missions 400",
     "sweet-spot": "--policy ddqn --policy greedy",
     "explorer age": "--missions 30",
-    "gap": "--missions 8",
+    "planning": "",
+    "gap": "--missions 30 --policy greedy --policy ddqn --policy planner",
     "seas": "--missions 1 --policy any --policy greedy --policy planner-short",
     "seas-landing seas-horizon": "--missions 1 --policy any --policy greedy",
 }

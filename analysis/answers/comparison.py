@@ -284,6 +284,7 @@ def _ends(results: Results, policy: str, replications: Iterable[int]) -> pd.Data
 
 
 BINS = 5  # largest number of bins of a parameter
+LEAST = 10  # missions of a bin that is shown
 EDGE = 0.005  # share of the missions that is beyond each end of the distribution's axis
 AHEAD, BEHIND = "ahead", "behind"
 VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}
@@ -313,6 +314,9 @@ def bins(values: pd.Series, most: int = BINS) -> tuple[np.ndarray, list[str]]:
 def along(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
     """The mean difference along every parameter that varies.
 
+    Bins of fewer than ``LEAST`` missions would show nothing and are left out, and so is a parameter
+    of which fewer than two bins are left.
+
     Args:
         missions: Rows of ``duels``.
         candidates: Number of pairs among which the two policies were chosen.
@@ -325,9 +329,10 @@ def along(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
     """
     rows = []
     for field in varied(missions):
-        bin_of, names = bins(missions[field])
-        for position, value in enumerate(names):
-            part = missions[bin_of == position]
+        bin_of, names = bins(missions[field], max(1, min(BINS, len(missions) // LEAST)))
+        large = np.flatnonzero(np.bincount(bin_of) >= LEAST)
+        for position, code in enumerate(large if len(large) > 1 else []):
+            part, value = missions[bin_of == code], names[code]
             ours, theirs = (values_within(part, PRODUCT + end, ()) for end in ("", OF_BASELINE))
             found = paired(ours, theirs, metric=PRODUCT)
             rows.append((field, position, value, *found[:4], found.n))
@@ -405,7 +410,7 @@ def spread(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFrame:
         dependences: Rows of ``dependence``.
     """
     lines = []
-    for row in dependences.itertuples():
+    for row in dependences[dependences["field"].isin(lead["field"])].itertuples():
         rows = lead[lead["field"] == row.field].sort_values("mean", kind="stable")
         bins_ = [f"{_points(one)} at {one.value}" for one in rows.itertuples()]
         shown = numbers.percent(row.explained), numbers.p_value(row.p_adjusted)

@@ -17,6 +17,7 @@ NOT_RUN = (
 )
 ALL = "all"  # in place of a number of UAVs: the missions of fleets of any size
 _SHOWN = {PRODUCT: "Product", BOUND: "Upper bound", GAP: "Gap [points]"}
+LEAST = 5  # missions of a fleet of which something is said
 _SAYS_NOTHING = 0.999  # a mean bound from which on it is not below 100 % as pages print it
 
 
@@ -59,8 +60,12 @@ def listed(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def useful(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of ``by_fleet`` of fleets whose bound says something: it is below 100 %."""
-    return table[(table["uavs"] != ALL) & (table[BOUND] < _SAYS_NOTHING)]
+    """The rows of ``by_fleet`` of fleets whose bound says something.
+
+    The bound is below 100 %, and is known of ``LEAST`` missions or more.
+    """
+    says = (table[BOUND] < _SAYS_NOTHING) & (table["n"] >= LEAST)
+    return table[(table["uavs"] != ALL) & says]
 
 
 def in_words(results: Results, policy: str | None = None) -> str:
@@ -76,15 +81,23 @@ def in_words(results: Results, policy: str | None = None) -> str:
     rows = found[found["policy"] == policy]
     parts = [
         f"{100 * row[f'{GAP}_high']:.1f} points with {numbers.counted(row['uavs'], 'UAV')} "
-        f"(mean gap {_points(*row[[GAP, f'{GAP}_low', f'{GAP}_high']])})"
+        f"(mean gap {_points(*row[[GAP, f'{GAP}_low', f'{GAP}_high']])}, n = {row['n']:,} missions)"
         for _, row in rows.iterrows()
     ]
-    others = sorted({*table["uavs"]} - {*found["uavs"], ALL})
-    text = f"`{policy}` is at most {numbers.words(parts)} from the best possible. " if parts else ""
-    if others:
-        fleets = numbers.words([numbers.counted(int(uavs), "UAV") for uavs in others])
-        text += f"The upper bound is 100 % for {fleets}, so there is no useful bound."
-    return text.strip()
+    sentences = []
+    if parts:
+        sentences.append(f"`{policy}` is at most {numbers.words(parts)} from the best possible.")
+    of_policy = table[(table["policy"] == policy) & (table["uavs"] != ALL)]
+    says = of_policy[BOUND] < _SAYS_NOTHING
+    for row in of_policy[says & (of_policy["n"] < LEAST)].itertuples():
+        fleet = numbers.counted(row.uavs, "UAV")
+        sentences.append(f"The bounds of n = {row.n} missions with {fleet} are too few to tell.")
+    if not says.all():
+        fleets = [numbers.counted(int(uavs), "UAV") for uavs in of_policy.loc[~says, "uavs"]]
+        sentences.append(
+            f"The upper bound is 100 % for {numbers.words(fleets)}, so there is no useful bound."
+        )
+    return " ".join(sentences)
 
 
 def _points(mean: float, low: float, high: float) -> str:

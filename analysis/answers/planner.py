@@ -57,6 +57,8 @@ def differences(results: Results, planners: Sequence[str], learner: str) -> pd.D
 def answer(table: pd.DataFrame, planner: str) -> tuple[str, str]:
     """Whether the planner is better than the learner, and by how many points over all missions.
 
+    The number for the index is empty if the missions do not tell which is better.
+
     Args:
         table: Rows of ``differences``.
         planner: The planner.
@@ -68,6 +70,8 @@ def answer(table: pd.DataFrame, planner: str) -> tuple[str, str]:
         f"{_CLAIMS[position(overall)]}: the product of {planner} minus that of {overall.baseline} "
         f"is {points} points over {overall.n:,} missions."
     )
+    if position(overall) == INCONCLUSIVE:
+        return sentence, ""
     return sentence, f"{numbers.difference(overall.difference, 0)} points"
 
 
@@ -241,7 +245,14 @@ def node_prices(results: Results, replication: int) -> np.ndarray:
 
 
 def prices(results: Results, replication: int) -> Drawing:
-    """A map of the prices of the nodes' data in the upper bound of a mission."""
+    """A map of the prices of the nodes' data in the upper bound of a mission.
+
+    Args:
+        results: A study with bounds.
+        replication: The mission; if it has no bound, the first one that has is taken.
+    """
+    known = [number for _, number in results.bounds]
+    replication = replication if replication in known else known[0]
     values = node_prices(results, replication)
     return Drawing(
         node_map(results.scenario(), "Price of a node's data", values, write="{:.2f}".format),

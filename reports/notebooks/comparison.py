@@ -50,7 +50,8 @@ html.lead(*answers.distribution(missions, pair))
 
 # %%
 lead = answers.along(missions, pair.candidates)
-html.gallery(answers.leads(missions, lead, pair), f"{pair.title}; bars are 95 % intervals.")
+too_few = html.say("Too few missions for bins of n = {least} or more.", least=answers.LEAST)
+html.show(answers.leads(missions, lead, pair, f"{pair.title}, 95 % intervals, ") or too_few)
 
 # %% [markdown]
 # ## Its worst missions

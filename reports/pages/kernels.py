@@ -139,7 +139,7 @@ def _environment(home: Path) -> dict[str, str]:
 
 COMPARISON, VERIFICATION = "comparison", "verification"  # names of the pages and of their studies
 # The pages that show times of decisions, and their studies.
-TIMED = {COMPARISON: COMPARISON, "planner": "gap", "seas": "seas"}
+TIMED = {COMPARISON: COMPARISON, "planner": "planning", "seas": "seas"}
 
 
 def make(

@@ -49,7 +49,8 @@ STUDIES: dict[str, dict[str, Any]] = {
             **{"failures.uav_repair": [0.0, 20.0]},
         ),
     },
-    "gap": {"policies": [*POLICIES, "planner"], "missions": 12, "logged": 2},
+    "planning": {"policies": [*POLICIES, "planner"], "missions": 40, "logged": 2},
+    "gap": {"policies": [*POLICIES, "planner"], "missions": 12},
     "seas": {"policies": ["any", "greedy", "planner"], "missions": 4, "design": _SEAS},
     "seas-landing": {"policies": ["any", "greedy"], "missions": 4, "design": _SEAS},
     "seas-horizon": {

@@ -1,7 +1,7 @@
 # ---
 # jupyter:
 #   dess:
-#     studies: [gap]
+#     studies: [planning, gap]
 #   jupytext:
 #     text_representation:
 #       extension: .py
@@ -14,7 +14,7 @@
 # A policy that plans and one that has learned, in the same missions, and the time that they take.
 
 # %% tags=["parameters"]
-results = "../../results"  # folder that holds the results folder gap
+results = "../../results"  # folder that holds the results folders planning and gap
 planner = "planner"  # the policy that plans
 longer = "planner-long"  # the same with a longer search, if the study has it
 learner = "ddqn"  # the policy that has learned
@@ -28,7 +28,7 @@ from dess.analysis.figures.comparison import gaps
 from dess.reports.pages import html
 
 # %%
-study = load_results(f"{results}/gap")
+study, bounded = (load_results(f"{results}/{name}") for name in ("planning", "gap"))
 times = comparison.read(results, study)
 planners = [planner, *(name for name in [longer] if name in study.policies)]
 differences = answers.differences(study, planners, learner)
@@ -50,7 +50,8 @@ html.lead(*answers.by_fleet(differences))
 
 # %%
 lead = comparison.along(missions, pair.candidates)
-html.gallery(comparison.leads(missions, lead, pair, f"{pair.title}, "))
+too_few = html.say("Too few missions for bins of n = {least} or more.", least=comparison.LEAST)
+html.show(comparison.leads(missions, lead, pair, f"{pair.title}, ") or too_few)
 
 # %%
 html.gallery(answers.coverages(study, planner, learner))
@@ -61,26 +62,29 @@ html.gallery(
     [
         answers.at_home(study, [planner, learner]),
         answers.plan(study, mission),
-        answers.prices(study, mission.replication),
+        answers.prices(bounded, mission.replication),
     ]
 )
 
 # %% [markdown]
 # ## How far to trust it
 #
-# All policies meet the same missions. The best possible policy is between the best one here and the
-# upper bound.
+# All policies meet the same missions. The study gap has an upper bound for some of them. The best
+# possible policy is between the best one here and this bound.
 
 # %%
-html.say("{gap}", gap=html.composed(optimality.in_words(study, planners[-1])))
+html.say("{gap}", gap=html.composed(optimality.in_words(bounded, planners[-1])))
 
 # %%
-bounded = optimality.by_fleet(study)
-drawn = [answers.front(study, times)]
-if len(useful := optimality.useful(bounded)):
+bounds = optimality.by_fleet(bounded)
+counted = f"n = {len(missions):,} missions per policy."
+front = answers.front(study, times)
+drawn = [front._replace(caption=f"{front.caption} {counted}")]
+if len(useful := optimality.useful(bounds)):
     alt = "The product of every policy and the upper bound, by number of UAVs"
-    drawn.append(Drawing(gaps(useful), alt, "The band is the 95 % interval of the bound."))
-html.gallery(drawn, f"n = {len(missions):,} missions per policy; bars are 95 % intervals.")
+    counted = f"n = {numbers.span(useful['n'])} missions. The band is the interval of the bound."
+    drawn.append(Drawing(gaps(useful), alt, counted))
+html.gallery(drawn, "Bars are 95 % intervals.")
 
 # %% [markdown]
 # ## Tables
@@ -95,7 +99,7 @@ html.table(
 
 # %%
 caption = "Means, the upper bound, and the gap in points"
-html.table(optimality.listed(bounded), caption, data=bounded)
+html.table(optimality.listed(bounds), caption, data=bounds)
 
 # %%
 html.table(
@@ -113,4 +117,4 @@ html.table(comparison.time_table(times), "Time of a decision for the UAVs of a m
 html.say("{remarks}", remarks=comparison.remarks(times, study, pair))
 
 # %%
-html.provenance([study])
+html.provenance([study, bounded])

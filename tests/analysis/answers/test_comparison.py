@@ -147,6 +147,14 @@ def test_along_a_parameter_the_difference_is_that_of_its_missions():
     assert table["p_adjusted"].tolist() == expected.tolist()
 
 
+def test_a_bin_has_ten_missions_or_more():
+    """Eight missions were drawn as bins of one or two."""
+    few = missions_of(lambda t: 0.0, n=8)
+    assert comparison.along(few).empty
+    assert comparison.spread(comparison.along(few), comparison.dependence(few)).empty
+    assert comparison.along(missions_of(lambda t: 0.0, n=45))["n"].min() >= 10
+
+
 def test_what_all_missions_share_is_no_parameter():
     missions = missions_of(lambda t: 0.1, uavs=2, flying_time=80)
     assert comparison.varied(missions) == ["charge_start", "charge_complete", "initial_data"]
