@@ -46,6 +46,8 @@ def estimates(
 ) -> pd.DataFrame:
     """Rows with ``mean``, ``low`` and ``high``: a cell per estimate, empty where there is none.
 
+    What was measured in no mission has a mean of nan, and makes no row of its own.
+
     Args:
         rows: The rows.
         index: The columns that name a row.
@@ -53,10 +55,9 @@ def estimates(
         write: Writes a mean and the ends of its interval.
     """
 
-    def cell(mean: float, low: float, high: float) -> str:
-        return "" if np.isnan(mean) else write(mean, low, high)
-
-    table = numbers.wide(rows, [*index], columns, cell).fillna("").reset_index()
+    order, known = rows[columns].unique(), rows[rows["mean"].notna()]
+    table = numbers.wide(known, [*index], columns, write)
+    table = table[[name for name in order if name in table]].fillna("").reset_index()
     for name in index:
         table[name] = counts(table[name]) if name == "n" else table[name].map(value_text)
     heads = {field: parameter(field).name for field in index} | _HEADS
