@@ -236,6 +236,15 @@ def age(results: Results) -> str:
     )
 
 
+def published() -> str:
+    """The published changes of the age with the number of UAVs, in words."""
+    parts = [
+        f"{numbers.minus(f'{100 * change:.0f}')} % from one to {uavs} UAVs"
+        for uavs, change in PUBLISHED.items()
+    ]
+    return numbers.words(parts)
+
+
 def lengths(results: Results) -> str:
     """How many mission slots the missions last, in a sentence."""
     slots, longest = results.missions["slots"], results.scenario().max_slots

@@ -157,7 +157,8 @@ def summary(results: Results, times: Times) -> pd.DataFrame:
 def worst(results: Results, policy: str, reference: str, count: int = 8) -> pd.DataFrame:
     """The seas on which a policy is the farthest behind another one, as a table of text."""
     ((_, values),) = _by_sea(results, ALL, PRODUCT)
-    behind = (values[policy] - values[reference]).nsmallest(count)
+    differences = values[policy] - values[reference]
+    behind = differences[differences < 0].nsmallest(count)
     spaces = dict(zip(_names(results), results.store.manifest.scenarios, strict=True))
     return pd.DataFrame(
         {
@@ -169,7 +170,7 @@ def worst(results: Results, policy: str, reference: str, count: int = 8) -> pd.D
             "Points": numbers.difference(points, 0),
         }
         for sea, points in behind.items()
-    )
+    ).reindex(columns=["Sea", "Nodes", "UAVs", policy, reference, "Points"])
 
 
 def answer(results: Results, times: Times, policy: str, reference: str, baseline: str) -> str:
@@ -183,7 +184,7 @@ def answer(results: Results, times: Times, policy: str, reference: str, baseline
     more = numbers.points(*gain[["difference", "low", "high"]])
     return (
         f"On {share['n']} unseen seas, {policy} reaches {reached} of the product of "
-        f"{reference}{faster}, and {more} points more than {baseline}."
+        f"{reference}{faster}; its product minus that of {baseline} is {more} points."
     )
 
 

@@ -120,12 +120,14 @@ def answer(results: Results, table: pd.DataFrame, metric: str) -> str:
     value = of.written(*best[[metric, f"{metric}_low", f"{metric}_high"]])
     names = [setting_of(results, row.policy, row.point) for row in tied.itertuples()]
     what, many = "setting" if varied(results) else "policy", len(names) - 1
+    named = f" ({'; '.join(names[1:])})" * (many <= MOST_NAMES)
     if others == 1:
         rest = f" The other {what} {'may be as good' if many else 'is significantly worse'}."
     elif not many:
         rest = f" All {others:,} others are significantly worse." if others else ""
+    elif many == others:
+        rest = f" All {others:,} others may be as good{named}."
     else:
-        named = f" ({'; '.join(names[1:])})" * (many <= MOST_NAMES)
         rest = (
             f" Of the {others:,} others, {many:,} may be as good{named}; the rest are "
             "significantly worse."

@@ -31,6 +31,7 @@ from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.design import NOISE, Saltelli
 from dess.analysis.tables import INTERVALS, MOST_ROWS, YES, Table, compared, counts
 
+UNGUARDED = "random-unguarded"  # the policy that acts without the return guard
 RESAMPLES = 1000  # bootstrap resamples of the blocks of the design; every metric has the same
 
 
@@ -306,14 +307,19 @@ def against_paper(means: pd.DataFrame, policy: str, printed: Mapping[str, float]
 
 
 def guard_in_words(means: pd.DataFrame) -> str:
-    """Why even a random policy succeeds: the return guard, and what success is without it.
+    """How often policies succeed under the return guard, and what success is without it.
 
     Args:
         means: Rows of ``dess.analysis.summary`` by policy.
     """
-    text = "All policies but `random-unguarded` act under the return guard, so nearly all succeed."
     known = {*means["policy"]}
-    for policy, guarded in (("random", "under"), ("random-unguarded", "without")):
+    guarded_means = means[(means["metric"] == SUCCESS) & (means["policy"] != UNGUARDED)]["mean"]
+    ends = dict.fromkeys(map(numbers.percent, (guarded_means.min(), guarded_means.max())))
+    text = (
+        f"All policies but `{UNGUARDED}` act under the return guard: they succeed in "
+        f"{' to '.join(ends)} of the missions."
+    )
+    for policy, guarded in (("random", "under"), (UNGUARDED, "without")):
         if policy in known:
             share = of_policy(means, policy)[SUCCESS]
             text += f" Random moves {guarded} the guard have a success of {share}."

@@ -112,8 +112,8 @@ html.gallery(
 # %% [markdown]
 # ## The paper's Fig. 1
 #
-# The paper draws a small map without numbers. A learned policy works only on the map of its
-# training, so a heuristic is shown.
+# The paper draws a small map without numbers. The policies that have learned on the paper's map
+# work on that map only, so a heuristic is shown.
 
 # %%
 caption = (

@@ -46,8 +46,13 @@ html.gallery(others)
 # %% [markdown]
 # ## How far to trust it
 #
-# Mathematics 13(21) 3564 reports, for another model, −46 % from one to two UAVs and −79 % from one
-# to ten. Only the size of the effect compares: scenario, channel and trajectories differ.
+# Another model differs in scenario, channel and trajectories: only the size of the effect compares.
+
+# %%
+html.say(
+    "Mathematics 13(21) 3564 reports, for another model, {published}.",
+    published=operations.published(),
+)
 
 # %%
 change = operations.age_changes(study)

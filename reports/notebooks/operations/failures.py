@@ -42,8 +42,9 @@ html.lead(*lead)
 # %% [markdown]
 # ## Why
 #
-# A mission succeeds only if every UAV fills its quota, so one lost UAV makes it fail. What it has
-# collected still counts in the collection ratio, which shows how far the others make up for it.
+# A mission succeeds only if every UAV fills its quota, so one that is lost before makes it fail.
+# What it has collected still counts in the collection ratio, which shows how far the others make up
+# for it.
 
 # %%
 html.gallery(others)

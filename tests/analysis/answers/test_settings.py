@@ -92,6 +92,15 @@ def test_a_setting_of_few_missions_is_not_tied_when_its_interval_is_below(result
     assert table["n"].tolist()[:2] == [300, 12] and table["tied"].tolist() == [True] + [False] * 11
 
 
+def test_where_all_settings_may_be_as_good_none_is_called_worse(results):
+    table = settings.ranked(results)
+    said = settings.answer(results, table.assign(tied=True), PRODUCT)
+    assert "All 11 others may be as good." in said and "worse" not in said
+    said = settings.answer(results, table.assign(tied=table["rank"] <= 3), PRODUCT)
+    assert "Of the 11 others, 2 may be as good (" in said
+    assert "the rest are significantly worse." in said
+
+
 def test_of_costs_the_lowest_is_the_best(results):
     missions = results.missions
     priced = replace(results, missions=missions.assign(cost=100.0 + missions["point"]))

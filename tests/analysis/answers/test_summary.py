@@ -11,7 +11,7 @@ from dess import InputError
 from dess.analysis import load_study, run_study
 from dess.analysis.answers import summary
 from dess.analysis.answers.summary import sensitivity
-from dess.analysis.metrics import PRODUCT
+from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.study.design import Saltelli
 
 # Names only: nothing is simulated.
@@ -159,3 +159,16 @@ def test_checkpoints_of_one_learner_are_one_learner(tmp_path):
     assert set(table["trainings"]) == {2}
     alone = results_of("greedy", "ddqn")
     assert set(summary.learned_against_heuristic(alone)["about"]) == {"this checkpoint"}
+
+
+def test_what_is_said_of_the_guard_is_computed():
+    """Policies under the guard may fail as well."""
+    shares = {"greedy": 0.4, "random": 0.9, "random-unguarded": 0.01}
+    means = pd.DataFrame(
+        {"policy": policy, "metric": metric, "mean": mean, "low": mean, "high": mean}
+        for policy, mean in shares.items()
+        for metric in METRICS
+    )
+    said = summary.guard_in_words(means)
+    assert "under the return guard: they succeed in 40.0 % to 90.0 % of the missions." in said
+    assert "nearly all" not in said
