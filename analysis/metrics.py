@@ -6,7 +6,8 @@ from typing import Any, Literal
 
 from dess.analysis import numbers
 from dess.record import OPERATIONS
-from dess.sections.data_sheet import Units, printed
+from dess.sections.data_sheet import Units
+from dess.sections.quantities import printed
 
 Kind = Literal["outcome", "share", "number", "cost"]
 

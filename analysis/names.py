@@ -193,9 +193,10 @@ def placing(space: ScenarioSpace) -> str:
             "node, with their data and rates added."
         )
     if space.moved:
+        verb = "are" if len(space.moved) > 1 else "is"
         return (
-            f" Of the {len(space.nodes)} nodes, {len(space.moved)} are in the nearest free cell, "
-            "since their own is taken or closed."
+            f" Of the {len(space.nodes)} nodes, {len(space.moved)} {verb} in the nearest free "
+            "cell, since their own is taken or closed."
         )
     return ""
 

@@ -304,18 +304,26 @@ class Fields(Strict):
         ]
 
 
+# What all nodes have in common, and what each has in its place: who sets the first means all.
+_EACH = {"arrival_rate": "arrivals.rates", "initial_data": "arrivals.initial"}
+
+
 def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
     """Values on top of others; ``failures.uav_rate`` and a table replace parts of a section.
 
-    ``zones.pads`` replaces the pads of the further zones: a number for all, or one for each.
+    ``zones.pads`` replaces the pads of the further zones: a number for all, or one for each. A rate
+    or an amount for all nodes replaces those of each.
 
     Raises:
         InputError: If ``zones.pads`` has another length than ``zones``.
     """
     result: dict[str, Any] = {}
+    below, above = dotted(base), dotted(values)
+    replaced = {each for for_all, each in _EACH.items() if for_all in above}
     if "nodes" in values:  # the names are those of others
-        base = {name: value for name, value in base.items() if name not in ("names", "moved")}
-    for name, value in (dotted(base) | dotted(values)).items():
+        replaced |= {"names", "moved"}
+    below = {name: value for name, value in below.items() if name not in replaced}
+    for name, value in (below | above).items():
         section, _, part = name.partition(".")
         table = result.setdefault(section, {}) if part and section in SECTIONS else None
         if isinstance(table, dict):

@@ -6,7 +6,7 @@ scenario = Scenario.of(uavs=2, forbid_swaps=True)  # a single scenario; Table II
 """
 
 from collections.abc import Iterator, Mapping
-from functools import partial
+from functools import cache, partial
 from itertools import chain
 from math import inf
 from pathlib import Path
@@ -16,6 +16,7 @@ import tomli_w
 from pydantic import (
     Field,
     SerializerFunctionWrapHandler,
+    TypeAdapter,
     ValidationError,
     ValidationInfo,
     model_serializer,
@@ -23,7 +24,7 @@ from pydantic import (
 )
 
 from dess.consistency import problems
-from dess.errors import InputError, check_type, one_of, shown, validated
+from dess.errors import InputError, check_type, form_of, one_of, shown, validated
 from dess.fields import (
     AS_RANGE,
     GEOMETRY,
@@ -41,6 +42,7 @@ from dess.fields import (
 )
 from dess.files.reading import Shipped, parse_toml
 from dess.sea.families import FAMILIES, is_generated, sea_of
+from dess.sea.nodes import AMOUNTS
 from dess.sea.own import OwnSea, unread
 from dess.sections.data_sheet import OPEN, DataSheet
 from dess.sections.section import Integer, Section
@@ -69,9 +71,12 @@ class Constants(Fields):
         if not (found and found.is_on):
             return values
         values = {n: dict(of) if isinstance(of, Section) else of for n, of in values.items()}
-        for name in sorted(found.fields().keys() & dotted(values).keys() - {*OPEN}):
+        following = found.fields()
+        for name in sorted(following.keys() & dotted(values).keys() - {*OPEN}):
             raise InputError(f"{name}: follows from the data sheet; allowed: without this field")
-        return merged(found.fields(), values)
+        for name, value in following.items():
+            _check_following(found, name, value)
+        return merged(following, values)
 
     @model_serializer(mode="wrap")
     def _without_what_is_off(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -199,9 +204,15 @@ def draft_scenario(name_or_path: str | Path, /, **overrides: Any) -> ScenarioSpa
     return _load(name_or_path, overrides, DRAFT)
 
 
-def parsed_scenario(text: str, path: Path) -> ScenarioSpace:
-    """The scenario that ``load_scenario`` would load if a file had this text."""
-    return _load(path, {}, found=(str(path), parse_toml(text, str(path))))
+def parsed_scenario(text: str, path: Path, context: str = "") -> ScenarioSpace:
+    """The scenario that ``load_scenario`` would load if a file had this text.
+
+    Args:
+        text: The text.
+        path: The file, in whose folder those lie that the text names.
+        context: ``DRAFT`` for one that is loaded wherever its cells are.
+    """
+    return _load(path, {}, context, (str(path), parse_toml(text, str(path))))
 
 
 def _load(
@@ -212,9 +223,13 @@ def _load(
     values = merged(read, overrides)
     if named := unread(read) | unread(values):
         draft = validated(ScenarioSpace, values | named, where, DRAFT)
-        own = OwnSea(where, partial(_SCENARIOS.beside, name_or_path), draft)
+        beside = partial(_SCENARIOS.beside, name_or_path)
+        own = OwnSea(where, beside, draft, dotted(overrides).keys())
         given = {field: of for field, of in values.items() if field not in unread(values)}
-        values = merged(own.placed(values, read.get("nodes")), given)
+        placed = own.placed(values, read.get("nodes"))
+        of_nodes = {field: placed.pop(field) for field in AMOUNTS if field in placed}
+        values = merged(placed, given)
+        values = merged(values, of_nodes)
     return validated(ScenarioSpace, values, where, context)
 
 
@@ -283,6 +298,31 @@ def _read(name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
     if is_generated(name):
         return f"scenario {name}", sea_of(name)
     return _SCENARIOS.load(name_or_path, others=scenario_families())
+
+
+# How what follows from a data sheet is checked, where another field has the same limits.
+_LIMITED = {"initial_data": "arrivals.initial"}
+
+
+@cache
+def _adapter(name: str) -> TypeAdapter:
+    field = fields_of(Fields)[name]
+    return TypeAdapter(Annotated[field.annotation, field])  # type: ignore[name-defined]
+
+
+def _check_following(sheet: DataSheet, name: str, value: Any) -> None:
+    """Refuse a data sheet from which a value follows that its field may not have."""
+    limited = _LIMITED.get(name, name)
+    if limited not in fields_of(Fields):
+        return  # it is checked beside the others, whose limits it has
+    try:
+        _adapter(limited).validate_python(value)
+    except ValidationError as error:
+        number = error.errors()[0]["input"]
+        raise InputError(
+            f"data_sheet: with {sheet.origin(name)}, {name} is {number:,g}; allowed: "
+            f"{form_of(fields_of(Fields)[limited])}"
+        ) from None
 
 
 def _out_of_range(c: Constants) -> Iterator[str]:

@@ -30,7 +30,6 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 import dess
-from dess.code.libraries import MissingLibraryError
 from dess.code.sources import path_of
 from dess.errors import InputError, one_of, shown
 from dess.fields import SAMPLED
@@ -339,10 +338,7 @@ def about(name: str) -> About:
     policy, folder = load(TypedByUser(name)), folder_of(name)
     described = read_description(folder) if folder else None
     requires = described.layout.model_dump() if described and described.layout else {}
-    scenarios = {}
-    for known in scenario_names():
-        with suppress(MissingLibraryError):  # pint, which a data sheet needs
-            scenarios[known] = load_scenario(known).model_dump(mode="json")
+    scenarios = {known: load_scenario(known).model_dump(mode="json") for known in scenario_names()}
     trained_on = described.training.scenario if described and described.layout else ""
     return About(
         name=name,

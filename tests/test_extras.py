@@ -57,7 +57,8 @@ def folder(tmp_path_factory):
 
 # What works without any extra, and what is missed then: the line, and the extra.
 ANSWERED = (
-    *("policies", "scenarios", "studies", "simulate --scenario small.toml --events log.parquet"),
+    *("policies", "scenarios", "scenarios show jade-bight", "studies"),
+    "simulate --scenario small.toml --events log.parquet",
     "evaluate --scenario small.toml --policy tour --missions 3",
     *("simulate --policy ddqn", "evaluate --policy any --policy ddqn-paper --missions 2"),
     *("study run trial.toml --out trial", "study show trial"),
@@ -73,10 +74,10 @@ MISSED = {
     "study export trial --crate trial.zip": ("dess study needs ", "reports"),
     "simulate --figure mission.png": ("dess simulate needs matplotlib", "reports"),
     "report ./trial": ("dess report needs ", "reports"),
-    "scenarios show jade-bight": (
-        *("scenario jade-bight: data_sheet.endurance: a data sheet needs pint", "units"),
+    "scenarios show lane.toml": (
+        "no_fly with lines, circles, touched or buffer needs shapely",
+        "geo",
     ),
-    "scenarios show lane.toml": ("no_fly with lines, touched or buffer needs shapely", "geo"),
 }
 
 
@@ -104,7 +105,7 @@ def test_a_sweep_answers_without_its_page(plain):
     _, out, err = plain[ANSWERED[-1]]
     assert "rank" in out and "page: " not in out
     assert err.splitlines()[-1].startswith("no page: the page of a sweep needs ")
-    assert err.endswith(": pip install 'dess[reports]'")
+    assert err.endswith(": pip install '.[reports]' -c constraints.txt")
 
 
 @pytest.mark.slow
@@ -114,7 +115,10 @@ def test_what_an_extra_adds_is_missed_in_one_line(folder, plain):
         code, out, err = plain[line]
         assert (code, out, err.count("\n")) == (2, "", 0), line
         assert err.startswith(f"dess: error: {what}"), err
-        assert err.endswith(f", which is not installed: pip install 'dess[{extra}]'"), err
+        command = f"pip install '.[{extra}]' -c constraints.txt"
+        assert err.endswith(f", which is not installed; in a clone of the repository: {command}"), (
+            err
+        )
     assert not {"run", "new", "mission.png"} & {path.name for path in folder.iterdir()}
 
 
@@ -147,4 +151,7 @@ def test_what_is_no_library_of_ours_is_no_library_that_is_missed():
     assert libraries.absence(ModuleNotFoundError(name="my_policies"), "dess") is None
     assert libraries.absence(ModuleNotFoundError(), "dess") is None
     line = str(libraries.absence(ModuleNotFoundError(name="torch.nn"), "a policy"))
-    assert line == "a policy needs PyTorch, which is not installed: pip install 'dess[learning]'"
+    assert line == (
+        "a policy needs PyTorch, which is not installed; in a clone of the repository: "
+        "pip install '.[learning]' -c constraints.txt"
+    )

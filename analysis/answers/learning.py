@@ -1,5 +1,6 @@
 """Training: its curves, what a choice of the trainer is worth, and trained policies."""
 
+import shlex
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -692,6 +693,11 @@ def course_in_words(policy: Trained, margin: float) -> str:
 def commands(policies: Iterable[Trained]) -> list[str]:
     """The commands that train the policies again."""
     return [
-        f"dess train {policy.config.name} --seed {policy.config.seed} --out runs/{policy.name}"
+        shlex.join(
+            [
+                *("dess", "train", policy.config.name),
+                *("--seed", str(policy.config.seed), "--out", f"runs/{policy.name}"),
+            ]
+        )
         for policy in policies
     ]

@@ -4,7 +4,7 @@ from dess.analysis import numbers
 from dess.analysis.answers import costs
 from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
-from dess.sections.data_sheet import printed
+from dess.sections.quantities import printed
 
 
 def assumptions(results: Results) -> list[str]:

@@ -38,7 +38,7 @@ from dess.analysis.study.study import Study, study_from
 from dess.errors import one_of, validation_line
 from dess.fields import SAMPLED, dotted, fields_of
 from dess.files.reading import paths_in
-from dess.files.writing import write_file
+from dess.files.writing import toml_value, write_file
 from dess.policies.registry import typed
 from dess.scenario import ScenarioSpace, is_scenario_name, load_scenario
 
@@ -149,7 +149,7 @@ def _options(name: str, values: Mapping[Any, Any]) -> list[str]:
 
 def _listed(values: Mapping[str, Iterable[Any]]) -> dict[str, str]:
     """The values of every field in the syntax of ``--set``."""
-    return {f: json.dumps([*v], separators=(",", ":"))[1:-1] for f, v in values.items()}
+    return {f: ",".join(map(toml_value, of_field)) for f, of_field in values.items()}
 
 
 def _key(study: Study) -> str:

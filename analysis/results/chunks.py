@@ -14,7 +14,7 @@ import pandas as pd
 import pyarrow as pa
 
 from dess import InputError
-from dess.analysis.results.manifest import Cell, Manifest
+from dess.analysis.results.manifest import ELSEWHERE, Cell, Manifest
 from dess.analysis.study.study import CHECK
 from dess.files.reading import paths_in
 
@@ -194,7 +194,7 @@ def check_places(folder: Path) -> None:
     for path in (*(folder / name for name in FOLDERS), *paths_in(folder, "*/policy=*")):
         if path.is_symlink() or (path.exists() and not path.is_dir()):
             raise InputError(
-                f"{path}: is a link, or not what a run would write there; allowed: another --out"
+                f"{path}: is a link, or not what a run would write there; allowed: {ELSEWHERE}"
             )
 
 

@@ -265,7 +265,9 @@ class Manifest(provenance.Origin):
         return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-_ALLOWED = "another --out or name, or remove the folder"
+# Where else a run can write, in the words of a message.
+ELSEWHERE = "another results folder (--out of dess study run, --results of dess sweep or what-if)"
+_ALLOWED = f"{ELSEWHERE}, another name, or remove the folder"
 
 
 @lru_cache(maxsize=2**15)

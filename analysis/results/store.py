@@ -26,12 +26,12 @@ from dess import InputError
 from dess.analysis.bound import Bound
 from dess.analysis.metrics import in_units
 from dess.analysis.results import chunks, parquet
-from dess.analysis.results.manifest import NO_TEAM, Cell, Manifest, Selected
+from dess.analysis.results.manifest import ELSEWHERE, NO_TEAM, Cell, Manifest, Selected
 from dess.analysis.study.study import Study
 from dess.files.reading import paths_in
 from dess.files.writing import check_folder, delete, locked, make_folder, write_file
 
-_BUSY = "in use by another run; allowed: another --out, or wait for its end"
+_BUSY = f"in use by another run; allowed: {ELSEWHERE}, or wait for its end"
 
 # The folders of the tables of each kind of work; a chunk is present when the first one is.
 TABLES = {"missions": ("missions", "uavs"), "bounds": ("bounds",), "events": ("events",)}
@@ -418,7 +418,7 @@ def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
         if any(not chunks.is_ours(other) for other in paths_in(folder)):
             raise InputError(
                 f"{folder}: holds other files and no {chunks.MANIFEST}; "
-                "allowed: a results folder, or a new or empty one (another --out)"
+                "allowed: a results folder, or a new or empty one"
             )
         return manifest
     held = Manifest.read(path)

@@ -24,6 +24,7 @@ from dess.analysis.study.selection import Choice, Selection
 from dess.analysis.study.study import StudyData
 from dess.errors import one_of
 from dess.fields import dotted
+from dess.files.writing import toml_value
 from dess.record import MISSION_RECORD
 from dess.scenario import SEA, ScenarioSpace, is_scenario_name, load_scenario
 
@@ -61,20 +62,10 @@ def of_fields(origin: Origin, policy: str, values: dict[str, Any], replication: 
         name, paper = "paper", load_scenario("paper").model_dump(mode="json")
         fields = origin.space(values).model_dump(mode="json")
         changes = {k: v for k, v in fields.items() if k not in paper or v != paper[k]}
-    settings = [w for k, v in dotted(changes).items() for w in ("--set", f"{k}={_as_toml(v)}")]
+    settings = [w for k, v in dotted(changes).items() for w in ("--set", f"{k}={toml_value(v)}")]
     acting = ",".join(policy.split(",")[: origin.space(values).uavs[1]])  # the others have no UAV
     which = ["--policy", acting, "--seed", str(origin.seed), "--replication", str(replication)]
     return shlex.join(["dess", "simulate", "--scenario", name, *settings, *which])
-
-
-def _as_toml(value: Any) -> str:
-    """A value in the syntax of TOML: as in JSON, but for tables, such as a type of UAVs."""
-    if isinstance(value, list):
-        return f"[{', '.join(map(_as_toml, value))}]"
-    if isinstance(value, dict):
-        given = {key: of_key for key, of_key in value.items() if of_key is not None}
-        return f"{{{', '.join(f'{key} = {_as_toml(of_key)}' for key, of_key in given.items())}}}"
-    return json.dumps(value)
 
 
 Given = ParamSpec("Given")

@@ -19,7 +19,7 @@ from dess.analysis.study.stopping import MOST, Line, Samples, StrictTable, of_it
 from dess.errors import shown
 from dess.fields import is_number
 from dess.scenario import ScenarioSpace
-from dess.sections.data_sheet import quantity_of
+from dess.sections.quantities import quantity_of
 from dess.sections.section import Integer, Number
 
 Verdict = Literal["met", "missed", "open"]

@@ -1,15 +1,17 @@
 """Optional libraries: which extra installs each, and one line that says so where it is absent.
 
-    pip install dess               the simulator, all policies, evaluations, studies and sweeps
-    pip install 'dess[learning]'   trainings
-    pip install 'dess[reports]'    figures, pages, and studies of sensitivities
-    pip install 'dess[geo]'        shipping lanes and buffers of seas from GeoJSON files
-    pip install 'dess[units]'      data sheets of scenarios
-    pip install 'dess[all]'        everything
-    pip install 'dess[examples]'   the libraries of the examples, as far as they fit together
+In a clone of the repository, since no package index has ``dess``:
 
-An optional library is imported where it is used. The command line turns an import that fails into
-the line of ``absence``; who would find out only after long work asks ``needs`` first.
+    pip install .               the simulator, all policies, evaluations, studies and sweeps
+    pip install '.[learning]'   trainings
+    pip install '.[reports]'    figures, pages, and studies of sensitivities
+    pip install '.[geo]'        shipping lanes, buffers and circles of seas from GeoJSON files
+    pip install '.[all]'        everything
+    pip install '.[examples]'   the libraries of the examples, as far as they fit together
+
+With ``-c constraints.txt``, the versions are those of the tests. An optional library is imported
+where it is used. The command line turns an import that fails into the line of ``absence``; who
+would find out only after long work asks ``needs`` first.
 """
 
 from importlib.util import find_spec
@@ -24,7 +26,6 @@ EXTRAS = {
         *("markupsafe", "nbconvert", "nbformat", "packaging", "pygments", "traitlets"),
     ),
     "geo": ("shapely",),
-    "units": ("pint",),
     "distributed": ("distributed",),
     "tensorboard": ("tensorboard",),
     "examples": ("sb3_contrib", "stable_baselines3", "supersuit", "torchrl"),
@@ -68,4 +69,5 @@ def absence(error: ModuleNotFoundError, what: str) -> MissingLibraryError | None
 
 def _line(what: str, library: str, extra: str) -> str:
     title = _TITLES.get(library, library)
-    return f"{what} needs {title}, which is not installed: pip install 'dess[{extra}]'"
+    command = f"pip install '.[{extra}]' -c constraints.txt"
+    return f"{what} needs {title}, which is not installed; in a clone of the repository: {command}"

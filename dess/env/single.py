@@ -12,6 +12,7 @@ import numpy as np
 
 from dess.env.parallel import HarvestEnv
 from dess.scenario import AnyScenario, ScenarioSpace
+from dess.state import check_seed
 
 _UAV = "uav_0"
 
@@ -48,7 +49,14 @@ class HarvestSingleEnv(gymnasium.Env[Any, SupportsInt]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Start the next mission, as ``HarvestEnv.reset``."""
+        """Start the next mission, as ``HarvestEnv.reset``.
+
+        Raises:
+            InputError: If the seed or the replication is out of range.
+        """
+        if seed is not None:  # gymnasium takes no integer of numpy
+            check_seed(seed, 0)
+            seed = int(seed)
         super().reset(seed=seed)
         return self._own(self.mission.reset(seed, options))
 

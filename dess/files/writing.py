@@ -3,6 +3,7 @@
 A temporary folder that a killed process has left is removed by a later one.
 """
 
+import json
 import os
 import re
 import secrets
@@ -12,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from filelock import FileLock, Timeout
@@ -22,6 +24,16 @@ from dess.files.reading import kind_of, paths_in
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip file can store
 _FILE, _FOLDER = 0o100644, 0o40755
+
+
+def toml_value(value: Any) -> str:
+    """A value in the syntax of TOML, on one line: as in JSON, but for tables and what is None."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml_value, value))}]"
+    if isinstance(value, dict):
+        given = {key: inner for key, inner in value.items() if inner is not None}
+        return f"{{{', '.join(f'{key} = {toml_value(inner)}' for key, inner in given.items())}}}"
+    return json.dumps(value, ensure_ascii=False)
 
 
 def write_zip(path: Path, entries: Iterable[tuple[str, bytes]]) -> None:

@@ -5,7 +5,8 @@
 
 Of polygons, a cell is a no-fly cell if its centre lies in one of them, and not in a hole; with
 ``touched``, every cell of which a part does. A line with a width is a shipping lane; without one,
-it closes every cell that it touches. A point closes its cell. A map in a text (``.txt``, ``.map``)
+it closes every cell that it touches. A point closes its cell, and one with a ``radius`` of its own
+every cell whose centre lies in the circle. A map in a text (``.txt``, ``.map``)
 has a line for each row of cells, one in a picture (``.png``) a pixel for each cell.
 """
 
@@ -25,11 +26,13 @@ from dess.files.reading import TEXT_LIMIT, read_bytes, read_text
 from dess.sea import places
 from dess.sea.chart import Rectangle
 from dess.sea.places import Place, Projection, Size
+from dess.sections.quantities import quantity_of
 from dess.sections.section import Number
 
 # The letters of maps, those of the MAPF benchmark among them: trees and water are closed.
 CLOSED, FREE = "#@OTW", ".GS"
 _MAPF = CLOSED[1:] + FREE
+MOST_METRES = 10**6  # of a width, a buffer or a radius
 
 
 class NoFlyFile(places.Source):
@@ -38,8 +41,8 @@ class NoFlyFile(places.Source):
     touched: bool = Field(
         False, description="whether a cell of which only a part lies in it counts"
     )
-    width: Number = Field(0.0, ge=0, le=10**6, description="of lines [m]")
-    buffer: Number = Field(0.0, ge=0, le=10**6, description="kept around everything [m]")
+    width: Number = Field(0.0, ge=0, le=MOST_METRES, description="of lines [m]")
+    buffer: Number = Field(0.0, ge=0, le=MOST_METRES, description="kept around everything [m]")
     colours: tuple[Annotated[str, Field(pattern="^#[0-9a-f]{6}$")], ...] = Field(
         (), description="colours of closed cells in a picture, such as '#ff0000'; by default red"
     )
@@ -142,9 +145,12 @@ def _of_places(
             "with degrees, or centre"
         )
     closed, unseen = np.zeros(size[::-1], np.bool_), []
-    for place in source.chosen(found):
+    chosen = source.chosen(found)
+    if not is_geographic and any(_has_radius(place) for place in chosen):
+        _note(f"{path}: the column radius is not used, since its places are cells and no degrees")
+    for place in chosen:
         if is_geographic and projection:
-            cells, is_near = _cells_of(place, projection, source)
+            cells, is_near = _cells_of(place, projection, source, _radius(place, path))
             unseen += [place.where] if is_near and not cells.any() else []
         else:
             cells, cell = np.zeros_like(closed), place.shapes[0][1][0][0].astype(int)
@@ -168,22 +174,64 @@ def _note(line: str) -> None:
     logging.getLogger(__name__).warning("note: no_fly: %s", line)
 
 
-def _cells_of(place: Place, projection: Projection, source: NoFlyFile) -> tuple[np.ndarray, bool]:
-    """The cells that a feature closes, and whether its bounding box has a part on the grid."""
+_RADIUS = ("radius",)  # what the property or the column of a circle is called
+
+
+def _has_radius(place: Place) -> bool:
+    return place.property("", _RADIUS) is not None
+
+
+def _radius(place: Place, path: Path) -> float:
+    """The radius of a circle [m]: a number in metres, or a distance with its unit; or else 0.
+
+    Raises:
+        InputError: If it is none.
+    """
+    given = place.property("", _RADIUS)
+    if given is None or all(kind != places.POINT for kind, _ in place.shapes):
+        return 0.0
+    where = f"{path}: {place.where}: radius"
+    try:
+        radius = float(str(given))
+    except ValueError:
+        radius = quantity_of(str(given), where, "m")
+    if not 0 <= radius <= MOST_METRES:
+        allowed = f"metres from 0 to {MOST_METRES:,}, or a distance with its unit"
+        raise InputError(f"{where}: {shown(given)} is out of range; allowed: {allowed}")
+    return radius
+
+
+def _cells_of(
+    place: Place, projection: Projection, source: NoFlyFile, radius: float
+) -> tuple[np.ndarray, bool]:
+    """The cells that a feature closes, and whether its bounding box has a part on the grid.
+
+    Args:
+        place: The feature.
+        projection: That of the sea.
+        source: What is taken of its file.
+        radius: Of its points, which are circles then [m].
+    """
     size = projection.size
     closed, is_near = np.zeros(size[::-1], np.bool_), False
     for kind, rings in place.shapes:
-        reach = source.buffer + source.width / 2 * (kind == places.LINE)
+        reach = source.buffer
+        if kind == places.LINE:
+            reach += source.width / 2
+        elif kind == places.POINT:
+            reach += radius
         for turned in projection.shapes(rings):
             low, high = turned[0].min(0), turned[0].max(0)
             margin = reach / projection.cell_size
             if (high + margin < 0).any() or (low - margin >= size).any():
                 continue
             is_near = True
-            if kind == places.POINT and not reach:
-                x, y = np.floor(turned[0][0]).astype(int)
+            x, y = np.floor(turned[0][0]).astype(int)
+            if kind == places.POINT and source.buffer == 0 and places.is_on_grid((x, y), size):
                 closed[y, x] = True
-            elif kind == places.POLYGON and not reach and not source.touched:
+            if kind == places.POINT and not reach:
+                continue
+            if kind == places.POLYGON and not reach and not source.touched:
                 closed |= centres_in(turned, size)
             else:
                 closed |= _covered(kind, turned, margin, size, source.touched)
@@ -194,7 +242,7 @@ def _covered(
     kind: str, rings: list[np.ndarray], reach: float, size: Size, touched: bool
 ) -> np.ndarray:
     """(H, W) whether a cell is in reach [cells] of a shape, with a part or with its centre."""
-    needs("geo", "no_fly with lines, touched or buffer")
+    needs("geo", "no_fly with lines, circles, touched or buffer")
     import shapely
 
     x, y = np.meshgrid(np.arange(size[0]), np.arange(size[1]))

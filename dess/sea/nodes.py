@@ -7,23 +7,48 @@ A CSV file has places, as cells (``x``, ``y``) or degrees (``lon``, ``lat``); of
 points are taken.
 """
 
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
 
-from dess.errors import InputError, listed
+from dess.errors import InputError, listed, one_of
 from dess.sea import places
 from dess.sea.chart import Cell
 from dess.sea.places import Place, Projection, Size
-from dess.sections.data_sheet import quantity_of
+from dess.sections.quantities import form_of, quantity_of
 
 MAX_NODES, MAX_GRID = 1024, 256  # as of a scenario
 # What columns are called that are used without being asked for, whatever the case.
 NAMES = ("name", "label", "id")
 RATES, DATA = ("rate", "arrival_rate", "data_rate"), ("data", "initial_data", "backlog")
+
+# The fields of a scenario that a file may give to each of its nodes.
+AMOUNTS = ("data_sheet.data_rate", "data_sheet.backlog", "arrivals.rates", "arrivals.initial")
+
+
+class Amounts(NamedTuple):
+    """Amounts that a file may give to each of its nodes, and what the scenario has for all.
+
+    Attributes:
+        field: The field of the scenario with an amount per node.
+        asked: The column that the scenario names for them; empty if it names none.
+        known: What else the column may be called, whatever the case.
+        unit: Their unit, of ``quantities.KINDS``; empty for plain numbers.
+        for_all: The field of the scenario that has one amount for all nodes.
+        otherwise: This amount in the unit, for nodes whose field is empty; None if there is none.
+        is_listed: Whether the scenario has a list of them, beside which a file has none.
+    """
+
+    field: str
+    asked: str
+    known: tuple[str, ...]
+    unit: str
+    for_all: str
+    otherwise: float | None
+    is_listed: bool
 
 
 class NodesFile(places.Source):
@@ -80,7 +105,12 @@ class NodesFound(NamedTuple):
         return Projection.about(self.spots, size, cell_size) if self.is_geographic else None
 
     def fields(
-        self, size: Size, projection: Projection | None, closed: Any, has_sheet: bool = False
+        self,
+        size: Size,
+        projection: Projection | None,
+        closed: Any,
+        amounts: Sequence[Amounts] = (),
+        is_cell_fixed: bool = False,
     ) -> dict[str, Any]:
         """The fields of a scenario that these nodes have on a grid, those of ``arrivals`` dotted.
 
@@ -88,16 +118,18 @@ class NodesFound(NamedTuple):
             size: Cells of the grid from west to east and from north to south.
             projection: That of the sea.
             closed: (H, W) whether a cell is a no-fly cell.
-            has_sheet: Whether the scenario has a data sheet: then rates and data are in units.
+            amounts: What the file may give to each node.
+            is_cell_fixed: Whether the cell size follows from a data sheet, so that no message may
+                advise another one.
 
         Raises:
-            InputError: If a node is off the grid, two share a cell, or a rate is no number.
+            InputError: If a node is off the grid, two share a cell, or an amount is none.
         """
         spots = self.spots + 0.5
         if projection and self.is_geographic:
             spots = projection.cells(self.spots)
         own: list[Cell] = [(int(x), int(y)) for x, y in np.floor(spots)]
-        self._check_on_grid(own, size)
+        self._check_on_grid(own, size, is_cell_fixed)
         moved: list[int] = []
         if self.source.place == "nearest":
             own, moved = _nearest_free(own, spots, closed)
@@ -105,7 +137,7 @@ class NodesFound(NamedTuple):
         for number, cell in enumerate(own):
             groups.setdefault(cell, []).append(number)
         if self.source.place == "own" and len(groups) < len(own):
-            self._refuse_shared(groups, projection)
+            self._refuse_shared(groups, None if is_cell_fixed else projection)
         if len(groups) > MAX_NODES:
             raise InputError(f"{self.path}: has {len(groups):,} nodes; allowed: 1..{MAX_NODES}")
         names, members = [*map(self._name, range(len(own)))], [*groups.values()]
@@ -115,41 +147,70 @@ class NodesFound(NamedTuple):
             "names": [_joined([names[n] for n in group]) for group in members if any(names)],
             "arrivals.merged": [len(group) for group in members if len(groups) < len(own)],
         }
-        rates, data = (self.source.rate, RATES), (self.source.data, DATA)
-        if has_sheet:
-            found["data_sheet.data_rate"] = self._sums(members, *rates, "bit/s")
-            found["data_sheet.backlog"] = self._sums(members, *data, "bit")
-        else:
-            found["arrivals.rates"] = self._sums(members, *rates)
-            found["arrivals.initial"] = self._sums(members, *data)
+        for kind in amounts:
+            found[kind.field] = self._sums(members, kind)
         return {field: values for field, values in found.items() if values}
+
+    def has_amounts(self, known: Sequence[str]) -> bool:
+        """Whether every node has one in a column of these names."""
+        return all(row.property("", known) is not None for row in self.rows)
 
     def _name(self, number: int) -> str:
         return str(self.rows[number].property(self.source.name, NAMES) or "")
 
-    def _sums(
-        self, groups: list[list[int]], column: str, known: tuple[str, ...], unit: str = ""
-    ) -> list[Any]:
-        """The sums of a column over groups of nodes; none if the file has no such column."""
-        texts = [row.property(column, known) for row in self.rows]
-        if all(text is None for text in texts):
+    def _sums(self, groups: list[list[int]], kind: Amounts) -> list[Any]:
+        """The sums of amounts over groups of nodes; none if the file has no such column."""
+        column = self._column(kind)
+        if not column:
             return []
-        where = [f"{self.path}: {row.where}: {column or known[0]}" for row in self.rows]
-        read = partial(quantity_of, unit=unit) if unit else places.number_of
-        values = [*map(read, (str(text or "") for text in texts), where)]
+        if kind.is_listed:
+            both = f"the scenario lists {kind.field}"
+            raise InputError(f"{self.path}: has the column {column}, and {both}; allowed: one")
+        values = [self._amount(row, column, kind) for row in self.rows]
         sums = [sum(values[number] for number in group) for group in groups]
-        return [f"{total!r} {unit}" for total in sums] if unit else sums
+        return [f"{total!r} {kind.unit}" for total in sums] if kind.unit else sums
+
+    def _column(self, kind: Amounts) -> str:
+        """The column of amounts, as the file calls it; empty if it has none that is filled."""
+        columns = {str(name) for row in self.rows for name in row.properties}
+        filled = [name for name in sorted(columns) if self._is_filled(name)]
+        if kind.asked:
+            if kind.asked not in columns:
+                raise InputError(f"{self.path}: has no {kind.asked}{one_of(kind.asked, columns)}")
+            return kind.asked if kind.asked in filled else ""
+        found = [name for name in filled if name.lower() in kind.known]
+        if len({name.lower() for name in found}) > 1:
+            both = f"the columns {' and '.join(found)}"
+            raise InputError(f"{self.path}: has {both} for one field; allowed: one of them")
+        return found[0] if found else ""
+
+    def _is_filled(self, column: str) -> bool:
+        return any(row.property("", [column.lower()]) is not None for row in self.rows)
+
+    def _amount(self, row: Place, column: str, kind: Amounts) -> float:
+        """What a node has in a column or, if its field is empty, what the scenario has for all."""
+        where = f"{self.path}: {row.where}: {column}"
+        text = row.property("", [column.lower()])
+        if text is not None and kind.unit:
+            return quantity_of(str(text), where, kind.unit)
+        if text is not None:
+            return places.amount_of(str(text), where)
+        if kind.otherwise is None:
+            allowed = form_of(kind.unit) if kind.unit else "a number"
+            raise InputError(f"{where}: is empty; allowed: {allowed}, or one in {kind.for_all}")
+        return kind.otherwise
 
     def _title(self, number: int) -> str:
         """Where a node stands in the file, and its name."""
         name, where = self._name(number), self.rows[number].where
         return f"{where} ({name})" if name else where
 
-    def _check_on_grid(self, own: list[Cell], size: Size) -> None:
+    def _check_on_grid(self, own: list[Cell], size: Size, is_cell_fixed: bool) -> None:
         beyond = [number for number, cell in enumerate(own) if not places.is_on_grid(cell, size)]
         if beyond:
             names = listed(f"{self._title(number)} at {[*own[number]]}" for number in beyond)
-            verb, enough = "are" if beyond[1:] else "is", _enough(own, size, self.is_geographic)
+            verb = "are" if beyond[1:] else "is"
+            enough = _enough(own, size, self.is_geographic, is_cell_fixed)
             line = f"{names} {verb} off the grid of {size[0]} x {size[1]} cells"
             raise InputError(f"{self.path}: {line}; allowed: {enough}")
 
@@ -200,14 +261,15 @@ def _nearest_free(
     return cells, moved
 
 
-def _enough(cells: list[Cell], size: Size, is_geographic: bool) -> str:
+def _enough(cells: list[Cell], size: Size, is_geographic: bool, is_cell_fixed: bool) -> str:
     """What would be allowed, such as a grid that is large enough, where cells are off the grid."""
     sides = np.array(cells).T
     beyond = [max(-side.min(), side.max() - n + 1, 0) for side, n in zip(sides, size, strict=True)]
     needed = [n + b * (1 + is_geographic) for n, b in zip(size, beyond, strict=True)]
     if size[0] == size[1]:
         needed = [max(needed)] * 2
+    coarser = "UAVs that fly further in a slot" if is_cell_fixed else "a larger cell_size"
     if max(needed) > MAX_GRID or (not is_geographic and min(map(min, cells)) < 0):
-        return "a larger cell_size" if is_geographic else f"0 <= x, y < {MAX_GRID}"
+        return coarser if is_geographic else f"0 <= x, y < {MAX_GRID}"
     enough = f"grid = {needed[0]}" + (f", rows = {needed[1]}" if needed[0] != needed[1] else "")
-    return f"{enough} or more" + (", or a larger cell_size" if is_geographic else "")
+    return f"{enough} or more" + (f", or {coarser}" if is_geographic else "")

@@ -5,7 +5,7 @@ no_fly = "land.geojson"
 zone = {lon = 8.70, lat = 53.87, width = 4, height = 3}
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field
 from dess.errors import InputError, validated
 from dess.sea.chart import Rectangle
 from dess.sea.no_fly import NoFlyFile, no_fly_in, zones_in
-from dess.sea.nodes import NodesFile, NodesFound
+from dess.sea.nodes import DATA, RATES, Amounts, NodesFile, NodesFound
 from dess.sea.places import Projection
 from dess.sections.section import Integer, Number, Strict
 
@@ -56,12 +56,14 @@ class OwnSea(NamedTuple):
     Attributes:
         where: The name of its scenario, for messages.
         beside: The path of a file that a field names.
-        grid: Its scenario with what ``unread`` says, of which size, cell size and centre are used.
+        grid: Its scenario with what ``unread`` says in the place of files and degrees.
+        replaced: The fields, those of sections dotted, that replace those of its file.
     """
 
     where: str
     beside: Callable[[str, str], Path]
     grid: Any
+    replaced: Set[str] = frozenset()
 
     def placed(self, values: Mapping[str, Any], of_nodes: Any) -> dict[str, Any]:
         """The fields that name files or degrees, as cells.
@@ -86,9 +88,37 @@ class OwnSea(NamedTuple):
             closed = np.zeros(self.grid.size[::-1], np.bool_)
             for x, y in placed.get("no_fly", self.grid.no_fly):
                 closed[y : y + 1, x : x + 1] = True  # none for a cell that is refused later
-            has_sheet = self.grid.data_sheet.is_on
-            placed |= found.fields(self.grid.size, projection, closed, has_sheet)
+            amounts = [kind for kind in self._amounts(found.source) if not self._replaces(kind)]
+            is_cell_fixed = self.grid.data_sheet.is_on
+            size = self.grid.size
+            placed |= found.fields(size, projection, closed, amounts, is_cell_fixed)
         return placed
+
+    def _replaces(self, kind: Amounts) -> bool:
+        """Whether a field that replaces those of the file says what its nodes have."""
+        return not self.replaced.isdisjoint({kind.field, kind.for_all})
+
+    def _amounts(self, source: NodesFile) -> list[Amounts]:
+        """The rates and the data that a file may give to each node."""
+        sheet, arrivals = self.grid.data_sheet, self.grid.arrivals
+        rates, data = (source.rate, RATES), (source.data, DATA)
+        if not sheet.is_on:
+            low, high = self.grid.initial_data
+            data_of_all = low if low == high else None
+            rate_of_all = self.grid.arrival_rate
+            has_rates, has_data = bool(arrivals.rates), bool(arrivals.initial)
+            return [
+                Amounts("arrivals.rates", *rates, "", "arrival_rate", rate_of_all, has_rates),
+                Amounts("arrivals.initial", *data, "", "initial_data", data_of_all, has_data),
+            ]
+        kinds = []
+        for name, columns, missing in (("data_rate", rates, None), ("backlog", data, 0.0)):
+            field, of_sheet = f"data_sheet.{name}", getattr(sheet, name)
+            is_listed = isinstance(of_sheet, tuple)
+            otherwise = missing if is_listed or not of_sheet else sheet.number(name)
+            unit = sheet.extra(name)["units"]
+            kinds.append(Amounts(field, *columns, unit, field, otherwise, is_listed))
+        return kinds
 
     def _no_fly(self, values: Mapping[str, Any], projection: Projection | None) -> dict[str, Any]:
         """The no-fly cells, row by row."""

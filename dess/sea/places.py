@@ -21,6 +21,7 @@ from dess.errors import InputError, one_of, shown, validated
 from dess.files.documents import Document
 from dess.files.reading import TEXT_LIMIT, read_text
 from dess.sea.chart import Cell
+from dess.sections.quantities import may_part_thousands
 from dess.sections.section import Strict
 
 EARTH_RADIUS = 6_371_008.8  # mean radius of WGS 84 [m]
@@ -62,6 +63,8 @@ class Projection(NamedTuple):
         if np.ptp(degrees[:, 0]) > 180:  # on both sides of the 180th meridian
             degrees = degrees + [360, 0] * (degrees < 0)
         lon, lat = (degrees.min(0) + degrees.max(0)) / 2
+        if lon > 180:
+            lon -= 360
         return cls((float(lon), float(lat)), size, cell_size)
 
     @property
@@ -77,10 +80,11 @@ class Projection(NamedTuple):
         return np.array(self.size) / 2 + away * self._degree
 
     def degrees(self, places: np.ndarray) -> np.ndarray:
-        """The (K, 2) places on the Earth of (K, 2) places on the grid [cells]."""
-        found = (places - np.array(self.size) / 2) / self._degree + self.centre
-        found[:, 0] -= 360 * np.round(found[:, 0] / 360)
-        return found
+        """The (K, 2) places on the Earth of (K, 2) places on the grid [cells].
+
+        Longitudes go on beyond 180 degrees where the grid does, so that no path jumps by 360.
+        """
+        return (places - np.array(self.size) / 2) / self._degree + self.centre
 
     def shapes(self, rings: list[np.ndarray]) -> Iterator[list[np.ndarray]]:
         """The rings of a shape on the grid [cells]; once more for each turn around the Earth.
@@ -222,6 +226,19 @@ def number_of(text: str, place: str) -> float:
         raise InputError(f"{place} is {shown(text)}; allowed: a number") from None
 
 
+def amount_of(text: str, place: str) -> float:
+    """A number whose comma, if it has one, parts decimals for certain.
+
+    Raises:
+        InputError: If it is none, or ``1,000`` could be a thousand; ``place`` says where it stands.
+    """
+    if may_part_thousands(text.strip()):
+        allowed = f"{text.replace(',', '')} or {text.replace(',', '.')}"
+        problem = "has a comma that may part thousands or decimals"
+        raise InputError(f"{place}: {shown(text)} {problem}; allowed: {allowed}")
+    return number_of(text, place)
+
+
 def _number(text: str, place: str, most: int, is_geographic: bool) -> float:
     """A number of at most this size; a cell has integers."""
     number = number_of(text, place)
@@ -283,8 +300,10 @@ def _shapes(geometry: _Geometry, place: str) -> Iterator[Shape]:
         if part and kind == POLYGON:
             rings = part if isinstance(part, list) else [part]
             yield kind, [_ring(ring, f"{where}.{n}") for n, ring in enumerate(rings)]
+        elif part and kind == LINE:
+            yield kind, [_line(part, where)]
         elif part:
-            yield kind, [_positions([part] if kind == POINT else part, where)]
+            yield kind, [_positions([part], where)]
 
 
 def _ring(value: Any, place: str) -> np.ndarray:
@@ -293,6 +312,13 @@ def _ring(value: Any, place: str) -> np.ndarray:
         allowed = "four positions or more, the last as the first"
         raise InputError(f"{place}: is no ring; allowed: {allowed}")
     return ring
+
+
+def _line(value: Any, place: str) -> np.ndarray:
+    line = _positions(value, place)
+    if len(line) < 2:
+        raise InputError(f"{place}: is no line; allowed: two positions or more")
+    return line
 
 
 def _positions(value: Any, place: str) -> np.ndarray:

@@ -5,123 +5,36 @@
     cruise = "15 m/s"
 
 A full battery is 100 slots: a slot is the hundredth part of the endurance, a cell the way of a slot
-at cruising speed, and a data unit what the bandwidth carries in a slot at 1 bit/s/Hz. The library
-pint reads the units; it is imported when there is a sheet.
+at cruising speed, and a data unit what the bandwidth carries in a slot at 1 bit/s/Hz.
 """
 
 import math
-import re
-from functools import cache, lru_cache
+from collections.abc import Sequence
 from typing import Any, NamedTuple, NoReturn, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from dess.code.libraries import needs
 from dess.errors import InputError, shown
+from dess.sections.quantities import KINDS, form_of, measured, printed, refuse
 from dess.sections.section import Section
 from dess.sections.wind import Moves, largest_wind, moves_in
 
-# What a quantity is and an example, by its units. A word in between parts two quantities.
-_KINDS = {
-    "s": ("a time", "35 min"),
-    "m/s": ("a speed", "15 m/s"),
-    "m": ("a distance", "2 km"),
-    "bit/s": ("a data rate", "3 MB/h"),
-    "bit": ("an amount of data", "20 MB"),
-    "Hz": ("a frequency", "125 kHz"),
-    "bit/s/Hz": ("a spectral efficiency", "6 bit/s/Hz"),
-    "percent": ("a share", "20 %"),
-    "dB": ("a ratio", "12 dB"),
-    "dBm": ("a power", "20 dBm"),
-    "dB at m": ("a ratio at a distance", "12 dB at 2 km"),
-    "m/s from deg": ("a speed and where it comes from", "10 m/s from SW"),
-}
-_NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d\d?)?) ?([a-zµμ%°/ ]*)", re.I)
-_POINTS = re.findall(r"\w+", "N NNE NE ENE E ESE SE SSE S SSW SW WSW W WNW NW NNW")
-
-# Units in which amounts are printed, with their sizes.
-_PRINTED = {
-    "s": {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0},
-    "m": {"m": 1.0, "km": 1000.0},
-    "bit": {"bit": 1.0, "B": 8.0, "kB": 8e3, "MB": 8e6, "GB": 8e9},
-}
 _NEEDED = ("endurance", "cruise", "charging", "bandwidth")
-_LINK_BUDGET = ("tx_power", "noise_figure", "frequency")
+LINK_BUDGET = ("tx_power", "noise_figure", "frequency")
+
+# From what in the sheet a field of the scenario follows; each is refused in the words of the sheet.
+_ORIGINS = {
+    "cell_size": ("endurance", "cruise"),
+    "charge_rate": ("endurance", "charging"),
+    "arrival_rate": ("data_rate", "bandwidth"),
+    "arrivals.rates": ("data_rate", "bandwidth"),
+    "initial_data": ("backlog", "endurance", "bandwidth"),
+    "arrivals.initial": ("backlog", "endurance", "bandwidth"),
+    "edge_snr": ("snr", *LINK_BUDGET, "free_space", "bandwidth"),
+}
 
 # The fields that a scenario with a sheet may set otherwise.
 OPEN = ("flying_time", "charge_start", "charge_complete", "landing", "quota")
-
-
-@cache
-def _registry() -> Any:
-    needs("units", "a data sheet")
-    import pint
-
-    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
-
-
-@lru_cache(maxsize=4096)
-def measured(text: str, units: str) -> tuple[float, ...]:
-    """The numbers of a quantity in the units of ``_KINDS``: ``12 dB at 2 km`` as 12 and 2000.
-
-    Raises:
-        InputError: If it has no unit, or one of another kind.
-    """
-    unit, *others = units.split(" ")
-    texts = re.split(rf"\s+{others[0]}\s+", text) if others else [text]
-    if len(texts) != len(units.split(" ")[::2]):
-        _refuse(text, f"is not {_KINDS[units][0]}", units)
-    return tuple(_number(*of, units) for of in zip(texts, (unit, *others[1:]), strict=True))
-
-
-def quantity_of(text: str, place: str, unit: str) -> float:
-    """A quantity in a unit; ``place`` says in messages where it stands."""
-    try:
-        return measured(text, unit)[0]
-    except InputError as error:
-        raise InputError(f"{place}: {error}") from None
-
-
-def _number(text: str, unit: str, units: str) -> float:
-    """A single quantity in a unit; ``units`` is for the message."""
-    text = " ".join(text.split())
-    if unit == "deg" and text.upper() in _POINTS:
-        return _POINTS.index(text.upper()) * 360 / len(_POINTS)
-    found = _NUMBER.fullmatch(text)
-    if not found or not found[2]:
-        _refuse(text, "has no unit" if found else "is not a number and a unit", units)
-    registry, wanted = _registry(), _registry().Quantity(1.0, unit)
-    try:
-        given = registry.Quantity(float(found[1]), registry.parse_units(found[2]))
-    except Exception:  # pint raises errors of many types for what is no unit
-        _refuse(text, "has an unknown unit", units)
-    if given.to_root_units().units != wanted.to_root_units().units:
-        _refuse(text, "has a unit of another kind", units)
-    return float(given.to(unit).magnitude)
-
-
-def times(text: str, factor: float) -> str:
-    """A quantity, or the first of two, times a factor: ``5 m/s from SW`` as ``10 m/s from SW``."""
-    amount, *others = re.split(r"(?= from | at )", " ".join(text.split()), maxsplit=1)
-    found = _NUMBER.fullmatch(amount)
-    assert found
-    return f"{float(found[1]) * factor:g} {found[2]}{''.join(others)}"
-
-
-def _refuse(value: object, problem: str, units: str) -> NoReturn:
-    raise InputError(f"{shown(value)} {problem}; allowed: {_form(units)}")
-
-
-def _form(units: str) -> str:
-    kind, example = _KINDS[units]
-    return f'{kind}, such as "{example}"'
-
-
-def printed(value: float, unit: str) -> str:
-    """An amount of ``s``, ``m`` or ``bit`` in the unit that suits it: 2100 s as ``35 min``."""
-    sizes = _PRINTED[unit]
-    name = max((of for of in sizes if sizes[of] <= value), key=sizes.__getitem__, default=unit)
-    return f"{value / sizes[name]:.4g} {name}"
 
 
 class Units(NamedTuple):
@@ -143,12 +56,29 @@ class Units(NamedTuple):
         return f"a slot is {printed(self.slot, 's')}, a cell {printed(self.cell, 'm')}, {data}"
 
 
+_DISTANCES = (0.01, 1e6)  # at which an SNR can be given [m]
+
+
+def _check_limits(text: str, units: str, limits: Sequence[tuple[float, float]]) -> None:
+    """Refuse a quantity of which a number is out of range."""
+    names = units.split(" ")[::2]
+    for number, unit, (least, most) in zip(measured(text, units), names, limits, strict=True):
+        if not least <= number <= most:
+            raise InputError(f"{shown(text)} is out of range; allowed: {least:g}..{most:g} {unit}")
+
+
 def _quantity(
-    units: str, description: str, least: float = 1e-6, most: float = 1e15, example: str = ""
+    units: str,
+    description: str,
+    least: float = 1e-6,
+    most: float = 1e15,
+    example: str = "",
+    second: tuple[float, float] | None = None,
 ) -> Any:
-    """A field in units of ``_KINDS``, with the limits of its first number."""
-    extra: dict[str, Any] = {"units": units, "limits": [least, most]}
-    examples = [example or _KINDS[units][1]]
+    """A field in units of ``KINDS``, with the limits of its first number and of the second one."""
+    limits = [(least, most), *([second] if second else [])]
+    extra: dict[str, Any] = {"units": units, "limits": limits}
+    examples = [example or KINDS[units][1]]
     return Field(None, description=description, examples=examples, json_schema_extra=extra)
 
 
@@ -167,26 +97,27 @@ class DataSheet(Section):
         "bit", "data of a node at the start, or else none: one for all, or a list for each", 0
     )
     bandwidth: str | None = _quantity("Hz", "bandwidth of the radio")
-    snr: str | None = _quantity("dB at m", "mean SNR at a distance", -200, 200)
+    snr: str | None = _quantity("dB at m", "mean SNR at a distance", -200, 200, second=_DISTANCES)
     tx_power: str | None = _quantity("dBm", "transmitted power (EIRP), without snr", -99, 99)
     noise_figure: str | None = _quantity("dB", "noise figure of the receiver", 0, 99, "6 dB")
     frequency: str | None = _quantity("Hz", "carrier frequency", 1e6, 1e12, "868 MHz")
     free_space: str | None = _quantity(
         "m",
         "where free space ends and path_loss_exponent begins, or else 1 m",
-        0.01,
-        1e6,
+        *_DISTANCES,
         "1 m",
     )
     range: str | None = _quantity("m", "distance beyond which there is no service", 0.01, 1e7)
     max_rate: str | None = _quantity("bit/s/Hz", "largest spectral efficiency", 0.001, 1000)
-    wind: str | None = _quantity("m/s from deg", "mean wind, and where it comes from", 0)
+    wind: str | None = _quantity(
+        "m/s from deg", "mean wind, and where it comes from", 0, second=(-360, 360)
+    )
     mtbf: str | None = _quantity("s", "mean flying time of a UAV between failures", example="30 d")
     repair: str | None = _quantity("s", "mean time of a repair, or else it is lost", example="2 h")
 
     @classmethod
     def extra(cls, name: str) -> dict[str, Any]:
-        """The units of a field and the limits of its first number."""
+        """The units of a field, and the limits of its numbers."""
         return cls.model_fields[name].json_schema_extra  # type: ignore[return-value]
 
     @field_validator("*", mode="before")
@@ -202,21 +133,24 @@ class DataSheet(Section):
         Raises:
             InputError: If it has no unit or another one, or is out of range.
         """
-        units, (least, most) = cls.extra(name).values()
+        units, limits = cls.extra(name)["units"], cls.extra(name)["limits"]
         for item in value if isinstance(value, list | tuple) else (value,):
             if isinstance(item, bool | int | float):
-                _refuse(item, "has no unit", units)
-            if isinstance(item, str) and not least <= measured(item, units)[0] <= most:
-                raise InputError(f"{shown(item)} is out of range; allowed: {least:g}..{most:g}")
+                refuse(item, "has no unit", units)
+            if isinstance(item, str):
+                _check_limits(item, units, limits)
+            elif item is not None:
+                problem = f"is of type {type(item).__name__}, not text"
+                refuse(item, problem, units, f"text in quotes: {form_of(units)}")
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
         """A scenario can follow; ``data_rate`` may still come from the file of the nodes."""
         if self.is_on:
-            has_budget = any(getattr(self, name) for name in _LINK_BUDGET)
+            has_budget = any(getattr(self, name) for name in LINK_BUDGET)
             if has_budget and self.snr:
                 raise InputError("snr: follows from tx_power; allowed: one of both")
-            needed = (*_NEEDED, *(_LINK_BUDGET if has_budget else ("snr",)))
+            needed = (*_NEEDED, *(LINK_BUDGET if has_budget else ("snr",)))
             for name in (*needed, "mtbf") if self.repair else needed:
                 if getattr(self, name) is None:
                     raise InputError(f"{name}: is missing; allowed: {self.form_of(name)}")
@@ -270,6 +204,12 @@ class DataSheet(Section):
             found["failures.uav_repair"] = self._slots("repair", 1e6) if self.repair else 0.0
         return found
 
+    def origin(self, field: str) -> str:
+        """From what in the sheet a field of the scenario follows, as it was typed."""
+        given = {name: getattr(self, name) for name in _ORIGINS.get(field, ())}
+        named = [f"{name} {shown(value)}" for name, value in given.items() if value]
+        return ", ".join(named) or "the data sheet"
+
     def _refuse(self, name: str, problem: str, allowed: str) -> NoReturn:
         raise InputError(f"{name}: {shown(getattr(self, name))} {problem}; allowed: {allowed}")
 
@@ -314,7 +254,8 @@ class DataSheet(Section):
         reach, cell = self.number("range"), self.units.cell
         if self.range and reach < cell:
             size = printed(cell, "m")
-            self._refuse("range", f"is less than a cell of {size}", f"{size} or more")
+            problem = f"is less than a cell of {size}, the way of a slot at {self.cruise}"
+            self._refuse("range", problem, f"{size} or more")
         return {
             **{"edge_snr": snr, "radio.anchor": anchor},
             **{"radio.range": reach, "radio.max_rate": self.number("max_rate")},

@@ -29,7 +29,10 @@ Slots = Annotated[Number, Field(ge=0, le=1_000_000), AfterValidator(_at_least_a_
 
 def plain(value: Any) -> Any:
     """What numpy or pandas holds as numbers and lists of Python: ``np.int64(3)`` as 3."""
-    return value.tolist() if hasattr(value, "tolist") else value
+    try:
+        return value.tolist()
+    except AttributeError:  # also of a quantity of pint, which has the method only for arrays
+        return value
 
 
 def tuples(value: Any) -> Any:

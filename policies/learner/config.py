@@ -26,6 +26,7 @@ from pydantic import (
 from dess.errors import InputError, shown, validated
 from dess.files.documents import Document, Sha256
 from dess.files.reading import Shipped
+from dess.files.writing import toml_value
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.sea.families import SETS, seas_of
 
@@ -323,7 +324,7 @@ def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
     for key in sorted(values.keys() & ScenarioSpace.model_fields.keys()):
         raise InputError(
             f"{where}: {key} is a field of the scenario; allowed: "
-            f"--set {key}={json.dumps(values[key])}, or {key} in the table [set]"
+            f"--set {shlex.quote(f'{key}={toml_value(values[key])}')}, or {key} in the table [set]"
         )
     return validated(TrainingConfig, values, where)
 
@@ -357,7 +358,7 @@ def resume_command(config: TrainingConfig, name: str, out: Path, device: str = "
     words += ["--seed", str(config.seed)] if config.seed != original.seed else []
     words += ["--scenario", config.scenario] if config.scenario != original.scenario else []
     for key, value in config.set.items():
-        words += ["--set", f"{key}={json.dumps(value)}"] if original.set.get(key) != value else []
+        words += ["--set", f"{key}={toml_value(value)}"] if original.set.get(key) != value else []
     words += [] if device == "auto" else ["--device", device]
     return shlex.join([*words, "--resume"])
 

@@ -1,6 +1,7 @@
 """``dess policies``, ``dess scenarios`` and ``dess studies``: lists, and ``show`` for one name."""
 
 import json
+import sys
 from pathlib import Path
 from textwrap import wrap
 from typing import Annotated, Any
@@ -135,19 +136,35 @@ def new_scenario(
         answers: An answer, such as endurance="35 min"; repeatable.
     """
     from dess.analysis.figures.missions import sea_figure
-    from dess.scenario import parsed_scenario
-    from dess.sea import new
+    from dess.analysis.names import placing
+    from dess.scenario import DRAFT, parsed_scenario
+    from dess.sea.new import NewScenario
 
     console.check_ending("FILE.toml", path, (".toml",), "a scenario")
     if path.exists():
         raise InputError(f"{path}: exists; allowed: the name of a new file")
+    if nodes.absolute().parent != path.absolute().parent:
+        raise InputError(f"--nodes: {nodes} is in another folder; allowed: a file beside {path}")
     parts = (answer.partition("=") for answer in answers or [])
     given = {key.strip(): value.strip() for key, _, value in parts}
-    text = new.new_scenario(nodes, console.answers(given, new.questions(nodes), new.check))
-    space, picture = parsed_scenario(text, path), path.with_suffix(".png")
+    new = NewScenario(nodes)
+    console.answers(given, new.questions(given), new.check)
+    text = new.text()
+    draft = parsed_scenario(text, path, DRAFT)
+    on_land = len({*draft.nodes} & {*draft.no_fly})
+    if on_land:
+        text = new.text(place="nearest")
+        draft = parsed_scenario(text, path, DRAFT)
+    picture = path.with_suffix(".png")
     with console.outputs([path, picture]) as [file, drawing]:
         fill(file, text)
-        save_figure(sea_figure(space), drawing, "png")
+        save_figure(sea_figure(draft), drawing, "png")
+    if on_land:
+        console.say(f"note: no-fly cells have nodes.{placing(draft)}", sys.stderr)
+    try:
+        space = parsed_scenario(text, path)
+    except InputError as error:
+        raise InputError(f"{path} is written, but cannot be simulated: {error}") from None
     console.say(f"{path}, {picture}: {space.units}")
 
 

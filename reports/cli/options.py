@@ -1,8 +1,10 @@
 """The options and arguments that commands share, and their completion by the shell."""
 
 import ast
+import json
 import math
 import re
+import shlex
 import sys
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -152,18 +154,49 @@ def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, An
         InputError: If the text has another form.
     """
     key, equals, value = (part.strip() for part in text.partition("="))
+    if allowed == FIELD and is_quantity(key) and value:
+        value = _quoted(value)
     with suppress(InputError):
         parsed = parse_toml(f"value = {value}", option)
         if equals and parsed.keys() == {"value"} and _is_plain(parsed["value"]):
             return key, parsed["value"]
     if allowed == FIELD and (_RANGE.fullmatch(value) or "," in value.partition("[")[0]):
-        raise InputError(
-            f"{option}: {shown(text)} has several values; allowed: one, or dess sweep {SET} {text}"
-        )
+        many = shlex.join(["dess", "sweep", SET, text])
+        raise InputError(f"{option}: {shown(text)} has several values; allowed: one, or {many}")
     if allowed == FIELD and value:
         _check_word(key, value, option)
         return key, value
     raise InputError(f"{option}: {shown(text)} is not KEY=VALUE; allowed: {allowed}")
+
+
+def is_quantity(field: str) -> bool:
+    """Whether a field of a scenario has quantities, such as ``35 min``."""
+    from dess.sections.data_sheet import DataSheet
+
+    section, _, name = field.partition(".")
+    return section == "data_sheet" and name in DataSheet.model_fields
+
+
+# A comma that parts values, and no decimals.
+_PARTING = re.compile(r",(?![0-9])|(?<![0-9]),")
+# A text in quotes, or all up to the next comma or bracket.
+_QUANTITY = re.compile(r"""("(?:[^"\\]|\\.)*"|'[^']*')|[^\[\],"']+""")
+
+
+def _quoted(value: str, is_single: bool = True) -> str:
+    """A value of quantities in TOML syntax: ``20 kB/h`` and ``[1 kB, 2 kB]`` get their quotes.
+
+    Args:
+        value: The value.
+        is_single: Whether it is one value, so that a comma outside of a list is a decimal one.
+    """
+    if is_single and not _PARTING.search(value) and not set(value) & set("[]\"'"):
+        return json.dumps(value)
+    return _QUANTITY.sub(lambda item: item[0] if item[1] else _with_quotes(item[0]), value)
+
+
+def _with_quotes(text: str) -> str:
+    return json.dumps(text.strip()) if text.strip() else text
 
 
 def _field(name: str, option: str = SET) -> "FieldInfo":
@@ -239,7 +272,10 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
     field, equals, values = (part.strip() for part in text.partition("="))
     if equals:
         _field(field)
-    if found := _RANGE.fullmatch(values):
+    if is_quantity(field):
+        values = _quoted(values, is_single=False)
+        text = f"{field}={values}"
+    elif found := _RANGE.fullmatch(values):
         return field, listed(field, _range(field, text, **found.groupdict()))
     try:
         given = setting(f"{field}=[{values}]" if equals else text, allowed="")[1]

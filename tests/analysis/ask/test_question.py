@@ -1,5 +1,6 @@
 """Questions: studies made of values, kept, and asked again."""
 
+import shlex
 import shutil
 
 import numpy as np
@@ -11,7 +12,8 @@ from dess.analysis.answers.diff import diff
 from dess.analysis.ask.question import sweep_question, values_of, what_if_question
 from dess.analysis.execution import effort
 from dess.analysis.execution.effort import BASELINE, SECONDS
-from tests.analysis.small import files_of, write_scenario
+from dess.reports.cli import options
+from tests.analysis.small import SHEET, files_of, write_scenario
 
 FIELDS = {"uavs": [1, 2], "quota": [20, 40], "pads": 2}
 
@@ -87,11 +89,36 @@ def test_a_name_is_of_one_question(asking, tmp_path):
     assert asking(name="mine")[2] == 24
     assert asking({**FIELDS, "uavs": [1, 2, 3]}, name="mine")[2] == 12
     before = files_of(tmp_path)
-    line = "mine/manifest.json: holds other scenarios .*; allowed: another --out or name, or remove"
+    line = "mine/manifest.json: holds other scenarios .*; allowed: another results folder .*, anoth"
     with pytest.raises(InputError, match=line):
         asking({**FIELDS, "uavs": [2]}, name="mine")
     assert files_of(tmp_path) == before
     assert len(load_results(tmp_path / "results" / "sweeps" / "mine").missions) == 36
+
+
+VALUES = {
+    "fleet": [{"slots_per_cell": 2}, {"flying_time": 60}],
+    "initial_data": [5, 20],
+    "names": ["Tönning 🌊", "O'Neill", 'a "b"'],
+    "zones": [{"cells": [0, 6, 2, 2], "pads": 1}],
+    "arrivals.service": "newest",
+    "arrivals.process": "continuous",
+}
+
+
+def test_the_command_of_a_question_can_be_pasted(tmp_path):
+    """Its options are read as the values that were asked about, in tables and with any letters."""
+    scenario = write_scenario(tmp_path)
+    made = what_if_question(VALUES, {"uavs": 2}, scenario, ["greedy"], folder=tmp_path)
+    words = shlex.split(made.command)
+    given = [words[n + 1] for n, word in enumerate(words) if word == "--set"]
+    assert options.all_settings(given) == VALUES
+    sheet = write_scenario(tmp_path, **SHEET)
+    fields = {"data_sheet.data_rate": ["20 kB/h", "3 MB/h"], "data_sheet.wind": ["2 m/s from W"]}
+    swept = sweep_question(fields, sheet, ["greedy"], folder=tmp_path)
+    words = shlex.split(swept.command)
+    given = [words[n + 1] for n, word in enumerate(words) if word == "--set"]
+    assert options.all_values(given) == {name: tuple(of) for name, of in fields.items()}
 
 
 def test_a_search_has_a_policy_for_the_missions_that_it_will_take():

@@ -77,7 +77,7 @@ def test_a_foreign_manifest_is_refused(case, out, tmp_path):
         with pytest.raises(InputError, match=line) as error:
             use()
         assert str(error.value).startswith(str(out / "manifest.json"))
-        assert "allowed: another --out" in str(error.value)
+        assert "allowed: another results folder" in str(error.value)
         assert "\n" not in str(error.value)
     assert files_of(out) == before
 

@@ -94,6 +94,13 @@ def test_copies_without_a_seed_play_missions_of_their_own(kind):
 
 
 @pytest.mark.parametrize("kind", MADE)
+def test_a_seed_may_be_an_integer_of_numpy(kind):
+    env = MADE[kind]()
+    env.reset(seed=np.int64(3))
+    assert {*seeds_of(env)} == {3}
+
+
+@pytest.mark.parametrize("kind", MADE)
 def test_copies_with_a_seed_play_the_same_missions(kind):
     original = MADE[kind](seed=3)
     for env in (original, deepcopy(original)):

@@ -76,6 +76,16 @@ def test_degrees_are_projected_about_the_centre_of_their_box(write):
     assert len({x for x, _ in found}) == 3
 
 
+def test_longitudes_go_on_beyond_the_180th_meridian():
+    """In places on the Earth, and in the centre of nodes on its both sides."""
+    projection = Projection.about(np.array([[179.9, 53.0], [-179.7, 53.0]]), (40, 8), 1000.0)
+    assert projection.centre == pytest.approx((-179.9, 53.0))
+    row = np.stack([np.arange(41.0), np.full(41, 4.0)], axis=1)
+    degrees = projection.degrees(row)
+    assert np.allclose(np.diff(degrees[:, 0]), np.diff(degrees[:2, 0]))
+    assert np.allclose(projection.cells(degrees), row)
+
+
 def test_a_grid_that_is_not_square_has_the_same_centre(write):
     """0.09 degrees of latitude at the equator are ten cells of 1 km and a bit."""
     path = write("buoys.csv", "lon,lat\n0,0.045\n0,-0.045\n0.045,0\n-0.045,0\n")
@@ -237,6 +247,9 @@ NO_FLY: list[tuple[str, Any, str]] = [
     ("land.geojson", features(("Polygon", [RING])), DEGREES),
     ("land.shp", "", "has no known file ending; allowed: .txt, .map, .png, .csv, .tsv, .geojson"),
 ]
+_SHORT = {"type": "LineString", "coordinates": [[8, 54]]}
+COLLECTED = collection(feature("GeometryCollection", []))
+COLLECTED["features"][0]["geometry"]["geometries"] = [_SHORT]
 POLYGONS: list[tuple[str, Any, str]] = [
     ("p.json", {"features": []}, "features: .* is too short"),
     ("p.json", features(("Polygon", [RING[:4]])), f"{SHAPE}: is no ring; allowed: four positions"),
@@ -244,6 +257,9 @@ POLYGONS: list[tuple[str, Any, str]] = [
         *("p.json", features(("Polygon", [[[8, 54], [8, 91], [9, 54], [8, 54]]]))),
         f"{SHAPE}.1: lat is 91; allowed: -90..90",
     ),
+    ("p.json", features(("LineString", [[8, 54]])), f"{SHAPE[:-2]}: is no line; allowed: two"),
+    ("p.json", features(("MultiLineString", [[[8, 54]]])), f"{SHAPE}: is no line; allowed: "),
+    ("p.json", COLLECTED, "features.0.geometry.geometries.0.coordinates: is no line; allowed: two"),
     ("p.json", features(("MultiPolygon", [5])), "features.0.geometry.coordinates.0.0: has not two"),
 ]
 READERS: dict[Any, list[tuple[str, Any, str]]] = {

@@ -127,6 +127,27 @@ def test_lines_are_lanes_and_everything_can_have_a_buffer(sea, tmp_path):
     assert closed(rock, EQUATOR, buffer=1.1 * CELL).sum() == 5  # its cell and the four beside it
 
 
+def test_a_point_with_a_radius_is_a_circle(sea, tmp_path, caplog):
+    """In metres or with a unit, beside the buffer of the file; a small one closes its own cell."""
+    for given, buffer, count in (
+        (1.1 * CELL, 0.0, 5),
+        ("1.22 km", 0.0, 5),
+        (f"{0.55 * CELL}", 0.55 * CELL, 5),
+        (1.0, 0.0, 1),
+        (None, 0.0, 1),
+    ):
+        sea(rock_json=collection(feature("Point", [0.005, 0.005], Radius=given)))
+        assert closed(tmp_path / "rock.json", EQUATOR, buffer=buffer).sum() == count, given
+    for given in (-1, "wide", 1e9, "2 min"):
+        sea(rock_json=collection(feature("Point", [0.005, 0.005], radius=given)))
+        with pytest.raises(InputError, match=r"features\.0: radius: .*; allowed: "):
+            closed(tmp_path / "rock.json", EQUATOR)
+    sea(cells_csv="x,y,radius\n3,3,500\n")
+    with caplog.at_level(logging.WARNING):
+        assert closed(tmp_path / "cells.csv", EQUATOR).sum() == 1
+    assert "cells.csv: the column radius is not used" in caplog.text
+
+
 # --- coasts as they are published ---
 
 
@@ -236,6 +257,20 @@ def test_a_column_gives_each_node_its_rate_and_initial_data(sea):
     assert batch.missions[0] == log.metrics
     with pytest.raises(InputError, match="n.csv: line 3: rate is 'some'; allowed: a number"):
         load_scenario(sea(lines, n_csv="x,y,rate\n1,1,1\n2,2,some\n"))
+
+
+def test_an_empty_field_of_a_node_is_that_of_the_scenario(sea):
+    table = "x,y,rate,data\n3,3,2.5,\n5,3,,40\n"
+    lines = 'nodes = "n.csv"\ngrid = 8\nzone = [0, 0, 2, 2]\narrival_rate = 0.5\n'
+    space = load_scenario(path := sea(lines + "initial_data = 7", n_csv=table))
+    assert (space.arrivals.rates, space.arrivals.initial) == ((2.5, 0.5), (7.0, 40.0))
+    # What is set for all nodes replaces what each has.
+    assert load_scenario(path, arrival_rate=0.25).node_rates == (0.25, 0.25)
+    assert type(space).of(space, initial_data=3).node_data == ((3.0, 3.0), (3.0, 3.0))
+    with pytest.raises(InputError, match="line 2: data: is empty; allowed: a number, or one in"):
+        load_scenario(sea(lines + "initial_data = [5, 20]", n_csv=table))
+    with pytest.raises(InputError, match="may part thousands or decimals; allowed: 1000 or 1.000"):
+        load_scenario(sea(lines, n_csv="x;y;rate\n3;3;1,000\n"))
 
 
 def test_nodes_are_chosen_by_their_properties(sea, tmp_path):

@@ -1,16 +1,18 @@
 """The data sheet: what follows from it, recomputed by hand, and what is refused."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import tomli_w
 
 from dess import InputError, load_scenario, simulate
 from dess.analysis.verification import closed_forms
 from dess.channel import world_of
 from dess.scenario import ScenarioSpace
-from dess.sections.data_sheet import printed
+from dess.sections.quantities import printed
 from dess.sections.wind import MOST, largest_wind, moves_in
 from dess.state import constants_of
 from tests.drawn import Script
@@ -104,11 +106,21 @@ def test_a_scenario_with_a_sheet_is_stored_and_changed_by_its_sheet():
     assert not ScenarioSpace.of().units and "radio" not in ScenarioSpace.of().model_dump()
 
 
+def _sea(folder: Path, rows: str, **sheet: Any) -> Path:
+    """A scenario with a sheet that reads its nodes from a file."""
+    (folder / "buoys.csv").write_text(rows)
+    given = {name: of for name, of in (SHEET | sheet).items() if of is not None}
+    text = tomli_w.dumps({"nodes": "buoys.csv", "data_sheet": given})
+    (folder / "sea.toml").write_text(text)
+    return folder / "sea.toml"
+
+
+MEGABYTE_PER_HOUR = 8e6 / 3600 / 125e3  # in units of the bandwidth of SHEET
+
+
 def test_nodes_of_a_file_have_their_own_rates_in_units(tmp_path):
-    sheet = "\n".join(f'{name} = "{of}"' for name, of in SHEET.items() if name != "data_rate")
     rows = "name,x,y,data_rate,backlog\na,1,1,3 MB/h,1 MB\nb,4,4,6 MB/h,0 MB\n"
-    (tmp_path / "buoys.csv").write_text(rows)
-    (tmp_path / "sea.toml").write_text(f'nodes = "buoys.csv"\n[data_sheet]\n{sheet}\n')
+    _sea(tmp_path, rows, data_rate=None)
     space = load_scenario(tmp_path / "sea.toml")
     assert (
         space.arrivals.rates[1]
@@ -117,8 +129,53 @@ def test_nodes_of_a_file_have_their_own_rates_in_units(tmp_path):
     )
     assert space.arrivals.initial == pytest.approx((8e6 / (125e3 * 21), 0))
     (tmp_path / "buoys.csv").write_text(rows.replace("3 MB/h", "3"))
-    with pytest.raises(InputError, match="line 2: rate: '3' has no unit; allowed: a data rate"):
+    with pytest.raises(
+        InputError, match="line 2: data_rate: '3' has no unit; allowed: a data rate"
+    ):
         load_scenario(tmp_path / "sea.toml")
+
+
+def test_a_field_of_a_node_wins_and_the_sheet_is_for_those_that_have_none(tmp_path):
+    rows = "name;x;y;data_rate;backlog\na;1;1;3,5 MB/h;20 MB\nb;4;4;;\n"
+    space = load_scenario(sea := _sea(tmp_path, rows, data_rate="2 MB/h"))
+    assert space.arrivals.rates == pytest.approx((3.5 * MEGABYTE_PER_HOUR, 2 * MEGABYTE_PER_HOUR))
+    assert space.arrivals.initial == pytest.approx((20 * 8e6 / (125e3 * 21), 0))
+    # What is set for the scenario is for all nodes, also through a table of the section.
+    for values in ({"data_sheet.data_rate": "1 MB/h"}, {"data_sheet": {"data_rate": "1 MB/h"}}):
+        space = load_scenario(sea, **values)
+        assert (space.arrivals.rates, space.arrival_rate) == ((), pytest.approx(MEGABYTE_PER_HOUR))
+    with pytest.raises(InputError, match="line 3: data_rate: is empty; allowed: a data rate, such"):
+        load_scenario(_sea(tmp_path, rows, data_rate=None))
+    listed = _sea(tmp_path, rows, data_rate=["1 MB/h", "2 MB/h"])
+    with pytest.raises(InputError, match="has the column data_rate, and the scenario lists"):
+        load_scenario(listed)
+    both = "x,y,rate,data_rate\n1,1,1 MB/h,2 MB/h\n4,4,3 MB/h,4 MB/h\n"
+    with pytest.raises(InputError, match="has the columns data_rate and rate for one field"):
+        load_scenario(_sea(tmp_path, both))
+
+
+def test_no_other_cell_size_is_advised_where_it_follows_from_the_sheet(tmp_path):
+    near, far = "lon,lat\n8,54\n8.02,54.02\n8.001,54.001\n", "lon,lat\n0,0\n0,0.2\n"
+    for rows, line in ((near, "in one cell"), (far, "off the grid")):
+        with pytest.raises(InputError, match=line) as error:
+            load_scenario(_sea(tmp_path, rows))
+        assert "cell_size" not in str(error.value)
+
+
+class Unreadable:
+    """Like a quantity of pint with a single number, whose method for arrays fails."""
+
+    def __repr__(self):
+        return "<Quantity(35, 'minute')>"
+
+    def tolist(self):
+        raise AttributeError("Magnitude 'int' does not support tolist.")
+
+
+@pytest.mark.parametrize("field", ["data_sheet.endurance", "data_sheet.data_rate", "cell_size"])
+def test_a_quantity_of_another_library_is_refused_in_a_line(field):
+    with pytest.raises(InputError, match=rf"{field}: <Quantity\(35, 'minute'\)> is .*; allowed: "):
+        load_scenario("jade-bight" if "." in field else "paper", **{field: Unreadable()})
 
 
 @pytest.mark.parametrize(
@@ -135,11 +192,27 @@ def test_nodes_of_a_file_have_their_own_rates_in_units(tmp_path):
         ({"wind": "14 m/s"}, {}, "is not a speed and where it comes from"),
         ({"horizon": "60 d"}, {}, "is 246,857 slots of 21 s; allowed: 24.31 d at most"),
         ({"charging": "10 s"}, {}, "is less than a slot of 21 s; allowed: 21 s or more"),
-        ({"range": "200 m"}, {}, "is less than a cell of 315 m; allowed: 315 m or more"),
+        (
+            {"range": "200 m"},
+            {},
+            "is less than a cell of 315 m, the way of a slot at 15 m/s; allowed: 315 m or more",
+        ),
         ({"tx_power": "20 dBm"}, {}, "snr: follows from tx_power"),
         ({"repair": "2 h"}, {}, "mtbf: is missing"),
         ({"reserve": "80 %"}, {}, "reserve: '80 %' is out of range; allowed: 0..60"),
         ({"reserve": "20 %"}, {"flying_time": 90}, "more than the reserve leaves; allowed: 80"),
+        (
+            {"snr": "12 dB at 0 m"},
+            {},
+            "snr: '12 dB at 0 m' is out of range; allowed: 0.01..1e+06 m",
+        ),
+        ({"snr": "12 dB at -2 km"}, {}, "is out of range; allowed: 0.01..1e+06 m"),
+        ({"snr": "12 dB at 2000 km"}, {}, "is out of range; allowed: 0.01..1e+06 m"),
+        ({"wind": "5 m/s from 400 deg"}, {}, "is out of range; allowed: -360..360 deg"),
+        # What follows is refused in the words of the sheet.
+        ({"cruise": "1000 km/s", "wind": None}, {}, "endurance '35 min', cruise '1000 km/s', cell"),
+        ({"data_rate": "3 TB/s"}, {}, "data_sheet: with data_rate '3 TB/s', bandwidth '125 kHz'"),
+        ({"bandwidth": "1 Hz", "backlog": "90 TB"}, {}, "data_sheet: with backlog '90 TB', end"),
         ({}, {"cell_size": 315.0}, "cell_size: follows from the data sheet"),
         ({}, {"initial_data": 3.0}, "initial_data: follows from the data sheet"),
         ({}, {"arrivals": {"rates": [0.1] * 25}}, "arrivals.rates: follows from the data sheet"),

@@ -32,7 +32,10 @@ BAD = {
     "report --results typo": ["--results: typo: no such folder"],
     "simulate --events a.png --figure ./a.png": ["the same file"],
     "evaluate --policy greedy --engine fast": ["--engine", "'batch', 'events'"],
-    "study run trial.toml --out .": ["no manifest.json", "another --out"],
+    "study run trial.toml --out .": [
+        "no manifest.json",
+        "allowed: a results folder, or a new or empty one",
+    ],
     "study show nope --csv --json": ["--csv: not with --json"],
     "study": ["Missing command", "dess study --help"],
     "report mission": ["holds no results of 2 studies"],

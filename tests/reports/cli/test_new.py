@@ -1,5 +1,7 @@
 """``dess scenarios new``: a file from options or answers, and a picture beside it."""
 
+import json
+
 import pytest
 
 from dess import load_scenario
@@ -65,9 +67,75 @@ def test_what_is_missing_is_asked_a_question_a_line(dess, buoys, tmp_path, monke
     assert space.radio.range == 2000 and space.wind.moves[3] > 1 and space.uavs == (3, 3)
 
 
+LINK_BUDGET = {"tx_power": "14 dBm", "noise_figure": "6 dB", "frequency": "868 MHz"}
+
+
+def test_a_link_budget_takes_the_place_of_the_snr(dess, buoys, tmp_path, refusal):
+    answers = ANSWERS | LINK_BUDGET
+    del answers["snr"]
+    code, _, err = dess("scenarios", "new", "my.toml", *buoys, *_set(answers))
+    assert (code, err) == (0, "")
+    assert load_scenario(tmp_path / "my.toml").radio.anchor == 1.0
+    del answers["frequency"]
+    assert "frequency: missing" in refusal("scenarios", "new", "b.toml", *buoys, *_set(answers))
+
+
+def test_a_wrong_answer_is_asked_again_at_once(dess, buoys, monkeypatch):
+    """A base as latitude and longitude, a wind that is too strong: before the next question."""
+    replies = {
+        "base": ["54.05, 8.18", ANSWERS["base"]],
+        "wind": ["15 m/s from SW", "5 m/s from SW"],
+    }
+    asked = []
+
+    def answer(question):
+        asked.append(name := question.partition(":")[0])
+        return replies[name].pop(0) if name in replies else OTHERS[name]
+
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", answer)
+    sheet = {name: of for name, of in ANSWERS.items() if name != "base"}
+    code, _, err = dess("scenarios", "new", "my.toml", *buoys, *_set(sheet))
+    assert code == 0 and asked[2:6] == ["wind", "wind", "base", "base"]
+    assert "is too strong for 15 m/s" in err
+    assert "base: '54.05, 8.18' is 5,911 km from the nearest node; allowed: longitude, then" in err
+
+
+def test_a_buoy_on_land_takes_the_nearest_open_cell(dess, buoys, tmp_path):
+    corners = [[8.13, 54.02], [8.17, 54.02], [8.17, 54.04], [8.13, 54.04], [8.13, 54.02]]
+    land = {"type": "Polygon", "coordinates": [corners]}
+    document = {"type": "FeatureCollection", "features": [{"type": "Feature", "geometry": land}]}
+    (tmp_path / "land.json").write_text(json.dumps(document))
+    answers = ANSWERS | {"no_fly": "land.json"}
+    code, _, err = dess("scenarios", "new", "my.toml", *buoys, *_set(answers))
+    assert code == 0 and "note: no-fly cells have nodes. Of the 4 nodes, 1 is in the nearest" in err
+    assert load_scenario(tmp_path / "my.toml").moved == (1,)
+    # A base there cannot be mended so; what was answered is not lost.
+    answers["base"] = "8.15, 54.03"
+    code, _, err = dess("scenarios", "new", "b.toml", *buoys, *_set(answers))
+    assert code == 2 and "b.toml is written, but cannot be simulated: b.toml: zone: " in err
+    assert (tmp_path / "b.toml").exists() and (tmp_path / "b.png").exists()
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.0013, 0.0021, 0.0034, 0.0047])
+def test_nodes_are_merged_on_the_grid_that_is_written(dess, tmp_path, shift):
+    """Two buoys that are 0.9 cells apart share a cell on some grids, and never by surprise."""
+    rows = f"lon,lat\n8.1,54\n8.1,{54.1 + shift}\n8.15,54.03\n8.15,54.03255\n"
+    (tmp_path / "near.csv").write_text(rows)
+    code, _, err = dess("scenarios", "new", "my.toml", "--nodes", "near.csv", *_set(ANSWERS))
+    assert (code, err) == (0, "")
+    load_scenario(tmp_path / "my.toml")
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
+        (
+            {"base": "54.05, 188"},
+            ["base: '54.05, 188' is no place on the Earth; allowed: longitude"],
+        ),
+        ({"base": "28.18, 54.05"}, ["base: buoys.csv and the base take ", "allowed: 256 x 256"]),
+        ({"no_fly": "none.json"}, ["no_fly: 'none.json' is no file; allowed: the name of a file"]),
         (
             {"endurance": None, "base": None},
             ["endurance, base: missing; allowed: --set "],

@@ -1,9 +1,11 @@
 """Values of fields on the command line."""
 
+import shlex
+
 import pytest
 
 from dess import InputError
-from dess.reports.cli.options import values_of
+from dess.reports.cli.options import setting, values_of
 
 VALUES = {
     "uavs=2..5": (2, 3, 4, 5),
@@ -17,6 +19,10 @@ VALUES = {
     "forbid_swaps=false,true": (False, True),
     "arrivals.service=newest, oldest": ("newest", "oldest"),
     "arrivals.process=continuous": ("continuous",),
+    "data_sheet.wind=5 m/s from W": ("5 m/s from W",),
+    "data_sheet.data_rate=20 kB/h, 3 MB/h": ("20 kB/h", "3 MB/h"),
+    'data_sheet.data_rate="20 kB/h","3 MB/h"': ("20 kB/h", "3 MB/h"),
+    "data_sheet.backlog=[1 kB, 2 kB],[3 kB,4 kB]": (["1 kB", "2 kB"], ["3 kB", "4 kB"]),
 }
 
 
@@ -26,6 +32,29 @@ def test_values(text):
     assert field == text.split("=")[0].strip()
     assert values == VALUES[text]
     assert [type(value) for value in values] == [type(value) for value in VALUES[text]]
+
+
+QUANTITIES = {
+    "data_sheet.data_rate=20 kB/h": "20 kB/h",
+    "data_sheet.backlog=3,5 MB": "3,5 MB",
+    "data_sheet.backlog=[1 kB, 2 kB]": ["1 kB", "2 kB"],
+    "data_sheet.wind='5 m/s from W'": "5 m/s from W",
+}
+
+
+@pytest.mark.parametrize("text", QUANTITIES)
+def test_a_quantity_needs_no_quotes_of_its_own(text):
+    assert setting(text) == (text.partition("=")[0], QUANTITIES[text])
+
+
+@pytest.mark.parametrize("text", ["uavs=2, 3", "data_sheet.data_rate=1 MB/h, 2 MB/h"])
+def test_the_command_for_several_values_can_be_pasted(text):
+    with pytest.raises(
+        InputError, match="has several values; allowed: one, or dess sweep"
+    ) as error:
+        setting(text)
+    *_, option, pasted = shlex.split(str(error.value).partition("or dess sweep ")[2])
+    assert (option, pasted) == ("--set", text) and len(values_of(pasted)[1]) == 2
 
 
 REFUSED = {

@@ -115,13 +115,13 @@ def test_the_event_log_is_written_as_its_ending_says(dess, tmp_path):
     pd.testing.assert_frame_equal(log, table, check_dtype=False)
 
 
-BUOYS = "name,lon,lat\nAlpha,8.50,54.25\nBeta,8.53,54.27\n"
+BUOYS = "name,lon,lat\nAlpha,179.985,54.25\nBeta,-179.985,54.27\n"
 AT_SEA = ("--scenario", "buoys.toml", "--set", "uavs=2", "--policy", "greedy")
 
 
 @pytest.fixture
 def buoys(tmp_path):
-    """A sea with names and degrees, and with a slow UAV."""
+    """A sea with names and degrees, on both sides of the 180th meridian, and with a slow UAV."""
     (tmp_path / "buoys.csv").write_text(BUOYS)
     lines = ['nodes = "buoys.csv"', "grid = 8", "zone = [5, 0, 3, 2]", "quota = 60"]
     lines += ["[[fleet]]", "[[fleet]]", "slots_per_cell = 2"]
@@ -141,6 +141,8 @@ def test_the_flown_path_is_written_with_its_times_in_degrees(dess, refusal, tmp_
         assert of["time"].tolist() == [*range(len(of))]
         steps = of[["x", "y"]].diff().abs().sum(axis=1).iloc[1:]
         assert set(steps) == {0.0, 1.0 / (1 + uav)}
+        assert of["lon"].diff().abs().max() < 0.02
+    assert table["lon"].min() < 180 < table["lon"].max()
     features = json.loads((tmp_path / "p.geojson").read_text())["features"]
     lines = [line for of in features for line in of["geometry"]["coordinates"]]
     assert np.allclose(lines, table[["lon", "lat", "altitude"]])
