@@ -137,7 +137,7 @@ class NodesFound(NamedTuple):
         for number, cell in enumerate(own):
             groups.setdefault(cell, []).append(number)
         if self.source.place == "own" and len(groups) < len(own):
-            self._refuse_shared(groups, None if is_cell_fixed else projection)
+            self._refuse_shared(groups, projection, is_cell_fixed)
         if len(groups) > MAX_NODES:
             raise InputError(f"{self.path}: has {len(groups):,} nodes; allowed: 1..{MAX_NODES}")
         names, members = [*map(self._name, range(len(own)))], [*groups.values()]
@@ -214,14 +214,18 @@ class NodesFound(NamedTuple):
             line = f"{names} {verb} off the grid of {size[0]} x {size[1]} cells"
             raise InputError(f"{self.path}: {line}; allowed: {enough}")
 
-    def _refuse_shared(self, groups: dict[Cell, list[int]], projection: Projection | None) -> None:
+    def _refuse_shared(
+        self, groups: dict[Cell, list[int]], projection: Projection | None, is_cell_fixed: bool
+    ) -> None:
         """Say which nodes share cells, and what would part them."""
         cells = listed(
             f"{' and '.join(map(self._title, group))} lie in one cell, {[*cell]}"
             for cell, group in groups.items()
             if len(group) > 1
         )
-        parted = self._finer(projection) if projection else "distinct cells, "
+        parted = "distinct cells, "
+        if projection:
+            parted = "" if is_cell_fixed else self._finer(projection)
         known = 'place = "merge", place = "nearest" beside the file'
         raise InputError(f"{self.path}: {cells}; allowed: {parted}{known}")
 
