@@ -307,7 +307,8 @@ _LIMITED = {"initial_data": "arrivals.initial"}
 @cache
 def _adapter(name: str) -> TypeAdapter:
     field = fields_of(Fields)[name]
-    return TypeAdapter(Annotated[field.annotation, field])  # type: ignore[name-defined]
+    kind: Any = Annotated[field.annotation, field]
+    return TypeAdapter(kind)
 
 
 def _check_following(sheet: DataSheet, name: str, value: Any) -> None:
