@@ -100,7 +100,7 @@ class Costs(StrictTable):
         if field not in uavs or np.isnan(np.asarray(uavs[field], float)).any():
             raise InputError(
                 f"costs: the records of an earlier version have no {field}, which has a price; "
-                "allowed: results of this version, of a run with another --out"
+                "allowed: results of this version, in another results folder"
             )
         return np.bincount(mission, np.asarray(uavs[field]), missions)
 
