@@ -194,13 +194,17 @@ def overall(results: Results, pair: Pair) -> pd.DataFrame:
 
 
 def pairing(comparison: pd.DataFrame) -> str:
-    """How many times as many independent missions would give equally narrow intervals.
+    """How many independent missions would give equally narrow intervals, as a sentence.
 
     Args:
         comparison: The rows of ``overall``.
     """
     reduction = comparison.set_index("metric").loc[PRODUCT, "variance_reduction"]
-    return f"{1 / (1 - reduction):.0f} times as many" if reduction < 1 else "infinitely many"
+    many = "infinitely many"
+    if reduction < 1:
+        times = f"{1 / (1 - reduction):.1f}"
+        many = "as many" if times == "1.0" else f"{times} times as many"
+    return f"{many} independent missions would be as precise"
 
 
 def outcomes(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
@@ -341,6 +345,24 @@ def along(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
     table = for_choice(table, candidates)
     sides = zip(table["mean"], table["p_adjusted"], strict=True)
     return table.assign(verdict=[VERDICTS[position_by_test(*side)] for side in sides])
+
+
+def colours_in_words(lead: pd.DataFrame, pair: Pair) -> str:
+    """What the colours of the dots in ``leads`` mean, of those that occur.
+
+    Args:
+        lead: Rows of ``along``.
+        pair: The policies.
+    """
+    meanings = {
+        AHEAD: f"blue means that {pair.policy} is ahead",
+        BEHIND: f"orange that {pair.policy} is behind",
+        INCONCLUSIVE: "hollow that it is inconclusive",
+    }
+    shown = [words for verdict, words in meanings.items() if verdict in {*lead["verdict"]}]
+    text = f"{', '.join(shown)} (Holm, over all bins); " if shown else ""
+    text = f"{text}dashed is the mean of all missions."
+    return text[0].upper() + text[1:]
 
 
 def leads(missions: pd.DataFrame, lead: pd.DataFrame, pair: Pair, note: str = "") -> list[Drawing]:

@@ -45,11 +45,13 @@ html.lead(*answers.distribution(missions, pair))
 # %% [markdown]
 # ## Why: where it is better
 #
-# Each parameter is divided into at most five bins with about equally many missions. Blue is better,
-# orange worse, hollow inconclusive (Holm, over all bins); dashed is the mean of all missions.
+# Each parameter is divided into at most five bins with about equally many missions.
 
 # %%
 lead = answers.along(missions, pair.candidates)
+html.say("{colours}", colours=answers.colours_in_words(lead, pair))
+
+# %%
 too_few = html.say("Too few missions for bins of n = {least} or more.", least=answers.LEAST)
 html.show(answers.leads(missions, lead, pair, f"{pair.title}, 95 % intervals, ") or too_few)
 
@@ -77,7 +79,7 @@ html.gallery(
 
 # %%
 found = {
-    f"{answers.pairing(comparison)} independent missions would be as precise": comparison,
+    answers.pairing(comparison): comparison,
     "every learner and the best heuristic": summary.learned_against_heuristic(study),
     "every policy and the best one": summary.comparisons(study),
 }

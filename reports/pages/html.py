@@ -268,7 +268,9 @@ def table(
     if not wrap:
         html = _aligned(html, len(frame.columns))
     html = str(indexed(Markup(_EMPTY_HEADER.sub(r"<td\1></td>", html))))
-    caption = ". ".join(filter(None, [caption, numbers.why_nan(frame.to_numpy().flat)]))
+    caption = ". ".join(
+        filter(None, [caption, numbers.why_nan(frame.astype(object).fillna("").to_numpy().flat)])
+    )
     if caption:
         html = html.replace(">", f"><caption>{indexed(caption)}</caption>", 1)
     below = "" if data is None else _downloads(caption, data, frame)

@@ -43,13 +43,13 @@ html.answer(*answers.answer(differences, planner))
 html.lead(*answers.by_fleet(differences))
 
 # %% [markdown]
-# ## Why: where each of them wins
-#
-# Blue means that the planner is better, orange the learner, hollow inconclusive (Holm, over all
-# bins); dashed is the mean of all missions.
+# ## Why: where each of them is ahead
 
 # %%
 lead = comparison.along(missions, pair.candidates)
+html.say("{colours}", colours=comparison.colours_in_words(lead, pair))
+
+# %%
 too_few = html.say("Too few missions for bins of n = {least} or more.", least=comparison.LEAST)
 html.show(comparison.leads(missions, lead, pair, f"{pair.title}, ") or too_few)
 

@@ -155,6 +155,24 @@ def test_a_bin_has_ten_missions_or_more():
     assert comparison.along(missions_of(lambda t: 0.0, n=45))["n"].min() >= 10
 
 
+def test_only_colours_that_occur_are_explained():
+    ahead = comparison.along(missions_of(lambda t: 0.5 + 0 * t["uavs"]))
+    said = comparison.colours_in_words(ahead, PAIR)
+    assert said.startswith("Blue means that ours is ahead (Holm")
+    assert "orange" not in said and "hollow" not in said
+    mixed = comparison.along(missions_of(lambda t: 0.05 * (t["uavs"] - 2)))
+    assert "orange that ours is behind" in comparison.colours_in_words(mixed, PAIR)
+
+
+@pytest.mark.parametrize(
+    ("reduction", "said"),
+    [(0.0, "as many"), (0.02, "as many"), (0.75, "4.0 times as many"), (1.0, "infinitely many")],
+)
+def test_what_the_pairing_gains_is_said_in_words(reduction, said):
+    table = pd.DataFrame({"metric": [PRODUCT], "variance_reduction": [reduction]})
+    assert comparison.pairing(table) == f"{said} independent missions would be as precise"
+
+
 def test_what_all_missions_share_is_no_parameter():
     missions = missions_of(lambda t: 0.1, uavs=2, flying_time=80)
     assert comparison.varied(missions) == ["charge_start", "charge_complete", "initial_data"]

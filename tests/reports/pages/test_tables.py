@@ -25,3 +25,10 @@ def test_the_head_of_a_group_stands_over_its_columns():
         ["", "", "ddqn", "ddqn"],
         ["Mission", "Points", "Success", "Collected"],
     ]
+
+
+def test_nan_is_explained_only_where_it_is_shown():
+    """A cell without a value is empty."""
+    without = html.table(pd.DataFrame({"p": [None, 0.5]}), "P-values").data
+    assert "nan" not in without
+    assert "nan: the missions are too few" in html.table(pd.DataFrame({"p": ["nan"]}), "P").data
