@@ -76,7 +76,8 @@ class Grid:
         best = rows[rows["metric"] == metrics.PRODUCT].sort_values("mean", ascending=False)
         parts = [f"{row.policy} {numbers.percent(row.mean)}" for row in best.itertuples()]
         setting = in_words(self.results)[self.start]
-        return f"With {setting}, the product is {numbers.words(parts)}; move a slider."
+        counted = numbers.span(best["n"])
+        return f"With {setting}, the product is {numbers.words(parts)} (n = {counted} missions)."
 
     def table(self) -> pd.DataFrame:
         """The means of all settings: the fields, then the columns of ``dess.analysis.summary``."""

@@ -154,6 +154,12 @@ def summary(results: Results, times: Times) -> pd.DataFrame:
     return table.assign(Decision=table.index.map(seconds)).fillna("").reset_index(names="Policy")
 
 
+def counted(results: Results) -> str:
+    """The number of seas of a study and of the missions on each, as ``n = 28 seas, ...``."""
+    of_sea = numbers.span(results.missions.groupby(["policy", "point"]).size())
+    return f"n = {len(_names(results))} seas, missions on each: {of_sea}"
+
+
 def worst(results: Results, policy: str, reference: str, count: int = 8) -> pd.DataFrame:
     """The seas on which a policy is the farthest behind another one, as a table of text."""
     ((_, values),) = _by_sea(results, ALL, PRODUCT)

@@ -64,7 +64,8 @@ html.table(
 # %%
 html.table(
     seas.summary(study, times),
-    "Every policy over all seas, and the time of a decision in batches on one core",
+    f"Every policy over all seas, and the time of a decision in batches on one core; "
+    f"{seas.counted(study)}",
 )
 
 # %% [markdown]
@@ -74,10 +75,11 @@ html.table(
 # hours of flying and charging. No shipped policy has learned on such missions.
 
 # %%
-html.table(seas.summary(landing, times), "Missions with a quota that end on the ground")
+counted = seas.counted(landing)
+html.table(seas.summary(landing, times), f"Missions with a quota that end on the ground; {counted}")
 
 # %%
-html.table(seas.summary(horizon, times), "Eight hours without a quota")
+html.table(seas.summary(horizon, times), f"Eight hours without a quota; {seas.counted(horizon)}")
 
 # %%
 rows = seas.quality(study, "family", SUCCESS)
