@@ -2,7 +2,8 @@
 
 A file has its name as the title of its block. The output of a command stands in a ``text`` block
 directly below it, where ``...`` is anything. All commands of the tutorial but the installation run,
-and of other pages those with an output.
+and of other pages those with an output. With ``DESS_WRITE_PINS=1`` the pages quote anew what is
+printed: read the difference before it is committed.
 """
 
 import doctest
@@ -79,11 +80,33 @@ def test_commands_print_what_the_page_says(page, installed, tmp_path):
             (place / step.title).write_text(step.text, encoding="utf-8")
         elif step.prints or (page == TUTORIAL and step.language == "sh"):
             output = output_of(step, place, variables)
-            if not doctest.OutputChecker().check_output(step.output, output, SAME):
+            if not is_same(step.output, output):
                 wrong.append(f"{step.text}{output}")
+                if os.environ.get("DESS_WRITE_PINS"):
+                    quote_anew(ROOT / page, step, output)
             if output.lstrip().startswith("runs/sea  "):
                 check_training(output)
     assert not wrong, "\n".join(wrong)
+
+
+def is_same(said: str, printed: str) -> bool:
+    """Whether a text is what is printed, where ``...`` is anything."""
+    return doctest.OutputChecker().check_output(said, printed, SAME)
+
+
+def quote_anew(path: Path, step: Step, output: str) -> None:
+    """Put what is printed now into a page; lines that still hold stay, with what they leave open.
+
+    If there are more or fewer lines than before, all of them are new.
+    """
+    said, printed = step.output.splitlines(), output.splitlines()
+    if len(said) == len(printed):
+        lines = zip(said, printed, strict=True)
+        printed = [old if is_same(old, new) else new for old, new in lines]
+    text = path.read_text("utf-8")
+    assert text.count(step.output) == 1, f"{path}: the same output stands there twice"
+    quoted = "".join(f"{line.rstrip()}\n" for line in printed)
+    path.write_text(text.replace(step.output, quoted), "utf-8")
 
 
 def check_training(output: str) -> None:
