@@ -5,6 +5,7 @@ training = train(load_config("quick"), Path("runs/quick"), resume=True)
 policy = dess.policies.load("runs/quick")       # from the first evaluation or interruption on
 """
 
+import os
 import signal
 import threading
 import time
@@ -41,6 +42,9 @@ TICK_END = 1.0  # seconds that a tick has to end after a signal
 SIGNALS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
+
+# Weights times rows of a batch up to which a network is small: one thread computes it fastest.
+SMALL = 100_000_000
 
 _BUSY = "in use by another training; allowed: another --out, or wait for its end"
 
@@ -127,6 +131,9 @@ def train(
     a second is given up; the folder then has all ticks before it. The folder is locked until the
     end of the session.
 
+    A small network is computed in one thread. The variable OMP_NUM_THREADS sets how many threads
+    torch takes for any network.
+
     Args:
         config: The settings.
         out: The folder.
@@ -173,9 +180,27 @@ def train(
                 f"training {config.name}: about {sizes.total / 2**30:.1f} GiB of memory are "
                 "too much for this machine; allowed: fewer environments or slots"
             ) from error
-        _run(training, out, progress)
-        _save_results(out, training)
+        with _threads(training):
+            _run(training, out, progress)
+            _save_results(out, training)
     return training
+
+
+@contextmanager
+def _threads(training: Training) -> Iterator[None]:
+    """Compute a small network in one thread, unless OMP_NUM_THREADS says in how many.
+
+    More threads wait for each other longer than they compute, above all beside other work.
+    """
+    network = training.learner.networks["online"]
+    weights = sum(weight.numel() for weight in network.parameters())
+    before = torch.get_num_threads()
+    if weights * training.config.batch <= SMALL and "OMP_NUM_THREADS" not in os.environ:
+        torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def _run(training: Training, out: Path, progress: Callable[[Training, int], None] | None) -> None:

@@ -193,12 +193,13 @@ def _run(
         print_plan(question.plan(workers), study, folder, workers)
         raise typer.Exit
     check_pages(out, page)
-    options.note_departures(study.policies, study.scenarios)
-    return complete(
+    results = complete(
         study.name,
         lambda progress, announce: question.ask(workers, progress, announce, yes),
         shlex.join(["dess", "study", "run", str(question.file), "--out", str(folder)]),
     )
+    options.note_departures(study.policies, study.scenarios)
+    return results
 
 
 def _tell(

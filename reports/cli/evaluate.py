@@ -56,9 +56,9 @@ def evaluate(
         asked = [Asked(space, team, missions, seed, engine, workers) for team in policy]
         with console.compile_notice():
             check_evaluation(asked, yes)
-        options.note_departures(policy, [space])
         with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
             evaluations = [means(of_team, bar.update) for of_team in asked]
+        options.note_departures(policy, [space])
     unknown = dict.fromkeys(("mean", "low", "high"), nan)
     rows = [
         {

@@ -103,7 +103,6 @@ def simulate(
         from dess.reports.player import check_ffmpeg
 
         check_ffmpeg()
-    options.note_departures([asked.policy], [asked.space])
     is_binary = events is not None and console.is_stdout(events)
     if is_binary and as_json:
         raise InputError("--json: standard output has the event log; allowed: --events FILE")
@@ -115,6 +114,7 @@ def simulate(
         for file, temporary in zip(paths, temporaries, strict=True):
             with writable(file):
                 writers[file](mission, temporary, file.suffix[1:].lower())
+    options.note_departures([asked.policy], [asked.space])
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
         others, told = _metrics(mission).items(), _told(record.measured, mission)

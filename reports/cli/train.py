@@ -37,7 +37,8 @@ def train(
 ) -> None:
     """Train a policy into a folder; Ctrl-C saves it, --resume continues exactly.
 
-    After the first ticks it prints how long this machine will take.
+    After the first ticks it prints how long this machine will take. A small network is computed in
+    one thread; the environment variable OMP_NUM_THREADS sets another number.
 
     Args:
         name: The name of a shipped config, or a TOML file.

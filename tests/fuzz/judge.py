@@ -30,8 +30,9 @@ _BIDI = {*map(chr, range(0x202A, 0x202F)), *map(chr, range(0x2066, 0x206A))}
 _RAW = {"Cc", "Cs", "Zl", "Zp"}  # categories of characters that must not reach a terminal
 # Lines on standard error that say what a command does, and no error.
 _NEWS = re.compile(
-    r"compiling the simulator .*|[\d,]+ missions(, [\d,]+ of them present)?|.*\d(s/|it/|/s).*"
-    r"|replay memory: .*|curves: tensorboard .*|.*: this training is not finished .*"
+    r"compiling the simulator .*|[\d,]+ missions(, [\d,]+ of them present)?|.*[\d?](s/\w|\w*/s).*"
+    r"|on this machine: .* to go|replay memory: .*|curves: tensorboard .*"
+    r"|.*: this training is not finished .*"
 )
 # Folders that libraries make and use again, and that have the name of the user.
 _CACHES = ("tmp/torchinductor_",)
@@ -90,6 +91,8 @@ def _errors(outcome: Outcome) -> Iterator[str]:
             if int(part.replace(",", "")) > int(whole.replace(",", "")):
                 yield f"more than there are: {line[:LINE]}"
     errors = [line for line in lines if not _NEWS.fullmatch(line.strip())]
+    if outcome.code == 130:  # what is noted of a command that has begun
+        errors = [line for line in errors if not line.startswith("note: ")]
     if outcome.code in (2, 130) and len(errors) != 1:
         yield f"{len(errors)} lines in place of one error: {' | '.join(errors)[:LINE]}"
     if outcome.code == 1 and not errors:

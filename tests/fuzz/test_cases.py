@@ -6,7 +6,7 @@ import pytest
 
 from tests.fuzz import drawing, ready
 from tests.fuzz.forks import Forks
-from tests.fuzz.judge import findings
+from tests.fuzz.judge import _NEWS, findings
 from tests.fuzz.strategies import commands
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="uses limits that Linux has")
@@ -34,6 +34,19 @@ def test_fixed_cases_keep_the_contract(folder):
     assert 2 in codes
     assert codes & {0, 130}  # what has first to be compiled may be interrupted
     assert [(o.case.arguments, found) for o in outcomes if (found := findings(o))] == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "  2%|2         | 5/300 [00:10<09:50,  1.99s/tick, phase=harvest]",
+        "tick:  40%|####      | 120/300 [00:10<00:15, 11.99tick/s]",
+        "compiling:   0%|          | 0/300 [00:10<?, ?tick/s]",
+        "on this machine: 0.02 s a tick, about 2 minutes to go",
+    ],
+)
+def test_progress_is_no_error(line):
+    assert _NEWS.fullmatch(line.strip())
 
 
 def test_every_parameter_of_every_command_is_known():

@@ -15,11 +15,11 @@ import torch
 from dess import policies
 from dess.policies.learner import session
 from dess.policies.learner.checkpoint import load_training
-from dess.policies.learner.config import CHECKPOINT, CONFIG, MODEL
+from dess.policies.learner.config import CHECKPOINT, CONFIG, MODEL, load_config
 from dess.policies.learner.dqn import DQNTraining
-from dess.policies.learner.network import arrays_of
+from dess.policies.learner.network import arrays_of, network_of
 from dess.policies.learner.session import CURVE, LOCK, SIGNALS, device_of, train
-from dess.policies.learner.trained import digest, weights_of
+from dess.policies.learner.trained import digest, observed, weights_of
 from dess.policies.learner.training import DivergenceError, Training
 from tests.analysis.small import files_of
 from tests.policies.learner.tiny import (
@@ -77,6 +77,43 @@ def test_the_folder_of_a_training(whole, tmp_path):
     written, best = weights_of(out), arrays_of(training.best)
     assert digest("", written) == digest("", best)
     assert json.loads((out / CONFIG).read_text("utf-8"))["name"] == "tiny"
+
+
+@pytest.mark.parametrize(
+    ("variable", "small", "threads"),
+    [(None, session.SMALL, 1), ("2", session.SMALL, 2), (None, 0, 2)],
+    ids=["small", "told", "large"],
+)
+def test_a_small_network_takes_one_thread(tmp_path, monkeypatch, variable, small, threads):
+    """The two threads of before stand for those that torch takes by itself."""
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    if variable:
+        monkeypatch.setenv("OMP_NUM_THREADS", variable)
+    monkeypatch.setattr(session, "SMALL", small)
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    seen: list[int] = []
+
+    def stop(_: Training, __: int) -> None:
+        seen.append(torch.get_num_threads())
+        signal.raise_signal(signal.SIGINT)
+
+    train(SHORT, tmp_path, progress=stop)
+    after = torch.get_num_threads()
+    torch.set_num_threads(before)
+    assert (seen, after) == ([threads], 2)
+    assert json.loads((tmp_path / CONFIG).read_text("utf-8"))["run"]["threads"] == threads
+
+
+def test_which_networks_are_small():
+    def rows(name: str) -> int:
+        config = load_config(name)
+        shapes = observed(config, config.spaces()[0])[1].shapes
+        weights = network_of(config, shapes).parameters()
+        return sum(weight.numel() for weight in weights) * config.batch
+
+    is_small = {name: rows(name) <= session.SMALL for name in ("quick", "ddqn", "ddqn-paper")}
+    assert is_small == {"quick": True, "ddqn": True, "ddqn-paper": False}
 
 
 STOPS = [(signal.SIGINT, 5), (signal.SIGTERM, 20), (signal.SIGHUP, 33)]

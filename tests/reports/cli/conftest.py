@@ -12,7 +12,6 @@ from tests.analysis.small import files_of, small_study
 # What a command may tell before it refuses: steps on a busy machine, what a training will take,
 # and that numba compiles in a new clone.
 PROGRESS = ("step", "compiling the simulator", "replay memory: ", "curves: tensorboard")
-PROGRESS += ("acts outside of its training",)
 
 
 @pytest.fixture

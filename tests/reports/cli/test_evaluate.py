@@ -19,6 +19,15 @@ def test_a_trained_policy_says_when_it_acts_outside_of_its_training(dess):
         assert code == 0 and f"note: ddqn acts outside of its training: {words}\n" in err
 
 
+def test_a_policy_that_cannot_act_is_refused_without_a_note(dess):
+    beyond = ("--scenario", "bay", "--set", "quota=600", "--policy", "ddqn")
+    for command in (("evaluate", "--missions", 1), ("simulate",)):
+        code, _, err = dess(*command, *beyond)
+        assert code == 2
+        assert "note" not in err
+        assert "dess: error:" in err.splitlines()[-1]
+
+
 def test_missions_can_be_kept_as_results(dess, dess_json, tmp_path):
     """With the means of an evaluation that keeps none; with more missions, they are added."""
     asked = ("--policy", "greedy", "--policy", "greedy,random", "--set", "failures.uav_rate=0.001")
