@@ -19,7 +19,8 @@ Several things happen at the start of a slot, at the same simulation time, in th
 A slot in which no UAV asks for a pad or gives one back has neither 2 nor 3, unless pads may fail.
 
 For numba, a numpy record as an argument takes longer (3 us) than the arrays of the whole state, so
-the compiled functions here take the arrays and hand their first records to the rules.
+the compiled functions here take the arrays and hand their first records to the rules. A tuple of
+arrays takes longer (1 us) than its arrays one by one.
 """
 
 from collections import namedtuple
@@ -36,6 +37,7 @@ from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.record import PARAMETER_EVENTS, EventLog, MissionRecord, empty_records, write_records
 from dess.scenario import AnyScenario, ScenarioSpace
+from dess.sea.chart import Chart
 from dess.sections import fleet
 from dess.sections.failures import strike
 from dess.sections.packets import Packets
@@ -206,7 +208,9 @@ class MissionModel:
     def _clock(self) -> Process:
         """Open every mission slot, run its communication slots and close it."""
         env, missions, uavs = self.env, *self.state[:2]
-        arrays, packets = (*self.state, *self.world, *self.scratch), self.packets
+        nodes, mean_snr, order, means, chart = self.world
+        opening = (nodes, mean_snr, order, means, *chart, self.scratch.search)
+        arrays, packets = (*self.state, order, means, *self.scratch), self.packets
         shown = self.world.shown()
         m = int(self.mission["communication_slots"])
         has_failures = bool(self.mission["has_failures"])
@@ -216,12 +220,12 @@ class MissionModel:
         slot, active, allowed = 0, len(self.fleet), 0
         while active or slot < shortest:
             decide(self.team, self.state, shown)
-            may_charge, granted = _resolve(missions, uavs, self.world.chart), _NOBODY
+            may_charge, granted = _resolve(missions, uavs, *chart), _NOBODY
             if may_charge != allowed or pads_fail:
                 allowed = may_charge
                 self._request_pads(slot, may_charge)
                 granted = self._grant_pads(slot)
-            _spend(missions, uavs, granted)
+            _depart(missions, uavs, granted, *opening)
             self._log_moves(slot)
             for n in range(1, m + 1):
                 yield env.timeout(slot + n / m - env.now)
@@ -377,9 +381,10 @@ class MissionModel:
 
 
 @kernel
-def _resolve(missions, uavs, chart):
+def _resolve(missions, uavs, zones, parking, sizes, nearest, ways, rows):
     """Resolve the moves; bit i of the result tells whether UAV i may charge now."""
     mission, team = missions[0], uavs[0]
+    chart = Chart(zones, parking, sizes, nearest, ways, rows)
     rules.resolve(mission, team, chart)
     may_charge = 0
     for i in range(mission.uavs):
@@ -388,20 +393,26 @@ def _resolve(missions, uavs, chart):
 
 
 @kernel
-def _spend(missions, uavs, granted):
-    """Let the UAVs that were granted pads begin to charge, and update the batteries."""
+def _depart(
+    missions, uavs, granted, nodes, mean_snr, order, means,
+    zones, parking, sizes, nearest, ways, rows, search,
+):  # fmt: skip
+    """Let the UAVs that were granted pads begin to charge, update the batteries, and open the slot.
+
+    The slot is opened here, since the functions of communication slots, which are called more
+    often, then take fewer arguments.
+    """
+    chart = Chart(zones, parking, sizes, nearest, ways, rows)
     for i in granted:
         rules.start_charging(missions[0], uavs[0], i)
     rules.spend(missions[0], uavs[0])
+    channel.open_slot(missions[0], uavs[0], nodes, mean_snr, order, means, chart, search)
 
 
 @kernel
 def _communicate(
-    missions, uavs, residual, sensors, teeth,
-    nodes, mean_snr, order, means, chart, batches, search, n,
+    missions, uavs, residual, sensors, teeth, order, means, batches, search, n
 ):  # fmt: skip
-    if n == 1:
-        channel.open_slot(missions[0], uavs[0], nodes, mean_snr, order, means, chart, search)
     rules.communicate(
         missions[0], uavs[0], residual[0], sensors[0], teeth[0],
         order, means, batches, search, n,

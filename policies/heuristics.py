@@ -16,7 +16,7 @@ from dess.guard.moves import contest, contests, guard, safe_moves
 from dess.guard.parking import parking_cell, parking_memory, stays
 from dess.guard.ways import path_length, round_trip
 from dess.rules import data_left
-from dess.sea.chart import distance, spread
+from dess.sea.chart import Chart, distance, spread
 from dess.sections.landing import flies
 from dess.sections.wind import reach_of
 from dess.state import HOVER, STEP_X, STEP_Y
@@ -71,7 +71,7 @@ class _Heuristic:
             circuit = _circuit(nodes.tobytes(), chart.zones.tobytes(), chart.zones.shape)
         return _decide(
             self._kind, state.missions, state.uavs, state.residual, state.sensors, nodes, circuit,
-            chart, reach_of(state.missions, chart), view.mission, view.uav,
+            *chart, reach_of(state.missions, chart), view.mission, view.uav,
         )  # fmt: skip
 
 
@@ -138,8 +138,10 @@ def _choose(missions, uavs, allowed, rows_mission, rows_uav):
 
 @kernel
 def _decide(
-    kind, missions, uavs, residual, sensors, nodes, circuit, chart, reach, rows_mission, rows_uav
+    kind, missions, uavs, residual, sensors, nodes, circuit,
+    zones, parking, sizes, nearest, ways, rows, reach, rows_mission, rows_uav,
 ):  # fmt: skip
+    chart = Chart(zones, parking, sizes, nearest, ways, rows)  # takes longer as an argument
     actions = np.empty(len(rows_mission), np.int64)
     memory = parking_memory(chart, uavs.shape[1])
     last, left = -1, 0.0
