@@ -2,7 +2,10 @@
 
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
+from math import inf, isfinite
 from typing import Any, Literal
+
+import pandas as pd
 
 from dess.analysis import numbers
 from dess.record import OPERATIONS
@@ -21,11 +24,15 @@ class Metric:
         name: What pages call it.
         unit: The unit; empty for shares and counts.
         kind: An ``outcome`` is 0 or 1 in each mission, and its mean has Wilson's interval. The
-            values of a ``share`` lie between 0 and 1, and so do the ends of its intervals. The
-            mean of a ``number`` and of a ``cost`` has Student's interval.
+            values of a ``share`` lie between 0 and 1. The mean of a ``number`` and of a ``cost``
+            has Student's interval, corrected for the skewness of the missions.
         less_is_better: Whether a lower value is better.
         in_percent: Whether it is written in percent, and its differences in percentage points.
         told: The unit in which it is told where there is a data sheet; empty if in the same.
+        horizons: The largest value that a mission can have, as a share of the longest that it may
+            last; 0 if it is not known.
+        least: The smallest value that a mission can have.
+        most: The largest value that a mission can have. Of a time, ``known_in`` finds it.
     """
 
     column: str
@@ -35,6 +42,23 @@ class Metric:
     less_is_better: bool = False
     in_percent: bool = False
     told: str = ""
+    horizons: float = 0.0
+    least: float = -inf
+    most: float = inf
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The smallest and the largest value that a mission, and so a mean, can have."""
+        return (0.0, 1.0) if self.is_bounded else (self.least, self.most)
+
+    @property
+    def has_range(self) -> bool:
+        """Whether both ends of the range are known."""
+        return bool(isfinite(self.range[0]) and isfinite(self.range[1]))
+
+    def lasting(self, horizon: float) -> "Metric":
+        """The metric of missions that may last a time, in its unit; a time has a range then."""
+        return replace(self, most=self.horizons * horizon) if self.horizons else self
 
     @property
     def in_units(self) -> "Metric":
@@ -124,49 +148,60 @@ _PAPER = (
 _OTHERS = (
     Metric(HOME, "Battery for the way home", kind="outcome", in_percent=True),
     Metric(REWARD, "Reward"),
-    Metric(BOUND, "Upper bound"),
-    Metric(GAP, "Optimality gap", less_is_better=True),
-    Metric(COST, "Cost", kind="cost", less_is_better=True),
+    Metric(BOUND, "Upper bound", least=0.0, most=1.0),
+    Metric(GAP, "Optimality gap", less_is_better=True, least=-1.0, most=1.0),
+    Metric(COST, "Cost", kind="cost", less_is_better=True, least=0.0),
 )
+MOST_SLOTS = "most_slots"  # the column of the longest that each mission may last
 
 
-def _time(column: str, name: str, told: str = "h") -> Metric:
-    """A time of which less is better."""
-    return Metric(column, name, _SLOTS, less_is_better=True, told=told)
+def _time(column: str, name: str, told: str = "h", horizons: float = 1.0) -> Metric:
+    """A time of which less is better; 0 ``horizons`` if it is a sum over UAVs."""
+    return Metric(
+        column, name, _SLOTS, less_is_better=True, told=told, horizons=horizons, least=0.0
+    )
+
+
+def _amount(column: str, name: str, unit: str = "", told: str = "", less: bool = False) -> Metric:
+    """A number that is not negative."""
+    return Metric(column, name, unit, less_is_better=less, told=told, least=0.0)
 
 
 # Those of ``OPERATIONS``, which only extended scenarios measure.
 _MEASURED = (
-    _time(AGE, "Age of information"),
+    # An age grows with time, so the mean of a node that nothing reaches is half of the horizon.
+    _time(AGE, "Age of information", horizons=0.5),
     _time("peak_age", "Peak age of information"),
     _time("age_p99", "99th percentile of the age"),
     _time("latency", "Latency"),
     _time("latency_p99", "99th percentile of the latency"),
-    Metric("generated", "Packets generated"),
-    Metric("delivered", "Packets delivered"),
-    Metric("lost_packets", "Packets lost", less_is_better=True),
-    Metric("lost", "Data lost", _DATA, less_is_better=True, told="MB"),
-    Metric("queue", "UAVs waiting for a pad", less_is_better=True),
+    _amount("generated", "Packets generated"),
+    _amount("delivered", "Packets delivered"),
+    _amount("lost_packets", "Packets lost", less=True),
+    _amount("lost", "Data lost", _DATA, "MB", less=True),
+    _amount("queue", "UAVs waiting for a pad", less=True),
     _time("waiting", "Waiting time for a pad", "min"),
-    Metric("pad_requests", "Requests for a pad"),
+    _amount("pad_requests", "Requests for a pad"),
     Metric("utilisation", "Utilisation of the pads", kind="share"),
-    Metric("failures", "Failures of UAVs", less_is_better=True),
-    _time("slots_grounded", "Time under repair"),
+    _amount("failures", "Failures of UAVs", less=True),
+    _time("slots_grounded", "Time under repair", horizons=0.0),
 )
 # What records have in slots and data units; there is a metric of each where it is told in units.
 _RECORDED = (
     _time("slots", "Length of the mission"),
-    _time("uav_slots", "UAV-hours"),
-    Metric("collected", "Data collected", _DATA, told="MB"),
-    Metric("collected_per_uav", "Data collected per UAV", _DATA, told="MB"),
-    Metric("residual", "Data left", _DATA, less_is_better=True, told="MB"),
+    _time(MOST_SLOTS, "Longest that the mission may last"),
+    _time("uav_slots", "UAV-hours", horizons=0.0),
+    _amount("collected", "Data collected", _DATA, "MB"),
+    _amount("collected_per_uav", "Data collected per UAV", _DATA, "MB"),
+    _amount("residual", "Data left", _DATA, "MB", less=True),
     _time("charging_per_uav", "Charging per UAV", "min"),
     _time("waiting_per_uav", "Waiting per UAV", "min"),
 )
 _IN_UNITS = {metric.in_units.column: metric.in_units for metric in _MEASURED}
 _TOLD = {metric.column: metric.in_units.column for metric in (*_MEASURED, *_RECORDED)}
 _KNOWN = {metric.column: metric for metric in (*_PAPER, *_OTHERS, *_MEASURED)}
-_KNOWN |= _IN_UNITS | {metric.in_units.column: metric.in_units for metric in _RECORDED}
+_KNOWN |= _IN_UNITS | {metric.column: metric for metric in _RECORDED}
+_KNOWN |= {metric.in_units.column: metric.in_units for metric in _RECORDED}
 
 METRICS = {metric.column: metric.name for metric in _PAPER}  # the paper's metrics, with their names
 MEASURES = {metric.column: metric for metric in _MEASURED}
@@ -176,12 +211,43 @@ ALWAYS = (*METRICS, REWARD)  # the metrics of every mission
 ALIASES = {"ratio": RATIO, "product": PRODUCT}
 
 
-def metric_of(column: str) -> Metric:
+def metric_of(column: str | Metric) -> Metric:
     """The metric of a column of missions; one that nothing is known of is named after the column.
 
-    Of such a metric more is better, and its values have no bounds.
+    Of such a metric more is better, and its values have no bounds. A metric is returned as it is.
     """
+    if isinstance(column, Metric):
+        return column
     return _KNOWN.get(column) or Metric(column, column.replace("_", " ").capitalize())
+
+
+def known_of(column: str, slots: int, units: Units | None) -> Metric:
+    """The metric of a column of missions of at most this length, with its range.
+
+    Args:
+        column: The column.
+        slots: The longest that a mission may last.
+        units: What a slot is, of missions with a data sheet.
+    """
+    of = metric_of(column)
+    return of.lasting(slots * size_of(of.unit, units) if units and of.is_told else slots)
+
+
+def known_in(missions: pd.DataFrame, column: str) -> Metric:
+    """The metric of a column of missions, with the range that it has in these missions.
+
+    Args:
+        missions: The missions; the largest time is known if they have ``MOST_SLOTS``, which the
+            missions of results have.
+        column: The column.
+    """
+    of = metric_of(column)
+    longest = metric_of(MOST_SLOTS)
+    longest = longest.in_units if of.is_told else longest
+    if not of.horizons or longest.column not in missions or not len(missions):
+        return of
+    units = _SIZES[longest.unit] / _SIZES[of.unit] if of.is_told else 1.0
+    return of.lasting(float(missions[longest.column].max()) * units)
 
 
 def told(column: str, missions: Container[str]) -> str:

@@ -16,7 +16,7 @@ from dess.analysis.answers import settings
 from dess.analysis.figures import Drawing
 from dess.analysis.figures.missions import courses
 from dess.analysis.figures.settings import lines
-from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, metric_of
+from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, known_in, metric_of
 from dess.analysis.names import value_text
 from dess.analysis.results.event_log import duration
 from dess.analysis.results.tables import Results
@@ -104,7 +104,7 @@ def changes(
         raise InputError(
             f"{field}: is never {reference!r} in the study; allowed: one of its values"
         )
-    rows = []
+    rows, of = [], known_in(results.missions, metric)
     for policy, missions in results.missions.groupby("policy", sort=False):
         wide = by_replication(missions, metric, "point")
         for point, partner in _pairs(table, field, reference):
@@ -112,9 +112,9 @@ def changes(
             if both.empty:
                 continue
             if relative:
-                change = relative_change(both[point].to_numpy(), both[partner].to_numpy())
+                change = relative_change(both[point].to_numpy(), both[partner].to_numpy(), of)
             else:
-                tests = column_tests(both[[point]], both[partner], metric)
+                tests = column_tests(both[[point]], both[partner], of)
                 change = tests[["difference", "low", "high"]].iloc[0]
             rows.append((policy, *table.to_dict("records")[point].values(), *change, len(both)))
     return pd.DataFrame(rows, columns=["policy", *table, *_ENDS, "n"])

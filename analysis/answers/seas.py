@@ -79,7 +79,7 @@ def gains(results: Results, baseline: str, by: str = ALL) -> pd.DataFrame:
     """
 
     def compared(values: pd.DataFrame) -> pd.DataFrame:
-        return column_tests(values.drop(columns=baseline), values[baseline])
+        return column_tests(values.drop(columns=baseline), values[baseline], PRODUCT)
 
     return _of_groups(results, by, PRODUCT, compared)
 
@@ -98,7 +98,9 @@ def shares(results: Results, reference: str, by: str = ALL) -> pd.DataFrame:
 
     def compared(values: pd.DataFrame) -> pd.DataFrame:
         known = values[reference].to_numpy()
-        changes = {name: relative_change(of.to_numpy(), known) for name, of in values.items()}
+        changes = {
+            name: relative_change(of.to_numpy(), known, PRODUCT) for name, of in values.items()
+        }
         return (1 + pd.DataFrame(changes, index=_ENDS).T).assign(n=len(values))
 
     return _of_groups(results, by, PRODUCT, compared)[[by, "policy", *_ENDS, "n"]]

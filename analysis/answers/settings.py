@@ -17,7 +17,16 @@ from pandas.api.types import is_numeric_dtype
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.metrics import COST, METRICS, PRODUCT, metric_of, metrics_in, told
+from dess.analysis.metrics import (
+    COST,
+    METRICS,
+    PRODUCT,
+    Metric,
+    known_in,
+    metric_of,
+    metrics_in,
+    told,
+)
 from dess.analysis.names import parameter, value_text
 from dess.analysis.results.tables import Results, once
 from dess.analysis.stats.differences import column_tests, with_adjusted
@@ -227,10 +236,10 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
     for name in (*others, metric):
         wide = by_replication(missions, name, cell)
         wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[cell]))
-        ends = column_intervals(wide, name, level_after(seen))
+        ends = column_intervals(wide, known_in(missions, name), level_after(seen))
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
     # By the ranking metric, which was computed last.
-    table["tied"] = may_be_best(wide.to_numpy(float), metric, seen)
+    table["tied"] = may_be_best(wide.to_numpy(float), known_in(missions, metric), seen)
     table["tied"] &= within_reach(table[f"{metric}_low"], table[f"{metric}_high"], metric)
     less = metric_of(metric).less_is_better
     table = table.sort_values(metric, ascending=less, kind="stable", ignore_index=True)
@@ -341,7 +350,8 @@ def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) 
         parts = []
         for policy, missions in _missions(results, metric, None).groupby("policy", sort=False):
             wide = by_replication(missions, metric, "point")
-            tests = column_tests(wide.drop(columns=point), wide[point], metric)
+            of = known_in(results.missions, metric)
+            tests = column_tests(wide.drop(columns=point), wide[point], of)
             tests = tests[tests["n"] > 0].join(points(results)).reset_index()
             parts.append(tests.assign(metric=metric, policy=policy))
         tables.append(with_adjusted(pd.concat(parts, ignore_index=True), "holm"))
@@ -357,7 +367,7 @@ def _averaged(
     groups = labels.groupby([*labels], sort=False)
     cell_of, cells = groups.ngroup().to_numpy(), labels.drop_duplicates(ignore_index=True)
     sizes = np.bincount(cell_of)
-    missions = _missions(results, metric, policy)
+    missions, of = _missions(results, metric, policy), known_in(results.missions, metric)
     design = results.manifest["study"]["design"] or {}
     if sampled := design.get("kind") == "saltelli":  # only its samples A and B are independent
         last = len(design["ranges"]) + 2
@@ -370,18 +380,18 @@ def _averaged(
             units = units[units["size"] == sizes[units.index.get_level_values("cell")]]
         wide = units["mean"].unstack("cell").reindex(columns=range(len(cells)))
         if sampled:
-            ends = column_intervals(wide, metric)
+            ends = column_intervals(wide, of)
         else:
             at_points = by_replication(part, metric, "point")
-            ends = _over_points(at_points.reindex(columns=range(len(cell_of))), cell_of, metric)
+            ends = _over_points(at_points.reindex(columns=range(len(cell_of))), cell_of, of)
         table = pd.concat([cells, ends], axis=1)
-        table = table.assign(points=sizes, tied=may_be_best(wide.to_numpy(float), metric))
+        table = table.assign(points=sizes, tied=may_be_best(wide.to_numpy(float), of))
         table.insert(0, "policy", name)
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
 
 
-def _over_points(values: pd.DataFrame, cell_of: np.ndarray, metric: str) -> pd.DataFrame:
+def _over_points(values: pd.DataFrame, cell_of: np.ndarray, metric: Metric) -> pd.DataFrame:
     """``mean``, ``low``, ``high`` and ``n`` of every cell, with its points as strata, or nan.
 
     Args:

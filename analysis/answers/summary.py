@@ -12,7 +12,16 @@ from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers import costs
 from dess.analysis.answers.settings import edge, ends, in_words
-from dess.analysis.metrics import ALWAYS, HOME, METRICS, PRODUCT, RATIO, SUCCESS, metric_of
+from dess.analysis.metrics import (
+    ALWAYS,
+    HOME,
+    METRICS,
+    PRODUCT,
+    RATIO,
+    SUCCESS,
+    known_in,
+    metric_of,
+)
 from dess.analysis.names import parameter, value_text
 from dess.analysis.results.chunks import parts_of
 from dess.analysis.results.tables import Results
@@ -205,7 +214,8 @@ def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
             missions = results.missions[results.missions["point"] == point]
             wide = by_replication(missions, str(metric), "policy")
             looks = np.array([results.looks(policy)[point] for policy in rows["policy"]])
-            may_be = may_be_best(wide[rows["policy"]].to_numpy(float), str(metric), looks)
+            of = known_in(results.missions, str(metric))
+            may_be = may_be_best(wide[rows["policy"]].to_numpy(float), of, looks)
             may_be &= within_reach(rows["low"], rows["high"], str(metric)).to_numpy()
             best = TIED if may_be.sum() > 1 else BEST
             verdicts[rows.index] = np.where(may_be, best, WORSE)

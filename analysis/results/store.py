@@ -24,7 +24,7 @@ import pyarrow as pa
 
 from dess import InputError
 from dess.analysis.bound import Bound
-from dess.analysis.metrics import in_units
+from dess.analysis.metrics import MOST_SLOTS, in_units
 from dess.analysis.results import chunks, parquet
 from dess.analysis.results.manifest import ELSEWHERE, NO_TEAM, Cell, Manifest, Selected
 from dess.analysis.study.study import Study
@@ -305,13 +305,16 @@ class Store:
     def missions(self, parts: Sequence[chunks.Part]) -> pd.DataFrame:
         """The missions of some parts, with their ``point``, in the order of the parts.
 
-        If the study has prices, the missions have a ``cost``; with a data sheet, what they
+        ``most_slots`` is the longest that each may last. If the study has prices, the missions have
+        a ``cost``; with a data sheet, what they
         measure is there in units as well (``metrics.in_units``).
 
         Raises:
             InputError: If some are missing or damaged.
         """
         missions = self._rows("missions", parts)
+        longest = np.array([space.max_slots for space in self.manifest.scenarios])
+        missions[MOST_SLOTS] = longest[missions["point"].to_numpy()]
         if costs := self.manifest.study.costs:
             cost = costs.parts(self.manifest.scenarios, missions, self.uavs(parts))
             missions["cost"] = sum(cost.values())

@@ -10,7 +10,7 @@ import scipy
 from scipy.special import stdtr, stdtrit
 
 from dess import InputError
-from dess.analysis.metrics import ALWAYS, EITHER, REWARD, metric_of
+from dess.analysis.metrics import ALWAYS, EITHER, REWARD, Metric, known_in, metric_of
 from dess.analysis.stats import intervals
 
 Treatment = Literal["policy", "point"]
@@ -164,7 +164,7 @@ def t_test(differences: np.ndarray, level: float) -> tuple[intervals.Interval, f
 
 
 def difference_test(
-    a: np.ndarray, b: np.ndarray, metric: str, level: float
+    a: np.ndarray, b: np.ndarray, metric: str | Metric, level: float
 ) -> tuple[intervals.Interval, float]:
     """The mean difference A - B of pairs, the interval that suits the metric, and the p-value.
 
@@ -175,13 +175,13 @@ def difference_test(
         level: Confidence level.
     """
     differences = differences_of(a, b)
-    rare = intervals.rare_differences(metric, a.mean(), b.mean())
-    if rare is None or (metric == REWARD and differences.size == 1):
+    rare, of = intervals.rare_differences(metric, a.mean(), b.mean()), metric_of(metric)
+    if rare is None or (differences.size == 1 and not of.is_bounded):
         return t_test(differences, level)
     smooth, p = t_test(smoothed(differences, rare), level)
-    if metric_of(metric).is_outcome and np.isin(differences, (-1, 0, 1)).all():
+    if of.is_outcome and np.isin(differences, (-1, 0, 1)).all():
         p = mcnemar(int(np.sum(differences > 0)), int(np.sum(differences < 0)))
-    limit = np.inf if metric == REWARD else 1.0
+    limit = of.range[1] - of.range[0]
     mean = float(differences.mean())
     return intervals.Interval(mean, max(smooth.low, -limit), min(smooth.high, limit)), p
 
@@ -192,7 +192,9 @@ def mcnemar(gains: int, losses: int) -> float:
     return float(scipy.stats.binomtest(gains, gains + losses).pvalue) if gains + losses else 1.0
 
 
-def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") -> pd.DataFrame:
+def column_tests(
+    values: pd.DataFrame, baseline: pd.Series, metric: str | Metric = ""
+) -> pd.DataFrame:
     """Paired comparisons of many columns with a baseline, as ``paired`` makes them.
 
     Args:
@@ -208,8 +210,9 @@ def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") ->
     constant = differences.max() - differences.min() <= _ROUNDING * size
     differences = differences.mask(differences.abs().le(_ROUNDING * size, axis=1), 0.0)
     present = differences.notna()
-    table = intervals.column_intervals(differences).rename(columns={"mean": "difference"})
-    n, mean = table["n"], table["difference"]
+    n, mean, of = differences.count(), differences.mean(), metric_of(metric)
+    half = -differences.sem() * stdtrit(np.maximum(n - 1, 1), (1 - intervals.LEVEL) / 2)
+    table = pd.DataFrame({"difference": mean, "low": mean - half, "high": mean + half, "n": n})
     own = values.where(present).mean()
     rare = intervals.rare_differences(metric, own, own - mean)
     if rare is None:
@@ -228,11 +231,11 @@ def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") ->
     half = -stdtrit(size - 1, (1 - intervals.LEVEL) / 2) * error
     table["low"], table["high"] = centre - half, centre + half
     table["p"] = 2 * stdtr(size - 1, -(centre / error).abs())
-    if metric == REWARD:
+    limit = of.range[1] - of.range[0]
+    table[["low", "high"]] = table[["low", "high"]].clip(-limit, limit)
+    if not of.is_bounded:
         table.loc[n == 1, ["low", "high", "p"]] = np.nan, np.nan, 1.0
-    else:
-        table[["low", "high"]] = table[["low", "high"]].clip(-1, 1)
-    if metric_of(metric).is_outcome:
+    if of.is_outcome:
         gains, losses = (differences > 0).sum(), (differences < 0).sum()
         exact = (differences.isin((-1, 0, 1)) | ~present).all() & (n > 0)
         table.loc[exact, "p"] = [*map(mcnemar, gains[exact], losses[exact])]
@@ -268,7 +271,7 @@ class Paired(NamedTuple):
 
 
 def paired(
-    a: np.ndarray, b: np.ndarray, level: float = intervals.LEVEL, metric: str = ""
+    a: np.ndarray, b: np.ndarray, level: float = intervals.LEVEL, metric: str | Metric = ""
 ) -> Paired:
     """Compare two samples pair by pair; differences are A - B.
 
@@ -281,7 +284,7 @@ def paired(
 
     Returns:
         The interval and the p-value of ``differences.difference_test``: of Student's t, with
-        rare differences added for the success, metrics from 0 to 1 and the reward.
+        rare differences added for all metrics of known range, and for the reward.
 
         - If all differences of another metric are equal (up to rounding), the interval is
           degenerate (low = difference = high). p is that of the sign test, 2^(1 - n); it is 1 if
@@ -314,22 +317,31 @@ def unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Paired:
     return Paired(difference, float(ends.low), float(ends.high), p, np.nan, np.nan, n)
 
 
-def relative_change(values: np.ndarray, reference: np.ndarray) -> intervals.Interval:
+def relative_change(
+    values: np.ndarray, reference: np.ndarray, metric: str | Metric = ""
+) -> intervals.Interval:
     """The change of a mean as a share of a reference mean, with the interval of a ratio of means.
 
     Source: W. G. Cochran, Sampling Techniques, 3rd edition, 1977, Section 6.3: the variance of the
-    ratio of two means of paired values; with Student's quantile.
+    ratio of two means of paired values; with Student's quantile. As in ``difference_test``, rare
+    differences are added: one value at an end of the metric's range, the other one at its mean.
 
     Args:
         values: (n,) values.
         reference: (n,) reference values of the same replications, whose mean is not 0.
+        metric: The metric; by default one without bounds.
     """
-    ratio, n = float(values.mean() / reference.mean()), len(values)
+    mean, base, n, of = values.mean(), reference.mean(), len(values), metric_of(metric)
+    ratio = float(mean / base)
     if n == 1:
         return intervals.Interval(ratio - 1, np.nan, np.nan)
-    error = np.std(values - ratio * reference, ddof=1) / np.sqrt(n) / abs(reference.mean())
-    half = -float(stdtrit(n - 1, (1 - intervals.LEVEL) / 2) * error)
-    return intervals.Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
+    residuals, (least, most) = values - ratio * reference, of.range
+    if of.has_range:
+        more = max(most - mean, mean - ratio * least)
+        less = min(least - mean, mean - ratio * most)
+        residuals = smoothed(residuals, (more, less))
+    _, low, high = (ratio - 1 + end for end in intervals.mean_interval(residuals / abs(base)))
+    return intervals.Interval(ratio - 1, max(low, -1.0) if least >= 0 else low, high)
 
 
 def compare(
@@ -374,14 +386,15 @@ def compare(
     others = [name for name in tables if name != baseline]
     if not others:
         raise InputError(f"{of}: nothing to compare with {baseline}; allowed: two or more")
-    rows = []
+    rows, known = [], {metric: known_in(missions, metric) for metric in metrics}
     for name in others:
         check_same_missions(tables, name, baseline)
         for group, (a, b) in matched([tables[name], reference], by):
             for metric in metrics:
                 measured = ~np.isnan(a[metric]) & ~np.isnan(b[metric])
                 if measured.any():
-                    result = paired(a[metric][measured], b[metric][measured], level, metric)
+                    pairs = a[metric][measured], b[metric][measured]
+                    result = paired(*pairs, level, known[metric])
                     rows.append((name, baseline, *group, metric, *result))
     columns = [of, "baseline", *by, "metric", *Paired._fields]
     return with_adjusted(pd.DataFrame(rows, columns=columns), correction)

@@ -15,7 +15,7 @@ import scipy
 from scipy.special import ndtr, ndtri, stdtrit
 
 from dess import InputError
-from dess.analysis.metrics import REWARD, metric_of, metrics_in
+from dess.analysis.metrics import REWARD, Metric, known_in, metric_of, metrics_in
 from dess.errors import one_of
 from dess.scenario import ScenarioSpace
 
@@ -67,15 +67,69 @@ def bounded_ends(mean: Any, variance: Any, n: Any, level: Any = LEVEL) -> tuple[
     return np.minimum(low, mean), np.maximum(high, mean)
 
 
-def rare_differences(metric: str, a: Any, b: Any) -> tuple[Any, Any] | None:
-    """The differences A - B of missions in which only one of two policies does well.
+def skewed_ends(mean: Any, error: Any, skewness: Any, n: Any, level: Any = LEVEL) -> Any:
+    """The ends of the confidence intervals of means of skewed values.
 
-    For outcomes, they are 1 and -1. Of a metric from 0 to 1, one value falls to 0 or rises to 1,
-    and the other one stays at its mean: what goes further counts. A reward changes by the cost of
-    a failure.
+    Student's interval covers too seldom where few values are much larger than the others, as ages
+    and costs are. Here the Student t of the mean is transformed so that its skewness disappears.
+    Without skewness, the ends are Student's.
+
+    Source: P. Hall, On the removal of skewness by transformation, J. R. Statist. Soc. B 54 (1992)
+    221-228, with Student's quantile in place of the normal one.
 
     Args:
-        metric: The metric.
+        mean: (...) means of the samples.
+        error: (...) their standard errors.
+        skewness: (...) skewness of the samples (``skewness_of``).
+        n: (...) numbers of values.
+        level: Confidence level, or (...) levels.
+
+    Returns:
+        (...) lower and (...) upper ends; nan where the standard error is.
+    """
+    quantile = stdtrit(np.maximum(n - 1, 1), (1 + level) / 2)
+    return ends_by_quantile(mean, error, skewness, n, quantile)
+
+
+def ends_by_quantile(mean: Any, error: Any, skewness: Any, n: Any, quantile: Any) -> Any:
+    """The ends of ``skewed_ends``, with the (...) quantiles of Student's t."""
+    slope = skewness / np.sqrt(n) / 3
+    return mean - error * _skewed(quantile, slope), mean - error * _skewed(-quantile, slope)
+
+
+def _skewed(quantile: Any, slope: Any) -> Any:
+    """The t with a slope of skewness that belongs to a quantile without: Hall's inverse."""
+    cube = 3 * slope * (quantile - slope / 2)
+    near = np.expm1(np.log1p(np.maximum(cube, -0.5)) / 3)  # exact for a small slope
+    root = np.where(cube > -0.5, near, np.cbrt(1 + cube) - 1)
+    return np.where(slope == 0, quantile, root / np.where(slope == 0, 1, slope))
+
+
+def skewness_of(squares: Any, cubes: Any, n: Any) -> Any:
+    """The skewness of samples, with the usual correction for their size; 0 if it is not known.
+
+    Args:
+        squares: (...) sums of squared deviations from the mean.
+        cubes: (...) sums of cubed deviations.
+        n: (...) numbers of values.
+    """
+    is_known = (n > 2) & (squares > 0)
+    size, spread = np.where(is_known, n, 3), np.where(is_known, squares, 1.0)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        plain = np.sqrt(size) * cubes / spread**1.5
+    skewness = np.sqrt(size * (size - 1)) / (size - 2) * plain
+    return np.where(is_known & np.isfinite(skewness), skewness, 0.0)
+
+
+def rare_differences(metric: str | Metric, a: Any, b: Any) -> tuple[Any, Any] | None:
+    """The differences A - B of missions in which only one of two policies does well.
+
+    For outcomes, they are 1 and -1. Of a metric with a known range, one value goes to an end of
+    the range, and the other one stays at its mean: what goes further counts. So a share falls to 0,
+    and an age rises to what it is where no UAV flies. A reward changes by the cost of a failure.
+
+    Args:
+        metric: The metric; that of missions (``known_in``) has the range of a time.
         a: (...) means of A.
         b: (...) means of B.
 
@@ -85,9 +139,10 @@ def rare_differences(metric: str, a: Any, b: Any) -> tuple[Any, Any] | None:
     of = metric_of(metric)
     if of.is_outcome:
         return 0 * (a - b) + 1, 0 * (a - b) - 1
-    if of.is_bounded:
-        return np.maximum(a, 1 - b), -np.maximum(b, 1 - a)
-    if metric == REWARD:
+    if of.has_range:
+        least, most = of.range
+        return np.maximum(a - least, most - b), -np.maximum(b - least, most - a)
+    if of.column == REWARD:
         return a - b + FAILURE_COST, a - b - FAILURE_COST
     return None
 
@@ -110,6 +165,7 @@ class Moments(NamedTuple):
         n: Number of values.
         total: Their sum.
         squares: Sum of their squared deviations from the mean.
+        cubes: Sum of their cubed deviations.
         least: The smallest value.
         most: The largest value.
     """
@@ -117,6 +173,7 @@ class Moments(NamedTuple):
     n: int
     total: float
     squares: float
+    cubes: float
     least: float
     most: float
 
@@ -125,8 +182,9 @@ class Moments(NamedTuple):
         """The moments of values, of which there is one or more."""
         sample = np.asarray(values, float)
         total = float(sample.sum())
-        squares = float(((sample - total / sample.size) ** 2).sum())
-        return cls(sample.size, total, squares, float(sample.min()), float(sample.max()))
+        deviations = sample - total / sample.size
+        squares, cubes = float((deviations**2).sum()), float((deviations**3).sum())
+        return cls(sample.size, total, squares, cubes, float(sample.min()), float(sample.max()))
 
     @property
     def mean(self) -> float:
@@ -137,13 +195,18 @@ class Moments(NamedTuple):
         """The moments of these values and others together.
 
         Source: T. F. Chan, G. H. Golub, R. J. LeVeque, Algorithms for computing the sample
-        variance, The American Statistician 37 (1983) 242-247, eq. 1.5b.
+        variance, The American Statistician 37 (1983) 242-247, eq. 1.5b; of the cubes P. Pebay,
+        Formulas for robust, one-pass parallel computation of covariances and arbitrary-order
+        statistical moments, Sandia report SAND2008-6212.
         """
         n, apart = self.n + others.n, others.mean - self.mean
+        between = self.n * others.n / n * (self.n - others.n) / n
+        within = (self.n * others.squares - others.n * self.squares) / n
         return type(self)(
             n,
             self.total + others.total,
             self.squares + others.squares + apart**2 * (self.n / n) * others.n,
+            self.cubes + others.cubes + apart**3 * between + 3 * apart * within,
             min(self.least, others.least),
             max(self.most, others.most),
         )
@@ -166,14 +229,18 @@ class Moments(NamedTuple):
         mean = float(np.mean([of.mean for of in drawn]))
         spread = weights**2 * counts / (counts - 1) * (1 - 1 / whole.n)
         squares = float(spread @ [of.squares for of in drawn])
-        return whole._replace(total=mean * whole.n, squares=squares)
+        cubes = float(spread**1.5 @ [of.cubes for of in drawn])
+        return whole._replace(total=mean * whole.n, squares=squares, cubes=cubes)
 
-    def interval(self, metric: str, level: float = LEVEL) -> Interval:
+    def interval(self, metric: str | Metric, level: float = LEVEL) -> Interval:
         """The mean of a metric with the interval of ``interval_of``."""
         of = metric_of(metric)
         if of.is_outcome and self._are_outcomes:
             return wilson(int(self.total), self.n, level)
-        return self.bounded(level) if of.is_bounded else self.student(level)
+        if of.is_bounded:
+            return self.bounded(level)
+        mean, *ends = self.skewed(level)
+        return Interval(mean, *np.clip(ends, *of.range).tolist())
 
     @property
     def _are_outcomes(self) -> bool:
@@ -185,6 +252,16 @@ class Moments(NamedTuple):
         """The mean of values from 0 to 1 with the interval of ``bounded_interval``."""
         low, high = bounded_ends(self.mean, self.squares / self.n, self.n, level)
         return Interval(self.mean, float(low), float(high))
+
+    def skewed(self, level: float = LEVEL) -> Interval:
+        """The mean with the interval of ``skewed_ends``; of equal values as ``mean_interval``."""
+        plain = self.student(level)
+        if not plain.low < plain.high:
+            return plain
+        error = np.sqrt(self.squares / (self.n - 1)) / np.sqrt(self.n)
+        skewness = skewness_of(self.squares, self.cubes, self.n)
+        ends = skewed_ends(self.mean, error, skewness, self.n, level)
+        return Interval(self.mean, *map(float, ends))
 
     def student(self, level: float = LEVEL) -> Interval:
         """The mean with the interval of ``mean_interval``."""
@@ -212,27 +289,27 @@ def bounded_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL)
 
 
 def mean_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) -> Interval:
-    """Mean with its Student t interval: for values without bounds, and for paired differences.
+    """Mean with its Student t interval: for values that are hardly skewed, and for differences.
 
-    It is fit for skewed metrics from some 30 values on. The mean of values from 0 to 1 has the
-    ``bounded_interval``. Equal values give a degenerate interval (low = mean = high). The ends of
-    a single value are nan, because it says nothing about the spread.
+    The means of metrics have the intervals of ``interval_of``. Equal values give a degenerate
+    interval (low = mean = high). The ends of a single value are nan, because it says nothing about
+    the spread.
     """
     return Moments.of(values).student(level)
 
 
 def interval_of(
-    metric: str, values: Sequence[float] | np.ndarray, level: float = LEVEL
+    metric: str | Metric, values: Sequence[float] | np.ndarray, level: float = LEVEL
 ) -> Interval:
     """The mean of a metric of missions with the interval that is fit for it.
 
     Wilson's interval for outcomes of ``success``, the ``bounded_interval`` for the collection ratio
-    and the product, and Student's t for all others.
+    and the product, and for all others that of ``skewed_ends``, within the range of the metric.
     """
     return Moments.of(values).interval(metric, level)
 
 
-def stratified(values: np.ndarray, metric: str, level: float = LEVEL) -> Interval:
+def stratified(values: np.ndarray, metric: str | Metric, level: float = LEVEL) -> Interval:
     """Mean of the means of fixed design points with its interval: the points are strata.
 
     What differs from point to point is no chance, so the interval rests on the variance within the
@@ -265,10 +342,13 @@ def stratified(values: np.ndarray, metric: str, level: float = LEVEL) -> Interva
         low, high = bounded_ends(mean, alone * missions, missions / effect, level)
         return Interval(mean, float(low), float(high))
     replications = int(present.any(axis=1).sum())
-    freedom = max(replications - 1, 1)
-    error = np.sqrt(common * replications / freedom)
-    half = -float(stdtrit(freedom, (1 - level) / 2) * error) if replications > 1 else np.nan
-    return Interval(mean, mean - half, mean + half)
+    if replications == 1:
+        return Interval(mean, np.nan, np.nan)
+    error = np.sqrt(common * replications / (replications - 1))
+    cubes = float(((residuals / n).sum(axis=1) ** 3).sum()) / points**3
+    skewness = skewness_of(common, cubes, replications)
+    ends = skewed_ends(mean, error, skewness, replications, level)
+    return Interval(mean, *np.clip(ends, *metric_of(metric).range).tolist())
 
 
 def summary(
@@ -297,19 +377,20 @@ def summary(
     for group, part in groups(missions, by):
         for metric in metrics_in(missions):
             if n := int(part[metric].count()):
-                rows.append((*group, metric, *_interval(part, metric, level, strata), n))
+                ends = _interval(part, known_in(missions, metric), level, strata)
+                rows.append((*group, metric, *ends, n))
     return pd.DataFrame(rows, columns=[*by, "metric", "mean", "low", "high", "n"])
 
 
 def column_intervals(
-    values: pd.DataFrame, metric: str = "", levels: float | np.ndarray = LEVEL
+    values: pd.DataFrame, metric: str | Metric = "", levels: float | np.ndarray = LEVEL
 ) -> pd.DataFrame:
     """Means of columns with their intervals (``interval_of``), for many columns at once.
 
     Args:
         values: (R, K) a row per replication, a column per group; nan where a group lacks one.
-        metric: The metric; Student's t, if not given. Values of ``success`` that are no outcomes 0
-            or 1, but means of such, have the interval of bounded values.
+        metric: The metric; by default one without bounds. Values of ``success`` that are no
+            outcomes 0 or 1, but means of such, have the interval of bounded values.
         levels: The confidence level, or (K,) levels.
 
     Returns:
@@ -317,8 +398,11 @@ def column_intervals(
     """
     n, mean = values.count(), values.mean()
     level = pd.Series(levels, index=values.columns)
-    half = -values.sem() * stdtrit(np.maximum(n - 1, 1), (1 - level) / 2)
-    table = pd.DataFrame({"mean": mean, "low": mean - half, "high": mean + half, "n": n})
+    deviations = values - mean
+    skewness = skewness_of((deviations**2).sum(), (deviations**3).sum(), n)
+    ends = skewed_ends(mean, values.sem(), skewness, np.maximum(n, 1), level)
+    low, high = (end.clip(*metric_of(metric).range) for end in ends)
+    table = pd.DataFrame({"mean": mean, "low": low, "high": high, "n": n})
     if metric_of(metric).is_bounded:
         some = n > 0
         ends = bounded_ends(mean[some], values.var(ddof=0)[some], n[some], level[some])
@@ -350,14 +434,14 @@ def groups(missions: pd.DataFrame, by: Sequence[str]) -> Iterator[tuple[tuple, p
     yield from missions.groupby(list(by), sort=False, dropna=False) if by else [((), missions)]
 
 
-def _interval(missions: pd.DataFrame, metric: str, level: float, strata: bool) -> Interval:
+def _interval(missions: pd.DataFrame, metric: Metric, level: float, strata: bool) -> Interval:
     """The mean of a group: over its missions, or over the points that these are at."""
     if strata and missions["point"].nunique() > 1:
-        wide = by_replication(missions, metric, "point").dropna(axis="columns", how="all")
+        wide = by_replication(missions, metric.column, "point").dropna(axis="columns", how="all")
         if (wide.count() > 1).all():
             # In this order, so that the last bits of sums are the same with every pandas.
             return stratified(np.ascontiguousarray(wide, float), metric, level)
-    values = values_within(missions, metric, ())
+    values = values_within(missions, metric.column, ())
     return interval_of(metric, values[~np.isnan(values)], level)
 
 

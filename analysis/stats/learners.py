@@ -13,7 +13,7 @@ import pandas as pd
 import scipy
 
 from dess import InputError
-from dess.analysis.metrics import ALWAYS, REWARD
+from dess.analysis.metrics import ALWAYS, Metric, known_in
 from dess.analysis.stats.differences import (
     Correction,
     check_same_missions,
@@ -142,7 +142,7 @@ def compare_learners(
     check_share("level", level)
     tables = metrics_by_treatment(missions, "policy", metrics, by)
     reference = select(tables, "policy", baseline)
-    rows = []
+    rows, known = [], {metric: known_in(missions, metric) for metric in metrics}
     for learner, checkpoints in learners.items():
         if not checkpoints or len(set(checkpoints)) < len(checkpoints) or baseline in checkpoints:
             raise InputError(
@@ -155,7 +155,7 @@ def compare_learners(
         for group, (b, *parts) in matched([reference, *trained], by):
             for metric in metrics:
                 of_learner = np.stack([a[metric] for a in parts])
-                result, differences = _compared(of_learner, b[metric], metric, level)
+                result, differences = _compared(of_learner, b[metric], known[metric], level)
                 about = LEARNER if len(parts) > 1 else CHECKPOINT
                 labels = (learner, baseline, *group, metric, about)
                 rows.append((*labels, *result, *differences.shape))
@@ -164,7 +164,7 @@ def compare_learners(
 
 
 def _compared(
-    a: np.ndarray, b: np.ndarray, metric: str, level: float
+    a: np.ndarray, b: np.ndarray, metric: Metric, level: float
 ) -> tuple[Crossed, np.ndarray]:
     """A learner (S, R) compared with a baseline (R,) by a metric, and the differences."""
     differences = differences_of(a, b)
@@ -173,10 +173,10 @@ def _compared(
         mean, p = difference_test(a[0], b, metric, level)
         return result._replace(low=mean.low, high=mean.high, p=p), differences
     rare = rare_differences(metric, a.mean(), b.mean())
-    if rare is None or (metric == REWARD and b.size == 1):
+    if rare is None or (b.size == 1 and not metric.is_bounded):
         return result, differences
     smooth = crossed(smoothed(differences, rare), level)
-    limit = np.inf if metric == REWARD else 1.0
+    limit = metric.range[1] - metric.range[0]
     ends = {name: float(np.clip(getattr(smooth, name), -limit, limit)) for name in _ENDS}
     return result._replace(**ends, p=smooth.p), differences
 

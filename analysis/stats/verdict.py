@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtrit
 
-from dess.analysis.metrics import metric_of
+from dess.analysis.metrics import Metric, metric_of
 from dess.analysis.stats.intervals import LEVEL, Interval, level_after, rare_differences
 
 ABOVE, INCONCLUSIVE, BELOW = POSITIONS = ("above", "inconclusive", "below")
@@ -146,7 +146,7 @@ def membership(
     return count / draws
 
 
-def within_reach(low: pd.Series, high: pd.Series, metric: str) -> pd.Series:
+def within_reach(low: pd.Series, high: pd.Series, metric: str | Metric) -> pd.Series:
     """The settings whose interval does not lie wholly on the worse side of another one.
 
     Paired tests alone cannot tell a setting of few missions from one of many: they see only the
@@ -165,7 +165,7 @@ _ROUNDING = 1e-12  # variances and differences below this, relative to the value
 
 
 def may_be_best(
-    values: np.ndarray, metric: str = "", looks: np.ndarray | None = None
+    values: np.ndarray, metric: str | Metric = "", looks: np.ndarray | None = None
 ) -> np.ndarray:
     """The settings that no other setting is significantly better than.
 
@@ -190,15 +190,15 @@ def may_be_best(
         is not ruled out.
     """
     present = np.isfinite(values)
-    values = -values if metric_of(metric).less_is_better else values
     means = np.nansum(values, axis=0) / np.maximum(present.sum(axis=0), 1)
+    values = -values if metric_of(metric).less_is_better else values
     # What a replication adds to all settings cancels in their differences.
     centre = np.nanmean(np.where(present.any(1, keepdims=True), values, 0.0), axis=1, keepdims=True)
     centred, mask = np.where(present, values - centre, 0.0), present.astype(float)
     looks = np.zeros(values.shape[1], int) if looks is None else looks
     each = (1 - LEVEL) / max(values.shape[1] - 1, 1)
     blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
-    rare = [rare_differences(metric, means, means[block, None]) for block in blocks]
+    rare = [_rare_leads(metric, means, means[block, None]) for block in blocks]
     # The missions that a pair shares end with those of the setting that has fewer.
     shared = [np.minimum(looks[block, None], looks) for block in blocks]
     alphas = [1 - level_after(of_pairs, 1 - each) for of_pairs in shared]
@@ -207,6 +207,16 @@ def may_be_best(
         for block, added, alpha in zip(blocks, rare, alphas, strict=True)
     ]
     return np.concatenate(parts) if parts else np.zeros(0, bool)
+
+
+def _rare_leads(
+    metric: str | Metric, others: np.ndarray, own: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """The rare differences by which others are ahead of a setting, and behind it."""
+    rare = rare_differences(metric, others, own)
+    if rare is None or not metric_of(metric).less_is_better:
+        return rare
+    return -rare[1], -rare[0]
 
 
 def _unbeaten(

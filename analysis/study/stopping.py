@@ -18,7 +18,7 @@ from scipy.special import ndtri, stdtrit
 
 from dess import InputError
 from dess.analysis.metrics import ALWAYS, MEASURES, metric_of
-from dess.analysis.stats.intervals import LEVEL, bounded_ends
+from dess.analysis.stats.intervals import LEVEL, bounded_ends, ends_by_quantile, skewness_of
 from dess.errors import listed, one_of, shown, validation_line
 from dess.sections.section import Integer, Number, plain
 
@@ -138,10 +138,11 @@ class Precision(StrictTable):
 
     The half-widths are half the lengths of the intervals of ``stats.intervals.interval_of``:
     Wilson's interval for ``success``, the interval of a bounded mean for the collection ratio and
-    the product, Student's t for the reward. They are not post-stratified by the number
-    of UAVs, so where it is drawn, the printed intervals are narrower. The *stopping point* is the
-    first n >= ``first`` at which all targets are met with n, n + 1, ..., n + ``look_ahead``
-    missions. Without the look-ahead, a sample whose interval is narrow by chance would stop too
+    the product, Student's t with a correction for skewness for the others. They are not
+    post-stratified by the number of UAVs, so where it is drawn, the printed intervals are narrower,
+    and they are not cut off at the ends of a metric's range. The *stopping point* is the first
+    n >= ``first`` at which all targets are met with n, n + 1, ..., n + ``look_ahead`` missions.
+    Without the look-ahead, a sample whose interval is narrow by chance would stop too
     early. The cell keeps the missions of the look-ahead.
 
     The stopping point depends only on the values of the missions, not on the rounds in which they
@@ -268,8 +269,8 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
         values: (n,) values; nan where a mission has not measured the metric.
 
     Returns:
-        (n,) means and (n,) half-widths. Student's half-width of a single value is infinite, and so
-        is that of no value.
+        (n,) means and (n,) half-widths. Without bounds, the half-width of a single value is
+        infinite, and so is that of no value.
     """
     sample = np.asarray(values, float)
     present = ~np.isnan(sample)
@@ -291,9 +292,12 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
     if metric_of(metric).is_bounded:
         low, high = bounded_ends(sample[:1] + means, squares / counts, counts)
         return sample[:1] + means, (high - low) / 2
-    freedom = np.maximum(counts - 1, 1)
+    sums = np.cumsum(shifted**3) - 3 * means * np.cumsum(shifted**2)
+    skewness = skewness_of(squares, sums + 2 * counts * means**3, counts)
+    errors = np.sqrt(squares / np.maximum(counts - 1, 1) / counts)
     quantiles = _student(1 << len(sample).bit_length())[: len(sample)]
-    widths = quantiles * np.sqrt(squares / freedom / counts)
+    low, high = ends_by_quantile(means, errors, skewness, counts, quantiles)
+    widths = (high - low) / 2
     widths[:1] = np.inf
     return sample[:1] + means, widths
 

@@ -42,6 +42,7 @@ def evaluate(
             with more missions, those that are there are not simulated again.
     """
     from dess.analysis.execution.evaluation import Asked, check_evaluation, means
+    from dess.analysis.metrics import known_of
     from dess.analysis.study.study import engine_of
     from dess.policies.registry import typed
     from dess.record import measures_of
@@ -69,7 +70,10 @@ def evaluate(
             "uav_slots": evaluation.uav_slots,
             "seconds": evaluation.seconds,
         }
-        | {name: of.interval(name)._asdict() for name, of in evaluation.moments.items()}
+        | {
+            name: of.interval(known_of(name, space.max_slots, space.units))._asdict()
+            for name, of in evaluation.moments.items()
+        }
         | {name: unknown for name in measures_of(space) if name not in evaluation.moments}
         for evaluation in evaluations
     ]

@@ -10,14 +10,16 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy import stats
 
-from dess.analysis.metrics import PRODUCT, REWARD
+from dess.analysis.metrics import AGE, MOST_SLOTS, PRODUCT, REWARD, known_in
 from dess.analysis.stats.differences import paired
 from dess.analysis.stats.distribution import quantile_interval
 from dess.analysis.stats.intervals import (
     bounded_ends,
+    column_intervals,
     level_after,
     mean_interval,
     stratified,
@@ -287,6 +289,108 @@ def table_of_rare_failures() -> str:
 def test_the_table_of_rare_failures_of_the_docs_is_measured():
     page = Path(__file__).parents[2] / "docs" / "concepts" / "confidence-intervals.md"
     assert table_of_rare_failures() in page.read_text("utf-8")
+
+
+# Ages and lengths of missions, which a failure changes by much more than a policy does
+
+LONGEST = 500  # slots that a mission may last
+FAILURES = (0.007, 0.008, 0.015, 0.035)
+
+
+def watches(metric: str, share: float, n: int, trials: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """Values (trials, n) of A, which never fails, and of B, and the true mean difference.
+
+    An age is then between that of a fleet that is lost late and that of a sea without UAVs; a
+    mission ends early, or only at the horizon.
+    """
+    generator = rng(23, n)
+    size = (trials, n)
+    common = generator.gamma(16, 2.5, size) if metric == AGE else generator.normal(100, 10, size)
+    a, b = common + generator.normal(0, 0.5, (2, *size))
+    if metric == AGE:
+        failed, mean = generator.uniform(100, LONGEST / 2, size), 40.0 - 175.0
+    else:
+        early = generator.uniform(10, 60, size)
+        failed, mean = np.where(generator.random(size) < 0.5, early, LONGEST), 100.0 - 267.5
+    return a, np.where(generator.random(size) < share, failed, b), share * mean
+
+
+def of_watches(metric: str, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The ends of the intervals of the differences, by trial."""
+    missions = pd.DataFrame({metric: [0.0], MOST_SLOTS: [LONGEST]})
+    of = known_in(missions, metric)
+    rows = [paired(*pair, metric=of) for pair in zip(a, b, strict=True)]
+    return np.array([row.low for row in rows]), np.array([row.high for row in rows])
+
+
+@pytest.mark.parametrize("trials", [200, pytest.param(TRIALS, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("n", [100, 300, 500])
+@pytest.mark.parametrize("metric", [AGE, "slots"])
+def test_paired_intervals_of_ages_and_lengths_cover_where_failures_are_rare(metric, n, trials):
+    for share in FAILURES:
+        a, b, truth = watches(metric, share, n, trials)
+        low, high = of_watches(metric, a, b)
+        assert np.mean((low <= truth) & (truth <= high)) >= 0.95 - max(0.02, error(trials))
+        assert (low < high).all()
+
+
+def table_of_watches() -> str:
+    """Of the intervals of differences of ages and of lengths of missions."""
+    heads = [f"{name}, {kind}" for name in ("age", "slots") for kind in ("Student's t", "ours")]
+    rows = [["B fails, A never", "n", *heads]]
+    for share in FAILURES:
+        for n in (100, 300, 500):
+            cells = []
+            for metric in (AGE, "slots"):
+                a, b, truth = watches(metric, share, n, 1000)
+                both = student(a - b), of_watches(metric, a, b)
+                cells += [told(tuple(end / 100 for end in ends), truth / 100) for ends in both]
+            rows.append([f"{100 * share:g} %", str(n), *cells])
+    return in_markdown(*rows)
+
+
+@pytest.mark.slow
+def test_the_table_of_ages_and_lengths_of_the_docs_is_measured():
+    page = Path(__file__).parents[2] / "docs" / "concepts" / "confidence-intervals.md"
+    assert table_of_watches() in page.read_text("utf-8")
+
+
+SKEWED: dict[str, Drawing] = {
+    "gamma(4)": (lambda g, size: g.gamma(4, 1, size), 4.0),
+    "exponential": (lambda g, size: g.exponential(1, size), 1.0),
+    "gamma(0.5)": (lambda g, size: g.gamma(0.5, 1, size), 0.5),
+    "log-normal": (lambda g, size: g.lognormal(0, 0.75, size), float(np.exp(0.75**2 / 2))),
+}
+
+
+def skewed(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The ends of the intervals of samples (trials, n) of a metric without bounds."""
+    ends = column_intervals(pd.DataFrame(values.T))
+    return ends["low"].to_numpy(), ends["high"].to_numpy()
+
+
+@pytest.mark.parametrize("drawing", SKEWED.values(), ids=SKEWED)
+def test_intervals_of_skewed_values_cover(drawing):
+    draw, mean = drawing
+    low, high = skewed(draw(rng(24), (4000, 50)))
+    assert np.mean((low <= mean) & (mean <= high)) >= 0.935
+
+
+def table_of_skewed_values() -> str:
+    """Of the intervals of means."""
+    rows = [["values", "n", "Student's t", "corrected for skewness"]]
+    for name, (draw, mean) in SKEWED.items():
+        for n in (20, 50, 200):
+            values = draw(rng(24, n), (4000, n))
+            cells = [told(tuple(of(values)), mean) for of in (student, skewed)]
+            rows.append([name, str(n), *(cell.partition(",")[0] for cell in cells)])
+    return in_markdown(*rows)
+
+
+@pytest.mark.slow
+def test_the_table_of_skewed_values_of_the_docs_is_measured():
+    page = Path(__file__).parents[2] / "docs" / "concepts" / "confidence-intervals.md"
+    assert table_of_skewed_values() in page.read_text("utf-8")
 
 
 # Learners

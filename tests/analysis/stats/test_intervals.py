@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from dess.analysis.execution.evaluation import Asked, evaluate, means
-from dess.analysis.metrics import PRODUCT, RATIO, REWARD, SUCCESS
+from dess.analysis.metrics import MOST_SLOTS, PRODUCT, RATIO, REWARD, SUCCESS, known_in
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import (
+    Moments,
     bootstrap_interval,
     bounded_interval,
     by_replication,
@@ -19,6 +20,7 @@ from dess.analysis.stats.intervals import (
     interval_of,
     mean_interval,
     post_stratified,
+    skewness_of,
     stratified,
     summary,
     wilson,
@@ -46,13 +48,15 @@ def test_it_has_a_length_holds_the_mean_and_ends_where_shares_do(values, level):
 @pytest.mark.parametrize(
     ("metric", "expected"),
     [(SUCCESS, wilson(7, 8)), (RATIO, bounded_interval([1.0] * 7 + [0.0]))]
-    + [(REWARD, mean_interval([1.0] * 7 + [0.0]))],
+    # Hall's slope is -2.82843 / (3 sqrt(8)) = -1 / 3, t(0.975, 7) = 2.36462: the cube roots are
+    # those of 1 - (2.36462 + 1 / 6) and 1 - (-2.36462 + 1 / 6), and s / sqrt(8) is 0.125
+    + [(REWARD, (0.875, 0.875 - 0.125 * 6.45786, 0.875 + 0.125 * 1.41990))],
 )
 def test_every_metric_has_the_interval_that_is_fit_for_it(metric, expected):
     values = pd.DataFrame({"a": [1.0] * 7 + [0.0], "b": np.nan})
-    assert interval_of(metric, values["a"]) == expected
+    assert interval_of(metric, values["a"]) == pytest.approx(expected, abs=1e-5)
     table = column_intervals(values, metric)
-    assert table.loc["a", ["mean", "low", "high"]].tolist() == pytest.approx([*expected])
+    assert table.loc["a", ["mean", "low", "high"]].tolist() == pytest.approx([*expected], abs=1e-5)
     assert table.loc["b", ["mean", "low", "high"]].isna().all() and table.loc["b", "n"] == 0
 
 
@@ -76,7 +80,7 @@ def test_points_that_share_all_chance_count_as_one():
     one = np.random.default_rng(4).beta(8, 2, (40, 1))
     alike = np.repeat(one, 5, axis=1)
     assert stratified(alike, PRODUCT) == pytest.approx(bounded_interval(one[:, 0]))
-    assert stratified(alike, REWARD) == pytest.approx(mean_interval(one[:, 0]))
+    assert stratified(alike, REWARD) == pytest.approx(interval_of(REWARD, one[:, 0]))
     # Failures, none of which is seen, may hit all points at once.
     certain = np.ones((40, 5))
     assert stratified(certain, SUCCESS) == pytest.approx(bounded_interval(np.ones(40)))
@@ -104,11 +108,36 @@ def test_a_summary_over_points_is_stratified_and_one_over_a_sample_of_points_is_
     assert tuple(row[["mean", "low", "high"]]) == bounded_interval(values.ravel())
 
 
-def test_student_of_strata_is_that_of_the_means_of_the_replications():
+def test_an_interval_over_strata_is_that_of_the_means_of_the_replications():
     values = at_points(np.random.default_rng(8), 25, common=0.5)
-    units = values.mean(axis=1)
-    low, high = stats.t.interval(0.95, 24, units.mean(), stats.sem(units))
-    assert stratified(values, REWARD) == pytest.approx((units.mean(), low, high))
+    expected = interval_of(REWARD, values.mean(axis=1))
+    assert stratified(values, REWARD) == pytest.approx(expected)
+
+
+def test_without_skewness_the_interval_is_students():
+    values = np.array([1.0, 2.0, 3.0, 5.0, 7.0, 8.0, 9.0])
+    assert interval_of(REWARD, values) == mean_interval(values)
+    assert interval_of("cost", 1e6 + 1e-3 * values) == pytest.approx(
+        mean_interval(1e6 + 1e-3 * values)
+    )
+
+
+@given(st.lists(st.floats(0, 250), min_size=2, max_size=30), st.sampled_from([0.5, 0.95, 0.999]))
+def test_an_interval_of_an_age_holds_the_mean_and_ends_where_ages_do(ages, level):
+    missions = pd.DataFrame({"age": ages, MOST_SLOTS: 500})
+    mean, low, high = interval_of(known_in(missions, "age"), ages, level)
+    assert 0 <= low <= mean * (1 + 1e-9) and mean <= high * (1 + 1e-9) and high <= 250
+    ends = column_intervals(missions, known_in(missions, "age")).loc["age", ["low", "high"]]
+    assert ends.between(0, 250).all()
+
+
+def test_the_moments_of_parts_are_those_of_the_whole():
+    values = np.random.default_rng(5).exponential(size=40)
+    parts = Moments.of(values[:7]).with_others(Moments.of(values[7:]))
+    assert parts == pytest.approx(Moments.of(values))
+    assert skewness_of(parts.squares, parts.cubes, 40) == pytest.approx(
+        stats.skew(values, bias=False)
+    )
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 from scipy import stats
 from scipy.special import ndtri
 
-from dess.analysis.metrics import SUCCESS
+from dess.analysis.metrics import MOST_SLOTS, SUCCESS, known_in
 from dess.analysis.stats.differences import difference_test
 from dess.analysis.stats.intervals import Interval
 from dess.analysis.stats.verdict import (
@@ -173,6 +173,16 @@ def test_it_is_the_paired_t_test_of_every_two_settings():
     expected = by_hand(values)
     assert 1 < expected.sum() < 10
     assert may_be_best(values).tolist() == expected.tolist()
+
+
+def test_of_ages_the_lower_is_better_and_a_rare_one_is_the_largest():
+    """An age of 4 in 12 missions against 10 is no evidence where a failure has one of 250."""
+    missions = pd.DataFrame({"age": [4.0], MOST_SLOTS: [500]})
+    of, noise = known_in(missions, "age"), np.random.default_rng(2).normal(0, 0.1, (400, 2))
+    ages = np.array([4.0, 10.0]) + noise
+    assert may_be_best(ages[:12], "age").tolist() == [True, False]
+    assert may_be_best(ages[:12], of).all()
+    assert may_be_best(ages, of).tolist() == [True, False]
 
 
 def test_after_a_search_the_tests_have_the_errors_of_their_looks():
