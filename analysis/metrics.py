@@ -9,6 +9,7 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.record import OPERATIONS
+from dess.scenario import ScenarioSpace
 from dess.sections.data_sheet import Units
 from dess.sections.quantities import printed
 
@@ -33,6 +34,8 @@ class Metric:
             last; 0 if it is not known.
         least: The smallest value that a mission can have.
         most: The largest value that a mission can have. Of a time, ``known_in`` finds it.
+        failure: By how much a failure changes it, where the range is not known; 0 if that is not
+            known either. Of a cost, ``known_in`` finds it.
     """
 
     column: str
@@ -45,6 +48,7 @@ class Metric:
     horizons: float = 0.0
     least: float = -inf
     most: float = inf
+    failure: float = 0.0
 
     @property
     def range(self) -> tuple[float, float]:
@@ -129,6 +133,10 @@ class Metric:
         return (lambda *ends: f"{write(*ends)} {self.unit}") if self.is_told else write
 
 
+# What a failure costs: the reward of a filled quota is not earned, that of an empty battery is.
+_FIELDS = ScenarioSpace.model_fields
+FAILURE_COST = _FIELDS["reward_quota"].default - _FIELDS["reward_depleted"].default
+
 SUCCESS, RATIO, HOME = "success", "collection_ratio", "home"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
 AGE, COST = "age", "cost"  # a cost have the missions of a study with prices
@@ -147,12 +155,13 @@ _PAPER = (
 )
 _OTHERS = (
     Metric(HOME, "Battery for the way home", kind="outcome", in_percent=True),
-    Metric(REWARD, "Reward"),
+    Metric(REWARD, "Reward", failure=FAILURE_COST),
     Metric(BOUND, "Upper bound", least=0.0, most=1.0),
     Metric(GAP, "Optimality gap", less_is_better=True, least=-1.0, most=1.0),
     Metric(COST, "Cost", kind="cost", less_is_better=True, least=0.0),
 )
-MOST_SLOTS = "most_slots"  # the column of the longest that each mission may last
+# The columns of the longest that each mission may last, and of what a loss of its UAVs costs.
+MOST_SLOTS, MOST_LOST = "most_slots", "most_lost"
 
 
 def _time(column: str, name: str, told: str = "h", horizons: float = 1.0) -> Metric:
@@ -237,11 +246,13 @@ def known_in(missions: pd.DataFrame, column: str) -> Metric:
     """The metric of a column of missions, with the range that it has in these missions.
 
     Args:
-        missions: The missions; the largest time is known if they have ``MOST_SLOTS``, which the
-            missions of results have.
+        missions: The missions; the largest time is known if they have ``MOST_SLOTS``, and what
+            failures cost if they have ``MOST_LOST``, as the missions of results do.
         column: The column.
     """
     of = metric_of(column)
+    if of.kind == "cost" and MOST_LOST in missions:
+        return replace(of, failure=float(missions[MOST_LOST].max()))
     longest = metric_of(MOST_SLOTS)
     longest = longest.in_units if of.is_told else longest
     if not of.horizons or longest.column not in missions or not len(missions):

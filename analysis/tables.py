@@ -13,8 +13,10 @@ from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.verdict import MARKS, position_by_test
 
 INTERVALS = f"{numbers.level(LEVEL)} intervals"
+MARKED = "▲ better, ▼ worse, ≈ inconclusive"
 CHECKED = f"The check of the selected settings: means with {INTERVALS}"
 MOST_ROWS = 25  # the largest number of rows of a table on a page; its data have all rows
+WIDER = 1.5  # times as wide as without the allowance for failures: what is explained in words
 YES = {True: "yes", False: "no"}
 _HEADS = {"policy": "Policy", "n": "Missions", **METRICS}
 
@@ -91,5 +93,23 @@ def compared(rows: pd.DataFrame, of: str) -> pd.DataFrame:
         texts = [numbers.points(*e).partition(" ")[2] for e in new]
         shown["One new training"] = np.where(product["trainings"] > 1, texts, "unknown")
         shown["Trainings"] = product["trainings"]
-    shown["p of the product"] = product["p_adjusted"].map(numbers.p_value)
+    shown["p of the product, corrected"] = product["p_adjusted"].map(numbers.p_value)
     return shown.reset_index(names=of.capitalize())
+
+
+def allowed_for(what: str, plain: str, wide: str, n: int) -> str:
+    """That intervals allow for failures that the missions do not show, with an example.
+
+    If none of n missions fails, a share of failures of 3 / n is just not ruled out at 95 %.
+
+    Args:
+        what: What is estimated.
+        plain: Half the length of its interval without the allowance.
+        wide: Half the length of its interval.
+        n: Number of missions.
+    """
+    return (
+        f"The intervals allow for rare failures, which the missions may not show: {n:,} missions "
+        f"without one do not rule out a failure in {max(round(n / 3), 1):,} missions. Without this "
+        f"allowance (Student's t), {what} would be known to {plain}; with it, to {wide}."
+    )

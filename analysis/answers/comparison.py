@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 from dess import InputError, simulate, simulate_batch
 from dess.analysis import numbers
 from dess.analysis.answers.missions import FOLDER
-from dess.analysis.answers.summary import learners, ranked_policies
+from dess.analysis.answers.summary import corrected, learners, ranked_policies
 from dess.analysis.figures import Drawing, style
 from dess.analysis.figures.comparison import middle
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
@@ -186,11 +186,10 @@ def overall(results: Results, pair: Pair) -> pd.DataFrame:
     """The policy compared with the baseline in every metric, over all missions.
 
     Returns:
-        A row per metric, as ``dess.analysis.compare`` returns it; ``p_adjusted`` also corrects for
-        the choice of the pair.
+        A row per metric, as ``dess.analysis.compare`` returns it, ``summary.corrected``.
     """
     missions = results.missions[results.missions["policy"].isin(pair[:2])]
-    return for_choice(compare(missions, pair.baseline, [*METRICS]), pair.candidates)
+    return corrected(results, compare(missions, pair.baseline, [*METRICS], correction=None))
 
 
 def pairing(comparison: pd.DataFrame) -> str:
@@ -376,7 +375,7 @@ def leads(missions: pd.DataFrame, lead: pd.DataFrame, pair: Pair, note: str = ""
         pair: The policies.
         note: The beginning of the captions.
     """
-    overall = missions["difference"].mean()
+    overall = values_within(missions, "difference", ()).mean()
     return [
         Drawing(
             _lead(rows, overall, style.ends(lead, zero=True)),

@@ -23,6 +23,7 @@ from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import column_tests, relative_change
 from dess.analysis.stats.intervals import LEVEL, by_replication, check_share
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
+from dess.analysis.tables import WIDER, allowed_for
 
 # The published changes of the average age of information, from one UAV to this number, in another
 # model of the same kind (Mathematics 13(21) 3564).
@@ -92,7 +93,8 @@ def changes(
 
     Returns:
         A row per policy and design point with another value: ``policy``, the varied fields,
-        ``mean`` (the change) with ``low`` and ``high`` (95 %), and ``n`` pairs. A point without a
+        ``mean`` (the change) with ``low`` and ``high`` (95 %), ``student`` (as in
+        ``stats.differences.Paired``), and ``n`` pairs. A point without a
         partner, the same but for the field, has no row.
 
     Raises:
@@ -112,12 +114,33 @@ def changes(
             if both.empty:
                 continue
             if relative:
-                change = relative_change(both[point].to_numpy(), both[partner].to_numpy(), of)
+                pairs = both[point].to_numpy(), both[partner].to_numpy()
+                plain = relative_change(*pairs)
+                change = (*relative_change(*pairs, of), (plain.high - plain.low) / 2)
             else:
                 tests = column_tests(both[[point]], both[partner], of)
-                change = tests[["difference", "low", "high"]].iloc[0]
+                change = tests[["difference", "low", "high", "student"]].iloc[0]
             rows.append((policy, *table.to_dict("records")[point].values(), *change, len(both)))
-    return pd.DataFrame(rows, columns=["policy", *table, *_ENDS, "n"])
+    return pd.DataFrame(rows, columns=["policy", *table, *_ENDS, "student", "n"])
+
+
+def allowance_in_words(changes: pd.DataFrame, what: str) -> str:
+    """Why the intervals of changes are wider than the missions alone would make them.
+
+    Args:
+        changes: Rows of ``changes``, which are shares.
+        what: What has changed, in words.
+
+    Returns:
+        Sentences with the change of the widest interval; empty if there is hardly an allowance.
+    """
+    halves = (changes["high"] - changes["low"]) / 2
+    wider = changes.assign(half=halves)[halves > WIDER * changes["student"]]
+    if wider.empty:
+        return ""
+    row = wider.loc[wider["half"].idxmax()]
+    plain, wide = (f"±{100 * row[half]:.2g} points" for half in ("student", "half"))
+    return allowed_for(f"the change of {what} with {row['policy']}", plain, wide, int(row["n"]))
 
 
 def enough_pads(results: Results, margin: float) -> pd.DataFrame:

@@ -22,7 +22,7 @@ from dess.analysis.figures.settings import decision_times
 from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import column_tests, relative_change
-from dess.analysis.stats.intervals import column_intervals
+from dess.analysis.stats.intervals import Interval, column_intervals
 from dess.scenario import SEA
 
 # Groups of seas by their number of nodes: the largest number of each but the last.
@@ -101,6 +101,7 @@ def shares(results: Results, reference: str, by: str = ALL) -> pd.DataFrame:
         changes = {
             name: relative_change(of.to_numpy(), known, PRODUCT) for name, of in values.items()
         }
+        changes[reference] = Interval(0.0, 0.0, 0.0)  # of itself, which is no estimate
         return (1 + pd.DataFrame(changes, index=_ENDS).T).assign(n=len(values))
 
     return _of_groups(results, by, PRODUCT, compared)[[by, "policy", *_ENDS, "n"]]
@@ -111,12 +112,16 @@ def by_group(results: Results, reference: str) -> list[Drawing]:
     drawings = []
     for by, name in GROUPS.items():
         table = shares(results, reference, by)
+        table = table[table["policy"] != reference]
         looks = style.policy_colours(table["policy"])
         with style.panels(4.2) as (figure, ax):
             style.along(style.placed(table, by), looks, "%", ax, linestyle="")
             ax.set(ylabel=f"product, share of {reference}")
         alt = f"The product as a share of that of {reference}, by {name.lower()}"
-        caption = f"n = {table['n'].min()} seas and more per dot; bars are 95 % intervals."
+        caption = (
+            f"n = {table['n'].min()} seas and more per dot; bars are 95 % intervals. Above 100 %, "
+            f"a policy collects more than {reference}."
+        )
         drawings.append(Drawing(figure, alt, caption, table))
     return drawings
 

@@ -34,10 +34,11 @@ from dess.analysis.stats.intervals import (
     by_replication,
     column_intervals,
     level_after,
+    mean_interval,
     stratified,
 )
 from dess.analysis.stats.verdict import may_be_best, within_reach
-from dess.analysis.tables import INTERVALS, MOST_ROWS, YES, Table, counts
+from dess.analysis.tables import INTERVALS, MOST_ROWS, WIDER, YES, Table, allowed_for, counts
 from dess.errors import one_of
 
 MOST_NAMES = 3  # the largest number of settings that are named because they may be as good
@@ -448,6 +449,27 @@ def intervals_in_words(results: Results) -> str:
     """What the intervals of the means of a study's settings are called."""
     is_search = any(results.looks(policy).any() for policy in results.policies)
     return f"{INTERVALS} that allow for the search" if is_search else INTERVALS
+
+
+def allowance_in_words(results: Results, rows: pd.DataFrame, metric: str) -> str:
+    """Why a setting may be the best although its mean is lower; empty if intervals hardly allow it.
+
+    Args:
+        results: The study.
+        rows: Its ``ranked``.
+        metric: The metric that ranks them.
+    """
+    first, of = rows.iloc[0], metric_of(metric)
+    missions = _missions(results, metric, first["policy"])
+    values = missions.loc[missions["point"] == first["point"], metric].to_numpy(float)
+    plain = mean_interval(values[~np.isnan(values)])
+    half = (plain.high - plain.low) / 2
+    wide = (first[f"{metric}_high"] - first[f"{metric}_low"]) / 2
+    if not of.is_bounded or not wide > WIDER * half:
+        return ""
+    best = setting_of(results, first["policy"], first["point"])
+    ends = (f"±{100 * end:.2g} points" for end in (half, wide))
+    return allowed_for(f"the {of.within} of {best}", *ends, int(first["n"]))
 
 
 def best_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:

@@ -25,7 +25,7 @@ from dess.analysis.metrics import (
 from dess.analysis.names import parameter, value_text
 from dess.analysis.results.chunks import parts_of
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import compare, for_choice
+from dess.analysis.stats.differences import compare
 from dess.analysis.stats.distribution import distribution
 from dess.analysis.stats.intervals import (
     LEVEL,
@@ -38,7 +38,17 @@ from dess.analysis.stats.learners import compare_learners
 from dess.analysis.stats.verdict import MARKS, may_be_best, position, within_reach
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.design import NOISE, Saltelli
-from dess.analysis.tables import INTERVALS, MOST_ROWS, YES, Table, compared, counts
+from dess.analysis.tables import (
+    INTERVALS,
+    MARKED,
+    MOST_ROWS,
+    WIDER,
+    YES,
+    Table,
+    allowed_for,
+    compared,
+    counts,
+)
 
 UNGUARDED = "random-unguarded"  # the policy that acts without the return guard
 RESAMPLES = 1000  # bootstrap resamples of the blocks of the design; every metric has the same
@@ -220,6 +230,21 @@ def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
             best = TIED if may_be.sum() > 1 else BEST
             verdicts[rows.index] = np.where(may_be, best, WORSE)
     return means.assign(verdict=verdicts)
+
+
+def weights_in_words(results: Results) -> str:
+    """How means weigh missions with different numbers of UAVs; empty if a study has one number."""
+    ends = {space.uavs for space in results.store.manifest.scenarios}
+    if all(low == high for low, high in ends):
+        return ""
+    policy = best_policy(results.missions)
+    missions = results.missions[results.missions["policy"] == policy]
+    weighted = summary(missions, by=[]).set_index("metric").loc[PRODUCT, "mean"]
+    return (
+        "Every number of UAVs that may be drawn has the same weight in a mean, however often the "
+        f"missions drew it: the product of {policy} is {numbers.percent(weighted)}, and would be "
+        f"{numbers.percent(missions[PRODUCT].mean())} as a plain mean of all missions."
+    )
 
 
 def by_fleet(missions: pd.DataFrame) -> pd.DataFrame:
@@ -410,24 +435,48 @@ def worst_table(results: Results, rows: pd.DataFrame) -> Table:
     return Table(pd.DataFrame(cells), caption, rows)
 
 
+def tests_of(results: Results) -> int:
+    """The number of comparisons that a study allows, by all of the paper's metrics.
+
+    Compared are every two policies, and every learner of several trainings with every heuristic.
+    """
+    trained, policies = learners(results), len(results.policies)
+    several = sum(len(trainings) > 1 for trainings in trained.values())
+    heuristics = policies - sum(map(len, trained.values()))
+    return len(METRICS) * (policies * (policies - 1) // 2 + several * heuristics)
+
+
+def corrected(results: Results, table: pd.DataFrame) -> pd.DataFrame:
+    """A table of comparisons, corrected for all comparisons that the study allows (Bonferroni).
+
+    So it does not matter which of them were chosen by these data, and a comparison has the same
+    p-value in every table of the study.
+
+    Args:
+        results: The study.
+        table: The comparisons, with ``p``.
+    """
+    return table.assign(p_adjusted=(table["p"] * tests_of(results)).clip(upper=1))
+
+
 def comparisons(results: Results) -> pd.DataFrame:
     """Every policy compared with the best one on the same missions, over all design points.
 
     Returns:
-        A row per policy and metric, as ``dess.analysis.compare`` returns it; ``p_adjusted`` also
-        corrects for the choice of the best policy. Empty if there is only one policy, or if a
-        stopping rule gave the policies different missions.
+        A row per policy and metric, as ``dess.analysis.compare`` returns it, ``corrected``. Empty
+        if there is only one policy, or if a stopping rule gave the policies different missions.
     """
     if len(results.policies) < 2 or not _same_missions(results):
         return pd.DataFrame()
-    table = compare(results.missions, best_policy(results.missions), [*METRICS])
-    return for_choice(table, len(results.policies))
+    best = best_policy(results.missions)
+    return corrected(results, compare(results.missions, best, [*METRICS], correction=None))
 
 
 def comparison_table(results: Results) -> Table:
     """The ``comparisons``."""
     data = comparisons(results)
-    return _compared(data, "policy", f"Differences from {data['baseline'].iloc[0]}")
+    caption = f"Differences from {data['baseline'].iloc[0]}"
+    return _compared(results, data, "policy", caption)
 
 
 def learners(results: Results) -> dict[str, list[str]]:
@@ -450,9 +499,9 @@ def learned_against_heuristic(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per learner and metric, as ``dess.analysis.compare_learners`` returns it: about the
-        learner if it has several trainings, otherwise about this one checkpoint. ``p_adjusted``
-        also corrects for the choice of the best policy. Empty if there is nothing to compare, or
-        if a stopping rule gave the policies different missions.
+        learner if it has several trainings, otherwise about this one checkpoint, ``corrected``.
+        Empty if there is nothing to compare, or if a stopping rule gave the policies different
+        missions.
     """
     trained = learners(results)
     learned = {policy for checkpoints in trained.values() for policy in checkpoints}
@@ -460,23 +509,56 @@ def learned_against_heuristic(results: Results) -> pd.DataFrame:
     if not trained or not heuristics or not _same_missions(results):
         return pd.DataFrame()
     baseline = best_policy(results.missions, heuristics)
-    table = compare_learners(results.missions, trained, baseline, [*METRICS])
-    return for_choice(table, len(heuristics))
+    table = compare_learners(results.missions, trained, baseline, [*METRICS], correction=None)
+    return corrected(results, table)
 
 
 def learner_table(results: Results) -> Table:
     """What ``learned_against_heuristic`` finds."""
     data = learned_against_heuristic(results)
     caption = f"Learned policies: differences from {data['baseline'].iloc[0]}, the best heuristic"
-    return _compared(data, "learner", caption)
+    return _compared(results, data, "learner", caption)
 
 
-def _compared(rows: pd.DataFrame, of: str, caption: str) -> Table:
+def _compared(results: Results, rows: pd.DataFrame, of: str, caption: str) -> Table:
     caption = (
-        f"{caption} [percentage points], with {INTERVALS} (▲ better, ▼ worse, ≈ inconclusive); p "
-        "corrected for the number of comparisons and the choice of the best by these data"
+        f"{caption} [percentage points], with {INTERVALS}, each by itself; {MARKED}, by p. "
+        f"{correction_in_words(results)}"
     )
     return Table(compared(rows, of), caption, rows)
+
+
+def allowance_in_words(rows: pd.DataFrame, of: str, metric: str = PRODUCT) -> str:
+    """Why the intervals of differences are wider than the missions alone would make them.
+
+    Args:
+        rows: Rows of ``dess.analysis.compare``.
+        of: The column that tells what is compared.
+        metric: The metric of the example.
+
+    Returns:
+        Sentences with the example that becomes wider by most; empty if none becomes much wider.
+    """
+    rows = rows[(rows["metric"] == metric) & rows["student"].notna()]
+    halves = (rows["high"] - rows["low"]) / 2
+    widest = rows.assign(half=halves)[halves > WIDER * rows["student"]]
+    if widest.empty:
+        return ""
+    row = widest.loc[(widest["half"] / widest["student"].clip(lower=1e-12)).idxmax()]
+    unit = metric_of(metric)
+    scale, words = (100, " points") if unit.in_percent else (1, f" {unit.unit}".rstrip())
+    plain, wide = (f"±{scale * row[half]:.2g}{words}" for half in ("student", "half"))
+    what = f"the difference of {row[of]} in {unit.within}"
+    return allowed_for(what, plain, wide, int(row["n"]))
+
+
+def correction_in_words(results: Results) -> str:
+    """For what p-values are corrected, and why a mark may differ from its interval."""
+    return (
+        f"P-values are corrected for the {tests_of(results):,} comparisons that the policies and "
+        f"metrics allow (Bonferroni). So ≈ may stand beside an interval without 0, which is not "
+        "corrected."
+    )
 
 
 def _same_missions(results: Results) -> bool:

@@ -24,7 +24,7 @@ import pyarrow as pa
 
 from dess import InputError
 from dess.analysis.bound import Bound
-from dess.analysis.metrics import MOST_SLOTS, in_units
+from dess.analysis.metrics import MOST_LOST, MOST_SLOTS, in_units
 from dess.analysis.results import chunks, parquet
 from dess.analysis.results.manifest import ELSEWHERE, NO_TEAM, Cell, Manifest, Selected
 from dess.analysis.study.study import Study
@@ -306,7 +306,7 @@ class Store:
         """The missions of some parts, with their ``point``, in the order of the parts.
 
         ``most_slots`` is the longest that each may last. If the study has prices, the missions have
-        a ``cost``; with a data sheet, what they
+        a ``cost``, and ``most_lost``, what a loss of all UAVs costs; with a data sheet, what they
         measure is there in units as well (``metrics.in_units``).
 
         Raises:
@@ -318,6 +318,7 @@ class Store:
         if costs := self.manifest.study.costs:
             cost = costs.parts(self.manifest.scenarios, missions, self.uavs(parts))
             missions["cost"] = sum(cost.values())
+            missions[MOST_LOST] = costs.of_lost(missions["uavs"].to_numpy())
         if units := self.manifest.units_at(missions["point"].to_numpy()):
             missions = missions.assign(**in_units(missions, units))
         return missions

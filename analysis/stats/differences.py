@@ -203,7 +203,8 @@ def column_tests(
         metric: The metric; by default one without bounds.
 
     Returns:
-        (K, 5): ``difference`` (column - baseline) with ``low``, ``high``, ``p`` and ``n``.
+        (K, 6): ``difference`` (column - baseline) with ``low``, ``high``, ``n``, ``student`` (as in
+        ``Paired``) and ``p``.
     """
     differences = values.sub(baseline, axis=0)
     size = values.abs().max().clip(lower=baseline.abs().max())
@@ -212,7 +213,8 @@ def column_tests(
     present = differences.notna()
     n, mean, of = differences.count(), differences.mean(), metric_of(metric)
     half = -differences.sem() * stdtrit(np.maximum(n - 1, 1), (1 - intervals.LEVEL) / 2)
-    table = pd.DataFrame({"difference": mean, "low": mean - half, "high": mean + half, "n": n})
+    ends = {"low": mean - half, "high": mean + half}
+    table = pd.DataFrame({"difference": mean, **ends, "n": n, "student": half})
     own = values.where(present).mean()
     rare = intervals.rare_differences(metric, own, own - mean)
     if rare is None:
@@ -258,7 +260,8 @@ class Paired(NamedTuple):
 
     ``variance_reduction`` is v = 1 - Var(A - B) / (Var A + Var B). Without common random numbers,
     1 / (1 - v) times as many missions would be needed. If v is negative, pairing made the interval
-    wider.
+    wider. ``student`` is half the length of Student's interval of these differences, without what
+    is added for rare failures; nan for a single pair.
     """
 
     difference: float
@@ -268,6 +271,7 @@ class Paired(NamedTuple):
     correlation: float
     variance_reduction: float
     n: int
+    student: float = np.nan
 
 
 def paired(
@@ -297,7 +301,9 @@ def paired(
     of_a, of_b, of_differences = map(_variance, (a, b, differences))
     correlation = float(np.corrcoef(a, b)[0, 1]) if of_a and of_b else 0.0
     reduction = 1 - of_differences / (of_a + of_b) if of_a + of_b else 0.0
-    return Paired(*mean, p, correlation, reduction, a.size)
+    plain = intervals.mean_interval(differences, level)
+    half = (plain.high - plain.low) / 2
+    return Paired(*mean, p, correlation, reduction, a.size, half)
 
 
 def unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Paired:

@@ -15,9 +15,8 @@ import scipy
 from scipy.special import ndtr, ndtri, stdtrit
 
 from dess import InputError
-from dess.analysis.metrics import REWARD, Metric, known_in, metric_of, metrics_in
+from dess.analysis.metrics import Metric, known_in, metric_of, metrics_in
 from dess.errors import one_of
-from dess.scenario import ScenarioSpace
 
 LEVEL = 0.95
 
@@ -35,11 +34,6 @@ def level_after(looks: Any, level: float = LEVEL) -> Any:
         level: The level after the search.
     """
     return 1 - (1 - level) / np.maximum(looks * (looks + 1), 1)
-
-
-# What a failure costs: the reward of a filled quota is not earned, that of an empty battery is.
-_FIELDS = ScenarioSpace.model_fields
-FAILURE_COST = _FIELDS["reward_quota"].default - _FIELDS["reward_depleted"].default
 
 
 def bounded_ends(mean: Any, variance: Any, n: Any, level: Any = LEVEL) -> tuple[Any, Any]:
@@ -126,7 +120,8 @@ def rare_differences(metric: str | Metric, a: Any, b: Any) -> tuple[Any, Any] | 
 
     For outcomes, they are 1 and -1. Of a metric with a known range, one value goes to an end of
     the range, and the other one stays at its mean: what goes further counts. So a share falls to 0,
-    and an age rises to what it is where no UAV flies. A reward changes by the cost of a failure.
+    and an age rises to what it is where no UAV flies. A reward changes by what a failure costs, and
+    a cost by the price of the fleet.
 
     Args:
         metric: The metric; that of missions (``known_in``) has the range of a time.
@@ -142,8 +137,8 @@ def rare_differences(metric: str | Metric, a: Any, b: Any) -> tuple[Any, Any] | 
     if of.has_range:
         least, most = of.range
         return np.maximum(a - least, most - b), -np.maximum(b - least, most - a)
-    if of.column == REWARD:
-        return a - b + FAILURE_COST, a - b - FAILURE_COST
+    if of.failure:
+        return a - b + of.failure, a - b - of.failure
     return None
 
 

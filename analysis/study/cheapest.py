@@ -219,7 +219,7 @@ class Setting(NamedTuple):
     @classmethod
     def of(cls, values: Mapping[str, Any], space: ScenarioSpace, costs: Costs) -> Self:
         """The setting of a design point."""
-        return cls(values, costs.missions * costs.lost_uav * space.uavs[1], horizon_of(space))
+        return cls(values, costs.of_lost(space.uavs[1]), horizon_of(space))
 
 
 def horizon_of(space: ScenarioSpace) -> float:

@@ -58,6 +58,10 @@ class Costs(StrictTable):
         if self.hour and self.slot_seconds is None and not follows:
             raise InputError(f"{where}: is missing; allowed: with hour, the seconds of a slot")
 
+    def of_lost(self, uavs: Any) -> Any:
+        """What it costs if every mission loses this number of UAVs, in the currency."""
+        return self.missions * self.lost_uav * uavs
+
     def parts(
         self, spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any], uavs: Mapping[str, Any]
     ) -> dict[str, np.ndarray]:

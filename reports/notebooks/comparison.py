@@ -72,8 +72,7 @@ html.gallery(
 # %% [markdown]
 # ## How far to trust it
 #
-# P-values are corrected for the number of comparisons (Holm) and for choosing the pair by these
-# data (Bonferroni); every interval has its level alone. A learner with several trainings is judged
+# Every interval has its level alone. A learner with several trainings is judged
 # by their mean; *one new training* is a prediction interval. A single training stands for itself
 # only.
 
@@ -87,7 +86,13 @@ for caption, rows in found.items():
     if len(rows):
         shown = tables.compared(rows, rows.columns[0])
         of = f"Points ahead of {rows['baseline'].iloc[0]} in n = {len(missions):,} missions"
-        display(html.table(shown, f"{of}; {caption}. ▲ better, ▼ worse, ≈ inconclusive", data=rows))
+        display(html.table(shown, f"{of}; {caption}. {tables.MARKED}, by p", data=rows))
+html.say(
+    "{correction} {why} {weights}",
+    correction=summary.correction_in_words(study),
+    why=summary.allowance_in_words(comparison, "policy"),
+    weights=summary.weights_in_words(study),
+)
 
 # %% [markdown]
 # ## Tables

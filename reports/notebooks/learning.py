@@ -88,7 +88,9 @@ html.gallery(answers.shipped_drawings(shipped), answers.TRAININGS)
 # ## How far to trust it
 #
 # Trainings of a variant differ only in their seed. A variant that was trained once has no interval.
-# P-values are corrected for the number of tests (Holm).
+# P-values are corrected for the number of tests (Holm). The result of a training is the plain mean
+# of missions that draw the number of UAVs. Other pages have other missions, and give each number of
+# UAVs the same weight, so their mean of the same policy may differ by about a point.
 
 # %%
 transfers = answers.transfers(trainings, answers.SHOWN, shortest=values.CROSSING)

@@ -110,7 +110,9 @@ html.gallery(
 
 # %%
 html.say(
-    "{text}", text=html.composed(optimality.in_words(bounded) if bounded else optimality.NOT_RUN)
+    "{weights} {text}",
+    weights=questions.weights_in_words(table4),
+    text=html.composed(optimality.in_words(bounded) if bounded else optimality.NOT_RUN),
 )
 
 # %%

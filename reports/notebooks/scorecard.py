@@ -76,8 +76,9 @@ table(scorecard.DIAGNOSTIC)
 # ## How far to trust it
 #
 # Every interval has its level alone, so some verdicts are wrong by chance. The best learned policy
-# is chosen on the missions that judge it. The paper prints no intervals; where it does not say over
-# how many missions a number is a mean, the number counts as exact.
+# is chosen on the missions that judge it. Every number of UAVs that a study draws has the same
+# weight in a mean, however often the missions drew it. The paper prints no intervals; where it does
+# not say over how many missions a number is a mean, the number counts as exact.
 
 # %%
 html.table(scorecard.counts(rows), "Verdicts by policy")

@@ -89,14 +89,24 @@ html.show(no_check if study.checks.empty else costs.checked_table(study))
 # ## The best settings
 #
 # A *setting* is a policy at a design point. It *may be the best* if no other one is significantly
-# better: with a probability of 95 %, the truly best is among these (paired t tests, Bonferroni).
+# better: with a probability of 95 %, the truly best is among these (paired t tests, corrected for
+# the number of settings and, after a search, of its looks). So a setting of few missions may be the
+# best although its mean is much lower.
 # The mean of the first tends to be too high, since it was ranked first for it.
 
 # %% tags=["if-settings"]
-html.show(settings.best_table(study, ranked, by), settings.best_of_policies(study, by))
+html.show(
+    settings.best_table(study, ranked, by),
+    settings.best_of_policies(study, by),
+    html.say("{why}", why=settings.allowance_in_words(study, ranked, by)),
+)
 
 # %% tags=["if-one-setting"]
-html.show((figures.means(study, of) for of in METRICS), tables.means(summary.means(study)))
+html.show(
+    (figures.means(study, of) for of in METRICS),
+    tables.means(summary.means(study)),
+    html.say("{weights}", weights=summary.weights_in_words(study)),
+)
 
 # %% [markdown] tags=["if-costs"]
 # ## Costs
@@ -177,7 +187,8 @@ html.show(settings.baseline_table(study, baseline, by))
 # The differences are means over all design points, computed replication by replication.
 
 # %% tags=["if-policies"]
-html.show(summary.comparison_table(study))
+compared = summary.comparison_table(study)
+html.show(compared, html.say("{why}", why=summary.allowance_in_words(compared.data, "policy")))
 
 # %% tags=["if-learned"]
 html.show(summary.learner_table(study))

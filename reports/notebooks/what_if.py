@@ -29,6 +29,7 @@ shown = None  # the policy whose missions are drawn; None for the best in the va
 from IPython.display import display
 
 from dess.analysis import metrics, what_if
+from dess.analysis.answers import summary
 from dess.analysis.ask.what_if import measured
 from dess.analysis.metrics import metric_of
 from dess.reports.pages import html
@@ -88,9 +89,11 @@ html.gallery([drawing for example in examples for drawing in example.drawings()]
 
 # %%
 html.say(
-    "{answer}\n\n{reading}\n\n{notes}",
+    "{answer}\n\n{reading}\n\n{why} {weights}\n\n{notes}",
     answer=html.composed(asked.answer()),
     reading=html.composed(asked.reading()),
+    why=summary.allowance_in_words(asked.table(), "policy"),
+    weights=summary.weights_in_words(found),
     notes=page.notes(found),
 )
 

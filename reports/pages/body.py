@@ -32,7 +32,8 @@ TERMS = {
     "paired": "taken in missions with the same random draws",
     "upper bound": "no policy can expect to collect more",
     "95 % intervals": "Wilson's for success; that of a bounded mean for the other shares, which is "
-    "wider and not symmetric; Student's t for differences, with rare failures allowed for",
+    "wider and not symmetric; Student's t with a correction for skewness for other means, and with "
+    "an allowance for rare failures for differences",
     "Holm": "a correction of p-values for the number of comparisons",
 }
 _TERM = re.compile(rf"\b({'|'.join(TERMS)})\b")

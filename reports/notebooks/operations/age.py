@@ -56,6 +56,9 @@ html.say(
 
 # %%
 change = operations.age_changes(study)
+html.say("{why}", why=operations.allowance_in_words(change, "the age"))
+
+# %%
 html.table(
     tables.estimates(change, ["policy", "uavs", "n"], "arrival_rate", operations.relative),
     "Change of the age from one UAV, with intervals of the ratio of means, by arrival rate",

@@ -66,6 +66,9 @@ html.say(
 
 # %%
 lost = operations.changes(study, "pads", study.missions["pads"].max(), PRODUCT)
+html.say("{why}", why=operations.allowance_in_words(lost, "the product"))
+
+# %%
 html.table(
     tables.estimates(lost, ["policy", "pads", "n"], "uavs", numbers.points),
     "Product minus that with the most pads: paired differences in points, by number of UAVs",

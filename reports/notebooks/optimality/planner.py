@@ -21,7 +21,7 @@ learner = "ddqn"  # the policy that has learned
 
 # %%
 from dess.analysis import load_results, numbers, tables
-from dess.analysis.answers import comparison, optimality
+from dess.analysis.answers import comparison, optimality, summary
 from dess.analysis.answers import planner as answers
 from dess.analysis.figures import Drawing
 from dess.analysis.figures.comparison import gaps
@@ -73,7 +73,12 @@ html.gallery(
 # possible policy is between the best one here and this bound.
 
 # %%
-html.say("{gap}", gap=html.composed(optimality.in_words(bounded, planners[-1])))
+html.say(
+    "{gap} {weights} {why}",
+    gap=html.composed(optimality.in_words(bounded, planners[-1])),
+    weights=summary.weights_in_words(study),
+    why=summary.allowance_in_words(differences[differences["uavs"] == optimality.ALL], "policy"),
+)
 
 # %%
 bounds = optimality.by_fleet(bounded)

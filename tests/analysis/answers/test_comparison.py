@@ -9,7 +9,7 @@ import pytest
 
 from dess import InputError
 from dess.analysis import run_study
-from dess.analysis.answers import comparison
+from dess.analysis.answers import comparison, summary
 from dess.analysis.answers.comparison import AHEAD, BEHIND, CALLS, Pair
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.names import PARAMETERS
@@ -49,6 +49,20 @@ def test_the_pair_is_the_best_learned_policy_and_the_best_other(
     assert comparison.pair_of(results, **asked) == Pair(
         ranked[policy], ranked[baseline], candidates
     )
+
+
+def test_a_pair_has_one_p_value_in_every_table(results):
+    """All tables are corrected for the same tests: of three pairs by three metrics."""
+    pair = comparison.pair_of(results)
+    of_pair = comparison.overall(results, pair).set_index("metric")
+    table = summary.comparisons(results)
+    other = table[table["policy"] == {*pair[:2]}.difference(table["baseline"]).pop()]
+    expected = other.set_index("metric")
+    assert of_pair["p_adjusted"].to_dict() == expected["p_adjusted"].to_dict()
+    assert of_pair["p_adjusted"].tolist() == pytest.approx(
+        (9 * of_pair["p"]).clip(upper=1).tolist()
+    )
+    assert "for the 9 comparisons" in summary.comparison_table(results).caption
 
 
 def test_what_is_no_pair_is_refused(results, studied):

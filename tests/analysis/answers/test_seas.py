@@ -47,6 +47,11 @@ def test_gains_and_shares_are_paired_by_sea(results):
     share = seas.shares(results, "greedy").set_index("policy")
     assert share.loc["greedy", ["mean", "low", "high"]].tolist() == pytest.approx([1, 1, 1])
     assert share.loc["nearest", "mean"] == pytest.approx(nearest.mean() / greedy.mean())
+    assert share.loc["nearest", "low"] < share.loc["nearest", "high"]
+    # A share of itself is no estimate, so no figure shows it as one.
+    assert all(
+        {*drawing.data["policy"]} == {"nearest"} for drawing in seas.by_group(results, "greedy")
+    )
 
 
 def test_the_worst_seas_come_first(results):

@@ -11,7 +11,8 @@ from dess import InputError
 from dess.analysis import load_study, run_study
 from dess.analysis.answers import summary
 from dess.analysis.answers.summary import sensitivity
-from dess.analysis.metrics import METRICS, PRODUCT
+from dess.analysis.metrics import METRICS, PRODUCT, RATIO
+from dess.analysis.stats.differences import compare
 from dess.analysis.study.design import Saltelli
 
 # Names only: nothing is simulated.
@@ -99,7 +100,9 @@ def stub(**policies):
         )
         for name, values in policies.items()
     ]
-    results = SimpleNamespace(missions=pd.concat(tables, ignore_index=True))
+    results = SimpleNamespace(
+        missions=pd.concat(tables, ignore_index=True), looks=lambda policy: np.zeros(1, int)
+    )
     rows = [(name, 0, PRODUCT, np.mean(values), 0.0, 1.0) for name, values in policies.items()]
     return results, pd.DataFrame(rows, columns=["policy", "point", "metric", "mean", "low", "high"])
 
@@ -116,6 +119,37 @@ def test_policies_are_compared_on_common_replications():
     results, means = stub(a=spread, b=spread[::-1])
     assert summary.with_verdicts(results, means)["verdict"].tolist() == [summary.TIED] * 2
     assert summary.with_verdicts(results, means[1:])["verdict"].tolist() == [summary.ONLY]
+
+
+def test_an_allowance_for_failures_is_said_with_both_intervals():
+    """One policy is ahead by 0.1 in all of 300 missions, but for a little noise."""
+    ratio = np.linspace(0.6, 0.8, 300)
+    rows = [("a", n, value, 2) for n, value in enumerate(ratio + np.tile([0.095, 0.105], 150))]
+    rows += [("b", n, value, 2) for n, value in enumerate(ratio)]
+    missions = pd.DataFrame(rows, columns=["policy", "replication", PRODUCT, "uavs"])
+    text = summary.allowance_in_words(compare(missions, "b", [PRODUCT]), "policy")
+    # Student's t of ±0.5 points: 1.968 x 0.5 / sqrt(299); with 0.8 and -0.7 added: ±0.7 points.
+    assert "300 missions without one do not rule out a failure in 100 missions" in text
+    assert (
+        "the difference of a in product would be known to ±0.057 points; with it, to ±0.7" in text
+    )
+    unlike = missions.assign(**{PRODUCT: np.random.default_rng(1).random(600)})
+    assert summary.allowance_in_words(compare(unlike, "b", [PRODUCT]), "policy") == ""
+
+
+def test_it_is_said_how_means_weigh_the_numbers_of_uavs():
+    """Of one UAV, which is drawn most often, the product is 0.4, of two UAVs 0.8."""
+    uavs = np.repeat([1, 2], [30, 10])
+    missions = pd.DataFrame({"policy": "a", "point": 0, "uavs": uavs, PRODUCT: 0.4 * uavs})
+    missions = missions.assign(replication=range(40), **dict.fromkeys(("success", RATIO), 1))
+    manifest = SimpleNamespace(scenarios=[SimpleNamespace(uavs=(1, 2))])
+    results = SimpleNamespace(
+        missions=missions.assign(reward=0.0), store=SimpleNamespace(manifest=manifest)
+    )
+    text = summary.weights_in_words(results)
+    assert "the product of a is 60.0 %, and would be 50.0 % as a plain mean" in text
+    manifest.scenarios[0].uavs = (2, 2)
+    assert summary.weights_in_words(results) == ""
 
 
 def test_targets_are_met_by_the_lower_end():

@@ -7,8 +7,8 @@ from pandas.testing import assert_frame_equal
 from scipy import stats
 
 from dess import InputError
-from dess.analysis.metrics import PRODUCT, REWARD, SUCCESS
-from dess.analysis.stats.differences import Paired, adjust, compare, paired
+from dess.analysis.metrics import MOST_LOST, MOST_SLOTS, PRODUCT, REWARD, SUCCESS, known_in
+from dess.analysis.stats.differences import Paired, adjust, column_tests, compare, paired
 
 METRIC = "collection_ratio"
 
@@ -197,3 +197,24 @@ def test_equal_differences_of_bounded_values_have_an_interval_and_its_p_value(di
     assert result.low < result.difference == difference < result.high
     assert result[1:3] == pytest.approx([*expected.confidence_interval()])
     assert result.p == pytest.approx(expected.pvalue)
+
+
+@pytest.mark.parametrize(
+    ("metric", "value", "column", "largest", "change"),
+    # The way of an age to half of the horizon is the longest, that of a length to all of it.
+    [("age", 40.0, MOST_SLOTS, 500, 210.0), ("slots", 40.0, MOST_SLOTS, 500, 460.0)]
+    + [("age_h", 4.0, "most_slots_h", 50, 21.0), ("waiting_min", 60.0, "most_slots_h", 50, 2940.0)]
+    + [("cost", 40.0, MOST_LOST, 9000, 9000.0)],
+)
+def test_equal_values_do_not_rule_out_a_failure(metric, value, column, largest, change):
+    """Both policies have the same value in all of 100 missions, and the interval has a length."""
+    missions = pd.DataFrame(
+        {"policy": np.repeat(["tour", "greedy"], 100), "replication": np.tile(range(100), 2)}
+    ).assign(**{metric: value, column: largest})
+    expected = stats.ttest_1samp([0.0] * 100 + [change, -change], 0).confidence_interval()
+    row = compare(missions, "tour", [metric]).iloc[0]
+    assert row[["difference", "p"]].tolist() == [0.0, 1.0]
+    assert row[["low", "high"]].tolist() == pytest.approx([*expected])
+    alike = pd.Series(np.full(100, value))
+    table = column_tests(alike.to_frame("a"), alike, known_in(missions, metric))
+    assert table.loc["a", ["low", "high"]].tolist() == pytest.approx([*expected])
