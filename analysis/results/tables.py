@@ -101,9 +101,10 @@ class Results:
             fields that the design sets and that are not in the record, and the fields of
             ``MISSION_RECORD``, then those of ``OPERATIONS`` that were measured, with nan where a
             mission lacks one. Rows are in the order of the policies in the study, then of point
-            and replication. If the study has prices, ``cost`` comes next; with a data sheet, times
-            and data follow in units, such as ``age_h``. If it has bounds, the last columns are
-            ``upper_bound``, and ``optimality_gap``: the bound minus the product.
+            and replication. ``most_slots`` is the longest that each may last. If the study has
+            prices, ``cost`` comes next, and ``most_lost``, what a loss of all UAVs costs; with a
+            data sheet, times and data follow in units, such as ``age_h``. If it has bounds, the
+            last columns are ``upper_bound``, and ``optimality_gap``: the bound minus the product.
         uavs: One row per UAV of each mission: ``policy``, ``point``, ``replication``, ``uav`` and
             the fields of ``UAV_RECORD``, with ``end`` as a name.
         checks: Further missions, in rows as above, of the design points that were selected; the
