@@ -248,7 +248,7 @@ def age(results: Results) -> str:
     parts = []
     for rate in dict.fromkeys([ends.index.min(), ends.index.max()]):
         (change,) = changed[changed["arrival_rate"] == rate].itertuples()
-        ages = [numbers.decimals(*row, 1) for row in ends.loc[[rate]].to_numpy()]
+        ages = [numbers.decimals(*row, digits=1) for row in ends.loc[[rate]].to_numpy()]
         parts.append(
             f"{verbs[position(change)]} from {' to '.join(ages)} slots at an arrival rate of "
             f"{value_text(rate)}"

@@ -468,8 +468,8 @@ def allowance_in_words(results: Results, rows: pd.DataFrame, metric: str) -> str
     if not of.is_bounded or not wide > WIDER * half:
         return ""
     best = setting_of(results, first["policy"], first["point"])
-    ends = (f"±{100 * end:.2g} points" for end in (half, wide))
-    return allowed_for(f"the {of.within} of {best}", *ends, int(first["n"]))
+    alone, allowing = (f"±{100 * end:.2g} points" for end in (half, wide))
+    return allowed_for(f"the {of.within} of {best}", alone, allowing, int(first["n"]))
 
 
 def best_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
