@@ -68,7 +68,7 @@ def print_details(
         "means": lambda means: _print_by_point(results, means, metrics),
         "distributions": _print_distributions,
         "precisions": lambda table: _print_precisions(results, table),
-        "comparisons": _print_comparisons,
+        "comparisons": lambda table: _print_comparisons(results, table),
         "gaps": lambda table: print_frame(
             "optimality gap", optimality.listed(table).set_index("Policy")
         ),
@@ -191,13 +191,16 @@ def _print_distributions(table: pd.DataFrame) -> None:
     print_frame("spread of the product", summary.spread(rows, PRODUCT).cells.set_index("Policy"))
 
 
-def _print_comparisons(table: pd.DataFrame) -> None:
+def _print_comparisons(results: Results, table: pd.DataFrame) -> None:
     """Differences of the other policies from the best one."""
     cells, product = differences(table, "policy")
     # How many times as many missions the comparison needs without common random numbers.
     gains = product["variance_reduction"].map(lambda v: f"{1 / (1 - v):.1f} x" if v < 1 else "")
     cells["pairing saves"] = gains
     print_frame(f"against {table['baseline'].iloc[0]} [points]", cells)
+    console.say(f" {summary.correction_in_words(results)}")
+    if why := summary.allowance_in_words(table, "policy"):
+        console.say(f" {why}")
 
 
 def _print_learners(table: pd.DataFrame) -> None:
