@@ -72,8 +72,11 @@ def changelog() -> str:
 def readme(heading: str) -> str:
     """A section of the README, with its links as a page in the root of the site has them."""
     text = LINK.sub(lambda link: place(link[0]), section_of_readme(heading))
-    # A paragraph of a list item, which GitHub takes from three spaces on, and MkDocs from four on.
-    return f"## {heading}\n{re.sub(r'^ {3}(?=[^ ])', ' ' * 4, text, flags=re.M)}"
+    # MkDocs indents the paragraphs of a list item by four spaces, GitHub by three; and in MkDocs an
+    # item needs an empty line before it.
+    text = re.sub(r"^ {3}(?=[^ ])", " " * 4, text, flags=re.M)
+    text = re.sub(r"\n(?=\d\. )", "\n\n", text)
+    return f"## {heading}\n{text}"
 
 
 def section_of_readme(heading: str) -> str:

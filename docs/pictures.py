@@ -26,8 +26,9 @@ from dess import load_scenario, policies, simulate
 from dess.analysis.figures import missions, style
 from dess.analysis.results import event_log
 from dess.errors import InputError
-from dess.reports.pages import html
+from dess.reports.pages import INDEX, html
 from dess.reports.pages.page import Page
+from dess.reports.pages.render import TILES
 
 HERE = Path(__file__).parent
 GALLERY, MODEL = HERE / "gallery", HERE / "model"
@@ -73,10 +74,13 @@ def is_current(name: str, pages: Path) -> bool:
 
 
 def finding_of(path: Path) -> str:
-    """The sentence of a page of a shipped question, or nothing."""
+    """The sentence of the page of a shipped question, if any; of the index those of its tiles."""
+    if path.name == INDEX:
+        tiles = [finding_of(path.with_name(page)) for page in TILES]
+        return "; ".join(tiles) if all(tiles) else ""
     try:
         card = Page.read(path).card
-    except (OSError, InputError):  # there is none, as on the index
+    except InputError:  # there is no such page
         return ""
     return card.finding if card.key else ""
 

@@ -167,6 +167,16 @@ def test_the_pictures_of_the_model_are_those_of_their_command():
         assert f"](../model/{name})" in PAGES["docs/concepts/model.md"]
 
 
+@pytest.mark.slow
+def test_the_pictures_of_the_gallery_are_as_new_as_the_pages():
+    """Of the look of the pages and, where ``nox -s reports`` has made them, of what they say."""
+    assert pictures.outdated(ROOT / "build" / "reports") == [], (
+        "renew them: nox -s reports, then python -m docs.pictures build/reports"
+    )
+    shown = re.findall(r"\]\(gallery/(.*)\.png\)", PAGES["docs/gallery.md"])
+    assert sorted(shown) == sorted(pictures.PAGES)
+
+
 def test_a_picture_that_is_older_than_its_page_is_found(tmp_path, monkeypatch):
     monkeypatch.setattr(pictures, "GALLERY", tmp_path)
     monkeypatch.setattr(pictures, "finding_of", lambda _: "Two pads are enough.")

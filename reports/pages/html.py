@@ -37,6 +37,8 @@ from dess.errors import printable
 from dess.reports.pages import ASKED
 from dess.reports.pages.page import FILES, STUDY, Learned, Page, hidden
 
+STUDIES_BESIDE = 6  # studies with a column in one table of what they were made with
+FEW_WORDS = 18  # characters of a cell that is not broken
 SHORT = 12  # characters of a hash that are shown
 PART = "application/vnd.dess.part+json"  # type of the output of a cell that contains a ``Part``
 
@@ -196,13 +198,15 @@ def provenance(studies: Iterable[Results]) -> HTML:
 
 
 def carrying(evidence: Sequence[Evidence]) -> HTML:
-    """A table of what studies were made with, a column for each, and hidden elements with it all.
+    """Tables of what studies were made with, a column for each, and hidden elements with it all.
 
     Args:
         evidence: The evidence of the studies.
     """
+    starts = range(0, len(evidence), STUDIES_BESIDE)
+    tables = [_origins(evidence[start : start + STUDIES_BESIDE]).data for start in starts]
     inside = [hidden(STUDY, json.dumps(of_study.data)) for of_study in evidence]
-    return HTML((_origins(evidence).data if evidence else "") + "".join(inside))
+    return HTML("".join([*tables, *inside]))
 
 
 def _origins(evidence: Sequence[Evidence]) -> HTML:
@@ -309,7 +313,9 @@ def _width(digits: str) -> float:
 
 
 def _kept_together(cell: str) -> str:
-    """The text of a cell without breaks before a unit and within an interval."""
+    """The text of a cell without breaks in a few words, before a unit and within an interval."""
+    if len(cell) <= FEW_WORDS and "[" not in cell:
+        return cell.replace(" ", "\N{NO-BREAK SPACE}")
     together = _UNIT.sub("\\1\N{NO-BREAK SPACE}", cell)
     return _BRACKETS.sub(lambda found: found[0].replace(" ", "\N{NO-BREAK SPACE}"), together)
 

@@ -76,6 +76,14 @@ def test_pages_and_results_that_nobody_altered_agree(results, page):
     assert compared == {"table4": 24, "fig4": 72, "fig4, event logs": 6}
 
 
+def test_the_origins_of_many_studies_stand_in_several_tables(results):
+    """So that no column is beyond the edge of a page."""
+    evidence = Evidence.of(load_results(results / "fig4"))
+    shown = html.carrying([evidence] * (html.STUDIES_BESIDE + 1)).data
+    assert shown.count("<table") == 2
+    assert len(Page(shown).evidence) == 1  # of the same study
+
+
 def test_a_page_whose_missions_were_altered_is_found_by_simulating_them(page, tmp_path):
     """Even where the checksum was made anew."""
     text = Page.read(page).hidden(STUDY)[0]
