@@ -163,7 +163,8 @@ def test_the_pictures_of_the_model_are_those_of_their_command():
     drawn = dict(pictures.draw_model())
     assert {path.name for path in pictures.MODEL.iterdir()} == {*drawn}
     for name, content in drawn.items():
-        assert (pictures.MODEL / name).read_bytes() == content, name
+        is_current = (pictures.MODEL / name).read_bytes() == content
+        assert is_current, f"{name} is another one; renew it: python -m docs.pictures"
         assert f"](../model/{name})" in PAGES["docs/concepts/model.md"]
 
 

@@ -66,7 +66,7 @@ _CELL = re.compile(r"<td>(.*?)</td>", re.S)
 # In a cell: the number at its beginning up to the decimal point; a number before its unit; an
 # interval.
 _NUMBER = re.compile(r"[-+−]?\d[\d,]*(?![\w–/-])")
-_UNIT = re.compile(r"(\d) (?=[%▲▼≈]|[^\W\d]+ \[|[^\W\d]+$)")
+_UNIT = re.compile(r"([\d\]]) (?=[%▲▼≈]|[^\W\d]+ \[|[^\W\d]+$)")
 _BRACKETS = re.compile(r"\[[^\[\]]*\]")
 _EMPTY_HEADER = re.compile(r"<th([^>]*)></th>")  # which is no header for a screen reader
 _BREAKS = re.compile(rb"\s+([LCQz]) ?")
