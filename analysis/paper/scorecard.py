@@ -306,7 +306,9 @@ def answer(rows: Sequence[Row]) -> str:
     policy = names(rows)[0]
     held = sum(row.findings[0].passes for row in telling)
     short = [f"“{row.claim.text}”" for row in telling if row.findings[0].fails]
-    without = sum(row.findings[0].passes for row in (*passed, *undecided))
+    without, undecided_held = (
+        sum(row.findings[0].passes for row in rows_of_kind) for rows_of_kind in (passed, undecided)
+    )
     shared = sum(row.findings[0].outcome == measures.SHARED for row in weaknesses)
     sentences = [
         f"Of {len(rows)} claims, {len(telling)} are diagnostic: {numbers.words(NULLS)}, as far as "
@@ -316,8 +318,9 @@ def answer(rows: Sequence[Row]) -> str:
     if short:
         sentences.append(f"It falls short of {numbers.words(short)}.")
     sentences.append(
-        f"It passes {without} of {len(passed) + len(undecided)} claims that say nothing about "
-        f"learning, and has {shared} of {len(weaknesses)} weaknesses that the paper names."
+        f"Of the others, it passes {without} of {len(passed)} that a policy without learning "
+        f"passes too, and {undecided_held} of {len(undecided)} on which such policies decide "
+        f"nothing; it has {shared} of {len(weaknesses)} weaknesses that the paper names."
     )
     return " ".join(sentences)
 

@@ -63,16 +63,12 @@ html.say("{text}", text=answers.without_each(last))
 # to charge from transitions in which a UAV enters the zone with a low battery and waits there.
 
 # %%
-html.say(
-    "How many trainings learn to charge: {counts}.",
-    counts=numbers.words(
-        [
-            f"{name} with transfer {answers.learning_to_charge(last, using)}, without "
-            f"{answers.learning_to_charge(last, without)}"
-            for name, (using, without) in answers.pairs_in(trainings).items()
-        ]
-    ),
-)
+lines = [
+    f"- {name}: {answers.learning_to_charge(last, using)} with transfer, "
+    f"{answers.learning_to_charge(last, without)} without"
+    for name, (using, without) in answers.pairs_in(trainings).items()
+]
+html.say("Trainings that learn to charge:\n\n{lines}", lines=html.composed("\n".join(lines)))
 
 # %%
 html.gallery(answers.transfer_drawings(trainings), answers.TRAININGS)
