@@ -97,12 +97,12 @@ def is_same(said: str, printed: str) -> bool:
 def quote_anew(path: Path, step: Step, output: str) -> None:
     """Put what is printed now into a page; lines that still hold stay, with what they leave open.
 
-    If there are more or fewer lines than before, all of them are new.
+    A line that is ``...`` alone is lost: it may stand for any number of lines.
     """
-    said, printed = step.output.splitlines(), output.splitlines()
-    if len(said) == len(printed):
-        lines = zip(said, printed, strict=True)
-        printed = [old if is_same(old, new) else new for old, new in lines]
+    said = [line for line in step.output.splitlines() if line.strip() != "..."]
+    printed = [
+        next((old for old in said if is_same(old, line)), line) for line in output.splitlines()
+    ]
     text = path.read_text("utf-8")
     assert text.count(step.output) == 1, f"{path}: the same output stands there twice"
     quoted = "".join(f"{line.rstrip()}\n" for line in printed)
