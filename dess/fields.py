@@ -1,16 +1,17 @@
 """The fields of a scenario: all constants of the model, and what follows from them alone."""
 
+from fractions import Fraction
 from functools import cache
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, TypeAdapter
+from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
 from pydantic.fields import FieldInfo
 
 from dess.errors import InputError, shown
 from dess.sea.chart import MOST_CHARTED, Cell, Chart, Rectangle, chart_at
 from dess.sections.age import Age
 from dess.sections.arrivals import Arrivals
-from dess.sections.charging import Charging
+from dess.sections.charging import Charging, charge_fraction
 from dess.sections.data_sheet import DataSheet, Units
 from dess.sections.failures import Failures
 from dess.sections.fleet import UavType
@@ -49,6 +50,11 @@ Latitude = Annotated[Number, Field(ge=-90, le=90)]
 def is_number(value: Any) -> bool:
     """Whether a value is an integer or a float, and no truth value."""
     return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _whole(value: float) -> float:
+    """A number without a fraction as an integer: compiled code has one type for all of them."""
+    return int(value) if value == int(value) else value
 
 
 # Lets a single number stand for a range of one element.
@@ -132,7 +138,7 @@ class Fields(Strict):
     )
 
     # Energy
-    charge_rate: Integer | Number = Field(
+    charge_rate: Annotated[Integer | Number, AfterValidator(_whole)] = Field(
         10,
         ge=0.01,
         le=100,
@@ -240,6 +246,13 @@ class Fields(Strict):
     def charging_pads(self) -> int:
         """Number of charging pads of all zones together."""
         return sum(self.zone_pads)
+
+    @property
+    def charge_fraction(self) -> Fraction:
+        """The battery gained in a charging slot [%], exactly as it or the data sheet was typed."""
+        sheet = self.data_sheet
+        given = sheet.charge_rate if sheet.is_on else Fraction(str(self.charge_rate))
+        return charge_fraction(given)
 
     @property
     def is_extended(self) -> bool:

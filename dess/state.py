@@ -48,8 +48,8 @@ MISSION = np.dtype(
         ("is_extended", np.int64),
         # Time, fleet and energy.
         *fields(np.int64, "communication_slots max_slots uavs flying_time charge_start"),
-        *fields(np.int64, "charge_complete charge_rate flight_cost quota"),
-        ("charge_gain", np.float64),  # the battery gained in a charging slot, if it is not whole
+        # A charging slot gains ``charge_rate / charge_slots`` percent, in lowest terms.
+        *fields(np.int64, "charge_complete charge_rate charge_slots flight_cost quota"),
         ("landing", np.int64),  # whether missions end on the ground
         # Charging (dess.sections.charging); ``plans_waits`` tells whether the return guard allows
         # for the wait for a pad.
@@ -198,7 +198,8 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         "communication_slot_length": scenario.slot_length / scenario.communication_slots,
         "shadowing_deviation": np.sqrt(scenario.shadowing_variance),
         **{"continuous": scenario.needs_events, "age_measured": slotted_age},
-        "charge_gain": scenario.charge_rate if scenario.charge_rate % 1 > 0 else 0.0,
+        "charge_rate": scenario.charge_fraction.numerator,
+        "charge_slots": scenario.charge_fraction.denominator,
         **{"range": scenario.radio.range, "max_rate": scenario.radio.max_rate},
         "age_reward": scenario.age.reward,
         **({"arrival_rate": np.mean(scenario.node_rates)} if own_rates else {}),

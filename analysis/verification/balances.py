@@ -163,7 +163,8 @@ def _charges_rightly(log: Log, before: pd.Series) -> pd.Series:
     )
     charge = pd.Series(begins).groupby(table["uav"]).cumsum()
     k = charging.groupby([table["uav"], charge]).cumsum()  # the slots of the present charge
-    added = np.floor(k * s.charge_rate) - np.floor((k - 1) * s.charge_rate)
+    rate, slots = s.charge_fraction.as_integer_ratio()
+    added = k * rate // slots - (k - 1) * rate // slots
     wanted = (s.charge_complete - before).clip(upper=added).where(charging, 0)
     gain = (table["battery"] - before).where(charging, 0)
     of_all = gain.groupby(place).transform("sum")

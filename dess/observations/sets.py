@@ -38,7 +38,7 @@ _PROBES = (1.0, 3.0, 8.0)
 # The fields of ``MISSION`` that ``sea_of`` reads and that a batch need not share.
 _FIELDS = (
     *("zone_pads", "initial_low", "initial_high", "arrival_rate", "charge_rate"),
-    *("charge_gain", "max_rate", "communication_slot_length"),
+    *("charge_slots", "max_rate", "communication_slot_length"),
 )
 
 
@@ -78,7 +78,7 @@ def sea_of(mission: Any, world: World) -> Sea:
     most = length * (float(mission["max_rate"]) or np.inf)
     rates = np.minimum(length * log10(1 + 10 ** (snr / 10)) / np.log10(2), most) / unit
     probes = np.interp(_PROBES, np.arange(len(rates)), rates)
-    charging = mission["charge_gain"] or mission["charge_rate"]
+    charging = mission["charge_rate"] / mission["charge_slots"]
     others = [40 * arriving / unit, charging / 10]
     return Sea(
         world.chart,

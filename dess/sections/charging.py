@@ -1,6 +1,6 @@
 """The order in which UAVs are given charging pads, and the power that the pads share."""
 
-import math
+from fractions import Fraction
 from typing import Any, Literal
 
 import numpy as np
@@ -55,29 +55,53 @@ def is_before(mission, u, other):
     return u.pad_request < other.pad_request
 
 
+# The largest denominator of a rate: sums of as many slots as a mission has are 64-bit integers.
+_MOST_SLOTS = 10**11
+
+
+def charge_fraction(rate: Fraction) -> Fraction:
+    """The rate of charging [% per slot] as rules and planner reckon with it.
+
+    It is exact for numbers of at most eleven decimals.
+    """
+    return rate.limit_denominator(_MOST_SLOTS)
+
+
 @for_sections
 def _is_fractional(mission):
     """Whether what a charging slot adds is not whole."""
-    return mission.charge_gain > 0.0
+    return mission.charge_slots > 1
+
+
+@inlined
+def charged_after(mission, k):
+    """The battery [%] that the first ``k`` slots of a charge add: ``floor(k g)`` at a rate g.
+
+    The rate is a fraction of integers, so it is exact.
+    """
+    if _is_fractional(mission):
+        return k * mission.charge_rate // mission.charge_slots
+    return k * mission.charge_rate
 
 
 @inlined
 def gain(mission, k):
-    """The battery [%] that slot ``k`` = 1, 2, ... of a charge adds.
-
-    It is whole; at a rate of g, the first k slots add ``floor(k g)``.
-    """
-    if _is_fractional(mission):
-        rate = mission.charge_gain
-        return int(math.floor(k * rate)) - int(math.floor((k - 1) * rate))
-    return mission.charge_rate
+    """The battery [%] that slot ``k`` = 1, 2, ... of a charge adds."""
+    return charged_after(mission, k) - charged_after(mission, k - 1)
 
 
 @inlined
-def slots_to_charge(mission, lacking):
-    """The slots that a charge takes that adds so much battery [%]."""
+def slots_to_charge(mission, lacking, begun=0):
+    """The least number of further slots in which a charge adds so much battery [%].
+
+    Args:
+        mission: ``MISSION`` record.
+        lacking: What is to be added [%].
+        begun: The slots of the charge until now; 0 for one that begins.
+    """
     if _is_fractional(mission):
-        return int(math.ceil(lacking / mission.charge_gain))
+        added = charged_after(mission, begun) + lacking
+        return -(-added * mission.charge_slots // mission.charge_rate) - begun
     return (lacking + mission.charge_rate - 1) // mission.charge_rate
 
 
@@ -127,5 +151,5 @@ def write_use(mission, uavs, out):
         charged += uavs[i].slots_charging
     out.pad_requests = mission.pad_requests
     out.queue = waited / mission.slot
-    out.waiting = waited / mission.pad_requests if mission.pad_requests > 0 else math.nan
+    out.waiting = waited / mission.pad_requests if mission.pad_requests > 0 else 0.0
     out.utilisation = charged / (mission.pads * mission.slot)

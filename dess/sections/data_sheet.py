@@ -10,12 +10,13 @@ at cruising speed, and a data unit what the bandwidth carries in a slot at 1 bit
 
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any, NamedTuple, NoReturn, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from dess.errors import InputError, shown
-from dess.sections.quantities import KINDS, form_of, measured, printed, refuse
+from dess.sections.quantities import KINDS, exactly, form_of, measured, printed, refuse
 from dess.sections.section import Section
 from dess.sections.wind import Moves, largest_wind, moves_in
 
@@ -175,6 +176,13 @@ class DataSheet(Section):
         slot = self.number("endurance") / 100
         return Units(slot, slot * self.number("cruise"), slot * self.number("bandwidth"))
 
+    @property
+    def charge_rate(self) -> Fraction:
+        """The battery that a charging slot adds [%], exactly as the times were typed."""
+        endurance, charging = self.endurance, self.charging
+        assert endurance and charging
+        return exactly(endurance, "s")[0] / exactly(charging, "s")[0]
+
     def number(self, name: str, missing: float = 0.0) -> float:
         """The first number of a field in SI units, bits, percent or decibels."""
         text = getattr(self, name)
@@ -187,11 +195,12 @@ class DataSheet(Section):
             InputError: If slots and cells are too coarse or too fine for the sheet.
         """
         full = 100 - math.ceil(self.number("reserve") - 1e-9)
-        gain = 100 / self._slots("charging", 10_000)
+        self._slots("charging", 10_000)
+        gain = self.charge_rate
         found: dict[str, Any] = {
             **{"cell_size": self.units.cell, "slot_length": 1.0, "landing": True, "quota": 0},
             **{"flying_time": full, "charge_start": 30, "charge_complete": full},
-            "charge_rate": int(gain) if gain.is_integer() else gain,
+            "charge_rate": int(gain) if gain.denominator == 1 else float(gain),
             **self._data(),
             **self._radio(),
         }

@@ -116,6 +116,7 @@ CRAFT = np.dtype(
         *fields(
             np.int64, "x y battery counted active latch charging next stayed action slots_left"
         ),
+        ("charge_slots", np.int64),  # of the present charge
         # Of the plan: its waypoints, and the last one to charge at, -1 without one.
         *fields(np.int64, "waypoints last_charge"),
         # Constants.
@@ -181,6 +182,7 @@ def begin(mission, uavs, residual, flight):
         v.charging, v.latch, v.active = u.charging, u.latch, u.active and not u.grounded
         v.next, v.stayed, v.slots_left, v.action = 0, 0, u.slots_left, u.executed
         v.quota, v.slots_per_cell, v.rate = u.quota, u.slots_per_cell, u.rate
+        v.charge_slots = u.charge_slots
     wait = _revival(mission)
     for k in range(mission.nodes):
         node = flight.sea[0, k]
@@ -258,14 +260,14 @@ def fly(mission, rates, plan, source, first, flight, slots, lag):
             if v.active == 0:
                 continue
             if v.charging != 0:
-                v.battery = min(v.battery + gain(mission, t + 1), mission.charge_complete)
+                _charge(mission, v)
                 continue
             if v.next > v.last_charge and not lands(mission):
                 penalty += _unplanned(mission, v, active, data_left)
             penalty += _act(mission, rates, waypoints, team, i, t, active)
             asks = v.latch != 0 and v.action == HOVER and in_zone(rates.chart, v.x, v.y)
             if asks and _has_pad(mission, rates.chart, team, v):
-                penalty += _begin_to_charge(mission, v, t, active)
+                penalty += _begin_to_charge(mission, v, active)
             elif _stands(mission, rates.chart, v):
                 v.battery += mission.flight_cost
         active = 0
@@ -440,11 +442,18 @@ def _has_pad(mission, chart, team, v):
 
 
 @inlined
-def _begin_to_charge(mission, v, t, active):
+def _charge(mission, v):
+    """Let a UAV charge for a slot."""
+    v.charge_slots += 1
+    v.battery = min(v.battery + gain(mission, v.charge_slots), mission.charge_complete)
+
+
+@inlined
+def _begin_to_charge(mission, v, active):
     """Let a UAV charge, and return the penalty if its battery is below the guard's reserve."""
     before = v.battery + mission.flight_cost
-    v.charging = 1
-    v.battery = min(before + gain(mission, t + 1), mission.charge_complete)
+    v.charging, v.charge_slots, v.battery = 1, 0, before
+    _charge(mission, v)
     return _LATE * max(1 + _reserve(mission, v, active) - before, 0)
 
 

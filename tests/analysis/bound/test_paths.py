@@ -14,7 +14,7 @@ def paper_like(**values: object) -> ScenarioSpace:
     nodes = tuple((x, y) for x in (1, 4, 7) for y in (1, 4, 7))
     battery = {"flying_time": 11, "charge_start": 10, "charge_complete": 13, "charge_rate": 5}
     space = {"grid": 9, "nodes": nodes, "zone": (3, 3, 2, 2), "quota": 60, "edge_snr": -15.0}
-    return load_scenario("paper", uavs=1, **space | battery | values)
+    return load_scenario("paper", uavs=1, **(space | battery | values))
 
 
 def test_the_derivatives_are_those_of_the_bound():
@@ -25,6 +25,12 @@ def test_the_derivatives_are_those_of_the_bound():
     step = 1e-6 * generator.normal(size=prices.shape)
     change = bounds.at(prices + step)[0] - bounds.at(prices - step)[0]
     assert change == pytest.approx(2 * (slope * step).sum(), rel=1e-3)
+
+
+def test_a_whole_rate_of_charging_has_a_bound_however_it_is_written():
+    spaces = [paper_like(charge_rate=rate) for rate in (5, 5.0)]
+    found = [Bounds(known_of(space, 4, 0), Detail()).at(np.full((2, 9), 0.3)) for space in spaces]
+    assert found[0][0] == found[1][0]
 
 
 def test_every_refinement_lowers_the_bound_at_the_same_prices():

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from fractions import Fraction
 from itertools import accumulate, pairwise, starmap
 from typing import Any
 
@@ -73,7 +74,7 @@ class Pads:
         for zone in range(len(self.zones)):
             left = self.power or math.inf
             for i in self._in_order(zone, "charging"):
-                u, rate = self.fleet.uavs[i], self.c["charge_rate"]
+                u, rate = self.fleet.uavs[i], Fraction(str(self.c["charge_rate"]))
                 u.charge_slots += 1
                 added = math.floor(u.charge_slots * rate) - math.floor((u.charge_slots - 1) * rate)
                 gain = min(added, self.complete - u.battery, left)

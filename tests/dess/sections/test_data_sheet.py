@@ -232,5 +232,6 @@ def test_amounts_are_printed_in_the_unit_that_suits_them():
 def test_the_bay_with_a_sheet_has_its_constants():
     bay = load_scenario("jade-bight")
     mission = constants_of(bay)[0]
-    assert mission["charge_gain"] == 0.875 and mission["max_rate"] == 6 and mission["range"] == 2000
+    assert (mission["charge_rate"], mission["charge_slots"]) == (7, 8)
+    assert mission["max_rate"] == 6 and mission["range"] == 2000
     assert len(bay.nodes) == 23 and len(bay.rectangles) == 2 and bay.names[0] == "Jade 1"

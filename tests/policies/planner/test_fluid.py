@@ -96,6 +96,19 @@ def test_a_flight_is_the_engines_where_nothing_is_random(uavs, quota):
         )
 
 
+@pytest.mark.parametrize("flying_time", [11, 12, 14])
+def test_a_charge_adds_what_the_engines_add_whenever_it_begins(flying_time):
+    """At 0.7 % a slot, which slots of a charge add 1 % depends on when it began."""
+    fields = {"flying_time": flying_time, "charge_rate": 0.7, "quota": 400, "max_slots": 60}
+    scenario = ScenarioSpace.of(**ALONE | CALM | fields)
+    policy = _Follow(_plan(1, [(2, 2, CHARGE)]), 60)
+    record = simulate(scenario, policy, 5, 0, events=True)
+    assert record.events is not None
+    battery = [event.battery for event in record.events if event.event == "move"]
+    assert battery[:60] == [int(craft["battery"][0]) for craft in policy.crafts[1:]]
+    assert battery[59] > 40
+
+
 @pytest.mark.parametrize("replication", range(4))
 def test_more_search_is_never_worse(replication):
     """The value that is returned is that of the plan, and each search keeps the best it finds."""
