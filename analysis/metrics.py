@@ -261,6 +261,11 @@ def known_in(missions: pd.DataFrame, column: str) -> Metric:
     return of.lasting(float(missions[longest.column].max()) * units)
 
 
+def in_either(*columns: str) -> list[str]:
+    """Metrics as they are measured and as they are told."""
+    return [*columns, *(_TOLD[column] for column in columns)]
+
+
 def told(column: str, missions: Container[str]) -> str:
     """The column in which a table of missions tells a metric: in units if there is a data sheet."""
     return of if (of := _TOLD.get(column, column)) in missions else column

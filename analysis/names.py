@@ -56,11 +56,18 @@ class Field:
     def words(self, value: Any) -> str:
         """A value in words: ``3 UAVs``, ``failed UAVs lost for good``, ``arrival rate 0.02``."""
         text = value_text(value)
-        if self.key == "failures.uav_repair":
-            return f"failed UAVs {f'repaired in {text} slots' if value else 'lost for good'}"
+        if self.key in _NO_REPAIR:
+            things, fate = _NO_REPAIR[self.key]
+            return f"failed {things} {f'repaired in {text} slots' if value else fate}"
         if self.counted:
             return f"{text} {self.counted}{'' if text == '1' else 's'}"
         return f"{self.within} {text}"
+
+    def cell(self, value: Any) -> str:
+        """A value in a table, below the name of the field."""
+        if self.key in _NO_REPAIR and value == 0:
+            return _NO_REPAIR[self.key][1]
+        return value_text(value)
 
     def comparable(self, values: Sequence[Any]) -> list[Any]:
         """Values that are to be compared: unchanged if all are numbers, otherwise as text."""
@@ -78,6 +85,13 @@ class Field:
         is_text = any(isinstance(value, bool | list | tuple | dict) for value in plain)
         return [*map(value_text, plain)] if is_text else plain
 
+
+# What a mean time of repair of 0 says: there is no repair.
+_NO_REPAIR = {
+    "failures.uav_repair": ("UAVs", "lost for good"),
+    "failures.pad_repair": ("pads", "never repaired"),
+    "failures.node_repair": ("nodes", "never repaired"),
+}
 
 # The parameters of the paper's Fig. 5; the record of every mission has their values.
 _PAPER = (

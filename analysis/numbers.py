@@ -137,9 +137,9 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
-def words(names: Sequence[str]) -> str:
-    """A list of names as ``a, b and c``."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+def words(names: Sequence[str], last: str = "and") -> str:
+    """A list of names as ``a, b and c``; another word may come before the last."""
+    return f" {last} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def csv(frame: pd.DataFrame, form: str | None = None) -> str:

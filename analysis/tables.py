@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.metrics import METRICS, PRODUCT
+from dess.analysis.metrics import HOME, METRICS, PRODUCT, metric_of
 from dess.analysis.names import parameter, value_text
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.verdict import MARKS, position_by_test
@@ -18,7 +18,7 @@ CHECKED = f"The check of the selected settings: means with {INTERVALS}"
 MOST_ROWS = 25  # the largest number of rows of a table on a page; its data have all rows
 WIDER = 1.5  # times as wide as without the allowance for failures: what is explained in words
 YES = {True: "yes", False: "no"}
-_HEADS = {"policy": "Policy", "n": "Missions", **METRICS}
+_HEADS = {"policy": "Policy", "n": "Missions", **METRICS, HOME: metric_of(HOME).name}
 
 
 class Table(NamedTuple):
@@ -61,14 +61,18 @@ def estimates(
     table = numbers.wide(known, [*index], columns, write)
     table = table[[name for name in order if name in table]].fillna("").reset_index()
     for name in index:
-        table[name] = counts(table[name]) if name == "n" else table[name].map(value_text)
+        table[name] = counts(table[name]) if name == "n" else table[name].map(parameter(name).cell)
     heads = {field: parameter(field).name for field in index} | _HEADS
     return table.rename(columns=lambda name: heads.get(name) or value_text(name))
 
 
-def means(rows: pd.DataFrame, caption: str = f"Means with {INTERVALS}") -> Table:
-    """Rows of ``dess.analysis.summary`` by policy: a column per metric of the paper."""
-    return Table(estimates(rows[rows["metric"].isin(METRICS)], ["policy", "n"]), caption, rows)
+def means(
+    rows: pd.DataFrame,
+    caption: str = f"Means with {INTERVALS}",
+    metrics: Sequence[str] = tuple(METRICS),
+) -> Table:
+    """Rows of ``dess.analysis.summary`` by policy: a column per metric, as those of the paper."""
+    return Table(estimates(rows[rows["metric"].isin(metrics)], ["policy", "n"]), caption, rows)
 
 
 def compared(rows: pd.DataFrame, of: str) -> pd.DataFrame:

@@ -19,7 +19,8 @@ FLOORS = ("dess", "policies", "analysis", "reports")  # from the ground up
 ROOMS = {
     "analysis": (
         *("names", "numbers", "metrics", "stats", "tables", "bound", "study", "results"),
-        *("execution", "figures", "answers.settings", "answers.costs", "answers.summary"),
+        *("execution", "figures", "answers.fleet.requirements", "answers.fleet.home"),
+        *("answers.settings", "answers.costs", "answers.fleet.cheapest", "answers.summary"),
         *("answers.main_effects", "figures.settings", "answers", "paper", "verification", "ask"),
     ),
     "reports": (

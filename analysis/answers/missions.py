@@ -30,8 +30,67 @@ def answer(missions: Sequence[Mission]) -> str:
     ]
     return (
         f"Of the data, single missions of {missions[0].policy} collect "
-        f"{numbers.words(parts)}: the UAVs share the nodes, and fly home to charge before their "
-        "batteries are empty."
+        f"{numbers.words(parts)}: the UAVs share the nodes, and charge before their batteries are "
+        f"empty.{_left_in_the_air(missions)}"
+    )
+
+
+def _left_in_the_air(missions: Sequence[Mission]) -> str:
+    """How many UAVs of missions end without the battery for the way home, in a sentence."""
+    stranded = [f"{stranded_uavs(mission)} of {len(mission.uavs)}" for mission in missions]
+    if not any(stranded_uavs(mission) for mission in missions):
+        return ""
+    return (
+        f" These missions end where the quotas are filled: {numbers.words(stranded)} UAVs end "
+        "without the battery for the way home."
+    )
+
+
+def stranded_uavs(mission: Mission) -> int:
+    """How many UAVs of a mission end without the battery for the way home."""
+    return int((mission.uavs["battery"] < mission.uavs["way_home"]).sum())
+
+
+_FATES = {
+    "battery": "deplete their battery",
+    "lost": "are lost",
+    "truncated": "run out of time",
+}
+
+
+def fate_in_words(mission: Mission) -> str:
+    """How the UAVs of a mission end: whether it is a success, and whether they could fly home.
+
+    Args:
+        mission: The mission.
+    """
+    ends, scenario = mission.uavs["end"].tolist(), mission.scenario
+    failures = [
+        f"{ends.count(end)} of {len(ends)} UAVs {fate}"
+        for end, fate in _FATES.items()
+        if end in ends
+    ]
+    if failures:
+        return f"{numbers.words(failures)}, so it counts 0"
+    text = f"all UAVs {scenario.aim}"
+    if scenario.landing:
+        return text
+    stranded = stranded_uavs(mission)
+    if not stranded:
+        return f"{text} and have the battery for the way home"
+    return f"{text}, but {stranded} of {len(ends)} have no battery left for the way home"
+
+
+def map_caption(mission: Mission, fleet: str) -> str:
+    """The caption of the map of a mission.
+
+    Args:
+        mission: The mission.
+        fleet: Its fleet in words.
+    """
+    return (
+        f"A mission with the policy {mission.policy} and {fleet}, replication "
+        f"{mission.replication}: {fate_in_words(mission)}. n = 1."
     )
 
 
@@ -151,6 +210,7 @@ def _outcome(mission: Mission) -> dict[str, Any]:
     return {
         "UAVs": row["uavs"],
         "Success": "yes" if row["success"] else "no",
+        "UAVs that can fly home": f"{len(mission.uavs) - stranded_uavs(mission)} of {row['uavs']}",
         "Collected": numbers.percent(row[RATIO]),
         "Mission slots": row["slots"],
         "Charging sessions": (log["event"] == "charge_start").sum(),

@@ -17,12 +17,16 @@ from pandas.api.types import is_numeric_dtype
 
 from dess import InputError
 from dess.analysis import numbers
+from dess.analysis.answers.fleet import home
 from dess.analysis.metrics import (
+    AGE,
     COST,
     METRICS,
     PRODUCT,
     Metric,
+    in_either,
     known_in,
+    lasting,
     metric_of,
     metrics_in,
     told,
@@ -42,6 +46,8 @@ from dess.analysis.tables import INTERVALS, MOST_ROWS, WIDER, YES, Table, allowe
 from dess.errors import one_of
 
 MOST_NAMES = 3  # the largest number of settings that are named because they may be as good
+# What grows with the length of a mission, so that missions of the same length are to be compared.
+_OF_LENGTH = {*in_either(AGE, "peak_age", "age_p99"), COST}
 MOST_VALUES, BINS = 12, 5  # a field with more than MOST_VALUES numbers is divided into BINS bins
 
 
@@ -126,26 +132,67 @@ def answer(results: Results, table: pd.DataFrame, metric: str) -> str:
         table: The result of ``ranked`` for the metric.
         metric: The metric.
     """
+    policies = dependence(results, table, metric) if len(results.policies) == 2 else []
+    return " ".join([best_sentence(results, table, metric), *policies])
+
+
+def best_sentence(results: Results, table: pd.DataFrame, metric: str) -> str:
+    """The best setting, how many may be as good, and what else is to be said of it.
+
+    Args:
+        results: The study.
+        table: The result of ``ranked`` for the metric.
+        metric: The metric.
+    """
     of, best, others, tied = metric_of(metric), table.iloc[0], len(table) - 1, table[table["tied"]]
     value = of.written(*best[[metric, f"{metric}_low", f"{metric}_high"]])
     names = [setting_of(results, row.policy, row.point) for row in tied.itertuples()]
     what, many = "setting" if varied(results) else "policy", len(names) - 1
     named = f" ({'; '.join(names[1:])})" * (many <= MOST_NAMES)
     if others == 1:
-        rest = f" The other {what} {'may be as good' if many else 'is significantly worse'}."
+        rest = f"The other {what} {'may be as good' if many else 'is significantly worse'}."
     elif not many:
-        rest = f" All {others:,} others are significantly worse." if others else ""
+        rest = f"All {others:,} others are significantly worse." if others else ""
     elif many == others:
-        rest = f" All {others:,} others may be as good{named}."
+        rest = f"All {others:,} others may be as good{named}."
     else:
         rest = (
-            f" Of the {others:,} others, {many:,} may be as good{named}; the rest are "
+            f"Of the {others:,} others, {many:,} may be as good{named}; the rest are "
             "significantly worse."
         )
-    best_one = f"The best {what} is {names[0]}: {of.within} {value}, "
-    policies = dependence(results, table, metric) if len(results.policies) == 2 else []
-    lies = edge(results, best["point"], ends(results, best["point"]))
-    return " ".join([f"{best_one}n = {best['n']:,}.{rest}{lies}", *policies])
+    parts = [
+        f"The best {what} is {names[0]}: {of.within} {value}, n = {best['n']:,}.",
+        rest,
+        edge(results, best["point"], ends(results, best["point"])).strip(),
+        home.share_sentence(results, best, metric),
+        unequal_lengths(results, [metric]),
+    ]
+    return " ".join(filter(None, parts))
+
+
+def unequal_lengths(results: Results, metrics: Iterable[str]) -> str:
+    """That missions of different lengths are compared by what depends on it; empty if not so.
+
+    Ages grow while a mission lasts, and hours are paid for. A cost is only to be among the metrics
+    where it depends on them.
+
+    Args:
+        results: The study.
+        metrics: The metrics that are compared.
+    """
+    compared = [metric_of(metric).within for metric in metrics if metric in _OF_LENGTH]
+    missions = results.missions
+    has_quota = any(space.quota for space in results.store.manifest.scenarios)
+    if not compared or not has_quota or missions["slots"].nunique() == 1:
+        return ""
+    means = missions.groupby(["policy", "point"])["slots"].mean()
+    units = results.scenario().units
+    lengths = [lasting(round(slots), units) for slots in (means.min(), means.max())]
+    return (
+        f"Missions end with their last UAV, after {' to '.join(dict.fromkeys(lengths))} on "
+        f"average, so {numbers.words(compared)} of settings are of missions of different lengths; "
+        "with quota = 0, all missions last until max_slots."
+    )
 
 
 def dependence(results: Results, ranked: pd.DataFrame, metric: str) -> list[str]:
@@ -161,7 +208,8 @@ def dependence(results: Results, ranked: pd.DataFrame, metric: str) -> list[str]
     ends = others[[metric, f"{metric}_low", f"{metric}_high"]].to_numpy()
     named = zip(others["policy"], others["point"], ends, strict=True)
     return [
-        f"With {policy}, it would be {words[point]}: {metric_of(metric).written(*of_metric)}."
+        f"With the policy {policy}, it would be {words[point]}: {metric_of(metric).within} "
+        f"{metric_of(metric).written(*of_metric)}."
         for policy, point, of_metric in named
         if len(words) > 1
     ]
@@ -539,12 +587,12 @@ def shown_metrics(metric: str) -> list[str]:
 def _cells(results: Results, rows: pd.DataFrame, metric: str) -> pd.DataFrame:
     """Rows of ``ranked`` as text."""
     cells = _named(results, rows)
-    for of in map(metric_of, shown_metrics(metric)):
+    for of in map(metric_of, home.beside_success(results, shown_metrics(metric))):
         cells[of.name] = numbers.estimates(rows, of.column, of.written)
     return cells.assign(Missions=counts(rows["n"]))
 
 
 def _named(results: Results, rows: pd.DataFrame) -> pd.DataFrame:
     """The policy, the number of the design point and its varied fields as text."""
-    fields = {parameter(f).name: rows[f].map(value_text) for f in varied(results)}
+    fields = {parameter(f).name: rows[f].map(parameter(f).cell) for f in varied(results)}
     return pd.DataFrame({"Policy": rows["policy"], "Point": rows["point"]} | fields)

@@ -10,7 +10,7 @@ from scipy.special import ndtri
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.answers import costs
+from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.settings import edge, ends, in_words
 from dess.analysis.metrics import (
     ALWAYS,
@@ -661,10 +661,10 @@ def selections(results: Results) -> pd.DataFrame:
         A row per policy: ``policy``, ``point``, ``setting`` in words, number of ``missions``,
         ``left`` (number of points not ruled out), ``guaranteed``, and ``guarantee`` in words, with
         the ends of the values at which the point lies. Empty if the study selects nothing. For a
-        study that selects the cheapest setting, the rows of ``costs.selections``.
+        study that selects the cheapest setting, the rows of ``cheapest.selections``.
     """
     if isinstance(results.study.selection, Cheapest):
-        return costs.selections(results)
+        return cheapest.selections(results)
     words, rows = in_words(results), []
     for policy in results.policies:
         if (c := results.choice(policy)) is not None:

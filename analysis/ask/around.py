@@ -5,14 +5,17 @@ question.ask()
 table(results)
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from dess import InputError
 from dess.analysis.answers import costs
+from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.requirements import Requirement, Verdict, least_spare, required
 from dess.analysis.ask.question import LONGEST, Question
 from dess.analysis.metrics import metric_of
 from dess.analysis.names import parameter
@@ -43,9 +46,8 @@ def around(results: Results, scenario: str, missions: int = 100) -> Question | N
         The question, a design point for the fleet and one for every change of it. None without a
         data sheet, or if no fleet is known to meet the requirements, or its policy is a file.
     """
-    policy, manifest = costs.best_policy(results), results.store.manifest
-    choice = results.cheapest(policy)
-    points = choice.answers[-1].points if choice else ()
+    policy, manifest = cheapest.best_policy(results), results.store.manifest
+    points = cheapest.the_answer(results).points
     if not points or not results.scenario(points[-1]).units or is_path(policy):
         return None
     fixed, values = manifest.study.set, manifest.points[points[-1]].values
@@ -78,7 +80,7 @@ def is_known(results: Results) -> bool:
 
 def _place(results: Results) -> Path:
     """The results folder of the question, beside that of the study."""
-    about = f"{results.store.manifest.key} {costs.best_policy(results)}"
+    about = f"{results.store.manifest.key} {cheapest.best_policy(results)}"
     name = f"{results.store.manifest.study.name[:LONGEST]}-around-{short_hash(about.encode())}"
     return results.store.folder.parent / name
 
@@ -101,35 +103,48 @@ def table(results: Results) -> Table:
     Args:
         results: The study that ``around`` was asked about.
     """
-    found, required = load_results(_place(results)), costs.required(results)
+    found, requirements = load_results(_place(results)), required(results)
     start, *rows = [point.values for point in found.store.manifest.points]
     changes = [{f: v for f, v in row.items() if v != start.get(f)} for row in rows]
     words = ["the fleet: " + costs.fleets(found)[0], *map(_in_words, changes)]
     refused = [change for change in _changes(found.scenario(0)) if change not in changes]
     data = costs.priced(found)
-    ends = ("_low", "", "_high")  # in this order or, where less is better, in the other one
-    leads = [[costs.lead(data[m + end], m, q) for end in ends] for m, q in required.items()]
-    worst, mean, best = np.min(np.sort(leads, axis=1), axis=0)
-    kept = np.where(worst >= 0, "kept", np.where(best < 0, "broken", "open"))
-    data = data.assign(change=[words[point] for point in data["point"]], lead=mean, kept=kept)
+    data = data.assign(
+        change=[words[point] for point in data["point"]],
+        lead=least_spare(data, requirements),
+        verdict=[_verdict(row, requirements) for _, row in data.iterrows()],
+    )
     data = data.iloc[np.lexsort((data["lead"], data["point"] > 0))].reset_index(drop=True)
-    cells = costs.cells(data.assign(condition="", fleet=data["change"]), required)
+    columns = [requirement.column for requirement in requirements]
+    cells = costs.cells(data.assign(condition="", fleet=data["change"]), columns)
     cells = cells.drop(columns="Policy").rename(columns={"Fleet": "What if"})
-    differences = compare(found.missions, 0, [*required], correction=None, of="point")
+    cells = cells.rename(columns={"Cost": f"Cost [{costs.currency(results)}]"})
+    differences = compare(found.missions, 0, columns, correction=None, of="point")
     differences = differences.set_index(["metric", "point"])[["difference", "low", "high"]]
-    for of in map(metric_of, required):
-        told = [of.change(*row) for row in differences.loc[of.column].loc[data["point"][1:]].values]
-        place = cells.columns.get_loc(of.name) + 1
-        cells.insert(place, f"Change of {of.within}", ["", *told])
-    cells.insert(1, "Requirements", data["kept"])
+    for metric in map(metric_of, columns):
+        of_changes = differences.loc[metric.column].loc[data["point"][1:]]
+        changes_in_words = [metric.change(*row) for row in of_changes.to_numpy()]
+        place = cells.columns.get_loc(metric.name) + 1
+        cells.insert(place, f"Change of {metric.within}", ["", *changes_in_words])
+    cells.insert(1, "Requirements", data["verdict"].astype(str))
     cells["Missions"] = counts(data["n"])
     caption = (
         "The fleet, one more of it, and harder conditions: means, and changes on the same "
-        f"missions, with {INTERVALS}; requirements are kept or broken if whole intervals say so"
+        f"missions, with {INTERVALS}; requirements are met or missed if whole intervals say so, "
+        "otherwise open"
     )
     if refused:
         caption += f". Cannot be simulated here: {'; '.join(map(_in_words, refused))}"
     return Table(cells, caption, data)
+
+
+def _verdict(row: pd.Series, requirements: Sequence[Requirement]) -> Verdict:
+    """Whether the intervals of a row keep all requirements."""
+    verdicts = [
+        requirement.verdict(row[f"{requirement.column}_low"], row[f"{requirement.column}_high"])
+        for requirement in requirements
+    ]
+    return Verdict.of_all(verdicts)
 
 
 def _in_words(change: dict[str, Any]) -> str:

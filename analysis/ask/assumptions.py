@@ -1,18 +1,22 @@
 """What an answer assumes, in ten lines for the one who pays."""
 
 from dess.analysis import numbers
-from dess.analysis.answers import costs
+from dess.analysis.answers import settings
+from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.requirements import required
+from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
 from dess.sections.quantities import printed
 
 
-def assumptions(results: Results) -> list[str]:
+def assumptions(results: Results, metric: str = PRODUCT) -> list[str]:
     """What a success, a slot and a cell are, who flies, and the data, radio, wind and failures.
 
     Args:
         results: A study of a scenario with a data sheet. Where its design varies a field, the line
             says so.
+        metric: The metric that ranks its settings, where it does not search for a fleet.
     """
     space, units = results.scenario(), results.scenario().units
     assert units
@@ -27,14 +31,16 @@ def assumptions(results: Results) -> list[str]:
         value = "as asked" if field in varied else getattr(sheet, field)
         return otherwise if not value else value if isinstance(value, str) else "a list of them"
 
-    failures = f"a UAV fails every {given('mtbf', '')} of flying on average, and is repaired in "
+    repair = given("repair", "")
+    fate = f"is repaired in {repair}" if repair else "is lost for good"
+    failures = f"a UAV fails every {given('mtbf', '')} of flying on average, and {fate}"
     return [
         f"Success: at the end of a mission every UAV has landed{quota}.",
         f"A slot is {printed(units.slot, 's')}, a hundredth of the endurance of "
         f"{given('endurance', '')}; once a slot every UAV moves by a cell, hovers or charges.",
         f"A cell is {printed(units.cell, 'm')} wide, the way of a slot at {given('cruise', '')}. "
         f"The sea is {wide} x {high}.",
-        f"Who flies: the policy {costs.best_policy(results)}, which knows the data left at every "
+        f"Who flies: the policy {_policy_of(results, metric)}, which knows the data left at every "
         f"node; UAVs fly {value_text(space.altitude)} m high.",
         f"A battery charges from empty to full in {given('charging', '')}; of it, "
         f"{given('reserve', 'nothing')} is kept in reserve.",
@@ -44,9 +50,14 @@ def assumptions(results: Results) -> list[str]:
         f"{value_text(space.path_loss_exponent)}; range {given('range', 'without end')}; "
         f"{given('bandwidth', '')} with at most {given('max_rate', 'any bit/s/Hz')}.",
         f"Wind: {given('wind', 'none')}, the same everywhere and always.",
-        f"Failures: {failures}{given('repair', 'no time: it is lost')}."
-        if sheet.mtbf or "mtbf" in varied
-        else "Failures: none.",
+        f"Failures: {failures}." if sheet.mtbf or "mtbf" in varied else "Failures: none.",
         f"A mission takes {given('horizon', printed(space.max_slots * units.slot, 's'))}; means "
         "are over random missions, with 95 % intervals.",
     ]
+
+
+def _policy_of(results: Results, metric: str) -> str:
+    """The policy of the answer: of the cheapest fleet, or of the best setting."""
+    if required(results):
+        return cheapest.best_policy(results)
+    return str(settings.ranked(results, metric)["policy"].iloc[0])

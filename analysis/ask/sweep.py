@@ -10,6 +10,7 @@ import pandas as pd
 
 from dess import InputError
 from dess.analysis.answers import costs, settings
+from dess.analysis.answers.fleet import cheapest
 from dess.analysis.ask.question import Question, plain, sweep_question, values_of
 from dess.analysis.execution.jobs import Progress
 from dess.analysis.execution.runner import Round
@@ -50,10 +51,18 @@ class Sweep:
         study = self.question.study
         if study.costs is None:
             return table
-        priced = costs.judged(self.results) if study.selection else costs.priced(self.results)
+        priced = cheapest.judged(self.results) if study.selection else costs.priced(self.results)
         key = ["policy", "point"]
         more = [name for name in priced if name in key or name not in table]
         return table.merge(priced[more], on=key, how="left")
+
+    def fleets(self) -> pd.DataFrame:
+        """With requirements: the fleets that the answer was chosen from, the cheapest first.
+
+        Returns:
+            A row per policy and fleet, as ``answers.fleet.cheapest.fleet_rows`` returns it.
+        """
+        return cheapest.fleet_rows(self.results)
 
     def best(self, metric: str = PRODUCT) -> pd.DataFrame:
         """The best setting of every policy, the best policy first.
@@ -67,25 +76,28 @@ class Sweep:
             return table[table["selected"]].sort_values("point", kind="stable", ignore_index=True)
         return table.drop_duplicates("policy", ignore_index=True)
 
-    def answers(self) -> list[str]:
+    def answers(self, metric: str = PRODUCT) -> list[str]:
         """The best setting and what other policies would have said, in sentences.
 
-        With requirements: the cheapest fleet of all policies first, then those of each policy and
-        condition, and why cheaper ones do not meet them.
+        With requirements: the cheapest fleet of all policies first, the prices, how sure the answer
+        is, and then the fleets of each other policy and condition.
+
+        Args:
+            metric: The metric that ranks the settings, where there are no requirements.
         """
-        if not self.question.study.selection:
-            ranked, words = self.table(), settings.in_words(self.results)
-            point, others = ranked["point"][0], settings.dependence(self.results, ranked, PRODUCT)
-            edge = settings.edge(self.results, point, settings.ends(self.results, point))
-            best = f"The best setting is {ranked['policy'][0]} with {words[point]}.{edge}"
-            return [best, *others] if others or edge else []
-        return [*map(plain, costs.sentences(self.results))]
+        if self.question.study.selection:
+            return [*map(plain, cheapest.sentences(self.results))]
+        ranked = settings.ranked(self.results, metric)
+        best = settings.best_sentence(self.results, ranked, metric)
+        lines = [best, *settings.dependence(self.results, ranked, metric)]
+        if self.question.study.costs:
+            lines.append(costs.prices_in_words(self.results))
+        return lines
 
     @property
     def guarantee(self) -> str:
         """With requirements: what is guaranteed about the selected settings, in words."""
-        choices = (self.results.cheapest(policy) for policy in self.results.policies)
-        return "; ".join(dict.fromkeys(choice.guarantee for choice in choices if choice))
+        return "; ".join(cheapest.guarantees(self.results))
 
     def plot(self, x: str | None = None, hue: str | None = None, metric: str = PRODUCT) -> "Figure":
         """Curves of a metric over a swept field, with 95 % intervals, for every policy.

@@ -13,7 +13,8 @@ from scipy.special import ndtri
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers import summary
-from dess.analysis.answers.missions import estimate
+from dess.analysis.answers.fleet import home
+from dess.analysis.answers.missions import estimate, fate_in_words
 from dess.analysis.ask.question import RANGES, Question, in_words, plain, what_if_question
 from dess.analysis.execution.jobs import Progress
 from dess.analysis.metrics import (
@@ -35,7 +36,7 @@ from dess.analysis.stats.intervals import LEVEL, by_replication
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position
 from dess.errors import one_of
 from dess.fields import fields_of
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario import ScenarioSpace
 
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.figure import Figure
@@ -98,14 +99,15 @@ def answers(results: Results) -> pd.DataFrame:
     """The variation compared with the baseline, mission by mission.
 
     Returns:
-        A row per policy and metric (those of ``METRICS``, what is ``measured``, then those of
-        ``MEASURES``): ``policy``, the means ``before`` and ``after``, and the columns of
-        ``dess.analysis.compare``. Every interval has its own level of 95 %; see
-        ``stats.differences.paired``. Of what only one side measures, ``n`` is 0 and all else nan
-        but the mean of this side.
+        A row per policy and metric (those of ``METRICS``, the way home where missions may end in
+        the air, what is ``measured``, then those of ``MEASURES``): ``policy``, the means ``before``
+        and ``after``, and the columns of ``dess.analysis.compare``. Every interval has its own
+        level of 95 %; see ``stats.differences.paired``. Of what only one side measures, ``n`` is 0
+        and all else nan but the mean of this side.
     """
     missions = missions_of(results)
-    metrics = [*METRICS, *measured(results), *(told(name, missions) for name in MEASURES)]
+    of_paper = home.beside_success(results, METRICS)
+    metrics = [*of_paper, *measured(results), *(told(name, missions) for name in MEASURES)]
     tables = []
     for policy, rows in missions.groupby("policy", sort=False):
         table = compare(rows, BASELINE, metrics, correction=None, of="point")
@@ -201,7 +203,7 @@ def change(answer: Any) -> str:
     It is in percentage points for the paper's metrics; small numbers have more digits.
     """
     ends = (answer.difference, answer.low, answer.high)
-    if answer.metric not in METRICS:
+    if not metric_of(answer.metric).in_percent:
         return _amount(*ends, sign="+")
     if 0 < answer.high - answer.low < 0.01:
         return _amount(*(100 * end for end in ends), sign="+")
@@ -367,7 +369,8 @@ class WhatIf:
         """The rows of the table of a policy, as a table to print."""
         table, lines = self.table(), []
         for row in table[table["policy"] == policy].itertuples():
-            write, unit = (numbers.percent, " points") if row.metric in METRICS else (_amount, "")
+            in_percent = metric_of(row.metric).in_percent
+            write, unit = (numbers.percent, " points") if in_percent else (_amount, "")
             sides = ["–" if np.isnan(mean) else write(mean) for mean in (row.before, row.after)]
             name = (_SHORT | MEASURES).get(row.metric) or metric_of(row.metric).label
             difference = f"{MARKS[verdict(row)]} {change(row)}{unit}" if row.n else ""
@@ -479,33 +482,12 @@ class Example:
         shown, results = self.answer.shown, self.answer.results
         mission = resimulate(results, shown, point, self.replication)
         figure = mission_figure(mission.events, mission.scenario)
-        ends = [uav["end"] for uav in mission.record.uav_rows()]
         caption = (
             f"{SIDES[point].capitalize()} ({', '.join(self.answer.sides[point])}): collection "
-            f"ratio {numbers.percent(mission.record.collection_ratio)}, "
-            f"{fate(ends, mission.scenario)}. "
+            f"ratio {numbers.percent(mission.record.collection_ratio)}; {fate_in_words(mission)}. "
             f"{lasting(mission.record.slots, mission.scenario.units)}. n = 1."
         )
         return figure, "Map of the mission; battery, residual data and charging", caption
-
-
-def fate(ends: Sequence[str], scenario: Scenario) -> str:
-    """How the UAVs of a mission ended, as a part of a sentence.
-
-    Args:
-        ends: The end of every UAV, as in a record.
-        scenario: The scenario of the mission.
-    """
-    fates = {"battery": "deplete their battery", "truncated": "run out of time"}
-    fates |= {"lost": "are lost"}
-    failures = [
-        f"{ends.count(end)} of {len(ends)} UAVs {fate_of_uav}"
-        for end, fate_of_uav in fates.items()
-        if end in ends
-    ]
-    if failures:
-        return f"but {numbers.words(failures)}: it counts 0"
-    return f"all UAVs {scenario.aim}"
 
 
 def check_shown(question: Question, policy: str | None) -> None:

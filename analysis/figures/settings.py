@@ -5,7 +5,7 @@ A figure of ``results`` comes with its caption, its alternative text and its dat
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from math import ceil, inf
+from math import ceil
 from textwrap import fill
 from typing import Any
 
@@ -20,6 +20,8 @@ from dess.analysis import numbers
 from dess.analysis.answers import costs as priced
 from dess.analysis.answers import main_effects as one_field
 from dess.analysis.answers import settings, summary
+from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.requirements import Verdict, in_words, required
 from dess.analysis.figures import Drawing, style
 from dess.analysis.metrics import COST, METRICS, PRODUCT, Metric, metric_of
 from dess.analysis.names import parameter, value_text
@@ -414,7 +416,12 @@ def index_figures(results: Results, metric: str = PRODUCT) -> Iterator[Drawing]:
 
 
 def leading(results: Results, metric: str) -> Drawing:
-    """The figure that shows the answer of a study: the metric over all that the design varies."""
+    """The figure that shows the answer of a study.
+
+    It is the metric over all that the design varies, or what decides a search for a fleet.
+    """
+    if required(results):
+        return deciding(results)
     fields, kind = [*settings.varied(results)], results.design
     if kind == "saltelli":
         return next(index_figures(results, metric))
@@ -542,24 +549,26 @@ def fronts(results: Results) -> Iterator[Drawing]:
 
 
 def deciding(results: Results) -> Drawing:
-    """The cost against the metric whose requirement asks for the most expensive fleet."""
-    rows, least = priced.judged(results), priced.required(results)
-    rows = rows[rows["policy"] == priced.best_policy(results)].assign(on_front=rows["selected"])
-    rows["probability"] = 0.4 + 0.6 * (rows["verdict"] == priced.MET)
-    parts = [(m, part) for m in least for _, part in rows.groupby("condition", sort=False)]
-    cheapest = [
-        min(part[COST][priced.lead(part[m], m, least[m]) >= 0], default=inf) for m, part in parts
-    ]
-    metric, part = parts[cheapest.index(max(cheapest))]
-    wanted = numbers.words(
-        [f"{metric_of(m).within} {metric_of(m).amount(q)}" for m, q in least.items()]
+    """The cost against the metric of the tightest requirement of a search, with the answer."""
+    answer = cheapest.the_answer(results)
+    requirement, condition = cheapest.tightest(results)
+    rows = cheapest.judged(results)
+    rows = rows[(rows["policy"] == answer.policy) & (rows["condition"] == condition)]
+    is_answer = rows["point"].isin(answer.points)
+    is_met = rows["verdict"] == Verdict.MET
+    rows = rows.assign(on_front=is_answer, probability=np.where(is_met, 1.0, 0.4))
+    marks = (
+        f"With the policy {answer.policy}. Large, dark marks meet all requirements "
+        f"({in_words(required(results))}); small, faint ones miss them or are open. "
     )
-    marks = f"Large, dark marks are shown to meet all requirements ({wanted}); faint ones are not."
-    return _costs(results, part, metric, marks)
+    marks += "The answer is named." if is_answer.any() else "None is the answer."
+    return _costs(results, rows, requirement.column, marks)
 
 
 def _costs(results: Results, rows: pd.DataFrame, metric: str, marks: str) -> Drawing:
-    condition, least = rows["condition"].iloc[0], priced.required(results).get(metric)
+    condition = rows["condition"].iloc[0]
+    bounds = {requirement.column: requirement.bound for requirement in required(results)}
+    least = bounds.get(metric)
     drawing = costs(rows, metric, results.manifest["study"]["costs"]["currency"], least)
     alt = f"Cost against {metric_of(metric).within}{', ' * bool(condition)}{condition}"
     counted = f"{INTERVALS}; n = {_counted(rows)} missions per setting."

@@ -11,6 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from scipy.special import stdtrit
 
 from dess import InputError
+from dess.analysis import numbers
 from dess.analysis.metrics import AGE, size_of, told
 from dess.analysis.names import DECISIONS
 from dess.analysis.study.costs import Costs
@@ -210,16 +211,19 @@ class Setting(NamedTuple):
         values: The fields that the design sets.
         loss: The cost over all missions if every mission lost all UAVs, in the currency.
         horizon: The largest age that data can have [h with a data sheet, otherwise slots].
+        currency: The currency of the costs.
     """
 
     values: Mapping[str, Any]
     loss: float
     horizon: float = 1.0
+    currency: str = Costs.model_fields["currency"].default
 
     @classmethod
     def of(cls, values: Mapping[str, Any], space: ScenarioSpace, costs: Costs) -> Self:
         """The setting of a design point."""
-        return cls(values, costs.of_lost(space.uavs[1]), horizon_of(space))
+        loss = costs.of_lost(space.uavs[1])
+        return cls(values, loss, horizon_of(space), costs.currency)
 
 
 def horizon_of(space: ScenarioSpace) -> float:
@@ -409,11 +413,12 @@ class Cheapest(StrictTable):
         if not search.done:
             return "none yet: the procedure needs more missions"
         low, high = (self._in_words(shift) for shift in (-self.tolerance, self.tolerance))
+        saving = numbers.money(self.indifference, search.settings[0].currency)
         words = (
             f"for each policy by itself, with probability at least {self.confidence:g}, all of "
             f"this holds: a setting that was found to meet the requirements has {low}; one that "
             f"was found to miss them does not have {high}; a selected setting costs at most "
-            f"{self.indifference:g} more than any that has {high}. The statement on costs takes "
+            f"{saving} more than any that has {high}. The statement on costs takes "
             "the differences of costs as nearly normal, apart from the losses of UAVs; where a "
             "rare mission is much more expensive than the others, it holds less often"
         )

@@ -14,7 +14,8 @@ from dess.sections.section import Integer, Number
 # A price; the sums of all missions that may be planned are still finite.
 Price = Annotated[float, Field(ge=0, le=10**12, allow_inf_nan=False)]
 
-PARTS = ("purchase", "charging", "hours", "losses")
+PURCHASE = "purchase"
+PARTS = (PURCHASE, "charging", "hours", "losses")
 
 
 class Costs(StrictTable):
@@ -88,7 +89,7 @@ class Costs(StrictTable):
         seconds = [space.units.slot if space.units else self.slot_seconds or 0 for space in spaces]
         hours = np.asarray(missions["slots"]) * np.array(seconds)[points] / 3600
         return {
-            "purchase": self.uav * fleet + self.pad * pads[points],
+            PURCHASE: self.uav * fleet + self.pad * pads[points],
             "charging": self.missions * self.charge * charged / 100,
             "hours": self.missions * self.hour * hours,
             "losses": self.missions * self.lost_uav * lost,

@@ -82,7 +82,7 @@ def sweep(
     from dess.analysis.ask import around
     from dess.analysis.ask.question import sweep_question
     from dess.analysis.ask.sweep import Sweep
-    from dess.analysis.metrics import ALIASES, PRODUCT, told
+    from dess.analysis.metrics import ALIASES, PRODUCT, SUCCESS, told
 
     question = sweep_question(
         options.all_values(settings or []),
@@ -112,8 +112,13 @@ def sweep(
 
         return render_study(question.out, out, progress, parameters)
 
-    show = partial(_print_settings, answer, ranking)
-    _tell(answer, answer.table(ranking), show, render, as_json, "sweep")
+    tables = {"table": answer.table(ranking)}
+    if question.study.selection:
+        tables["fleets"] = answer.fleets()
+        show = partial(_print_fleets, answer, ranking if metric else SUCCESS)
+    else:
+        show = partial(_print_settings, answer, ranking)
+    _tell(answer, answer.answers(ranking), tables, show, render, as_json, "sweep")
 
 
 @options.command(app, WHAT_IF)
@@ -181,7 +186,8 @@ def what_if(
 
     answer = WhatIf(question, found, shown or best_policy(found, VARIATION))
     show = partial(_print_measures, answer)
-    _tell(answer, answer.table(), show, render, as_json, "what-if question")
+    tables = {"table": answer.table()}
+    _tell(answer, answer.answers(), tables, show, render, as_json, "what-if question")
 
 
 def _run(
@@ -204,7 +210,8 @@ def _run(
 
 def _tell(
     answer: "Sweep | WhatIf",
-    table: "pd.DataFrame",
+    sentences: list[str],
+    tables: "dict[str, pd.DataFrame]",
     show: Callable[[], None],
     render: "Callable[[Progress], Path]",
     as_json: bool,
@@ -214,7 +221,7 @@ def _tell(
     question = answer.question
     if not as_json:
         show()
-        for line in answer.answers():
+        for line in sentences:
             console.say(line)
         console.say(f"study: {question.file}")
     page = None
@@ -226,8 +233,8 @@ def _tell(
     if as_json:
         places = {"results": str(question.out), "study_file": str(question.file)}
         about = {"study": question.study.name, **places, "page": page and str(page)}
-        rows = json.loads(table.to_json(orient="records"))
-        print(json.dumps({**about, "answers": answer.answers(), "table": rows}, indent=2))
+        rows = {name: json.loads(table.to_json(orient="records")) for name, table in tables.items()}
+        print(json.dumps({**about, "answers": sentences, **rows}, indent=2))
     elif page:
         console.say(f"page: {page}")
 
@@ -238,35 +245,55 @@ def _print_settings(answer: "Sweep", ranking: str) -> None:
     import pandas as pd
 
     from dess.analysis import numbers
-    from dess.analysis.answers import costs
+    from dess.analysis.answers.fleet import home
     from dess.analysis.answers.settings import varied
-    from dess.analysis.ask import around
     from dess.analysis.metrics import COST, PRODUCT, SUCCESS, metric_of
-    from dess.analysis.names import value_text
-    from dess.reports.cli.tables import print_frame
+    from dess.analysis.names import parameter
 
-    study = answer.question.study
-    table, fields, prices = answer.table(ranking), [*varied(answer.results)], study.costs
+    prices = answer.question.study.costs
+    table = answer.table(ranking)
     top = table.head(SHOWN)
     cells = pd.DataFrame({"rank": top["rank"], "": np.where(top["tied"], "≈", "")})
     cells["policy"] = top["policy"]
-    cells[fields] = top[fields].map(value_text)
-    required = costs.required(answer.results)
-    shown = dict.fromkeys([ranking, SUCCESS, *required, PRODUCT])
-    for name in [name for name in shown if name != COST]:
-        metric = metric_of(name)
-        cells[metric.head] = numbers.estimates(top, name, metric.written)
+    for field in varied(answer.results):
+        cells[field] = top[field].map(parameter(field).cell)
+    shown = home.beside_success(answer.results, [ranking, SUCCESS, PRODUCT])
+    for metric in map(metric_of, shown):
+        if metric.column != COST:
+            cells[metric.head] = numbers.estimates(top, metric.column, metric.written)
     if prices:
-        paid = [numbers.money(cost, prices.currency) for cost in top[COST]]
-        cells[COST] = paid
+        cells[COST] = [numbers.money(cost, prices.currency) for cost in top[COST]]
     console.print_table([*map(str, cells)], cells.astype(str).to_numpy().tolist())
     first = f", the first {SHOWN} are shown" if len(table) > SHOWN else ""
     what = metric_of(ranking).within
     console.say(
         f"{len(table):,} settings{first}; ≈: the {what} may be as good as that of the first"
     )
-    if required and around.is_known(answer.results):
-        print_frame("What if", around.table(answer.results).cells.set_index("What if"))
+
+
+def _print_fleets(answer: "Sweep", further: str) -> None:
+    """Print the fleets of a search by cost, with the answer marked; then what a change brings.
+
+    Args:
+        answer: The answer.
+        further: A metric that is shown beside those of the requirements.
+    """
+    from dess.analysis.answers.fleet import cheapest
+    from dess.analysis.answers.fleet.requirements import in_words, required
+    from dess.analysis.ask import around
+    from dess.reports.cli.tables import print_frame
+
+    results = answer.results
+    rows = cheapest.fleet_rows(results)
+    cells = cheapest.fleet_cells(results, cheapest.shown_rows(rows, SHOWN), further)
+    print_frame("Fleet", cells.set_index("Fleet"))
+    shown = f", {SHOWN} of them shown" if len(rows) > SHOWN else ""
+    console.say(
+        f"{len(rows):,} pairs of a fleet and a policy{shown}, the cheapest first; required: "
+        f"{in_words(required(results))}; {cheapest.VERDICTS_EXPLAINED}"
+    )
+    if around.is_known(results):
+        print_frame("What if", around.table(results).cells.set_index("What if"))
 
 
 def _print_measures(answer: "WhatIf") -> None:

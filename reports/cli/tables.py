@@ -7,6 +7,7 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers import costs, diff, optimality, summary
+from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.settings import in_words, setting_of
 from dess.analysis.metrics import EITHER, METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
 from dess.analysis.paper import values
@@ -32,7 +33,7 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         _print_selections(selected)
         is_search = "condition" in selected
         if is_search and study.costs:
-            for text in costs.sentences(results):
+            for text in cheapest.sentences(results):
                 console.say(f" {text.translate(str.maketrans('', '', '*`'))}")
         if len(results.checks):
             means, checks = summary.checks(results), study.selection.check

@@ -21,6 +21,7 @@ results = "../../results"  # folder with the results folder of explorer
 from pathlib import Path
 
 from dess.analysis import load_results, metrics, numbers
+from dess.analysis.answers.fleet import home
 from dess.analysis.answers.settings import in_words
 from dess.reports.explorer import Grid, explorer
 from dess.reports.pages import html
@@ -46,6 +47,9 @@ html.say(
     "[what-if question](what-if.html) compares them mission by mission.",
     missions=numbers.span(start["n"]),
 )
+
+# %%
+html.say("{sentence}", sentence=home.range_sentence(study))
 
 # %% [markdown]
 # ## The setting at which the sliders start

@@ -25,20 +25,21 @@ import numpy as np
 
 from dess.analysis import distribution, load_results, tables
 from dess.analysis.answers import costs, settings, summary
+from dess.analysis.answers.fleet import cheapest, home
 from dess.analysis.figures import settings as figures
-from dess.analysis.metrics import METRICS, metric_of
+from dess.analysis.metrics import METRICS, SUCCESS, metric_of
 from dess.reports.pages import html
 from dess.reports.pages import study as page
 
 # %%
 study = load_results(Path(results))
-by = settings.ranking_metric(study, metric)
-metrics, called = settings.shown_metrics(by), metric_of(by).within
+by = page.leading_metric(study, metric)
+metrics, called = page.shown_metrics(study, by), metric_of(by).within
 
 # %% tags=["if-cheapest"]
-html.answer(costs.answer(study))
+html.answer(cheapest.answer(study))
 
-# %% tags=["if-ranked"]
+# %% tags=["if-answer"]
 ranked = settings.ranked(study, by)
 best = ranked.iloc[0]
 
@@ -49,21 +50,27 @@ html.answer(settings.answer(study, ranked, by))
 html.answer(summary.of_variance(study, by))
 
 # %%
-html.lead(*(figures.deciding(study) if costs.required(study) else figures.leading(study, by)))
+html.lead(*figures.leading(study, by))
 
 # %% tags=["if-sheet"]
 from dess.analysis.ask.assumptions import assumptions
 
-html.rendered("assumptions.html", lines=assumptions(study))
+html.rendered("assumptions.html", lines=assumptions(study, by))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## Why
 #
 # An operator decides on the fleet. The other fields are conditions under which it has to work. A
-# setting gets no further missions once a cheaper one is known to meet the requirements.
+# fleet gets no further missions once a cheaper one is known to meet the requirements.
 
 # %% tags=["if-cheapest"]
-html.show(html.say("{answers}", answers=page.reasons(study)), costs.judged_table(study))
+html.show(
+    cheapest.fleet_table(study, by if metric else SUCCESS),
+    html.say("{answers}", answers=page.reasons(study)),
+)
+
+# %% tags=["if-conditions"]
+html.show(cheapest.condition_table(study))
 
 # %% [markdown] tags=["if-around"]
 # ## What if
@@ -83,7 +90,7 @@ html.show(around.table(study))
 
 # %% tags=["if-cheapest"]
 no_check = html.say("No setting was checked.")
-html.show(no_check if study.checks.empty else costs.checked_table(study))
+html.show(no_check if study.checks.empty else cheapest.check_table(study))
 
 # %% [markdown] tags=["if-settings"]
 # ## The best settings
@@ -104,9 +111,15 @@ html.show(
 # %% tags=["if-one-setting"]
 html.show(
     (figures.means(study, of) for of in METRICS),
-    tables.means(summary.means(study)),
+    tables.means(summary.means(study), metrics=home.beside_success(study, METRICS)),
     html.say("{weights}", weights=summary.weights_in_words(study)),
 )
+
+# %% [markdown] tags=["if-priced-search"]
+# ## Costs
+
+# %% tags=["if-priced-search"]
+html.show(costs.parts_table(study))
 
 # %% [markdown] tags=["if-costs"]
 # ## Costs
@@ -115,7 +128,12 @@ html.show(
 # The probability of being on it comes from a Bayesian bootstrap over common replications.
 
 # %% tags=["if-costs"]
-html.show(figures.fronts(study), costs.front_table(study), costs.parts_table(study))
+html.show(
+    html.say("{prices}", prices=costs.prices_in_words(study)),
+    figures.fronts(study),
+    costs.front_table(study),
+    costs.parts_table(study),
+)
 
 # %% [markdown] tags=["if-selection"]
 # ## The selection
@@ -127,7 +145,9 @@ html.show(figures.fronts(study), costs.front_table(study), costs.parts_table(stu
 html.show(
     summary.selection_table(study),
     html.say("{guarantees}", guarantees=page.guarantees(study)),
-    tables.means(summary.checks(study), tables.CHECKED),
+    tables.means(
+        summary.checks(study), tables.CHECKED, metrics=home.beside_success(study, METRICS)
+    ),
 )
 
 # %% [markdown] tags=["if-precision"]
@@ -196,15 +216,21 @@ html.show(summary.learner_table(study))
 # %% [markdown]
 # ## Single missions
 
+# %% tags=["if-answer"]
+missions, whose = settings.at_best(study, ranked), f"every policy at its best setting by {called}"
+worst = summary.worst(study, best["policy"], point=best["point"])
+
+# %% tags=["if-cheapest"]
+missions, whose = cheapest.shown_missions(study), "the fleet of the answer"
+worst = summary.worst(study, cheapest.best_policy(study), point=cheapest.shown_point(study))
+
 # %% tags=["if-ranked"]
-missions = settings.at_best(study, ranked)
 spread = distribution(missions, by, np.random.default_rng(study.store.manifest.seed))
 html.show(
-    html.say("These figures show every policy at its best setting by {metric}:", metric=called),
+    html.say("These figures show {whose}:", whose=whose),
     [figures.distribution(missions, by)],
     summary.spread(spread, by),
 )
-worst = summary.worst(study, best["policy"], point=best["point"])
 
 # %% tags=["if-sensitivity"]
 worst = summary.worst(study, summary.best_policy(study.missions))

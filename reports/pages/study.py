@@ -10,6 +10,8 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers import costs, settings, summary
+from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.requirements import required
 from dess.analysis.ask import around
 from dess.analysis.names import parameter, value_text
 from dess.analysis.results.tables import Results, load_results
@@ -19,7 +21,7 @@ from dess.policies.registry import departures
 from dess.reports.pages import PREFIX, html, notebook
 from dess.reports.pages.notebook import Report, tags_of
 
-_BEST = "Which setting is the best for {}?"
+_MOST_FIELDS = 3  # the largest number of fields that a title names
 _MOST_VALUES = 12  # the largest number of values of a field in a list
 
 
@@ -54,15 +56,50 @@ def notes(results: Results) -> html.Marked:
 
 def page_title(results: Results) -> str:
     """The question that a study answers."""
+    fields = [parameter(field).within for field in settings.varied(results)]
     if isinstance(results.study.selection, Cheapest):
-        question = "Which fleet is the cheapest for {}?"
+        question = "Which fleet is the cheapest on {}?"
     elif results.design == "saltelli":
-        question = "Which parameters matter for {}?"
-    elif fields := [parameter(field).within for field in settings.varied(results)]:
-        question = f"Which {numbers.words(fields)} for {{}}?" if len(fields) < 4 else _BEST
+        question = "Which parameters matter on {}?"
+    elif 0 < len(fields) <= _MOST_FIELDS:
+        verb = "is" if len(fields) == 1 else "are"
+        question = f"Which {numbers.words(fields)} {verb} the best on {{}}?"
+    elif fields:
+        question = "Which setting is the best on {}?"
     else:
-        question = "Which policy for {}?"
-    return question.format(results.study.scenario)
+        question = "Which policy is the best on {}?"
+    return question.format(_sea(results.study.scenario))
+
+
+def _sea(scenario: str) -> str:
+    """A scenario in words: the paper's sea, or that of its name or file."""
+    return "the paper's sea" if scenario == "paper" else f"the sea {Path(scenario).stem}"
+
+
+def leading_metric(results: Results, metric: str | None) -> str:
+    """The metric that the page is about: of a search for a fleet, that of its tightest requirement.
+
+    Args:
+        results: The study.
+        metric: The metric that is asked for, if one is.
+
+    Raises:
+        InputError: If there is no such metric.
+    """
+    if metric is None and required(results):
+        return cheapest.tightest(results)[0].column
+    return settings.ranking_metric(results, metric)
+
+
+def shown_metrics(results: Results, by: str) -> list[str]:
+    """The metrics that the page shows: of a search those that are required, else the paper's.
+
+    Args:
+        results: The study.
+        by: The metric that the page is about, which comes first.
+    """
+    asked = [requirement.column for requirement in required(results)]
+    return [*dict.fromkeys([by, *asked])] if asked else settings.shown_metrics(by)
 
 
 def guarantees(results: Results) -> html.Marked:
@@ -88,10 +125,9 @@ def commands(results: Results, missions: pd.DataFrame) -> html.Marked:
 
 
 def reasons(results: Results) -> html.Marked:
-    """The cheapest settings that meet the requirements, with reasons, and the guarantee."""
-    lines = [f"- {text}" for text in costs.sentences(results)]
-    said = {choice.guarantee for p in results.policies if (choice := results.cheapest(p))}
-    sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(said))
+    """The prices, how sure the answer of a search is, the other answers, and the guarantee."""
+    lines = [f"- {text}" for text in (costs.prices_in_words(results), *cheapest.reasons(results))]
+    sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(cheapest.guarantees(results)))
     return html.composed("\n".join(lines) + f"\n\n{sure}")
 
 
@@ -162,8 +198,8 @@ def parts(results: Results) -> dict[str, bool]:
     is_ranked, is_search = kind != "saltelli", isinstance(study.selection, Cheapest)
     is_scan = kind == "grid" or (kind == "table" and fields <= 2)
     return {
-        # Several design points whose missions share their replications: settings to rank.
-        "if-settings": several and is_ranked,
+        # Several design points with as many missions each: settings to rank.
+        "if-settings": several and is_ranked and not is_search,
         # Settings, one or several, with missions enough to rank them.
         "if-ranked": is_ranked,
         # The answer is the best setting.
@@ -187,8 +223,10 @@ def parts(results: Results) -> dict[str, bool]:
         # Tables of the study.
         "if-selection": isinstance(study.selection, Selection),
         "if-cheapest": is_search,
+        "if-conditions": is_search and cheapest.has_conditions(results),
         "if-precision": study.precision is not None,
-        "if-costs": study.costs is not None,
+        "if-costs": study.costs is not None and not is_search,
+        "if-priced-search": is_search and costs.has_running_cost(results),
         # A scenario in units, and what changes a little around the cheapest fleet.
         "if-sheet": all(space.units for space in manifest.scenarios),
         "if-around": is_search and around.is_known(results),

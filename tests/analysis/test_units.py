@@ -1,10 +1,13 @@
 """What is told in units with a data sheet is what the model has in slots and data units."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dess import InputError
-from dess.analysis.answers import costs
+from dess.analysis.answers import costs, settings
+from dess.analysis.answers.fleet import cheapest
 from dess.analysis.ask import around
 from dess.analysis.ask.assumptions import assumptions
 from dess.analysis.ask.question import sweep_question, what_if_question
@@ -51,6 +54,17 @@ def test_the_price_of_an_hour_takes_the_slot_of_the_sheet(searched):
     np.testing.assert_allclose(hours, 36 * means.to_numpy() * SLOT / 3600)
 
 
+def test_ages_of_missions_of_different_lengths_are_not_compared_without_saying_so(studied):
+    results = studied(set={"age.measured": True})
+    means = results.missions.groupby("policy")["slots"].mean().round()
+    text = settings.unequal_lengths(results, ["age"])
+    assert f"after {means.min():.0f} mission slots to {means.max():.0f} mission slots" in text
+    assert "age of information of settings are of missions of different lengths" in text
+    assert settings.unequal_lengths(results, ["collection_ratio"]) == ""
+    alike = replace(results, missions=results.missions.assign(slots=480))
+    assert settings.unequal_lengths(alike, ["age"]) == ""
+
+
 def test_without_a_sheet_nothing_is_told_in_units(studied):
     missions = studied(set={"age.measured": True}).missions
     assert told(AGE, missions) == AGE
@@ -85,10 +99,17 @@ def test_an_age_is_required_to_be_at_most(column, age, verdict):
 
 
 def test_the_answer_has_every_requirement_in_its_unit(searched):
-    text = " ".join(costs.sentences(searched))
-    assert " h (0.8333 h required)" in text
+    text = " ".join(cheapest.sentences(searched))
+    assert " h (at most 0.8333 h required)" in text
     # Half a percent of two hours more.
-    assert "age of information of at most 0.8433 h" in text
+    assert "its age of information is at most 0.8433 h" in text
+    # A mission with a sheet ends on the ground.
+    assert "way home" not in text
+
+
+def test_the_check_has_every_requirement(searched):
+    heads = [*cheapest.check_table(searched).cells]
+    assert heads[-4:] == ["Success", "Collection ratio", "Age of information", "n"]
 
 
 REFUSED = {
@@ -131,8 +152,8 @@ def test_the_fleet_is_asked_about_with_one_more_and_in_harder_conditions(searche
     assert cells["What if"][0].startswith("the fleet: ")
     assert "data rate 12 MB/h" in {*cells["What if"]}
     for row in data.itertuples():
-        is_kept = row.success_low >= 0.6 and row.collection_ratio_low >= 0.3
-        assert (row.kept == "kept") == (is_kept and row.age_h_high <= 50 / 60)
+        is_met = row.success_low >= 0.6 and row.collection_ratio_low >= 0.3
+        assert (row.verdict == "met") == (is_met and row.age_h_high <= 50 / 60)
     assert data["point"][0] == 0
     for metric, name in (("success", "success"), ("age_h", "age of information")):
         means = found.missions.groupby("point")[metric].mean()[data["point"]].to_numpy()

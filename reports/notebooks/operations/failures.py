@@ -21,6 +21,7 @@ from IPython.display import display
 
 from dess.analysis import load_results, numbers, tables
 from dess.analysis.answers import operations
+from dess.analysis.answers.fleet import home
 from dess.analysis.metrics import PRODUCT, RATIO, SUCCESS, metric_of
 from dess.reports.pages import html
 
@@ -45,6 +46,9 @@ html.lead(*lead)
 # A mission succeeds only if every UAV fills its quota, so one that is lost before makes it fail.
 # What it has collected still counts in the collection ratio, which shows how far the others make up
 # for it.
+
+# %%
+html.say("{sentence}", sentence=home.range_sentence(study))
 
 # %%
 html.gallery(others)

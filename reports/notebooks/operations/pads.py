@@ -22,6 +22,7 @@ from IPython.display import display
 
 from dess.analysis import load_results, numbers, tables
 from dess.analysis.answers import operations
+from dess.analysis.answers.fleet import home
 from dess.analysis.metrics import PRODUCT, SUCCESS, metric_of
 from dess.reports.pages import html
 
@@ -46,6 +47,9 @@ html.lead(*drawn[PRODUCT])
 
 # %%
 html.say("{lines}", lines=html.composed(operations.few_pads(study)))
+
+# %%
+html.say("{sentence}", sentence=home.range_sentence(study))
 
 # %%
 html.figure(*operations.waits(study, margin))

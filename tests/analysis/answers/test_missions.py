@@ -6,10 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dess import load_scenario
 from dess.analysis import run_study
 from dess.analysis.answers import missions
 from dess.analysis.results.resimulate import Mission
-from tests.analysis.small import grid, small_study
+from tests.analysis.small import SHEET, grid, small_study, write_scenario
 
 
 @pytest.fixture(scope="module")
@@ -114,3 +115,37 @@ def test_any_straight_line_makes_sectors(angle, offset):
     one = (PAPER - (13, 16)) @ (np.cos(angle), np.sin(angle)) < offset
     data = np.array([one, ~one], float)
     assert missions.sectors(data, PAPER) == pytest.approx(1)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "ends", "batteries", "words"),
+    [
+        (SHEET, ["landed", "landed"], [3, 3], "all UAVs landed"),
+        (
+            SHEET,
+            ["landed", "battery"],
+            [3, 0],
+            "1 of 2 UAVs deplete their battery, so it counts 0",
+        ),
+        (
+            {},
+            ["quota", "quota"],
+            [9, 8],
+            "all UAVs filled their quota and have the battery for the way home",
+        ),
+        (
+            {},
+            ["quota", "quota"],
+            [9, 7],
+            "all UAVs filled their quota, but 1 of 2 have no battery left for the way home",
+        ),
+    ],
+)
+def test_the_fate_of_a_mission_says_whether_uavs_can_fly_home(
+    scenario, ends, batteries, words, tmp_path
+):
+    """A mission without a quota fills none, and a UAV that has landed is home."""
+    space = load_scenario(write_scenario(tmp_path, **scenario))
+    uavs = pd.DataFrame({"end": ends, "battery": batteries, "way_home": 8})
+    mission = Mission("greedy", space, {}, uavs, pd.DataFrame())
+    assert missions.fate_in_words(mission) == words

@@ -27,9 +27,11 @@ def test_a_line_leads_to_a_page(dess, unrendered, tmp_path):
     assert "48 missions" in err
     name = re.search(r"sweeps/(uavs-quota-[0-9a-f]{16})\.toml", out)[1]
     assert len(load_results(tmp_path / "results" / "sweeps" / name).missions) == 48
-    assert re.search(r"rank +policy +uavs +quota +product +success +cost", out)
-    assert re.search(r"1 +≈ +(greedy|random) +[12] +(20|40) +.* [24]0,000 USD", out)
+    assert re.search(r"rank +policy +uavs +quota +product +success +battery for the way home", out)
+    assert re.search(r"1 +≈? +(greedy|random) +[12] +(20|40)", out)
+    assert re.search(r"[24]0,000 USD", out)
     assert "8 settings" in out
+    assert "Prices: 20,000 USD for a UAV." in out
     assert f"page: build/reports/study-{name}.html\n" in out
     file = re.search(r"study: (.*)", out)[1]
     before = files_of(tmp_path / "results")
@@ -55,16 +57,36 @@ def test_the_cheapest_fleet_is_named(dess, unrendered):
     asked += ["--policy", "greedy"]
     code, out, _ = dess(*asked)
     assert code == 0
-    assert re.search(r"quota 20, greedy: the cheapest .* is 1 UAV for 20,000 EUR", out)
-    assert "All conditions together, greedy: the cheapest setting" in out
+    fleet = r"the cheapest fleet that meets the requirements is 1 UAV for 20,000 EUR"
+    assert re.search(rf"With the policy greedy and under (communication )?quota 20, {fleet}", out)
+    assert f"With the policy greedy and under all conditions, {fleet}" in out
+    assert re.search(r"1 UAV +greedy +20,000 +met: the answer", out)
+    assert "Prices: 20,000 EUR for a UAV. Nothing is paid for a charging pad, " in out
+    # Missions of the paper may end in the air.
+    assert re.search(
+        r"At the end of [\d.]+ % \[.*\] of the missions all UAVs have the battery", out
+    )
     data = json.loads(dess(*asked, "--json")[1])
     assert [row["selected"] for row in data["table"] if row["uavs"] == 1] == [True, True]
-    assert len(data["answers"]) == 3
+    # The answer, the prices, the reasons, and the answers for both conditions.
+    assert len(data["answers"]) == 5
+    assert [row["answer"] for row in data["fleets"]] == ["answer", ""]
     assert Path(data["study_file"]).exists()
     (manifest,) = Path("results").rglob("manifest.json")
     shown = json.loads(dess("study", "show", manifest.parent, "--json")[1])
     points = [row["point"] for row in shown["selected"]]
     assert points == [0, 1, None]  # all conditions together have several
+
+
+def test_the_closing_sentence_ranks_by_the_metric_that_was_asked_for(dess, unrendered):
+    asked = [*ASKED, *FIELDS]
+    for metric, column in (("reward", "reward"), ("ratio", "collection_ratio")):
+        code, out, _ = dess(*asked, "--metric", metric)
+        rows = json.loads(dess(*asked, "--json")[1])["table"]
+        best = max(rows, key=lambda row: row[column])
+        words = f"{best['uavs']} UAV{'s' if best['uavs'] > 1 else ''}"
+        name = column.replace("_", " ")
+        assert re.search(rf"The best setting is {best['policy']} with {words}, .*: {name} ", out)
 
 
 def test_a_what_if_question_is_answered_and_asked_again(dess, unrendered, tmp_path):

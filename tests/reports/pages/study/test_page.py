@@ -63,7 +63,10 @@ def test_there_are_a_page_a_notebook_and_an_index_with_a_card(page, out):
     index = (out / "index.html").read_text("utf-8")
     assert '<a class="card" href="study-trial.html">' in index
     for text in (page, index):
-        assert "Which number of UAVs and number of charging pads for small.toml?" in text
+        assert (
+            "Which number of UAVs and number of charging pads are the best on the sea small?"
+            in text
+        )
         assert "The best setting is " in text
     assert len(Page(page).hidden(STUDY)) == 1
     assert Page(index).hidden(STUDY) == []  # it stands on the page

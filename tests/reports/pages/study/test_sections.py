@@ -13,6 +13,8 @@ from tests.reports.small import shown_by
 PRECISION = {"first": 5, "look_ahead": 2, "budget": 12,
              "targets": {"collection_ratio": {"absolute": 0.05}}}  # fmt: skip
 SELECTION = {"procedure": "kn-bounded", "first": 5, "indifference": 0.05, "budget": 60, "check": 9}
+SEARCH = {"procedure": "cheapest", "requirements": {"collection_ratio": 0.1}, "first": 20,
+          "tolerance": 0.05, "indifference": 100, "budget": 8000, "check": 9}  # fmt: skip
 # What is changed in the small study, what the page says, and what it does not.
 STUDIES = {
     "a single point": (
@@ -45,6 +47,19 @@ STUDIES = {
         {"design": grid(uavs=[1, 3]), "selection": SELECTION},
         ["The selection", "The setting that was selected", "The check of the selected settings"],
         ["Comparison of the policies"],
+    ),
+    "a search for a fleet": (
+        {"design": grid(uavs=[1, 2]), "costs": {"uav": 20_000}, "selection": SEARCH},
+        [
+            "Which fleet is the cheapest on the sea small?",
+            "With the policy greedy, the cheapest fleet that meets the requirements is",
+            "met: the answer",
+            "Prices: 20,000 EUR for a UAV.",
+            "of the missions all UAVs have the battery for the way home",
+            "These figures show the fleet of the answer",
+            "The check of the selected fleets",
+        ],
+        ["The best setting", "May be the best", "Pareto front", "Comparison with a baseline"],
     ),
     "a precision": (
         {"precision": PRECISION, "policies": ["greedy"]},

@@ -3,11 +3,25 @@
 from dess.analysis.ask import around
 from dess.analysis.ask.question import sweep_question
 from dess.reports.pages.render import render_study
+from dess.reports.pages.study import report_of
 from tests.analysis.small import SHEET, write_scenario
-from tests.reports.small import words_of
+from tests.reports.small import said_by, words_of
 
 A4 = 182, 269  # less the margins [mm]
 PIXEL = 25.4 / 96  # [mm]
+
+
+def test_a_sheet_needs_no_prices_and_prices_no_requirement(tmp_path):
+    """The page names the best setting, and the policy that flies there."""
+    scenario = write_scenario(tmp_path, **SHEET)
+    for prices in (None, {"uav": 20_000}):
+        asked = {"prices": prices, "folder": tmp_path / "results"}
+        question = sweep_question({"uavs": (1, 2)}, scenario, ["greedy"], 10, **asked)
+        question.ask()
+        said = said_by(report_of(question.out), results=str(question.out))
+        assert "The best setting is greedy with " in said
+        assert "Who flies: the policy greedy" in said
+        assert ("Prices: 20,000 EUR for a UAV." in said) == bool(prices)
 
 
 def test_the_answer_the_figure_and_what_is_assumed_are_one_sheet_of_paper(tmp_path, visit):

@@ -1,0 +1,1 @@
+"""The cheapest fleet that meets requirements, and whether its UAVs come home."""

@@ -1,0 +1,657 @@
+"""The answer of a search for the cheapest fleet that meets requirements.
+
+    results = load_results("results/fleets")  # of a study that searches for the cheapest fleet
+    answer(results)  # in words
+    fleet_table(results)  # the fleets by cost, with the answer marked
+
+A fleet is searched for every policy and under every condition and, if there are several conditions,
+under all of them together. The answer is the cheapest fleet of any policy under all conditions.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from pandas.api.types import is_numeric_dtype
+
+from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.answers import costs
+from dess.analysis.answers.fleet import home
+from dess.analysis.answers.fleet.requirements import (
+    Requirement,
+    Verdict,
+    in_words,
+    least_spare,
+    required,
+    spare,
+)
+from dess.analysis.answers.settings import edge, ends, intervals_in_words, points, unequal_lengths
+from dess.analysis.metrics import COST, HOME, SUCCESS, metric_of
+from dess.analysis.names import DECISIONS
+from dess.analysis.results.tables import Results, once
+from dess.analysis.study.cheapest import Answer, Cheapest, CheapestChoice
+from dess.analysis.tables import INTERVALS, MOST_ROWS, Table, counts
+from dess.fields import ZONE_PADS
+
+ALL_CONDITIONS = "all conditions"
+_WHY_NOT = {
+    Verdict.MET: "meets the requirements as well, and saves less than matters",
+    Verdict.OPEN: "is not known to meet the requirements",
+    Verdict.MISSED: "misses the requirements",
+}
+# For tables with a column of verdicts.
+VERDICTS_EXPLAINED = (
+    "met or missed: what the search has shown of all requirements together; open: what it did not "
+    "need to decide, or could not"
+)
+
+
+@once
+def judged(results: Results) -> pd.DataFrame:
+    """Which settings meet the requirements, and the cheapest of these under each condition.
+
+    Args:
+        results: A study that searches for the cheapest fleet.
+
+    Returns:
+        The rows of ``costs.priced`` with two more columns: ``verdict`` (``met``, ``missed`` or
+        ``open``), and ``selected``, which is true for the cheapest setting of each policy under
+        each condition whose verdict is ``met``. Both have the guarantee of the search.
+    """
+    tables = []
+    for policy, rows in costs.priced(results).groupby("policy", sort=False):
+        choice = _choice(results, str(policy))
+        selected = [a.points[0] for a in choice.answers if a.condition is not None and a.points]
+        verdicts = rows["point"].map(dict(enumerate(choice.verdicts)))
+        tables.append(rows.assign(verdict=verdicts, selected=rows["point"].isin(selected)))
+    return pd.concat(tables).sort_index()
+
+
+@once
+def everywhere(results: Results) -> pd.DataFrame:
+    """The fleets under all conditions together.
+
+    Returns:
+        A row per policy and fleet that the design has under every condition, the cheapest first,
+        with the columns of ``judged``: ``cost`` is the mean over the conditions, ``verdict`` holds
+        under all of them, and a metric is that of the condition under which the fleet is worst at
+        it. ``n`` is the least number of missions under a condition.
+    """
+    table, rows = judged(results), []
+    conditions = table["condition"].nunique()
+    for (policy, _), under_conditions in table.groupby(["policy", "fleet"], sort=False):
+        if len(under_conditions) == conditions:
+            rows.append(_together(results, str(policy), under_conditions))
+    fleets = pd.DataFrame(rows, columns=table.columns)
+    return fleets.sort_values(COST, kind="stable", ignore_index=True)
+
+
+def _together(results: Results, policy: str, rows: pd.DataFrame) -> pd.Series:
+    """The row of ``everywhere`` of a fleet, of its rows under all conditions."""
+    together = rows.iloc[0].copy()
+    for column in _estimated(results):
+        less = metric_of(column).less_is_better
+        worst = rows[column].idxmax() if less else rows[column].idxmin()
+        ends_of = _ends_of(column)
+        together[ends_of] = rows.loc[worst, ends_of]
+    together[_ends_of(COST)] = rows[_ends_of(COST)].mean()
+    together["condition"] = ALL_CONDITIONS
+    together["verdict"] = Verdict.of_all([*rows["verdict"]])
+    together["n"] = rows["n"].min()
+    selected = _choice(results, policy).answers[-1].points
+    together["selected"] = {*selected} == {*rows["point"]}
+    return together
+
+
+def _estimated(results: Results) -> list[str]:
+    """What the tables and sentences of a search tell of a fleet: success, and what is required."""
+    asked = [requirement.column for requirement in required(results)]
+    return home.beside_success(results, [SUCCESS, *asked])
+
+
+def _ends_of(column: str) -> list[str]:
+    """The columns of a mean and the ends of its interval."""
+    return [column, f"{column}_low", f"{column}_high"]
+
+
+@once
+def checks(results: Results) -> pd.DataFrame:
+    """The check of the selected settings on missions that were not used for the selection.
+
+    Returns:
+        A row per policy and selected design point, with the columns of ``costs.priced``.
+    """
+    return costs.priced(replace(results, missions=results.checks))
+
+
+@once
+def quoted(results: Results) -> pd.DataFrame:
+    """The settings with the estimates that answers quote.
+
+    A search gives most missions to a setting whose results were good so far. The check had no part
+    in the search, so its means are unbiased.
+
+    Returns:
+        The rows of ``judged``. The metrics, the cost and ``n`` of settings that were checked are
+        those of ``checks``.
+    """
+    table, setting = judged(results), ["policy", "point"]
+    if results.checks.empty:
+        return table
+    rows, checked = table.set_index(setting), checks(results).set_index(setting)
+    rows.loc[checked.index, checked.columns] = checked
+    return rows.reset_index()[[*table]]
+
+
+@dataclass(frozen=True, eq=False)
+class FleetAnswer:
+    """The cheapest fleet of a policy under one condition, or under all conditions together.
+
+    Attributes:
+        results: The study.
+        policy: The policy.
+        condition: The condition in words; empty if there is only one.
+        number: The number of the answer among those of the policy; the last is for all conditions.
+    """
+
+    results: Results
+    policy: str
+    condition: str
+    number: int
+
+    @cached_property
+    def _choice(self) -> CheapestChoice:
+        return _choice(self.results, self.policy)
+
+    @property
+    def _answer(self) -> Answer:
+        return self._choice.answers[self.number]
+
+    @property
+    def points(self) -> tuple[int, ...]:
+        """The design points of the fleet, one for each condition of the question; empty if none."""
+        return self._answer.points
+
+    @cached_property
+    def fleets(self) -> pd.DataFrame:
+        """The rows of ``judged`` or ``everywhere`` that the answer was chosen from."""
+        together = self.condition == ALL_CONDITIONS
+        table = everywhere(self.results) if together else judged(self.results)
+        is_asked = (table["policy"] == self.policy) & (table["condition"] == self.condition)
+        return table[is_asked]
+
+    @property
+    def fleet(self) -> str:
+        """The fleet in words; ``none`` if no fleet is known to meet the requirements."""
+        return costs.fleets(self.results)[self.points[0]] if self.points else "none"
+
+    @property
+    def cost(self) -> float:
+        """The mean cost of the fleet over the conditions; infinite if there is none."""
+        selected = self.fleets[self.fleets["selected"]]
+        return float(selected[COST].iloc[0]) if len(selected) else np.inf
+
+    @cached_property
+    def requirements(self) -> list[Requirement]:
+        """The requirements, that with the least to spare first."""
+        selected = self.fleets["selected"]
+        if not selected.any():
+            return required(self.results)
+        room = {r.column: float(spare(self.fleets, r)[selected].iloc[0]) for r in self._required}
+        return sorted(self._required, key=lambda requirement: room[requirement.column])
+
+    @property
+    def _required(self) -> list[Requirement]:
+        return required(self.results)
+
+    def estimates(self, column: str) -> pd.Series:
+        """The mean of a metric of the fleet with its interval, under its worst condition.
+
+        All sentences on the fleet take their numbers from here, from ``quoted``.
+
+        Args:
+            column: The column of the metric.
+
+        Returns:
+            A row with the metric, the ends of its interval and ``n``.
+        """
+        table = quoted(self.results)
+        rows = table[(table["policy"] == self.policy) & table["point"].isin(self.points)]
+        worst = rows[column].idxmax() if metric_of(column).less_is_better else rows[column].idxmin()
+        return rows.loc[worst]
+
+    # --- sentences ---
+
+    @property
+    def _where(self) -> str:
+        """The policy and the condition, as the beginning of a sentence."""
+        where = f"With the policy `{self.policy}`"
+        if self.condition:
+            where += f" and under {self.condition}"
+        return where
+
+    def choice_sentence(self) -> str:
+        """Which fleet is the cheapest that meets the requirements, and what it costs."""
+        if not self.points:
+            return f"{self._where}, no fleet is known to meet the requirements."
+        amount = numbers.money(self.cost, costs.currency(self.results))
+        return (
+            f"{self._where}, the cheapest fleet that meets the requirements is **{self.fleet}** "
+            f"for {amount}{costs.parts_in_words(self.results, self.policy, self.points)}."
+        )
+
+    def estimates_sentence(self) -> str:
+        """What was measured of the fleet, beside what is required; that with the least spare first.
+
+        Of a fleet whose success is not required, the sentence says what it is.
+        """
+        if not self.points:
+            return ""
+        texts = []
+        for requirement in self.requirements:
+            row = self.estimates(requirement.column)
+            measured = requirement.metric.written(*row[_ends_of(requirement.column)])
+            texts.append(
+                f"its {requirement.metric.within} is {measured} ({requirement.bound_in_words} "
+                "required)"
+            )
+        if SUCCESS not in [requirement.column for requirement in self.requirements]:
+            row = self.estimates(SUCCESS)
+            success = metric_of(SUCCESS).written(*row[_ends_of(SUCCESS)])
+            texts.append(f"its success is {success} (none is required)")
+        missions = f"{int(row['n']):,} missions"
+        is_checked = not self.results.checks.empty
+        source = f"{missions} that check it" if is_checked else f"the {missions} of the search"
+        where = ", under the worst condition for each," if len(self.points) > 1 else ","
+        text = f"In {source}{where} {numbers.words(texts)}."
+        if len(self.requirements) > 1:
+            text += f" The tightest requirement is the {self.requirements[0].metric.within}."
+        return text
+
+    def home_sentence(self) -> str:
+        """Whether the UAVs of the fleet could fly home, where missions may end in the air."""
+        if not self.points or not home.may_end_in_the_air(self.results):
+            return ""
+        row = self.estimates(HOME)
+        share = home.sentence(*row[_ends_of(HOME)])
+        parts = costs.parts(self.results)
+        rows = parts[(parts["policy"] == self.policy) & parts["point"].isin(self.points)]
+        return f"{share} {home.stranded_sentence(self.results, rows['stranded'].mean())}".strip()
+
+    def guarantee_sentence(self, policies: int = 1) -> str:
+        """What the search has shown of the fleet, with its probability.
+
+        Args:
+            policies: Of how many policies the fleet is the cheapest.
+        """
+        if not self.points:
+            return ""
+        rule = self.results.study.selection
+        assert isinstance(rule, Cheapest)
+        horizon = self.results.store.manifest.settings[self.points[0]].horizon
+        shifted = [requirement.shifted(rule.tolerance, horizon) for requirement in self._required]
+        shown = [f"its {each.metric.within} is {each.bound_in_words}" for each in shifted]
+        where = " under every condition" if self._answer.condition is None else ""
+        sure = numbers.level(rule.shown(policies))
+        return f"With a probability of at least {sure}, {numbers.words(shown)}{where}."
+
+    def ends_sentence(self) -> str:
+        """At which ends of the values asked for the fleet lies, beyond which one may be cheaper."""
+        if not self.points:
+            return ""
+        point = self.points[0]
+        return edge(self.results, point, _ends(self.results, point), "a cheaper one").strip()
+
+    def budget_sentence(self) -> str:
+        """Whether the budget ended before the answer was sure, and what would settle it."""
+        choice, rule = self._choice, self.results.study.selection
+        if not choice.done or self._answer.settled:
+            return ""
+        assert isinstance(rule, Cheapest)
+        enough = f"about {float(f'{choice.enough:.2g}'):,.0f}" if choice.enough else "far more"
+        return (
+            f"The budget of {rule.budget:,} missions ended before this was decided; {enough} would "
+            "settle it."
+        )
+
+    def cheaper_sentence(self) -> str:
+        """The next cheaper fleet and why it is not the answer; without an answer, the closest."""
+        selected = self.fleets[self.fleets["selected"]]
+        if len(selected):
+            other, which = self.fleets[self.fleets[COST] < self.cost].tail(1), "next cheaper"
+        else:
+            nearest = least_spare(self.fleets, self._required).nlargest(1).index
+            other, which = self.fleets.loc[nearest], "closest"
+        if other.empty:
+            return ""
+        row = other.iloc[0]
+        amount = numbers.money(row[COST], costs.currency(self.results))
+        measured = [
+            f"{r.metric.within} {r.metric.written(*row[_ends_of(r.column)])}"
+            for r in self._required
+        ]
+        return (
+            f"The {which} one, **{row['fleet']}** for {amount} with {numbers.words(measured)}, "
+            f"{_WHY_NOT[row['verdict']]}."
+        )
+
+    def headline(self) -> str:
+        """The fleet, its cost, what was measured of it, and whether its UAVs could fly home."""
+        parts = [self.choice_sentence(), self.estimates_sentence(), self.home_sentence()]
+        return " ".join(filter(None, parts))
+
+    def reasons(self, policies: int = 1) -> str:
+        """How sure the answer is, and why it is not a cheaper fleet.
+
+        Args:
+            policies: Of how many policies the fleet is the cheapest.
+        """
+        parts = [
+            self.guarantee_sentence(policies),
+            self.ends_sentence(),
+            self.budget_sentence(),
+            self.cheaper_sentence(),
+        ]
+        return " ".join(filter(None, parts))
+
+
+@once
+def fleet_answers(results: Results) -> list[FleetAnswer]:
+    """The answers of every policy: one for each condition, then one for all of them together."""
+    conditions = [*dict.fromkeys(costs.conditions(results))]
+    if len(conditions) > 1:
+        conditions.append(ALL_CONDITIONS)
+    return [
+        FleetAnswer(results, policy, condition, number)
+        for policy in results.policies
+        for number, condition in enumerate(conditions)
+    ]
+
+
+@once
+def the_answer(results: Results) -> FleetAnswer:
+    """The cheapest fleet of any policy under all conditions; that of the first policy if none."""
+    return min(_last_answers(results), key=lambda answer: answer.cost)
+
+
+def _last_answers(results: Results) -> list[FleetAnswer]:
+    """The answer of every policy for all conditions."""
+    of_policies = {answer.policy: answer for answer in fleet_answers(results)}
+    return [*of_policies.values()]
+
+
+def best_policy(results: Results) -> str:
+    """The policy whose fleet is the cheapest that meets the requirements under every condition."""
+    return the_answer(results).policy
+
+
+def cheapest_fleet(results: Results) -> str:
+    """The cheapest fleet of all policies that meets the requirements under every condition."""
+    return the_answer(results).fleet
+
+
+def shown_point(results: Results) -> int:
+    """The design point of the answer that pages show missions of; of the closest fleet if none.
+
+    Of a fleet for several conditions, it is that of the last condition.
+    """
+    answer = the_answer(results)
+    if answer.points:
+        return answer.points[-1]
+    rows = judged(results)
+    rows = rows[rows["policy"] == answer.policy]
+    return int(rows.loc[least_spare(rows, required(results)).idxmax(), "point"])
+
+
+def shown_missions(results: Results) -> pd.DataFrame:
+    """The missions of the answer that pages show, those of ``shown_point``."""
+    missions, policy = results.missions, best_policy(results)
+    is_shown = (missions["policy"] == policy) & (missions["point"] == shown_point(results))
+    return missions[is_shown]
+
+
+def has_conditions(results: Results) -> bool:
+    """Whether fleets have to work under several conditions."""
+    return len({*costs.conditions(results)}) > 1
+
+
+def answer(results: Results) -> str:
+    """In words: the cheapest fleet of all policies, and which the others would have named."""
+    return " ".join([the_answer(results).headline(), *dependence(results)])
+
+
+def dependence(results: Results) -> list[str]:
+    """A sentence for each other policy: what its cheapest fleet is, so how much depends on it."""
+    best, sentences = the_answer(results), []
+    for other in _last_answers(results):
+        if other.policy == best.policy:
+            continue
+        if other.fleet == best.fleet:
+            if best.points:
+                sentences.append(f"With the policy `{other.policy}`, it is the same fleet.")
+        elif other.points:
+            amount = numbers.money(other.cost, costs.currency(results))
+            sentences.append(
+                f"With the policy `{other.policy}`, it would be **{other.fleet}** for {amount}."
+            )
+        else:
+            sentences.append(
+                f"With the policy `{other.policy}`, no fleet is known to meet the requirements."
+            )
+    return sentences
+
+
+def reasons(results: Results) -> list[str]:
+    """How sure the answer is; then the answers of the other policies and conditions."""
+    best = the_answer(results)
+    lines = [best.reasons(len(results.policies)), unequal_lengths(results, _compared(results))]
+    lines += [
+        f"{other.headline()} {other.reasons()}".strip()
+        for other in fleet_answers(results)
+        if other is not best
+    ]
+    return [line for line in lines if line]
+
+
+def _compared(results: Results) -> list[str]:
+    """The metrics by which fleets are compared that may depend on the length of a mission."""
+    asked = [requirement.column for requirement in required(results)]
+    return [*asked, COST] if costs.pays_for_hours(results) else asked
+
+
+def sentences(results: Results) -> list[str]:
+    """In words: the answer, what is paid for, how sure it is, and the other answers."""
+    return [answer(results), costs.prices_in_words(results), *reasons(results)]
+
+
+def guarantees(results: Results) -> list[str]:
+    """What is guaranteed about the selected fleets of every policy; none without a search."""
+    choices = [results.cheapest(policy) for policy in results.policies]
+    return [*dict.fromkeys(choice.guarantee for choice in choices if choice)]
+
+
+@once
+def selections(results: Results) -> pd.DataFrame:
+    """What was selected by a study that searches for the cheapest fleets.
+
+    Returns:
+        A row per policy and condition and, if there are several conditions, one for all of them:
+        ``policy``, ``condition`` in words, ``point`` (None if no setting is selected, or for all
+        conditions), ``setting`` (the fleet in words), ``missions`` of the policy, ``left`` (number
+        of settings that may be as good), ``guaranteed`` and ``guarantee``.
+    """
+    rows = []
+    for found in fleet_answers(results):
+        choice = _choice(results, found.policy)
+        of_one = choice.answers[found.number]
+        is_point = of_one.points and of_one.condition is not None
+        rows.append(
+            {
+                "policy": found.policy,
+                "condition": found.condition,
+                "point": of_one.points[0] if is_point else None,
+                "setting": found.fleet,
+                "missions": choice.missions,
+                "left": len(of_one.left),
+                "guaranteed": of_one.settled,
+                "guarantee": choice.guarantee,
+            }
+        )
+    return pd.DataFrame(rows).astype({"point": "Int64"})
+
+
+# --- tables ---
+
+
+def fleet_rows(results: Results) -> pd.DataFrame:
+    """The fleets that the answer was chosen from, of all policies, the cheapest first.
+
+    Returns:
+        Rows of ``judged``, or of ``everywhere`` if there are several conditions, with the parts of
+        the cost (``purchase`` and ``running``) and ``answer``: ``answer`` for the answer,
+        ``selected`` for the cheapest fleet of another policy that meets the requirements.
+    """
+    rows = everywhere(results) if has_conditions(results) else judged(results)
+    rows = rows.sort_values(COST, kind="stable", ignore_index=True)
+    best = the_answer(results)
+    is_answer = rows["selected"] & (rows["policy"] == best.policy)
+    marks = np.where(is_answer, "answer", np.where(rows["selected"], "selected", ""))
+    purchase = costs.purchases(results)
+    bought = [purchase[point] for point in rows["point"]]
+    return rows.assign(purchase=bought, running=rows[COST] - bought, answer=marks)
+
+
+def shown_rows(rows: pd.DataFrame, most: int) -> pd.DataFrame:
+    """At most so many rows of ``fleet_rows``: the first ones, or those around the answer."""
+    place = int(np.argmax(rows["answer"] == "answer"))
+    first = max(0, min(place - most // 2, len(rows) - most)) if place >= most else 0
+    return rows.iloc[first : first + most]
+
+
+def fleet_cells(results: Results, rows: pd.DataFrame, further: str = SUCCESS) -> pd.DataFrame:
+    """Rows of ``fleet_rows`` as text, for page and terminal.
+
+    Args:
+        results: The study.
+        rows: The rows.
+        further: A metric that is shown beside those of the requirements.
+    """
+    cells = costs.cells(rows.assign(condition=""), [])
+    cells = cells.rename(columns={"Cost": f"Cost [{costs.currency(results)}]"})
+    place = cells.shape[1]
+    if costs.has_running_cost(results):
+        cells.insert(place, "Purchase", rows["purchase"].map(costs.amount))
+        cells.insert(place + 1, "Missions' cost", rows["running"].map(costs.amount))
+    is_answer = rows["answer"] == "answer"
+    cells["Requirements"] = rows["verdict"].where(~is_answer, rows["verdict"] + ": the answer")
+    for metric in map(metric_of, dict.fromkeys([*_estimated(results), further])):
+        if metric.column != COST:
+            cells[metric.name] = numbers.estimates(rows, metric.column, metric.written)
+    return cells.assign(n=counts(rows["n"]))
+
+
+def fleet_table(results: Results, further: str = SUCCESS) -> Table:
+    """The fleets by cost, with their verdicts, the required metrics, and the answer marked.
+
+    Args:
+        results: The study.
+        further: A metric that is shown beside those of the requirements.
+    """
+    rows = fleet_rows(results)
+    top = shown_rows(rows, MOST_ROWS)
+    caption = f"The fleets, the cheapest first. Required: {in_words(required(results))}. "
+    if len(top) < len(rows):
+        caption += f"{len(top)} of {len(rows):,} rows, those about the answer; the data have all. "
+    if has_conditions(results):
+        caption += (
+            "All conditions together: costs are means over them, a metric is that of the condition "
+            "under which the fleet is worst at it. "
+        )
+    caption += f"{VERDICTS_EXPLAINED.capitalize()}. Means with {intervals_in_words(results)}"
+    return Table(fleet_cells(results, top, further), caption, rows)
+
+
+def condition_table(results: Results) -> Table:
+    """The fleets under every condition, whether they meet the requirements there."""
+    rows = judged(results)
+    top = rows.head(MOST_ROWS)
+    shown = costs.cells(top, _estimated(results))
+    shown.insert(shown.columns.get_loc("Cost") + 1, "Requirements", top["verdict"])
+    shown["Cheapest that meets them"] = top["selected"].map({True: "yes", False: ""})
+    shown["n"] = counts(top["n"])
+    caption = f"The fleets under every condition; means with {intervals_in_words(results)}"
+    return Table(shown, caption, rows)
+
+
+def check_table(results: Results) -> Table:
+    """The check of the selected fleets: all that is required, and the way home."""
+    rows = checks(results)
+    shown = costs.cells(rows, _estimated(results)).assign(n=counts(rows["n"]))
+    caption = (
+        "The check of the selected fleets on missions that had no part in the search: means with "
+        f"{INTERVALS}"
+    )
+    return Table(shown, caption, rows)
+
+
+def _ends(results: Results, point: int) -> dict[str, str]:
+    """The ends of the swept values at which a fleet lies and beyond which one may be cheaper.
+
+    With more UAVs or pads a fleet is cheaper only if that saves enough of the others.
+    """
+    table, space, prices = points(results), results.scenario(point), costs.prices_of(results)
+    price_of = {"uavs": prices.uav, "pads": prices.pad, ZONE_PADS: prices.pad * len(space.zones)}
+    price_of = {field: price for field, price in price_of.items() if field in table}
+    spent = {
+        field: price * (table[field][point] - 1)
+        for field, price in price_of.items()
+        if is_numeric_dtype(table[field])
+    }
+
+    def may_be_cheaper(field: str, end: str) -> bool:
+        if end == "least" or not price_of.get(field):
+            return True
+        return sum(spent.values()) - spent[field] > price_of[field]
+
+    return {
+        field: end
+        for field, end in ends(results, point).items()
+        if field in DECISIONS and may_be_cheaper(field, end)
+    }
+
+
+def _choice(results: Results, policy: str) -> CheapestChoice:
+    choice = results.cheapest(policy)
+    if choice is None:
+        raise InputError(
+            f"{results.store.folder}: does not search for the cheapest setting; allowed: a study "
+            'with the procedure "cheapest"'
+        )
+    return choice
+
+
+def tightest(results: Results) -> tuple[Requirement, str]:
+    """The requirement that the answer is chosen by, and the condition under which it is.
+
+    It is the one that alone asks for the most expensive fleet, with the policy of the answer; of
+    several of these, the one that the answer keeps with the least to spare.
+    """
+    best = the_answer(results)
+    rows = judged(results)
+    rows = rows[rows["policy"] == best.policy]
+
+    def tightness(requirement: Requirement, part: pd.DataFrame) -> tuple[float, float]:
+        keeps = requirement.margin(part[requirement.column]) >= 0
+        cheapest_cost = part[COST][keeps].min() if keeps.any() else np.inf
+        room = spare(part, requirement)
+        selected = part["point"].isin(best.points)
+        least_room = float(room[selected].iloc[0]) if selected.any() else float(room.max())
+        return cheapest_cost, -least_room
+
+    parts: Sequence[tuple[str, pd.DataFrame]] = [*rows.groupby("condition", sort=False)]
+    asked = [(each, str(name), part) for each in required(results) for name, part in parts]
+    requirement, condition, _ = max(asked, key=lambda found: tightness(found[0], found[2]))
+    return requirement, condition

@@ -1,0 +1,82 @@
+"""Whether the UAVs of missions that end in the air have the battery for the way home.
+
+A mission of the paper ends where its quotas are filled, and its success does not ask for more. So
+what is said of a success goes with the share of the missions in which all UAVs could fly home. With
+``landing`` a success ends on the ground, and there is nothing to add.
+"""
+
+from collections.abc import Iterable
+
+import pandas as pd
+
+from dess.analysis import numbers
+from dess.analysis.metrics import HOME, PRODUCT, SUCCESS, metric_of
+from dess.analysis.results.tables import Results
+
+
+def may_end_in_the_air(results: Results) -> bool:
+    """Whether a success of a study may leave UAVs in the air."""
+    scenarios = results.store.manifest.scenarios
+    return HOME in results.missions and not all(space.landing for space in scenarios)
+
+
+def beside_success(results: Results, metrics: Iterable[str]) -> list[str]:
+    """Metrics, with that of the way home after success where missions may end in the air."""
+    shown = [*dict.fromkeys(metrics)]
+    if SUCCESS in shown and HOME not in shown and may_end_in_the_air(results):
+        shown.insert(shown.index(SUCCESS) + 1, HOME)
+    return shown
+
+
+def share_sentence(results: Results, setting: pd.Series, metric: str = SUCCESS) -> str:
+    """In how many missions of a setting all UAVs could fly home; empty where there is no need.
+
+    Args:
+        results: The study.
+        setting: A row of ``settings.ranked``.
+        metric: The metric that is spoken of; only success, and what is made of it, needs this.
+    """
+    if metric not in (SUCCESS, PRODUCT) or not may_end_in_the_air(results):
+        return ""
+    return sentence(*setting[[HOME, f"{HOME}_low", f"{HOME}_high"]])
+
+
+def sentence(mean: float, low: float, high: float) -> str:
+    """The sentence on the share of the missions in which all UAVs could fly home."""
+    share = metric_of(HOME).written(mean, low, high)
+    return (
+        f"At the end of {share} of the missions all UAVs have the battery for the way home; with "
+        "landing = true, missions end on the ground."
+    )
+
+
+def stranded_sentence(results: Results, mean: float) -> str:
+    """How many UAVs of a mission cannot fly home, which no price counts; empty if none.
+
+    Args:
+        results: The study.
+        mean: Their mean number, without UAVs that are lost.
+    """
+    if not may_end_in_the_air(results) or not mean > 0:
+        return ""
+    return (
+        f"On average {numbers.quantity(round(mean, 2))} UAVs of a mission are left without the "
+        "battery for the way home; no price counts them."
+    )
+
+
+def range_sentence(results: Results) -> str:
+    """In how many missions of the settings all UAVs could fly home; empty where there is no need.
+
+    Args:
+        results: A study of several settings.
+    """
+    if not may_end_in_the_air(results):
+        return ""
+    shares = results.missions.groupby(["policy", "point"])[HOME].mean()
+    ends = numbers.span([100 * shares.min(), 100 * shares.max()], "{:.1f}")
+    return (
+        "Success does not ask for the way home: all UAVs have the battery for it at the end of "
+        f"{ends} % of the missions, depending on the setting. With landing = true, missions end on "
+        "the ground."
+    )
