@@ -3,9 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from dess import InputError
+from dess.analysis import tables
 from dess.analysis.answers import costs, settings
 from dess.analysis.answers.fleet import cheapest
 from dess.analysis.ask import around
@@ -13,7 +15,7 @@ from dess.analysis.ask.assumptions import assumptions
 from dess.analysis.ask.question import sweep_question, what_if_question
 from dess.analysis.ask.what_if import WhatIf
 from dess.analysis.metrics import AGE, metric_of, told
-from dess.analysis.names import fields
+from dess.analysis.names import fields, parameter
 from dess.analysis.study.cheapest import Cheapest, Setting
 from tests.analysis.small import SHEET, write_scenario
 
@@ -160,6 +162,16 @@ def test_the_fleet_is_asked_about_with_one_more_and_in_harder_conditions(searche
         told = [metric_of(metric).change(mean - means[0], 0, 0).split()[0] for mean in means[1:]]
         assert [text.split()[0] for text in cells[f"Change of {name}"][1:]] == told
     assert data["lead"][1:].is_monotonic_increasing
+
+
+def test_a_repair_of_0_reads_as_what_it_is():
+    repairs = [parameter(f"failures.{name}_repair") for name in ("uav", "pad", "node")]
+    assert [repair.cell(0.0) for repair in repairs] == ["lost for good", *["never repaired"] * 2]
+    assert [repair.cell(20.0) for repair in repairs] == ["20"] * 3
+    assert parameter("uavs").cell(0) == "0"
+    row = {"failures.uav_repair": 0.0, "n": 8, "rate": 0.01, "mean": 0.9, "low": 0.8, "high": 1.0}
+    cells = tables.estimates(pd.DataFrame([row]), ["failures.uav_repair", "n"], "rate")
+    assert cells.iloc[0, 0] == "lost for good"
 
 
 def test_fields_that_follow_from_the_sheet_are_marked(searched):

@@ -195,7 +195,7 @@ class FleetAnswer:
         return float(selected[COST].iloc[0]) if len(selected) else np.inf
 
     @cached_property
-    def requirements(self) -> list[Requirement]:
+    def tightest_first(self) -> list[Requirement]:
         """The requirements, that with the least to spare first."""
         selected = self.fleets["selected"]
         if not selected.any():
@@ -251,14 +251,14 @@ class FleetAnswer:
         if not self.points:
             return ""
         texts = []
-        for requirement in self.requirements:
+        for requirement in self.tightest_first:
             row = self.estimates(requirement.column)
             measured = requirement.metric.written(*row[_ends_of(requirement.column)])
             texts.append(
                 f"its {requirement.metric.within} is {measured} ({requirement.bound_in_words} "
                 "required)"
             )
-        if SUCCESS not in [requirement.column for requirement in self.requirements]:
+        if SUCCESS not in [requirement.column for requirement in self.tightest_first]:
             row = self.estimates(SUCCESS)
             success = metric_of(SUCCESS).written(*row[_ends_of(SUCCESS)])
             texts.append(f"its success is {success} (none is required)")
@@ -267,8 +267,8 @@ class FleetAnswer:
         source = f"{missions} that check it" if is_checked else f"the {missions} of the search"
         where = ", under the worst condition for each," if len(self.points) > 1 else ","
         text = f"In {source}{where} {numbers.words(texts)}."
-        if len(self.requirements) > 1:
-            text += f" The tightest requirement is the {self.requirements[0].metric.within}."
+        if len(self.tightest_first) > 1:
+            text += f" The tightest requirement is the {self.tightest_first[0].metric.within}."
         return text
 
     def home_sentence(self) -> str:

@@ -51,7 +51,6 @@ STUDIES = {
     "a search for a fleet": (
         {"design": grid(uavs=[1, 2]), "costs": {"uav": 20_000}, "selection": SEARCH},
         [
-            "Which fleet is the cheapest on the sea small?",
             "With the policy greedy, the cheapest fleet that meets the requirements is",
             "met: the answer",
             "Prices: 20,000 EUR for a UAV.",
