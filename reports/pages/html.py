@@ -39,6 +39,7 @@ from dess.reports.pages.page import FILES, STUDY, Learned, Page, hidden
 
 STUDIES_BESIDE = 6  # studies with a column in one table of what they were made with
 FEW_WORDS = 18  # characters of a cell that is not broken
+SENTENCES = 150  # characters of a cell from which on its column is wide
 SHORT = 12  # characters of a hash that are shown
 PART = "application/vnd.dess.part+json"  # type of the output of a cell that contains a ``Part``
 
@@ -269,8 +270,7 @@ def table(
     """
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
-    if not wrap:
-        html = _aligned(html, len(frame.columns))
+    html = _CELL.sub(_wrapped, html) if wrap else _aligned(html, len(frame.columns))
     html = str(indexed(Markup(_EMPTY_HEADER.sub(r"<td\1></td>", html))))
     caption = ". ".join(
         filter(None, [caption, numbers.why_nan(frame.astype(object).fillna("").to_numpy().flat)])
@@ -305,6 +305,12 @@ def _aligned(table: str, columns: int) -> str:
         for cell, indent in zip(cells, indents, strict=True)
     )
     return _CELL.sub(lambda _: next(aligned), table)
+
+
+def _wrapped(cell: re.Match[str]) -> str:
+    """A cell that is broken into several lines; sentences get a column that is wide enough."""
+    look = ' class="long"' if len(cell[1]) > SENTENCES else ""
+    return f"<td{look}>{_kept_together(cell[1])}</td>"
 
 
 def _width(digits: str) -> float:

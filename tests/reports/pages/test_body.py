@@ -112,3 +112,10 @@ def test_thresholds_have_indices_but_in_code():
     found = main_of("C_S, DC_S, C_C\n\n```\nC_C\n```")
     assert "<p>C<sub>S</sub>, DC_S, C<sub>C</sub></p>" in found
     assert '<pre tabindex="0"><code>C_C' in found
+
+
+def test_a_cell_of_sentences_has_a_wide_column_and_keeps_intervals_together():
+    cells = {"mean": ["97.4 % [96.5, 97.7]"], "guarantee": ["it is the best. " * 12]}
+    shown = html.table(pd.DataFrame(cells), wrap=True).data
+    assert "<td>97.4\xa0% [96.5,\xa097.7]</td>" in shown
+    assert shown.count('<td class="long">it is the best. it') == 1
