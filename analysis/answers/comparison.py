@@ -354,14 +354,16 @@ def colours_in_words(lead: pd.DataFrame, pair: Pair) -> str:
         pair: The policies.
     """
     meanings = {
-        AHEAD: f"blue means that {pair.policy} is ahead",
-        BEHIND: f"orange that {pair.policy} is behind",
-        INCONCLUSIVE: "hollow that it is inconclusive",
+        AHEAD: f"{pair.policy} is ahead where a dot is blue",
+        BEHIND: f"{pair.policy} is behind where a dot is orange",
+        INCONCLUSIVE: "a hollow dot is inconclusive",
     }
     shown = [words for verdict, words in meanings.items() if verdict in {*lead["verdict"]}]
-    text = f"{', '.join(shown)} (Holm, over all bins); " if shown else ""
-    text = f"{text}dashed is the mean of all missions."
-    return text[0].upper() + text[1:]
+    if not shown:
+        return ""
+    return (
+        f"By Holm's test over all bins, {numbers.words(shown)}. Dashed: the mean of all missions."
+    )
 
 
 def leads(missions: pd.DataFrame, lead: pd.DataFrame, pair: Pair, note: str = "") -> list[Drawing]:

@@ -23,15 +23,18 @@ FOLDER = "cross-check"  # folder of missions simulated again, beside the results
 
 
 def answer(missions: Sequence[Mission]) -> str:
-    """What share of the data single missions of fleets of different sizes collect."""
+    """What share of the data single missions of fleets collect, and how many UAVs run empty."""
     parts = [
         f"{numbers.percent(m.record[RATIO])} with {m.fleet} in {m.record.slots} slots"
         for m in missions
     ]
+    empty = sum(int((mission.uavs["end"] == "battery").sum()) for mission in missions)
+    run_empty = "No UAV runs"
+    if empty:
+        run_empty = f"{empty} of {sum(len(mission.uavs) for mission in missions)} UAVs run"
     return (
-        f"Of the data, single missions of {missions[0].policy} collect "
-        f"{numbers.words(parts)}: the UAVs share the nodes, and charge before their batteries are "
-        f"empty.{_left_in_the_air(missions)}"
+        f"Of the data, single missions of {missions[0].policy} collect {numbers.words(parts)}. "
+        f"{run_empty} out of battery in them.{_left_in_the_air(missions)}"
     )
 
 

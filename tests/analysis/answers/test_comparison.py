@@ -172,10 +172,10 @@ def test_a_bin_has_ten_missions_or_more():
 def test_only_colours_that_occur_are_explained():
     ahead = comparison.along(missions_of(lambda t: 0.5 + 0 * t["uavs"]))
     said = comparison.colours_in_words(ahead, PAIR)
-    assert said.startswith("Blue means that ours is ahead (Holm")
+    assert said.startswith("By Holm's test over all bins, ours is ahead where a dot is blue. ")
     assert "orange" not in said and "hollow" not in said
     mixed = comparison.along(missions_of(lambda t: 0.05 * (t["uavs"] - 2)))
-    assert "orange that ours is behind" in comparison.colours_in_words(mixed, PAIR)
+    assert "ours is behind where a dot is orange" in comparison.colours_in_words(mixed, PAIR)
 
 
 @pytest.mark.parametrize(

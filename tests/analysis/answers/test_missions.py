@@ -1,5 +1,7 @@
 """How a team shares out the nodes, on layouts worked by hand."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -149,3 +151,19 @@ def test_the_fate_of_a_mission_says_whether_uavs_can_fly_home(
     uavs = pd.DataFrame({"end": ends, "battery": batteries, "way_home": 8})
     mission = Mission("greedy", space, {}, uavs, pd.DataFrame())
     assert missions.fate_in_words(mission) == words
+
+
+def test_the_answer_counts_the_uavs_that_run_empty():
+    """It does not say that they charge in time."""
+
+    class Record(dict[str, float]):
+        slots = 100
+
+    def mission(*ends: str) -> SimpleNamespace:
+        uavs = pd.DataFrame({"end": ends, "battery": 0, "way_home": 0})
+        record, fleet = Record(collection_ratio=0.5), f"{len(ends)} UAVs"
+        return SimpleNamespace(policy="random", fleet=fleet, record=record, uavs=uavs)
+
+    said = missions.answer([mission("quota", "battery"), mission("battery", "battery", "quota")])
+    assert "3 of 5 UAVs run out of battery in them." in said and "before" not in said
+    assert "No UAV runs out of battery in them." in missions.answer([mission("quota", "quota")])
