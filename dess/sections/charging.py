@@ -60,7 +60,7 @@ _MOST_SLOTS = 10**11
 
 
 def charge_fraction(rate: Fraction) -> Fraction:
-    """The rate of charging [% per slot] as rules and planner reckon with it.
+    """The rate of charging [% per slot] as rules and planner compute with it.
 
     It is exact for numbers of at most eleven decimals.
     """
