@@ -248,7 +248,8 @@ def age(results: Results) -> str:
     parts = []
     for rate in dict.fromkeys([ends.index.min(), ends.index.max()]):
         (change,) = changed[changed["arrival_rate"] == rate].itertuples()
-        ages = [numbers.decimals(*row, digits=1) for row in ends.loc[[rate]].to_numpy()]
+        rows = ends.loc[[rate]].to_numpy()
+        ages = [numbers.decimals(mean, low, high, digits=1) for mean, low, high in rows]
         parts.append(
             f"{verbs[position(change)]} from {' to '.join(ages)} slots at an arrival rate of "
             f"{value_text(rate)}"

@@ -388,7 +388,8 @@ def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) 
         A row per metric, policy and other design point: ``metric``, ``policy``, ``point``, the
         varied fields, ``difference`` (positive if more than at the baseline) with ``low`` and
         ``high`` (95 % each), ``p``, ``p_adjusted`` (Holm, over the rows of the metric) and ``n``
-        pairs. A point without a replication of the baseline has no row.
+        pairs. Intervals and p-values allow for a search. A point without a replication of the
+        baseline has no row.
 
     Raises:
         InputError: If there is no such point or metric.
@@ -399,8 +400,12 @@ def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) 
         parts = []
         for policy, missions in _missions(results, metric, None).groupby("policy", sort=False):
             wide = by_replication(missions, metric, "point")
-            of = known_in(results.missions, metric)
-            tests = column_tests(wide.drop(columns=point), wide[point], of)
+            of, others = known_in(results.missions, metric), wide.drop(columns=point)
+            looks = results.looks(str(policy))
+            # The pairs end with the missions of the one that has fewer.
+            seen = np.minimum(looks[others.columns.to_numpy()], looks[point])
+            tests = column_tests(others, wide[point], of, level_after(seen))
+            tests["p"] = (tests["p"] * np.maximum(seen * (seen + 1), 1)).clip(upper=1)
             tests = tests[tests["n"] > 0].join(points(results)).reset_index()
             parts.append(tests.assign(metric=metric, policy=policy))
         tables.append(with_adjusted(pd.concat(parts, ignore_index=True), "holm"))
@@ -424,6 +429,8 @@ def _averaged(
     missions = missions.assign(cell=cell_of[missions["point"].to_numpy()])
     tables = []
     for name, part in missions.groupby("policy", sort=False):
+        looks = results.looks(str(name))
+        seen = np.array([looks[cell_of == cell].min() for cell in range(len(cells))])
         units = part.groupby(["cell", "replication"])[metric].agg(["mean", "size"])
         if not sampled:  # only replications that all points of a cell have
             units = units[units["size"] == sizes[units.index.get_level_values("cell")]]
@@ -432,26 +439,31 @@ def _averaged(
             ends = column_intervals(wide, of)
         else:
             at_points = by_replication(part, metric, "point")
-            ends = _over_points(at_points.reindex(columns=range(len(cell_of))), cell_of, of)
+            at_points = at_points.reindex(columns=range(len(cell_of)))
+            ends = _over_points(at_points, cell_of, of, level_after(seen))
         table = pd.concat([cells, ends], axis=1)
-        table = table.assign(points=sizes, tied=may_be_best(wide.to_numpy(float), of))
+        table = table.assign(points=sizes, tied=may_be_best(wide.to_numpy(float), of, seen))
         table.insert(0, "policy", name)
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
 
 
-def _over_points(values: pd.DataFrame, cell_of: np.ndarray, metric: Metric) -> pd.DataFrame:
+def _over_points(
+    values: pd.DataFrame, cell_of: np.ndarray, metric: Metric, levels: np.ndarray
+) -> pd.DataFrame:
     """``mean``, ``low``, ``high`` and ``n`` of every cell, with its points as strata, or nan.
 
     Args:
         values: (R, K) a row per replication and a column per design point.
         cell_of: (K,) the cell of every point.
         metric: The metric.
+        levels: The confidence level of every cell.
     """
     rows = []
     for cell in range(cell_of.max() + 1):
         complete = values.loc[:, cell_of == cell].dropna().to_numpy(float)
-        ends = stratified(complete, metric) if len(complete) else [np.nan] * 3
+        level = float(levels[cell])
+        ends = stratified(complete, metric, level) if len(complete) else [np.nan] * 3
         rows.append((*ends, len(complete)))
     return pd.DataFrame(rows, columns=["mean", "low", "high", "n"])
 

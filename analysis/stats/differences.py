@@ -193,7 +193,10 @@ def mcnemar(gains: int, losses: int) -> float:
 
 
 def column_tests(
-    values: pd.DataFrame, baseline: pd.Series, metric: str | Metric = ""
+    values: pd.DataFrame,
+    baseline: pd.Series,
+    metric: str | Metric = "",
+    levels: float | np.ndarray = intervals.LEVEL,
 ) -> pd.DataFrame:
     """Paired comparisons of many columns with a baseline, as ``paired`` makes them.
 
@@ -201,6 +204,7 @@ def column_tests(
         values: (R, K) a row per replication; nan where a column lacks one.
         baseline: (R,) the values of the baseline.
         metric: The metric; by default one without bounds.
+        levels: The confidence level, or (K,) levels.
 
     Returns:
         (K, 6): ``difference`` (column - baseline) with ``low``, ``high``, ``n``, ``student`` (as in
@@ -212,7 +216,7 @@ def column_tests(
     differences = differences.mask(differences.abs().le(_ROUNDING * size, axis=1), 0.0)
     present = differences.notna()
     n, mean, of = differences.count(), differences.mean(), metric_of(metric)
-    half = -differences.sem() * stdtrit(np.maximum(n - 1, 1), (1 - intervals.LEVEL) / 2)
+    half = -differences.sem() * stdtrit(np.maximum(n - 1, 1), (1 - levels) / 2)
     ends = {"low": mean - half, "high": mean + half}
     table = pd.DataFrame({"difference": mean, **ends, "n": n, "student": half})
     own = values.where(present).mean()
@@ -230,7 +234,7 @@ def column_tests(
     squares = n * (differences.var(ddof=0) + (mean - centre) ** 2)
     squares += (rare[0] - centre) ** 2 + (rare[1] - centre) ** 2
     error = np.sqrt(squares / (size - 1) / size)
-    half = -stdtrit(size - 1, (1 - intervals.LEVEL) / 2) * error
+    half = -stdtrit(size - 1, (1 - levels) / 2) * error
     table["low"], table["high"] = centre - half, centre + half
     table["p"] = 2 * stdtr(size - 1, -(centre / error).abs())
     limit = of.range[1] - of.range[0]

@@ -4,8 +4,9 @@ import pandas as pd
 import pytest
 
 from dess.analysis import numbers, run_study
-from dess.analysis.answers import costs, summary
+from dess.analysis.answers import costs, settings, summary
 from dess.analysis.answers.fleet import cheapest
+from dess.analysis.stats.differences import paired
 from dess.analysis.stats.intervals import level_after, wilson
 from dess.analysis.study.study import CHECK
 from tests.analysis.answers.test_costs import DESIGN, PRICES
@@ -68,6 +69,19 @@ def test_an_answer_quotes_the_check_and_a_table_allows_for_the_search(searched):
         assert level > 0.95
         _, *ends = wilson(int(missions["success"].sum()), len(missions), level)
         assert [row["success_low"], row["success_high"]] == pytest.approx(ends)
+
+
+def test_differences_from_a_baseline_allow_for_the_search(searched):
+    """Two settings are compared on the missions of both, at the error of their last look."""
+    looks = searched.looks("greedy")
+    missions = searched.missions.query("policy == 'greedy'")
+    wide = missions.pivot(index="replication", columns="point", values="success")
+    for row in settings.against(searched, 0, ["success"]).query("policy == 'greedy'").itertuples():
+        both = wide[[row.point, 0]].dropna().to_numpy(float)
+        level = float(level_after(min(looks[row.point], looks[0])))
+        expected = paired(*both.T, level, "success")
+        assert (row.low, row.high) == pytest.approx((expected.low, expected.high))
+        assert row.p >= expected.p
 
 
 def test_the_guarantee_is_of_each_policy_and_says_what_it_takes_of_costs(searched):
