@@ -43,7 +43,9 @@ def page(studied, tmp_path_factory):
 def test_a_hostile_study_is_text_on_its_page_and_in_the_index(page):
     for name in (page.name, "index.html"):
         found = Links((page.parent / name).read_text("utf-8"))
-        assert unescape(found.outside_scripts).count(ATTACK) >= 2
+        # The index names nothing but the page: the origins of results stand there.
+        shown = unescape(found.outside_scripts)
+        assert shown.count(ATTACK) >= 2 if name == page.name else page.name in found.found
         assert not found.tags & {"iframe", "object", "form", "base", "link"}
         inside = re.compile(r"data:|[\w-]+\.(html|ipynb)$|#[\w-]+$|$")
         assert [link for link in found.found if not inside.match(link)] == []
