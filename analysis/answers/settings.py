@@ -190,8 +190,8 @@ def unequal_lengths(results: Results, metrics: Iterable[str]) -> str:
     lengths = [lasting(round(slots), units) for slots in (means.min(), means.max())]
     return (
         f"Missions end with their last UAV, after {' to '.join(dict.fromkeys(lengths))} on "
-        f"average, so {numbers.words(compared)} of settings are of missions of different lengths; "
-        "with quota = 0, all missions last until max_slots."
+        f"average, so settings are compared by {numbers.words(compared)} over missions of "
+        "different lengths; with quota = 0, all missions last until max_slots."
     )
 
 

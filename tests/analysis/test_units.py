@@ -61,7 +61,7 @@ def test_ages_of_missions_of_different_lengths_are_not_compared_without_saying_s
     means = results.missions.groupby("policy")["slots"].mean().round()
     text = settings.unequal_lengths(results, ["age"])
     assert f"after {means.min():.0f} mission slots to {means.max():.0f} mission slots" in text
-    assert "age of information of settings are of missions of different lengths" in text
+    assert "compared by age of information over missions of different lengths" in text
     assert settings.unequal_lengths(results, ["collection_ratio"]) == ""
     alike = replace(results, missions=results.missions.assign(slots=480))
     assert settings.unequal_lengths(alike, ["age"]) == ""
