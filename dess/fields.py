@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 from dess.errors import InputError, shown
 from dess.sea.chart import MOST_CHARTED, Cell, Chart, Rectangle, chart_at
 from dess.sections.age import Age
-from dess.sections.arrivals import Arrivals
+from dess.sections.arrivals import MOST_AMOUNT, Arrivals
 from dess.sections.charging import Charging, charge_fraction
 from dess.sections.data_sheet import DataSheet, Units
 from dess.sections.failures import Failures
@@ -28,7 +28,7 @@ MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS = 256, 1024, 100_000, 64
 MOST_ZONES = 8  # charging zones
 
 # Largest amount of initial data of a node [data units].
-MOST_DATA = 10**9
+MOST_DATA = MOST_AMOUNT
 
 # The fields that go beyond the paper.
 SECTIONS = ("arrivals", "age", "charging", "radio", "failures", "wind", "fleet", "data_sheet")

@@ -7,14 +7,15 @@ A CSV file has places, as cells (``x``, ``y``) or degrees (``lon``, ``lat``); of
 points are taken.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
 
-from dess.errors import InputError, listed, one_of
+from dess.errors import InputError, listed, one_of, shown
 from dess.sea import places
 from dess.sea.chart import Cell
 from dess.sea.places import Place, Projection, Size
@@ -37,6 +38,7 @@ class Amounts(NamedTuple):
         asked: The column that the scenario names for them; empty if it names none.
         known: What else the column may be called, whatever the case.
         unit: Their unit, of ``quantities.KINDS``; empty for plain numbers.
+        limits: The least and the largest amount in this unit.
         for_all: The field of the scenario that has one amount for all nodes.
         otherwise: This amount in the unit, for nodes whose field is empty; None if there is none.
         is_listed: Whether the scenario has a list of them, beside which a file has none.
@@ -46,6 +48,7 @@ class Amounts(NamedTuple):
     asked: str
     known: tuple[str, ...]
     unit: str
+    limits: tuple[float, float]
     for_all: str
     otherwise: float | None
     is_listed: bool
@@ -191,10 +194,15 @@ class NodesFound(NamedTuple):
         """What a node has in a column or, if its field is empty, what the scenario has for all."""
         where = f"{self.path}: {row.where}: {column}"
         text = row.property("", [column.lower()])
-        if text is not None and kind.unit:
-            return quantity_of(str(text), where, kind.unit)
         if text is not None:
-            return places.amount_of(str(text), where)
+            read: Callable[[str, str], float]
+            read = partial(quantity_of, unit=kind.unit) if kind.unit else places.amount_of
+            amount = read(str(text), where)
+            least, most = kind.limits
+            if not least <= amount <= most:
+                limits = f"{least:g}..{most:g} {kind.unit}".rstrip()
+                raise InputError(f"{where}: {shown(text)} is out of range; allowed: {limits}")
+            return amount
         if kind.otherwise is None:
             allowed = form_of(kind.unit) if kind.unit else "a number"
             raise InputError(f"{where}: is empty; allowed: {allowed}, or one in {kind.for_all}")

@@ -17,6 +17,7 @@ from dess.sea.chart import Rectangle
 from dess.sea.no_fly import NoFlyFile, no_fly_in, zones_in
 from dess.sea.nodes import DATA, RATES, Amounts, NodesFile, NodesFound
 from dess.sea.places import Projection
+from dess.sections.arrivals import MOST, MOST_AMOUNT
 from dess.sections.section import Integer, Number, Strict
 
 # What stands for a field in a scenario whose files are not read yet.
@@ -105,19 +106,19 @@ class OwnSea(NamedTuple):
         if not sheet.is_on:
             low, high = self.grid.initial_data
             data_of_all = low if low == high else None
-            rate_of_all = self.grid.arrival_rate
-            has_rates, has_data = bool(arrivals.rates), bool(arrivals.initial)
+            of_rate = "arrival_rate", self.grid.arrival_rate, bool(arrivals.rates)
+            of_data = "initial_data", data_of_all, bool(arrivals.initial)
             return [
-                Amounts("arrivals.rates", *rates, "", "arrival_rate", rate_of_all, has_rates),
-                Amounts("arrivals.initial", *data, "", "initial_data", data_of_all, has_data),
+                Amounts("arrivals.rates", *rates, "", (0, MOST), *of_rate),
+                Amounts("arrivals.initial", *data, "", (0, MOST_AMOUNT), *of_data),
             ]
         kinds = []
         for name, columns, missing in (("data_rate", rates, None), ("backlog", data, 0.0)):
             field, of_sheet = f"data_sheet.{name}", getattr(sheet, name)
             is_listed = isinstance(of_sheet, tuple)
             otherwise = missing if is_listed or not of_sheet else sheet.number(name)
-            unit = sheet.extra(name)["units"]
-            kinds.append(Amounts(field, *columns, unit, field, otherwise, is_listed))
+            unit, limits = sheet.extra(name)["units"], sheet.extra(name)["limits"][0]
+            kinds.append(Amounts(field, *columns, unit, limits, field, otherwise, is_listed))
         return kinds
 
     def _no_fly(self, values: Mapping[str, Any], projection: Projection | None) -> dict[str, Any]:

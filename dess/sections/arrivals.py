@@ -21,9 +21,10 @@ from dess.sections.section import Integer, Number, Section
 
 # The highest rate or factor, the last slot and the largest number of a schedule.
 MOST, LAST, MOST_ROWS = 100, 1_000_000, 10_000
+MOST_AMOUNT = 10**9  # initial data of a node
 
 Rate = Annotated[Number, Field(ge=0, le=MOST)]
-Amount = Annotated[Number, Field(ge=0, le=10**9)]
+Amount = Annotated[Number, Field(ge=0, le=MOST_AMOUNT)]
 Time = Annotated[Number, Field(ge=0, le=LAST)]
 
 # The Poisson process of one node.

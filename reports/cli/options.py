@@ -274,7 +274,6 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
         _field(field)
     if is_quantity(field):
         values = _quoted(values, is_single=False)
-        text = f"{field}={values}"
     elif found := _RANGE.fullmatch(values):
         return field, listed(field, _range(field, text, **found.groupdict()))
     try:

@@ -15,6 +15,7 @@ from tests.fuzz.strategies.commands import COMMANDS, READING
 from tests.fuzz.strategies.dear import dear, signals
 from tests.fuzz.strategies.forged import forged
 from tests.fuzz.strategies.outputs import outputs
+from tests.fuzz.strategies.own_seas import own_seas
 from tests.fuzz.strategies.reports import reports
 from tests.fuzz.strategies.settings import duplicates, odd_fields, unfit
 from tests.fuzz.strategies.sizes import sizes, work
@@ -30,6 +31,7 @@ ROUND: tuple[tuple[SearchStrategy[Case], int], ...] = (
     (odd_fields(), 60),
     (duplicates(), 8),
     (unfit(), 30),
+    (own_seas(), 30),
     (outputs(), 50),
     (signals(), 20),
     (sizes(), 20),

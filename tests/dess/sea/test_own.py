@@ -269,6 +269,8 @@ def test_an_empty_field_of_a_node_is_that_of_the_scenario(sea):
     assert type(space).of(space, initial_data=3).node_data == ((3.0, 3.0), (3.0, 3.0))
     with pytest.raises(InputError, match="line 2: data: is empty; allowed: a number, or one in"):
         load_scenario(sea(lines + "initial_data = [5, 20]", n_csv=table))
+    with pytest.raises(InputError, match=r"line 3: rate: '101' is out of range; allowed: 0\.\.100"):
+        load_scenario(sea(lines, n_csv=table.replace(",,40", ",101,40")))
     with pytest.raises(InputError, match="may part thousands or decimals; allowed: 1000 or 1.000"):
         load_scenario(sea(lines, n_csv="x;y;rate\n3;3;1,000\n"))
 

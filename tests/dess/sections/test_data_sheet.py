@@ -149,6 +149,9 @@ def test_a_field_of_a_node_wins_and_the_sheet_is_for_those_that_have_none(tmp_pa
     listed = _sea(tmp_path, rows, data_rate=["1 MB/h", "2 MB/h"])
     with pytest.raises(InputError, match="has the column data_rate, and the scenario lists"):
         load_scenario(listed)
+    below = rows.replace("20 MB", "-1 MB")
+    with pytest.raises(InputError, match="line 2: backlog: '-1 MB' is out of range; allowed: 0"):
+        load_scenario(_sea(tmp_path, below, data_rate="2 MB/h"))
     both = "x,y,rate,data_rate\n1,1,1 MB/h,2 MB/h\n4,4,3 MB/h,4 MB/h\n"
     with pytest.raises(InputError, match="has the columns data_rate and rate for one field"):
         load_scenario(_sea(tmp_path, both))

@@ -23,6 +23,8 @@ PLAIN = (
     'data_sheet={endurance="35 min", cruise="15 m/s", charging="40 min", wind="4 m/s from SW"}',
     'data_sheet={bandwidth="125 kHz", snr="12 dB at 2 km", range="2 km", mtbf="100 h"}',
     'data_sheet.data_rate="3 MB/h"',
+    "data_sheet.data_rate=20 kB/h",
+    "data_sheet.backlog=[1 MB, 2 MB, 0 MB]",
     "landing=true",
     "quota=0",  # which needs landing
 )
@@ -33,6 +35,7 @@ _ENDS = st.sampled_from(
     + ["[[1, 2]]", "[[0, 1], [0, 2]]", "[[1.5, 1]]", "[0.1, 0.1, 0.1]", '"storm.csv"', "[{}]"]
     + ['"/dev/zero"', "{}", "{measured=true}", "[{slots_per_cell=0}]", "[{a=1}]"]
     + ["[{slots_per_cell=100000}]", '"0 km"', '"1e300 h"', '"-3 MB"', '"5 m/s from nowhere"']
+    + ['"12 dB at 0 m"', "3,5 MB/h", "54 kmph", "[1 kB, 2 kB]"]
 )
 _names = st.sampled_from(FIELDS) | st.sampled_from(SECTIONS).flatmap(
     lambda section: texts.map(lambda name: f"{section}.{name}")
