@@ -105,12 +105,14 @@ class OwnSea(NamedTuple):
         rates, data = (source.rate, RATES), (source.data, DATA)
         if not sheet.is_on:
             low, high = self.grid.initial_data
-            data_of_all = low if low == high else None
-            of_rate = "arrival_rate", self.grid.arrival_rate, bool(arrivals.rates)
-            of_data = "initial_data", data_of_all, bool(arrivals.initial)
+            amount = low if low == high else None
+            most = (0, MOST_AMOUNT)
+            rate = self.grid.arrival_rate
+            has_rates = bool(arrivals.rates)
+            has_data = bool(arrivals.initial)
             return [
-                Amounts("arrivals.rates", *rates, "", (0, MOST), *of_rate),
-                Amounts("arrivals.initial", *data, "", (0, MOST_AMOUNT), *of_data),
+                Amounts("arrivals.rates", *rates, "", (0, MOST), "arrival_rate", rate, has_rates),
+                Amounts("arrivals.initial", *data, "", most, "initial_data", amount, has_data),
             ]
         kinds = []
         for name, columns, missing in (("data_rate", rates, None), ("backlog", data, 0.0)):
