@@ -42,6 +42,7 @@ from dess.fields import (
 )
 from dess.files.reading import Shipped, parse_toml
 from dess.sea.families import FAMILIES, is_generated, sea_of
+from dess.sea.no_fly import notes_after
 from dess.sea.nodes import AMOUNTS
 from dess.sea.own import OwnSea, unread
 from dess.sections.data_sheet import OPEN, DataSheet
@@ -219,6 +220,14 @@ def _load(
     name_or_path: str | Path, overrides: dict[str, Any], context: str = "", found: Any = None
 ) -> ScenarioSpace:
     where, read = found or _read(name_or_path)
+    with notes_after():
+        return _of_values(name_or_path, where, read, overrides, context)
+
+
+def _of_values(
+    name_or_path: str | Path, where: str, read: dict[str, Any], overrides: Any, context: str
+) -> ScenarioSpace:
+    """The scenario of the values that its file has, and of those that replace them."""
     read.pop("description", None)
     values = merged(read, overrides)
     if named := unread(read) | unread(values):

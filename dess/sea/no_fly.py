@@ -12,7 +12,9 @@ has a line for each row of cells, one in a picture (``.png``) a pixel for each c
 
 import io
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 from typing import Annotated
@@ -168,9 +170,34 @@ def _of_places(
     return closed
 
 
-@cache
+# Notes that are kept until a scenario is known to be valid: a refusal is told alone.
+_held: ContextVar[list[str] | None] = ContextVar("held", default=None)
+
+
+@contextmanager
+def notes_after() -> Iterator[None]:
+    """Tell the notes of a block at its end, and none if it raises an error."""
+    token = _held.set([])
+    try:
+        yield
+        notes = _held.get() or []
+    finally:
+        _held.reset(token)
+    for line in notes:
+        _note(line)
+
+
 def _note(line: str) -> None:
-    """Tell once what a user should know."""
+    """Tell once what a user should know, or keep it for the end of ``notes_after``."""
+    held = _held.get()
+    if held is None:
+        _tell(line)
+    else:
+        held.append(line)
+
+
+@cache
+def _tell(line: str) -> None:
     logging.getLogger(__name__).warning("note: no_fly: %s", line)
 
 

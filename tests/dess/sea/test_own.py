@@ -148,6 +148,19 @@ def test_a_point_with_a_radius_is_a_circle(sea, tmp_path, caplog):
     assert "cells.csv: the column radius is not used" in caplog.text
 
 
+def test_a_note_is_not_told_before_a_refusal(sea, caplog):
+    far = collection(feature("Polygon", [box(9, 9, 10, 10)]))
+    lines = f'nodes = "n.csv"\nno_fly = "far-away.json"\ngrid = 8\ncell_size = {CELL}\n'
+    path = sea(lines + "zone = [0, 0, 2, 2]\n", n_csv="lon,lat\n0.005,0.005\n")
+    (path.parent / "far-away.json").write_text(json.dumps(far))
+    with caplog.at_level(logging.WARNING), pytest.raises(InputError, match="zone: "):
+        load_scenario(path, zone=[7, 7, 2, 2])
+    assert not caplog.messages
+    with caplog.at_level(logging.WARNING):
+        load_scenario(path)
+    assert "far-away.json closes no cell" in caplog.text
+
+
 # --- coasts as they are published ---
 
 

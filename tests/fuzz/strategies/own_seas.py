@@ -78,7 +78,8 @@ def own_seas(draw: st.DrawFn) -> Case:
         write("in/own.csv", draw(_tables()).encode("utf-8", "surrogatepass")),
         write("in/own.geojson", draw(_documents()).encode("utf-8", "surrogatepass")),
     )
-    words, values = draw(st.sampled_from(_COMMANDS))
+    # A sweep loads the scenario several times, and may tell of a file before it refuses a value.
+    words, values = _COMMANDS[0] if "no_fly" in head else draw(st.sampled_from(_COMMANDS))
     arguments = line(words, values)
     if draw(st.integers(0, 2)) == 2:
         name = draw(st.sampled_from(sorted(_SHEET)))
