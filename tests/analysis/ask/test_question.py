@@ -98,7 +98,7 @@ def test_a_name_is_of_one_question(asking, tmp_path):
 
 VALUES = {
     "fleet": [{"slots_per_cell": 2}, {"flying_time": 60}],
-    "initial_data": [5, 20],
+    "initial_data": [5, 30],
     "names": ["Tönning 🌊", "O'Neill", 'a "b"'],
     "zones": [{"cells": [0, 6, 2, 2], "pads": 1}],
     "arrivals.service": "newest",

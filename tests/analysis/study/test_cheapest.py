@@ -45,7 +45,7 @@ def test_results_of_before_are_priced_if_charging_and_losses_have_no_price():
     assert Costs(uav=100).parts([space(uavs=1)], missions, uavs)["purchase"].tolist() == [100]
     for price, field in (({"charge": 2}, "charged"), ({"lost_uav": 2}, "down")):
         for known in (uavs, uavs | {field: [np.nan]}):  # a folder with older and newer files
-            with pytest.raises(InputError, match=f"^costs: .* no {field}, .*; allowed: .*--out$"):
+            with pytest.raises(InputError, match=f"^costs: .* no {field}, .*; allowed: .* another results folder$"):
                 Costs(**price).parts([space(uavs=1)], missions, known)
 
 

@@ -1,7 +1,6 @@
 """The auditor: it replays a mission slot by slot, and computes its record."""
 
 from collections.abc import Mapping, Sequence
-from math import nan
 from typing import Any
 
 from tests.dess.auditor.failures import Failures
@@ -147,7 +146,7 @@ class _Auditor:
             found |= {"failures": self.failures.of_uavs, "slots_grounded": grounded}
         if "charging" in self.c:
             waited, requests = self._sum("slots_waiting"), self.pads.requests
-            found |= {"queue": waited / slots, "waiting": waited / requests if requests else nan}
+            found |= {"queue": waited / slots, "waiting": waited / max(requests, 1)}
             found["pad_requests"] = requests
             found["utilisation"] = self._sum("slots_charging") / (self.pads.number * slots)
         return found

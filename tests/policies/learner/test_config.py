@@ -16,7 +16,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"phases": [PHASE, PHASE]}, "phases: ['harvest', 'harvest'] are not distinct"),
     ({"n_step": 60}, "learning_starts: 60 is too few; allowed: more than n_step 60"),
     ({"replay": 4, "n_step": 3}, "replay: 4 is too few; allowed: n_step 3 + 2 or more"),
-    ({"uavs": [2, 3]}, "uavs is a field of the scenario; allowed: --set uavs=[2, 3], or uavs in"),
+    ({"uavs": [2, 3]}, "uavs is a field of the scenario; allowed: --set 'uavs=[2, 3]', or uavs in"),
     ({"set": {"batch": 3}}, "batch is a setting of the training, not a field of the scenario; "),
     ({"set": {"uvs": 3}}, "scenario: scenario paper: uvs: unknown key (did you mean uavs?)"),
     ({"phases": [PHASE | {"ticks": 10**8}]}, "evaluate_every: 25 makes more than 50,000 evalu"),
