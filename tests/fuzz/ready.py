@@ -33,7 +33,6 @@ ASKED_WITH = {
     "fields": "{uavs=[1, 2]}",
     "settings": "{uavs=2}",
     "baseline": "{uavs=1}",
-    "example": "{uavs=2}",
     "requirements": "{success=0.1}",
     "prices": "{uav=1000}",
 }

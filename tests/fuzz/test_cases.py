@@ -43,11 +43,16 @@ def test_fixed_cases_keep_the_contract(folder):
         "  2%|2         | 5/300 [00:10<09:50,  1.99s/tick, phase=harvest]",
         "tick:  40%|####      | 120/300 [00:10<00:15, 11.99tick/s]",
         "compiling:   0%|          | 0/300 [00:10<?, ?tick/s]",
+        "57mission [1:00:10,  1.99mission/s]",
         "on this machine: 0.02 s a tick, about 2 minutes to go",
     ],
 )
 def test_progress_is_no_error(line):
     assert _NEWS.fullmatch(line.strip())
+
+
+def test_a_line_that_names_a_path_is_no_progress():
+    assert not _NEWS.fullmatch("interrupted: continue with dess study run 2/sweep --out 3/study")
 
 
 def test_every_parameter_of_every_command_is_known():
