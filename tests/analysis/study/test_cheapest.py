@@ -44,8 +44,9 @@ def test_results_of_before_are_priced_if_charging_and_losses_have_no_price():
     missions, uavs = {"point": [0], "uavs": [1], "slots": [90]}, {"battery": [27]}
     assert Costs(uav=100).parts([space(uavs=1)], missions, uavs)["purchase"].tolist() == [100]
     for price, field in (({"charge": 2}, "charged"), ({"lost_uav": 2}, "down")):
+        line = f"^costs: .* no {field}, .*; allowed: .* another results folder$"
         for known in (uavs, uavs | {field: [np.nan]}):  # a folder with older and newer files
-            with pytest.raises(InputError, match=f"^costs: .* no {field}, .*; allowed: .* another results folder$"):
+            with pytest.raises(InputError, match=line):
                 Costs(**price).parts([space(uavs=1)], missions, known)
 
 
