@@ -8,10 +8,10 @@ from typing import Any, Literal
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.record import OPERATIONS
-from dess.scenario import ScenarioSpace
-from dess.sections.data_sheet import Units
-from dess.sections.quantities import printed
+from dess.model.record import OPERATIONS
+from dess.scenario.data_sheet import Units
+from dess.scenario.quantities import printed
+from dess.scenario.scenario import ScenarioSpace
 
 Kind = Literal["outcome", "share", "number", "cost"]
 

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dess.errors import form_of, kind_of
-from dess.fields import SAMPLED, ZONE_PADS, fields_of
-from dess.scenario import Scenario, ScenarioSpace
+from dess.base.errors import form_of, kind_of
+from dess.scenario.fields import SAMPLED, ZONE_PADS, fields_of
+from dess.scenario.scenario import Scenario, ScenarioSpace
 
 # The description of the studies of sweeps, and the folder of their results folders.
 SWEEP, SWEEPS = "a sweep: every combination of the values", "sweeps"

@@ -20,32 +20,34 @@ ROUNDS = 3
 VARIANTS = {
     "as it is": (),
     "no pruning: every node with data is drawn": (
-        ("dess/channel.py", "if batch.rest + reach < best or", "if"),
+        ("dess/model/channel.py", "if batch.rest + reach < best or", "if"),
     ),
     "no vector code: the length of a batch is known to the compiler": (
-        ("dess/channel.py", "batch, search[i, WIDTH])", "batch, _BATCH)"),
-        ("dess/channel.py", "word, search[i, WIDTH])", "word, _BATCH)"),
+        ("dess/model/channel.py", "batch, search[i, WIDTH])", "batch, _BATCH)"),
+        ("dess/model/channel.py", "word, search[i, WIDTH])", "word, _BATCH)"),
     ),
     "no bounds: every deviate is transformed exactly": (
-        ("dess/channel.py", "streams.normal_or_bound(", "streams.normal("),
+        ("dess/model/channel.py", "streams.normal_or_bound(", "streams.normal("),
     ),
     "no table of steps: order and means worked out in every slot": (
-        ("dess/channel.py", "if order[row, mission.nodes] == 0:", "if True:"),
+        ("dess/model/channel.py", "if order[row, mission.nodes] == 0:", "if True:"),
     ),
     "no inlining: the rules are called": (
-        ("dess/code/kernels.py", '{"forceinline": True, "_nrt": False}', "{}"),
+        ("dess/base/kernels.py", '{"forceinline": True, "_nrt": False}', "{}"),
     ),
     "references counted in inlined rules, too": (
-        ("dess/code/kernels.py", '"forceinline": True, "_nrt": False', '"forceinline": True'),
+        ("dess/base/kernels.py", '"forceinline": True, "_nrt": False', '"forceinline": True'),
     ),
     "the code of sections compiled in": (
         (
-            "dess/state.py",
+            "dess/model/state.py",
             "mission if scenario.is_extended else mission.view(PLAIN_MISSION)",
             "mission",
         ),
     ),
-    "no batch: one mission at a time": (("dess/batch.py", "BATCH_SIZE = 256", "BATCH_SIZE = 1"),),
+    "no batch: one mission at a time": (
+        ("dess/model/batch.py", "BATCH_SIZE = 256", "BATCH_SIZE = 1"),
+    ),
 }
 
 TIMED = """

@@ -14,7 +14,7 @@ import pytest
 
 from benchmarks.recorded import Recorder
 from dess import load_scenario, policies, simulate_batch
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 
 SEED, MISSIONS = 5, 2000
 RATIOS = json.loads(Path(__file__).with_name("ratios.json").read_text("utf-8"))

@@ -27,17 +27,17 @@ from torch import nn
 from tqdm import tqdm
 
 from dess import load_scenario, simulate_batch
-from dess.guard import guard
-from dess.observations.observer import encoder_of
-from dess.observations.sets import Sets
-from dess.observations.states import CompactStates, compact_states, masks
+from dess.envs.observations.observer import encoder_of
+from dess.envs.observations.sets import Sets
+from dess.envs.observations.states import CompactStates, compact_states, masks
+from dess.model.guard import guard
+from dess.model.view import View
 from dess.policies.learner.config import MISSION_SEED, TrainingConfig, load_config
 from dess.policies.learner.network import SetNetwork, arrays_of
 from dess.policies.learner.trained import policy_of, save_policy
 from dess.policies.learner.training import soft_update
 from dess.policies.planner import LongPlanner, Planner
-from dess.sea.families import FAMILIES, SETS
-from dess.view import View
+from dess.scenario.families import FAMILIES, SETS
 
 
 class Round(NamedTuple):

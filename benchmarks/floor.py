@@ -8,11 +8,12 @@ import math
 
 import numpy as np
 
-from dess import channel, rules, streams
-from dess.channel import empty_scratch, world_of
-from dess.code.kernels import kernel
-from dess.scenario import ScenarioSpace
-from dess.state import starts_of, state_of
+from dess.base.kernels import kernel
+from dess.model import channel, rules
+from dess.model.channel import empty_scratch, world_of
+from dess.model.state import starts_of, state_of
+from dess.physics import streams
+from dess.scenario.scenario import ScenarioSpace
 
 
 def needed_draws(

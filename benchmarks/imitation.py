@@ -25,13 +25,13 @@ from benchmarks.recorded import Recorded, Recorder
 from dess import load_scenario, policies, simulate_batch
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.stats.intervals import mean_interval
-from dess.guard import guard
-from dess.observations.states import CompactStates, masks
+from dess.envs.observations.states import CompactStates, masks
+from dess.model.guard import guard
+from dess.model.view import View
 from dess.policies.learner.config import MISSION_SEED, TrainingConfig, load_config
 from dess.policies.learner.dqn import Batch, DQNLearner, DQNTraining
 from dess.policies.learner.trained import save_policy, weights_of
 from dess.policies.registry import TRAINED
-from dess.view import View
 
 RECORDED, EVALUATED = 777_002, 777_001  # seeds of the planner's missions and of the evaluation
 HELD_OUT = 50  # of the planner's missions, which no training sees

@@ -23,8 +23,8 @@ import pyarrow as pa
 from dess import simulate_batch
 from dess.analysis.answers.learning import SHIPPED, read_curves, trained_policies
 from dess.analysis.metrics import METRICS, PRODUCT
-from dess.files.reading import paths_in
-from dess.files.tables import read_table, write_table
+from dess.base.files.reading import paths_in
+from dess.base.files.tables import read_table, write_table
 from dess.policies.learner.config import TrainingConfig, load_config
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.session import device_of

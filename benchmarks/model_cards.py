@@ -18,8 +18,8 @@ from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.paper import values
 from dess.analysis.stats.differences import paired
 from dess.analysis.stats.intervals import interval_of, post_stratified
-from dess.files.reading import read_text
-from dess.files.writing import write_file
+from dess.base.files.reading import read_text
+from dess.base.files.writing import write_file
 from dess.policies.learner.config import MISSION_SEED, load_config, read_description
 from dess.policies.learner.trained import weights_of
 from dess.policies.registry import CARD, HEURISTICS, load

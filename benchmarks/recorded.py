@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from dess.code.kernels import kernel
-from dess.view import View
+from dess.base.kernels import kernel
+from dess.model.view import View
 
 
 @kernel

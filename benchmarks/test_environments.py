@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from dess import load_scenario, parallel_env, vector_env
-from dess.env.vector import HarvestVectorEnv
-from dess.observations import observer
+from dess.envs.observations import observer
+from dess.envs.vector import HarvestVectorEnv
 
 SCENARIO, SEED = load_scenario("paper"), 5
 STEPS = {1: 2000, 64: 400, 1024: 60}  # of all missions, per round, by the number of missions
@@ -125,7 +125,7 @@ def test_parallel_env(benchmark, ended: str) -> None:
 def test_stable_baselines3(benchmark, num_envs: int) -> None:
     """``vector_env`` as a ``VecEnv`` of stable-baselines3, with its masks."""
     pytest.importorskip("stable_baselines3")
-    from dess.integrations.sb3 import SB3VecEnv
+    from dess.envs.integrations.sb3 import SB3VecEnv
 
     inner = vector_env(SCENARIO, num_envs, SEED)
     env, generator = SB3VecEnv(inner), np.random.default_rng(SEED)

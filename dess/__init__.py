@@ -15,31 +15,31 @@ from importlib import import_module, metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dess.env.registration import register
+from dess.envs.registration import register
 
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
-    from dess.batch import simulate_batch as simulate_batch
-    from dess.env.parallel import parallel_env as parallel_env
-    from dess.env.single import single_env as single_env
-    from dess.env.vector import vector_env as vector_env
-    from dess.errors import InputError as InputError
-    from dess.mission import simulate as simulate
-    from dess.scenario import Scenario as Scenario
-    from dess.scenario import ScenarioSpace as ScenarioSpace
-    from dess.scenario import load_scenario as load_scenario
-    from dess.scenario import scenario_names as scenario_names
+    from dess.base.errors import InputError as InputError
+    from dess.envs.parallel import parallel_env as parallel_env
+    from dess.envs.single import single_env as single_env
+    from dess.envs.vector import vector_env as vector_env
+    from dess.model.batch import simulate_batch as simulate_batch
+    from dess.model.mission import simulate as simulate
+    from dess.scenario.scenario import Scenario as Scenario
+    from dess.scenario.scenario import ScenarioSpace as ScenarioSpace
+    from dess.scenario.scenario import load_scenario as load_scenario
+    from dess.scenario.scenario import scenario_names as scenario_names
 
 _HOME = {
-    "InputError": "errors",
-    "Scenario": "scenario",
-    "ScenarioSpace": "scenario",
-    "load_scenario": "scenario",
-    "scenario_names": "scenario",
-    "simulate": "mission",
-    "simulate_batch": "batch",
-    "parallel_env": "env.parallel",
-    "single_env": "env.single",
-    "vector_env": "env.vector",
+    "InputError": "base.errors",
+    "Scenario": "scenario.scenario",
+    "ScenarioSpace": "scenario.scenario",
+    "load_scenario": "scenario.scenario",
+    "scenario_names": "scenario.scenario",
+    "simulate": "model.mission",
+    "simulate_batch": "model.batch",
+    "parallel_env": "envs.parallel",
+    "single_env": "envs.single",
+    "vector_env": "envs.vector",
 }
 
 _FLOORS = ("policies", "analysis")  # above this one, imported by name alone

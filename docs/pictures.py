@@ -25,7 +25,7 @@ from PIL.PngImagePlugin import PngInfo
 from dess import load_scenario, policies, simulate
 from dess.analysis.figures import missions, style
 from dess.analysis.results import event_log
-from dess.errors import InputError
+from dess.base.errors import InputError
 from dess.reports.pages import INDEX, html
 from dess.reports.pages.page import Page
 from dess.reports.pages.render import TILES

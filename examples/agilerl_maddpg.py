@@ -11,7 +11,7 @@ from agilerl.training.train_multi_agent_off_policy import train_multi_agent_off_
 from agilerl.vector import PzDummyVecEnv
 
 import dess
-from dess.env.parallel import HarvestEnv
+from dess.envs.parallel import HarvestEnv
 
 
 def train(env: HarvestEnv, steps: int, seed: int = 0) -> list[MADDPG]:

@@ -11,7 +11,7 @@ from benchmarl.experiment import Experiment, ExperimentConfig
 from benchmarl.models.mlp import MlpConfig
 
 import dess
-from dess.integrations.benchmarl import HarvestTask
+from dess.envs.integrations.benchmarl import HarvestTask
 
 
 def experiment(scenario, algorithm, slots, out, per_batch=2000, seed=0):

@@ -6,7 +6,7 @@ import torch
 from pufferlib.cleanrl import Policy
 
 import dess
-from dess.integrations.pufferlib import HarvestPufferEnv, MaskedPolicy
+from dess.envs.integrations.pufferlib import HarvestPufferEnv, MaskedPolicy
 
 
 def train(env: HarvestPufferEnv, steps: int, seed: int = 0, gamma: float = 0.99) -> Policy:

@@ -8,7 +8,7 @@ from ray.rllib.core.rl_module.rl_module import RLModuleSpec
 from ray.rllib.examples.rl_modules.classes.action_masking_rlm import ActionMaskingTorchRLModule
 
 import dess
-from dess.integrations.rllib import HarvestMultiAgentEnv
+from dess.envs.integrations.rllib import HarvestMultiAgentEnv
 
 
 def learner(scenario: str, batch: int, seed: int = 0, **design: object) -> PPO:

@@ -20,7 +20,7 @@ from sb3_contrib import MaskablePPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 import dess
-from dess.integrations.sb3 import SB3VecEnv
+from dess.envs.integrations.sb3 import SB3VecEnv
 from dess.policies.adapter import Adapter
 
 FILE = Path("maskable_ppo.zip")  # in the working folder

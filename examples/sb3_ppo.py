@@ -12,7 +12,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecNormalize
 
 import dess
-from dess.integrations.sb3 import SB3VecEnv
+from dess.envs.integrations.sb3 import SB3VecEnv
 
 SCENARIO = dess.load_scenario("paper")  # each mission draws its fleet of 1 to 3 UAVs
 

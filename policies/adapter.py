@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from dess.env.stepper import checked_actions
-from dess.files.reading import read_bytes
-from dess.observations.observer import Observer
-from dess.scenario import ScenarioSpace
-from dess.sea.chart import geometry
-from dess.view import View
+from dess.base.files.reading import read_bytes
+from dess.envs.observations.observer import Observer
+from dess.envs.stepper import checked_actions
+from dess.model.view import View
+from dess.physics.chart import geometry
+from dess.scenario.scenario import ScenarioSpace
 
 LIMIT = 2**32  # bytes of the largest file of weights
 

@@ -9,18 +9,18 @@ from functools import lru_cache
 
 import numpy as np
 
-from dess import streams
-from dess.code.kernels import inlined, kernel
-from dess.guard.battery import margin, must_charge, slots_left, slots_needed
-from dess.guard.moves import contest, contests, guard, safe_moves
-from dess.guard.parking import parking_cell, parking_memory, stays
-from dess.guard.ways import path_length, round_trip
-from dess.rules import data_left
-from dess.sea.chart import Chart, distance, spread
-from dess.sections.landing import flies
-from dess.sections.wind import reach_of
-from dess.state import HOVER, STEP_X, STEP_Y
-from dess.view import View
+from dess.base.kernels import inlined, kernel
+from dess.model.guard.battery import margin, must_charge, slots_left, slots_needed
+from dess.model.guard.moves import contest, contests, guard, safe_moves
+from dess.model.guard.parking import parking_cell, parking_memory, stays
+from dess.model.guard.ways import path_length, round_trip
+from dess.model.rules import data_left
+from dess.model.state import HOVER, STEP_X, STEP_Y
+from dess.model.view import View
+from dess.physics import streams
+from dess.physics.chart import Chart, distance, spread
+from dess.physics.landing import flies
+from dess.physics.wind import reach_of
 
 _NEAREST, _GREEDY, _TOUR, _AGE = range(4)
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from dess.code.kernels import kernel
-from dess.state import ACTION_NAMES, HOVER
+from dess.base.kernels import kernel
+from dess.model.state import ACTION_NAMES, HOVER
 
 ACTIONS = len(ACTION_NAMES)
 KERNELS, KERNEL_SIZE = 16, 5

@@ -30,13 +30,13 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 import dess
-from dess.code.sources import path_of
-from dess.errors import InputError, one_of, shown
-from dess.fields import SAMPLED
-from dess.files.reading import Missing, paths_in, read_text
+from dess.base.errors import InputError, one_of, shown
+from dess.base.files.reading import Missing, paths_in, read_text
+from dess.base.sources import path_of
+from dess.model.view import View
 from dess.policies.learner.config import CHECKPOINT, CONFIG, ranges_of, read_description
-from dess.scenario import ScenarioSpace, load_scenario, scenario_names
-from dess.view import View
+from dess.scenario.fields import SAMPLED
+from dess.scenario.scenario import ScenarioSpace, load_scenario, scenario_names
 
 
 @runtime_checkable

@@ -22,9 +22,9 @@ from dess.analysis import numbers
 from dess.analysis.results.chunks import BOUNDS, MANIFEST, partition
 from dess.analysis.results.parquet import files_in
 from dess.analysis.results.tables import Results
-from dess.files import documents, tables
-from dess.files.reading import read_bytes
-from dess.files.writing import write_zip
+from dess.base.files import documents, tables
+from dess.base.files.reading import read_bytes
+from dess.base.files.writing import write_zip
 from dess.reports.pages.html import template
 from dess.reports.pages.page import LARGEST, LIMIT, Page
 

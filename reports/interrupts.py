@@ -84,7 +84,7 @@ class Interrupts(AbstractContextManager["Interrupts"]):
             while time.process_time() < end and not self.received:
                 time.sleep(0.05)
             if not self.received and signal.getsignal(number[0]) == self._receive:
-                if writing := sys.modules.get("dess.files.writing"):
+                if writing := sys.modules.get("dess.base.files.writing"):
                     writing.remove_temporaries()
                 os.write(2, f"\n{LINE}\n".encode())  # there may be a progress bar
                 os._exit(EXIT_CODE)

@@ -34,7 +34,7 @@ from dess.analysis.figures.style import node_colours, uav_colours
 from dess.analysis.metrics import lasting, size_of
 from dess.analysis.results import event_log
 from dess.reports.pages.html import Part, figures, template
-from dess.scenario import Scenario
+from dess.scenario.scenario import Scenario
 
 TRAIL = 12  # number of last moves that are drawn behind a UAV
 # The events that a player jumps to, in words; of a pad, the text has no number.
@@ -58,7 +58,7 @@ class Shown(NamedTuple):
     """A mission that a player shows.
 
     Attributes:
-        events: The event log (a data frame, or the columns, of ``dess.record.EventLog``).
+        events: The event log (a data frame, or the columns, of ``dess.model.record.EventLog``).
         scenario: The scenario of the mission.
         title: The text above the map.
         choice: The text of the mission where several can be chosen from.
@@ -277,7 +277,7 @@ def write_animation(
     """Write a mission as an animation; the same mission gives the same bytes of a GIF.
 
     Args:
-        events: The event log (a data frame, or the columns, of ``dess.record.EventLog``).
+        events: The event log (a data frame, or the columns, of ``dess.model.record.EventLog``).
         scenario: The mission's scenario.
         file: The file to write, whatever its suffix.
         kind: ``GIF`` or ``MP4``.
@@ -343,7 +343,7 @@ class Film:
     All that stays is drawn once, and what moves is drawn on it for every slot.
 
     Args:
-        events: The event log (a data frame, or the columns, of ``dess.record.EventLog``).
+        events: The event log (a data frame, or the columns, of ``dess.model.record.EventLog``).
         scenario: The mission's scenario.
         title: The text above all.
 

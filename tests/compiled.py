@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from dess import rules
-from dess.channel import empty_scratch
-from dess.code.kernels import kernel
-from dess.guard import battery, moves, parking, ways
+from dess.base.kernels import kernel
+from dess.model import rules
+from dess.model.channel import empty_scratch
+from dess.model.guard import battery, moves, parking, ways
+from dess.model.state import SENSOR, STEP_X, STEP_Y
+from dess.physics.chart import FAR, distance, is_open
 from dess.policies import heuristics
-from dess.sea.chart import FAR, distance, is_open
-from dess.state import SENSOR, STEP_X, STEP_Y
 
 
 @kernel

@@ -23,9 +23,11 @@ __all__ = ["installed"]  # a fixture
 HERE = Path(__file__).parent
 # Files and folders whose tests take less than half a minute together.
 QUICK = (
-    *("dess/test_scenario.py", "dess/sections/test_failures.py"),
-    *("dess/test_errors.py", "dess/test_files.py"),
-    *("dess/test_missions.py", "dess/test_rules.py", "dess/sea", "dess/test_streams.py"),
+    *("dess/scenario/test_scenario.py", "dess/scenario/test_families.py"),
+    *("dess/scenario/test_own_sea.py", "dess/scenario/test_sea_files.py"),
+    *("dess/physics/test_failures.py", "dess/physics/test_streams.py"),
+    *("dess/base/test_errors.py", "dess/base/test_files.py"),
+    *("dess/model/test_missions.py", "dess/model/test_rules.py"),
     *("policies/test_registry.py", "analysis/stats", "test_doors.py"),
 )
 # Files that compile most, each what those before it do not: two workers begin with them, so that
@@ -33,7 +35,7 @@ QUICK = (
 COMPILING = ("reports/cli/study/test_diff.py", "analysis/bound/test_optimum.py")
 COMPILING += ("reports/cli/test_evaluate.py", "policies/learner/test_policy.py")
 # Between them some that compile nothing, until what the planner needs of others is compiled.
-COMPILING += ("dess/observations/test_states.py", "reports/cli/test_interruptions.py")
+COMPILING += ("dess/envs/observations/test_states.py", "reports/cli/test_interruptions.py")
 COMPILING += ("reports/pages/test_render.py", "policies/planner/test_policy.py")
 # Files that take longest; they come next, so that workers end together.
 LONGEST = ("reports", "analysis/execution", "fuzz", "test_architecture.py", "test_docs.py")

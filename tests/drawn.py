@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from dess import streams
-from dess.scenario import Scenario, ScenarioSpace
-from dess.state import HOVER, STEP_X, STEP_Y
-from dess.view import View
+from dess.model.state import HOVER, STEP_X, STEP_Y
+from dess.model.view import View
+from dess.physics import streams
+from dess.scenario.scenario import Scenario, ScenarioSpace
 from tests import compiled
 
 NORTH, EAST, SOUTH, WEST = range(4)

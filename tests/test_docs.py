@@ -19,8 +19,8 @@ from benchmarks import learning_curves
 from dess import load_scenario, policies
 from dess.analysis import load_study, numbers
 from dess.analysis.paper import values
-from dess.channel import world_of
-from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
+from dess.model.channel import world_of
+from dess.model.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
 from dess.reports import cli
 from dess.reports.cli import commands, options
 from docs import hooks, pictures

@@ -7,7 +7,7 @@ from functools import cache
 
 import pytest
 
-from dess.scenario import Scenario
+from dess.scenario.scenario import Scenario
 from tests.test_architecture import LIBRARY, SOURCES
 
 DOTTED = re.compile(r"``([A-Za-z_]\w+(?:\.[A-Za-z_]\w*)+)(?:\(\))?``")

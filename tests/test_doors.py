@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from tests.test_architecture import SOURCES
 
-DOOR = "dess.files"
+DOOR = "dess.base.files"
 # What opens, reads, writes or lists files, by the name that is called, or by its attribute.
 OPENING = {
     *("open", "fdopen", "read_text", "read_bytes", "write_text", "write_bytes", "fromfile"),
@@ -34,8 +34,8 @@ ALLOWED = {
     # A results folder, whose files the door reads and writes.
     "dess.analysis.execution.runner": {"open"},
     # Sources of our own code, and what numba keeps of it.
-    "dess.code.kernels": {"read_bytes"},
-    "dess.code.sources": {"read_bytes", "walk"},
+    "dess.base.kernels": {"read_bytes"},
+    "dess.base.sources": {"read_bytes", "walk"},
     # A library that opens a file which the door has checked, or a temporary one of the door.
     "dess.policies.learner.trained": {"safe_open", "save_file"},
     "dess.policies.learner.session": {"SummaryWriter"},

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from packaging.utils import canonicalize_name
 
-from dess.code import libraries
+from dess.base import libraries
 from dess.policies.registry import trained_names
 from tests.analysis.small import environment, small_study
 from tests.distributions import EXTRAS, absent, homes, requirements

@@ -19,17 +19,17 @@ from dess.analysis.results.manifest import Manifest
 from dess.analysis.results.resimulate import Evidence
 from dess.analysis.study.study import Study
 from dess.analysis.verification.measurements import CrossCheck
-from dess.files.documents import Document
+from dess.base.files.documents import Document
+from dess.model.record import MISSION_RECORD
 from dess.policies.learner.checkpoint import Header
 from dess.policies.learner.config import Description, TrainingConfig, load_config
 from dess.policies.registry import TRAINED
-from dess.record import MISSION_RECORD
 from dess.reports.pages.page import Card, Learned
-from dess.scenario import Scenario, ScenarioSpace, validated
-from dess.sea.no_fly import NoFlyFile
-from dess.sea.nodes import NodesFile
-from dess.sea.own import ZonePlace
-from dess.sea.places import Features
+from dess.scenario.no_fly import NoFlyFile
+from dess.scenario.nodes import NodesFile
+from dess.scenario.own_sea import ZonePlace
+from dess.scenario.places import Features
+from dess.scenario.scenario import Scenario, ScenarioSpace, validated
 
 SECTIONS = {
     "arrivals": {"process": "continuous", "schedule": [[0, 1.0]], "buffer": 3},
@@ -73,8 +73,8 @@ def study(**changes: Any) -> dict[str, Any]:
 def documents() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     """Valid JSON documents, as plain data."""
     data = Manifest.of(Study.model_validate(study(missions=2))).data
-    data["code"] = {"dess.batch": "0" * 64}
-    data["accepted"] = [{"modules": {"dess.batch": ["0" * 64, ""]}, "missions": 1}]
+    data["code"] = {"dess.model.batch": "0" * 64}
+    data["accepted"] = [{"modules": {"dess.model.batch": ["0" * 64, ""]}, "missions": 1}]
     yield Manifest, data
     origin = {name: data[name] for name in Evidence.model_fields.keys() & data.keys()}
     record = dict.fromkeys(MISSION_RECORD.names or (), 0)

@@ -69,7 +69,7 @@ def test_an_unpacked_archive_gives_the_same_wheel(tree, wheel, tmp_path):
 
 
 USE = """
-from dess.code.sources import code_of
+from dess.base.sources import code_of
 from dess.reports.pages import kernels
 
 print(kernels.PACKAGES, "dess.policies.network" in code_of("dess.policies.registry"))

@@ -26,12 +26,12 @@ from dess.analysis.stats.differences import compare, for_choice, paired, with_ad
 from dess.analysis.stats.intervals import LEVEL, by_replication, values_within, wilson
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, on_front, position_by_test
 from dess.analysis.study.stopping import Text
-from dess.errors import one_of
-from dess.files.documents import Document
-from dess.files.reading import read_text
-from dess.files.writing import check_target, write_file
+from dess.base.errors import one_of
+from dess.base.files.documents import Document
+from dess.base.files.reading import read_text
+from dess.base.files.writing import check_target, write_file
+from dess.model.view import View
 from dess.policies.registry import Policy, load_team
-from dess.view import View
 
 OF_BASELINE = "_baseline"  # suffix of the names of the baseline's metrics
 

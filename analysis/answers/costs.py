@@ -25,8 +25,8 @@ from dess.analysis.results.tables import Results, once
 from dess.analysis.stats.verdict import membership, on_front
 from dess.analysis.study.costs import PARTS, PURCHASE, Costs, stranded
 from dess.analysis.tables import MOST_ROWS, Table
-from dess.errors import one_of
-from dess.fields import ZONE_PADS
+from dess.base.errors import one_of
+from dess.scenario.fields import ZONE_PADS
 
 COUNTED = ("uavs", "pads", ZONE_PADS)  # the numbers of what has a price
 # What the parts of a cost are called, and the price that makes each.

@@ -25,9 +25,9 @@ from dess.analysis.results.provenance import differing
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import Paired, compare, unpaired, with_adjusted
 from dess.analysis.stats.intervals import groups
-from dess.errors import shown
-from dess.fields import dotted
-from dess.record import MISSION_RECORD, OPERATIONS, UAV_RECORD
+from dess.base.errors import shown
+from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD
+from dess.scenario.fields import dotted
 
 _KEYS = ["team", "scenario", "replication"]  # columns by which missions are matched
 _MISSION_FIELDS = [n for n in MISSION_RECORD.names or () if n not in ("seed", "replication")]

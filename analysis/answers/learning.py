@@ -22,9 +22,9 @@ from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import adjust
 from dess.analysis.stats.intervals import LEVEL, Interval, mean_interval
 from dess.analysis.stats.verdict import INCONCLUSIVE, MARKS, above, judged, position
-from dess.errors import one_of
-from dess.files.reading import paths_in
-from dess.files.tables import read_table
+from dess.base.errors import one_of
+from dess.base.files.reading import paths_in
+from dess.base.files.tables import read_table
 from dess.policies.learner.config import TrainingConfig, learner_of, read_description
 
 if TYPE_CHECKING:  # figures need the extra reports

@@ -17,7 +17,7 @@ from dess.analysis.results.event_log import Events
 from dess.analysis.results.resimulate import Mission, resimulate
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.intervals import summary
-from dess.files.reading import paths_in
+from dess.base.files.reading import paths_in
 
 FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
 

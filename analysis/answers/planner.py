@@ -25,7 +25,7 @@ from dess.analysis.stats.intervals import summary
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
 from dess.policies.planner import Course, Planner, first_plan
 from dess.policies.registry import load
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 
 _CLAIMS = {
     ABOVE: "The planner is better",

@@ -23,7 +23,7 @@ from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import column_tests, relative_change
 from dess.analysis.stats.intervals import Interval, column_intervals
-from dess.scenario import SEA
+from dess.scenario.scenario import SEA
 
 # Groups of seas by their number of nodes: the largest number of each but the last.
 _NODES = (15, 30, 60)

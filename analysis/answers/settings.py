@@ -43,7 +43,7 @@ from dess.analysis.stats.intervals import (
 )
 from dess.analysis.stats.verdict import may_be_best, within_reach
 from dess.analysis.tables import INTERVALS, MOST_ROWS, WIDER, YES, Table, allowed_for, counts
-from dess.errors import one_of
+from dess.base.errors import one_of
 
 MOST_NAMES = 3  # the largest number of settings that are named because they may be as good
 # What grows with the length of a mission, so that missions of the same length are to be compared.

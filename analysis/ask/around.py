@@ -25,8 +25,8 @@ from dess.analysis.stats.differences import compare
 from dess.analysis.study.study import study_from
 from dess.analysis.tables import INTERVALS, Table, counts
 from dess.policies.registry import is_path
-from dess.scenario import ScenarioSpace, load_scenario
-from dess.sections.quantities import times
+from dess.scenario.quantities import times
+from dess.scenario.scenario import ScenarioSpace, load_scenario
 
 FACTOR = 2  # harder conditions have twice the wind, the failures and the data
 WIND, HOURS = 0.5, 100  # without any: the wind as a share of the cruising speed; between failures

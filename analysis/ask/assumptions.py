@@ -7,7 +7,7 @@ from dess.analysis.answers.fleet.requirements import required
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
-from dess.sections.quantities import printed
+from dess.scenario.quantities import printed
 
 
 def assumptions(results: Results, metric: str = PRODUCT) -> list[str]:

@@ -35,12 +35,12 @@ from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.costs import Costs
 from dess.analysis.study.design import MAX_SIZE, Grid, Table
 from dess.analysis.study.study import Study, study_from
-from dess.errors import one_of, validation_line
-from dess.fields import SAMPLED, dotted, fields_of
-from dess.files.reading import paths_in
-from dess.files.writing import toml_value, write_file
+from dess.base.errors import one_of, validation_line
+from dess.base.files.reading import paths_in
+from dess.base.files.writing import toml_value, write_file
 from dess.policies.registry import typed
-from dess.scenario import ScenarioSpace, is_scenario_name, load_scenario
+from dess.scenario.fields import SAMPLED, dotted, fields_of
+from dess.scenario.scenario import ScenarioSpace, is_scenario_name, load_scenario
 
 WHAT_IF = "what-if"
 RANGES = (*SAMPLED, "initial_data")  # fields that hold [low, high]

@@ -34,9 +34,9 @@ from dess.analysis.results.tables import Results, once
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import LEVEL, by_replication
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position
-from dess.errors import one_of
-from dess.fields import fields_of
-from dess.scenario import ScenarioSpace
+from dess.base.errors import one_of
+from dess.scenario.fields import fields_of
+from dess.scenario.scenario import ScenarioSpace
 
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.figure import Figure

@@ -22,9 +22,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.code.kernels import inlined, kernel
-from dess.scenario import Scenario, ScenarioSpace
-from dess.state import STEP_X, STEP_Y
+from dess.base.kernels import inlined, kernel
+from dess.model.state import STEP_X, STEP_Y
+from dess.scenario.scenario import Scenario, ScenarioSpace
 
 _WIDTH = 8  # flying slots whose first charges share a phase
 

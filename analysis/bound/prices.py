@@ -19,14 +19,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess import InputError, rules
+from dess import InputError
 from dess.analysis.bound import paths
 from dess.analysis.bound.service import POINTS, add_slopes, rates_of, spread, step_values
-from dess.channel import empty_scratch, world_of
-from dess.code.kernels import kernel
-from dess.scenario import AnyScenario, ScenarioSpace
-from dess.sea import chart
-from dess.state import sample_scenario, spaces_of, starts_of, state_of
+from dess.base.kernels import kernel
+from dess.model import rules
+from dess.model.channel import empty_scratch, world_of
+from dess.model.state import sample_scenario, spaces_of, starts_of, state_of
+from dess.physics import chart
+from dess.scenario.scenario import AnyScenario, ScenarioSpace
 
 _STEPS = 300
 

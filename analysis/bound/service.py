@@ -15,10 +15,10 @@ import math
 import numpy as np
 
 from dess.analysis.bound import paths
-from dess.channel import rate
-from dess.code.kernels import inlined, kernel
-from dess.state import EAST, HOVER, NORTH, SOUTH, STEP_X, STEP_Y, WEST
-from dess.streams import MAX_NORMAL
+from dess.base.kernels import inlined, kernel
+from dess.model.channel import rate
+from dess.model.state import EAST, HOVER, NORTH, SOUTH, STEP_X, STEP_Y, WEST
+from dess.physics.streams import MAX_NORMAL
 
 _HALF = (0.6, 1.3, 2.2, 3.4, MAX_NORMAL)
 _UNLIKELY = 1e-5

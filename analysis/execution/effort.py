@@ -16,9 +16,9 @@ from dess.analysis.results.chunks import bound_parts, check_parts, missions_in, 
 from dess.analysis.results.store import Store, sources
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.study import Study
-from dess.code.memory import check_memory
+from dess.base.files.memory import check_memory
 from dess.policies.registry import SHIPPED, folder_of, load_team
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 
 # The policies from the slowest to the fastest: the time of a decision [s] as measured on one core.
 SECONDS = {"planner": 4e-4, "planner-short": 7e-5, "any": 2.5e-5, "greedy": 2e-6}
@@ -205,7 +205,7 @@ def check_workers_memory(
 
 
 def mission_memory(space: ScenarioSpace) -> float:
-    """The memory [bytes] of the packets, and the tables of ``dess.channel.World``, all filled."""
+    """The memory [bytes] of the packets and of all tables of ``dess.model.channel.World``."""
     nodes = len(space.nodes)
     steps = 5 * math.prod(space.size) * (8 * nodes * space.communication_slots + 2 * (nodes + 1))
     return PACKET_MEMORY * space.packets + steps + space.chart.ways.nbytes

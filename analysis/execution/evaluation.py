@@ -24,13 +24,13 @@ from dess.analysis.results.chunks import Part, split
 from dess.analysis.results.manifest import Cell
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.intervals import Moments
-from dess.errors import check_type
+from dess.base.errors import check_type
+from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
+from dess.model.state import check_seed, spaces_of
+from dess.model.view import check_team
+from dess.physics.streams import MAX_REPLICATION
 from dess.policies.registry import TypedByUser, load_team
-from dess.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
-from dess.scenario import AnyScenario, ScenarioSpace
-from dess.state import check_seed, spaces_of
-from dess.streams import MAX_REPLICATION
-from dess.view import check_team
+from dess.scenario.scenario import AnyScenario, ScenarioSpace
 
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
 # sums depend on it.

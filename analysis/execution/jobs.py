@@ -16,9 +16,9 @@ from dess.analysis.results.chunks import Chunk, Part
 from dess.analysis.results.manifest import Cell
 from dess.analysis.results.provenance import Member, bound_code, members_of
 from dess.analysis.results.store import Store
+from dess.model.record import Records, empty_records
 from dess.policies.registry import load_team
-from dess.record import Records, empty_records
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 
 # Missions of a chunk, by engine: enough to fill a batch, few enough to lose little when
 # interrupted.

@@ -22,7 +22,7 @@ from dess import InputError
 from dess.analysis.execution import live_and_die_with, variable
 from dess.analysis.execution.jobs import Job, Problem, Progress, attempt, first_failing
 from dess.analysis.results.provenance import Member, engine_code
-from dess.code.libraries import needs
+from dess.base.libraries import needs
 
 Finished = Generator[tuple[int, Any], None, None]  # numbers and results of jobs
 

@@ -1,8 +1,8 @@
 """Figures of one mission: its map, batteries, residual data, age, charging zone; mean courses.
 
 Each function of a panel takes the event log of the mission (a data frame, or the columns, of
-``dess.record.EventLog``), its ``dess.Scenario`` and the axes to draw on; ``mission_figure`` puts
-them together. Nothing touches pyplot's state.
+``dess.model.record.EventLog``), its ``dess.Scenario`` and the axes to draw on; ``mission_figure``
+puts them together. Nothing touches pyplot's state.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +21,7 @@ from dess.analysis.figures import style
 from dess.analysis.metrics import size_of
 from dess.analysis.names import value_text
 from dess.analysis.results import event_log
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario.scenario import Scenario, ScenarioSpace
 
 # Width [cells] over which UAVs on the same path are drawn side by side.
 SPREAD = 0.4

@@ -18,7 +18,7 @@ from dess.analysis.paper import measures, rules, values
 from dess.analysis.paper.rules import MARGIN, NEAR
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import INCONCLUSIVE, position
-from dess.files.reading import parse_toml, read_text
+from dess.base.files.reading import parse_toml, read_text
 from dess.policies.learner.config import TrainingConfig
 
 TRAININGS = "trainings"  # in place of the name of a study, for claims about learning curves

@@ -16,7 +16,7 @@ import pyarrow as pa
 from dess import InputError
 from dess.analysis.results.manifest import ELSEWHERE, Cell, Manifest
 from dess.analysis.study.study import CHECK
-from dess.files.reading import paths_in
+from dess.base.files.reading import paths_in
 
 Present = defaultdict[str, list[range]]  # replications by the key of their cell
 

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.scenario import Scenario
-from dess.sea.chart import spread
-from dess.sea.places import Projection
-from dess.sections.fleet import type_of
+from dess.physics.chart import spread
+from dess.physics.fleet import type_of
+from dess.scenario.places import Projection
+from dess.scenario.scenario import Scenario
 
 _ROUNDING = 1e-9  # less than this is no part of a packet [data units]
 
@@ -182,7 +182,7 @@ def causes(events: Events, scenario: Scenario, first: int = 1) -> list[str]:
     """A sentence per UAV that did not fill its quota, or did not land, without a full stop.
 
     Args:
-        events: The event log (a data frame, or the columns, of ``dess.record.EventLog``).
+        events: The event log (a data frame, or the columns, of ``dess.model.record.EventLog``).
         scenario: The scenario of the mission.
         first: The number of the first UAV, as in what stands beside the sentences.
     """
@@ -286,7 +286,7 @@ def path_text(events: Events, scenario: Scenario, kind: str) -> str:
     """The paths in a file.
 
     Args:
-        events: The event log (a data frame, or the columns, of ``dess.record.EventLog``).
+        events: The event log (a data frame, or the columns, of ``dess.model.record.EventLog``).
         scenario: The scenario of the mission.
         kind: ``csv``, ``geojson``, with cells where the sea has no degrees, or ``kml``.
     """

@@ -17,9 +17,9 @@ from dess.analysis.results import provenance
 from dess.analysis.study.cheapest import Setting
 from dess.analysis.study.design import DesignPoint
 from dess.analysis.study.study import CHECK, Study, StudyData
-from dess.files.documents import Sha256
-from dess.scenario import SEA, ScenarioSpace, load_scenario
-from dess.sections.data_sheet import Units
+from dess.base.files.documents import Sha256
+from dess.scenario.data_sheet import Units
+from dess.scenario.scenario import SEA, ScenarioSpace, load_scenario
 
 SCHEMA_VERSION = 3
 PROGRESS = {"missions", "selected", "complete"}  # what a run changes in its manifest

@@ -22,13 +22,20 @@ from pydantic import Field, TypeAdapter
 from dess import InputError
 from dess.analysis.bound import Bound
 from dess.analysis.results.chunks import Chunk, name_of, short_hash
-from dess.fields import MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS
-from dess.files.reading import paths_in, read_bytes
-from dess.files.tables import LIMIT, check_size, parquet_of
-from dess.files.writing import write_file
-from dess.record import EVENT_COLUMNS, EVENT_NAMES, MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
-from dess.state import END_NAMES
-from dess.streams import MAX_REPLICATION
+from dess.base.files.reading import paths_in, read_bytes
+from dess.base.files.tables import LIMIT, check_size, parquet_of
+from dess.base.files.writing import write_file
+from dess.model.record import (
+    EVENT_COLUMNS,
+    EVENT_NAMES,
+    MISSION_RECORD,
+    OPERATIONS,
+    UAV_RECORD,
+    Records,
+)
+from dess.model.state import END_NAMES
+from dess.physics.streams import MAX_REPLICATION
+from dess.scenario.fields import MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS
 
 NAME = re.compile(r"[0-9a-f]{16}(-\d+)?-[0-9a-f]{16}\.parquet")
 PARTS = b"dess.parts"  # key of the metadata that lists the parts in a file, in their order

@@ -1,6 +1,6 @@
 """Provenance of records: the code of the engines and policies, the libraries, the git commit.
 
-Code is identified by hashes of the syntax trees of modules (``dess.code.sources``), both of the
+Code is identified by hashes of the syntax trees of modules (``dess.base.sources``), both of the
 modules that the engines import and of those that a policy imports. So the code of environments and
 figures does not count, nor do comments and docstrings.
 """
@@ -27,13 +27,13 @@ import dess
 from dess import InputError
 from dess.analysis.study.stopping import Text
 from dess.analysis.study.study import StudyData, changed
-from dess.code.sources import OURS, code_of, combined
-from dess.errors import validation_line
-from dess.files.documents import Document, Sha256
+from dess.base.errors import validation_line
+from dess.base.files.documents import Document, Sha256
+from dess.base.sources import OURS, code_of, combined
 from dess.policies.registry import Policy, TypedByUser, confirmed, load_team
-from dess.scenario import SEA, ScenarioSpace, scenario_at
+from dess.scenario.scenario import SEA, ScenarioSpace, scenario_at
 
-ENGINES = ("dess.batch", "dess.mission")
+ENGINES = ("dess.model.batch", "dess.model.mission")
 BOUND = ("dess.analysis.bound",)
 LIBRARIES = ("numpy", "numba", "simpy", "scipy", "pandas", "pyarrow")
 

@@ -18,14 +18,14 @@ from dess.analysis.results.event_log import causes
 from dess.analysis.results.provenance import Origin
 from dess.analysis.results.tables import Results
 from dess.analysis.study.stopping import Text
-from dess.fields import SAMPLED
-from dess.files.documents import Document
-from dess.files.reading import paths_in, read_bytes
-from dess.files.tables import LIMIT
+from dess.base.files.documents import Document
+from dess.base.files.reading import paths_in, read_bytes
+from dess.base.files.tables import LIMIT
+from dess.model.record import MISSION_RECORD, UAV_RECORD, MissionRecord
+from dess.model.state import END_NAMES, sample_scenario
 from dess.policies.registry import TRAINED, Policy, load_team
-from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
-from dess.scenario import Scenario, ScenarioSpace
-from dess.state import END_NAMES, sample_scenario
+from dess.scenario.fields import SAMPLED
+from dess.scenario.scenario import Scenario, ScenarioSpace
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Mission:
         record: The metrics of the mission as attributes: a row of ``Results.missions`` or, if it
             was simulated again, a ``MissionRecord``.
         uavs: The records of its UAVs, a row each.
-        events: The event log, with the columns of ``dess.record.EventLog``.
+        events: The event log, with the columns of ``dess.model.record.EventLog``.
     """
 
     policy: str

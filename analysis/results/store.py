@@ -28,8 +28,8 @@ from dess.analysis.metrics import MOST_LOST, MOST_SLOTS, in_units
 from dess.analysis.results import chunks, parquet
 from dess.analysis.results.manifest import ELSEWHERE, NO_TEAM, Cell, Manifest, Selected
 from dess.analysis.study.study import Study
-from dess.files.reading import paths_in
-from dess.files.writing import check_folder, delete, locked, make_folder, write_file
+from dess.base.files.reading import paths_in
+from dess.base.files.writing import check_folder, delete, locked, make_folder, write_file
 
 _BUSY = f"in use by another run; allowed: {ELSEWHERE}, or wait for its end"
 

@@ -22,11 +22,11 @@ from dess.analysis.results.store import Place, Store
 from dess.analysis.study.cheapest import Cheapest, CheapestChoice
 from dess.analysis.study.selection import Choice, Selection
 from dess.analysis.study.study import StudyData
-from dess.errors import one_of
-from dess.fields import dotted
-from dess.files.writing import toml_value
-from dess.record import MISSION_RECORD
-from dess.scenario import SEA, ScenarioSpace, is_scenario_name, load_scenario
+from dess.base.errors import one_of
+from dess.base.files.writing import toml_value
+from dess.model.record import MISSION_RECORD
+from dess.scenario.fields import dotted
+from dess.scenario.scenario import SEA, ScenarioSpace, is_scenario_name, load_scenario
 
 
 def of_folder(folder: str | Path, manifest: Manifest, cell: Cell, replication: int) -> str:
@@ -146,7 +146,7 @@ class Results:
         return self.store.manifest.scenarios[point]
 
     def events(self, policy: str, point: int = 0, replication: int = 0) -> pd.DataFrame:
-        """The event log of a mission, with the columns of ``dess.record.EventLog``.
+        """The event log of a mission, with the columns of ``dess.model.record.EventLog``.
 
         Raises:
             InputError: If it has not been stored.

@@ -16,7 +16,7 @@ from scipy.special import ndtr, ndtri, stdtrit
 
 from dess import InputError
 from dess.analysis.metrics import Metric, known_in, metric_of, metrics_in
-from dess.errors import one_of
+from dess.base.errors import one_of
 
 LEVEL = 0.95
 

@@ -17,11 +17,11 @@ from dess.analysis.names import DECISIONS
 from dess.analysis.study.costs import Costs
 from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, needed
 from dess.analysis.study.stopping import MOST, Line, Samples, StrictTable, of_its_kind
-from dess.errors import shown
-from dess.fields import is_number
-from dess.scenario import ScenarioSpace
-from dess.sections.quantities import quantity_of
-from dess.sections.section import Integer, Number
+from dess.base.errors import shown
+from dess.physics.section import Integer, Number
+from dess.scenario.fields import is_number
+from dess.scenario.quantities import quantity_of
+from dess.scenario.scenario import ScenarioSpace
 
 Verdict = Literal["met", "missed", "open"]
 

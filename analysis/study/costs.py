@@ -8,8 +8,8 @@ from pydantic import Field
 
 from dess import InputError
 from dess.analysis.study.stopping import MOST, Line, StrictTable
-from dess.scenario import ScenarioSpace
-from dess.sections.section import Integer, Number
+from dess.physics.section import Integer, Number
+from dess.scenario.scenario import ScenarioSpace
 
 # A price; the sums of all missions that may be planned are still finite.
 Price = Annotated[float, Field(ge=0, le=10**12, allow_inf_nan=False)]

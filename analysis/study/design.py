@@ -19,12 +19,12 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from dess import InputError
 from dess.analysis.study.stopping import StrictTable, of_its_kind
-from dess.errors import shown
-from dess.fields import dotted, fields_of
-from dess.scenario import SEA, Scenario
-from dess.sea.families import seas_of
-from dess.sections.section import Integer, tuples
-from dess.streams import MAX_REPLICATION, MAX_SEED
+from dess.base.errors import shown
+from dess.physics.section import Integer, tuples
+from dess.physics.streams import MAX_REPLICATION, MAX_SEED
+from dess.scenario.families import seas_of
+from dess.scenario.fields import dotted, fields_of
+from dess.scenario.scenario import SEA, Scenario
 
 # The factor of a Saltelli design that is not a field of the scenario: the replication.
 NOISE = "replication (noise)"
@@ -171,7 +171,7 @@ class Table(_Design):
 
 
 class Seas(_Design):
-    """Generated seas: every sea of a set is a design point (``dess.sea.families``)."""
+    """Generated seas: every sea of a set is a design point (``dess.scenario.families``)."""
 
     kind: Literal["seas"] = "seas"
     set: Literal["train", "validation", "test"] = Field("test", description="the set of seas")

@@ -44,7 +44,7 @@ from pydantic import Field, model_validator
 from dess import InputError
 from dess.analysis.metrics import PRODUCT, SUCCESS, metric_of
 from dess.analysis.study.stopping import MOST, Metric, Samples, StrictTable, values_in
-from dess.sections.section import Integer, Number
+from dess.physics.section import Integer, Number
 
 # Number of stages whose sums are computed together; it does not change any result.
 _BLOCK = 128

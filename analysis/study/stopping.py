@@ -19,8 +19,8 @@ from scipy.special import ndtri, stdtrit
 from dess import InputError
 from dess.analysis.metrics import ALWAYS, MEASURES, metric_of
 from dess.analysis.stats.intervals import LEVEL, bounded_ends, ends_by_quantile, skewness_of
-from dess.errors import listed, one_of, shown, validation_line
-from dess.sections.section import Integer, Number, plain
+from dess.base.errors import listed, one_of, shown, validation_line
+from dess.physics.section import Integer, Number, plain
 
 _METRICS = [*ALWAYS, *MEASURES]
 

@@ -26,13 +26,15 @@ from dess.analysis.study.costs import Costs
 from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
 from dess.analysis.study.selection import Selection
 from dess.analysis.study.stopping import MOST, Precision, StrictTable, Text
-from dess.batch import check_slotted
-from dess.errors import cut, listed, one_of, validation_line
-from dess.fields import dotted, merged
-from dess.files.reading import Shipped
+from dess.base.errors import cut, listed, one_of, validation_line
+from dess.base.files.reading import Shipped
+from dess.model.batch import check_slotted
+from dess.model.record import measures_of
+from dess.physics.section import Integer, plain, tuples
+from dess.physics.streams import MAX_SEED
 from dess.policies.registry import load_team, typed
-from dess.record import measures_of
-from dess.scenario import (
+from dess.scenario.fields import dotted, merged
+from dess.scenario.scenario import (
     SEA,
     ScenarioSpace,
     is_scenario_name,
@@ -40,8 +42,6 @@ from dess.scenario import (
     scenario_at,
     validated,
 )
-from dess.sections.section import Integer, plain, tuples
-from dess.streams import MAX_SEED
 
 Engine = Literal["batch", "events"]
 

@@ -20,12 +20,12 @@ from dess.analysis.verification.checks import (
     Check,
 )
 from dess.analysis.verification.measurements import CrossCheck, Log, longest
-from dess.fields import SAMPLED
-from dess.files.reading import paths_in
-from dess.scenario import Scenario
-from dess.sections.fleet import type_of
-from dess.sections.wind import surcharges
-from dess.state import EAST, NORTH, SOUTH, WEST
+from dess.base.files.reading import paths_in
+from dess.model.state import EAST, NORTH, SOUTH, WEST
+from dess.physics.fleet import type_of
+from dess.physics.wind import surcharges
+from dess.scenario.fields import SAMPLED
+from dess.scenario.scenario import Scenario
 
 EPSILON = np.finfo(float).eps
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import integrate, stats
 
 from dess.analysis.stats.intervals import LEVEL, wilson
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario.scenario import Scenario, ScenarioSpace
 
 World = Scenario | ScenarioSpace
 

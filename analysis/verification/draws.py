@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 from scipy import special, stats
 
-from dess import streams
 from dess.analysis.names import parameter
 from dess.analysis.numbers import decimals, interval, minus
 from dess.analysis.stats.intervals import Interval, mean_interval, wilson
@@ -26,9 +25,10 @@ from dess.analysis.verification.checks import (
     uniform_fit,
 )
 from dess.analysis.verification.measurements import Log
-from dess.fields import SAMPLED
-from dess.scenario import ScenarioSpace
-from dess.sections.fleet import type_of
+from dess.physics import streams
+from dess.physics.fleet import type_of
+from dess.scenario.fields import SAMPLED
+from dess.scenario.scenario import ScenarioSpace
 
 _FEWEST = 30  # with this many values or more, their sum is taken as normal
 

@@ -13,7 +13,7 @@ from dess.analysis.figures import style
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.verification import closed_forms
 from dess.analysis.verification.checks import Fit
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 
 SEEN, MISS, KNOWN = "#0072b2", "#d55e00", "#c9d3da"
 _ABOVE: dict = {"rows": 2, "values": "y", "sharex": True, "height_ratios": (2, 1), "legend": 2}

@@ -28,13 +28,13 @@ from dess.analysis.results.resimulate import Mission, difference, recorded
 from dess.analysis.results.tables import Results
 from dess.analysis.study.stopping import Text
 from dess.analysis.verification import closed_forms
-from dess.files.documents import Document, Outdated
-from dess.files.reading import Missing
-from dess.files.writing import check_target, write_file
+from dess.base.files.documents import Document, Outdated
+from dess.base.files.reading import Missing
+from dess.base.files.writing import check_target, write_file
+from dess.model.state import HOVER
+from dess.model.view import View
 from dess.policies.registry import files_of, load_team
-from dess.scenario import ScenarioSpace
-from dess.state import HOVER
-from dess.view import View
+from dess.scenario.scenario import ScenarioSpace
 
 
 class Log(Mission):

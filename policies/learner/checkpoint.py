@@ -14,11 +14,12 @@ import numpy as np
 import torch
 from pydantic import Field, create_model
 
-from dess.errors import InputError
-from dess.fields import SAMPLED
-from dess.files.documents import Document, Sha256
-from dess.files.reading import parse_json
-from dess.observations import states as column
+from dess.base.errors import InputError
+from dess.base.files.documents import Document, Sha256
+from dess.base.files.reading import parse_json
+from dess.envs.observations import states as column
+from dess.model.record import MISSION_RECORD
+from dess.model.state import ACTION_NAMES, END_NAMES, State, constants_of, types_of
 from dess.policies.learner import trained
 from dess.policies.learner.config import CHECKPOINT, Name, Number, TrainingConfig
 from dess.policies.learner.dqn import DQNTraining
@@ -33,9 +34,8 @@ from dess.policies.learner.trained import (
     require_version,
 )
 from dess.policies.learner.training import METRICS, Training
-from dess.record import MISSION_RECORD
-from dess.scenario import ScenarioSpace
-from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, types_of
+from dess.scenario.fields import SAMPLED
+from dess.scenario.scenario import ScenarioSpace
 
 FORMAT = 2
 # Room for the header of a checkpoint; safetensors allows 100 MB.

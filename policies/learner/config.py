@@ -23,12 +23,12 @@ from pydantic import (
     model_validator,
 )
 
-from dess.errors import InputError, shown, validated
-from dess.files.documents import Document, Sha256
-from dess.files.reading import Shipped
-from dess.files.writing import toml_value
-from dess.scenario import ScenarioSpace, load_scenario
-from dess.sea.families import SETS, seas_of
+from dess.base.errors import InputError, shown, validated
+from dess.base.files.documents import Document, Sha256
+from dess.base.files.reading import Shipped
+from dess.base.files.writing import toml_value
+from dess.scenario.families import SETS, seas_of
+from dess.scenario.scenario import ScenarioSpace, load_scenario
 
 _CONFIGS = Shipped("config", "dess.policies.learner", "configs")
 

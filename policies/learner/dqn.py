@@ -11,15 +11,15 @@ import numpy as np
 import torch
 from torch import nn
 
-from dess.code.kernels import kernel
-from dess.env.stepper import MissionStepper
-from dess.errors import InputError
-from dess.observations import states as column
-from dess.observations.states import CompactStates, empty_states, masks
+from dess.base.errors import InputError
+from dess.base.kernels import kernel
+from dess.envs.observations import states as column
+from dess.envs.observations.states import CompactStates, empty_states, masks
+from dess.envs.stepper import MissionStepper
+from dess.model.state import HOVER, STEP_X, STEP_Y
+from dess.physics.chart import FAR, spread
 from dess.policies.learner import training
 from dess.policies.learner.config import MISSION_SEED, TrainingConfig
-from dess.sea.chart import FAR, spread
-from dess.state import HOVER, STEP_X, STEP_Y
 
 
 class Batch(NamedTuple):

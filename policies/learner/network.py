@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from dess.code.kernels import kernel
+from dess.base.kernels import kernel
 from dess.policies import network as acting
 from dess.policies.learner.config import TrainingConfig
 from dess.policies.network import ACTIONS, DENSE, KERNEL_SIZE, KERNELS

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from dess.channel import World
-from dess.errors import InputError
-from dess.observations.sets import sea_constants, sea_kinds, sea_of
-from dess.observations.states import Layout, compact_states, masks
+from dess.base.errors import InputError
+from dess.envs.observations.sets import sea_constants, sea_kinds, sea_of
+from dess.envs.observations.states import Layout, compact_states, masks
+from dess.model.channel import World
+from dess.model.view import View
 from dess.policies.network import Weights
-from dess.view import View
 
 # The rounding errors of a network depend on the number of rows that it evaluates together and on
 # the processor, but the action must not. So if the two best values differ by less than a share

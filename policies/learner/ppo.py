@@ -19,19 +19,19 @@ import numpy as np
 import torch
 from torch import nn
 
-from dess.code.kernels import kernel
-from dess.env.stepper import MissionStepper
-from dess.errors import InputError
-from dess.observations.observer import encoder_of
-from dess.observations.sets import Sets
-from dess.observations.states import CompactStates, masks
+from dess.base.errors import InputError
+from dess.base.kernels import kernel
+from dess.envs.observations.observer import encoder_of
+from dess.envs.observations.sets import Sets
+from dess.envs.observations.states import CompactStates, masks
+from dess.envs.stepper import MissionStepper
+from dess.model.record import MISSION_RECORD
+from dess.model.state import HOVER
+from dess.physics.chart import spread
 from dess.policies.learner import training
 from dess.policies.learner.config import MISSION_SEED, TrainingConfig, ranges_of
 from dess.policies.learner.network import SetNetwork
-from dess.record import MISSION_RECORD
-from dess.scenario import ScenarioSpace
-from dess.sea.chart import spread
-from dess.state import HOVER
+from dess.scenario.scenario import ScenarioSpace
 
 TRACE = 0.98  # lambda of generalized advantage estimation
 CLIP = 0.2  # by which share an action may become more likely or less before it gains no more

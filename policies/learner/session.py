@@ -19,22 +19,22 @@ import pyarrow as pa
 import torch
 
 import dess
-from dess.batch import BATCH_SIZE
-from dess.code.memory import check_memory
-from dess.errors import InputError, shown
-from dess.files.reading import paths_in
-from dess.files.tables import write_table
-from dess.files.writing import check_folder, locked, writable
-from dess.observations.observer import encoder_of
+from dess.base.errors import InputError, shown
+from dess.base.files.memory import check_memory
+from dess.base.files.reading import paths_in
+from dess.base.files.tables import write_table
+from dess.base.files.writing import check_folder, locked, writable
+from dess.envs.observations.observer import encoder_of
+from dess.model.batch import BATCH_SIZE
+from dess.model.record import MISSION_RECORD
+from dess.model.state import MISSION, UAV
 from dess.policies.learner.checkpoint import load_training, new_training, save_training
 from dess.policies.learner.config import CHECKPOINT, MODEL, TrainingConfig
 from dess.policies.learner.dqn import ReplayMemory
 from dess.policies.learner.network import arrays_of, network_of, units_of
 from dess.policies.learner.trained import observed, save_policy, weights_of
 from dess.policies.learner.training import Training
-from dess.record import MISSION_RECORD
-from dess.scenario import ScenarioSpace
-from dess.state import MISSION, UAV
+from dess.scenario.scenario import ScenarioSpace
 
 CURVE, EVENTS, LOCK = "training.parquet", "tensorboard", ".lock"
 CHECKPOINT_EVERY = 240.0  # seconds between checkpoints

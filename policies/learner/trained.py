@@ -18,13 +18,13 @@ import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import load, save, save_file
 
-from dess.errors import InputError, shown
-from dess.files.reading import Missing, checked, read_bytes
-from dess.files.writing import replacing, write_file
-from dess.observations.maps import POOL, Maps
-from dess.observations.sets import Sets
-from dess.observations.states import Layout, layout_of
-from dess.observations.vector import Vector
+from dess.base.errors import InputError, shown
+from dess.base.files.reading import Missing, checked, read_bytes
+from dess.base.files.writing import replacing, write_file
+from dess.envs.observations.maps import POOL, Maps
+from dess.envs.observations.sets import Sets
+from dess.envs.observations.states import Layout, layout_of
+from dess.envs.observations.vector import Vector
 from dess.policies import network
 from dess.policies.learner.config import (
     CONFIG,
@@ -42,7 +42,7 @@ from dess.policies.learner.config import (
 )
 from dess.policies.learner.policy import LearnedPolicy
 from dess.policies.network import Weights
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 
 Arrays = dict[str, np.ndarray]
 

@@ -15,16 +15,16 @@ import numpy as np
 import torch
 from torch import nn
 
-from dess.batch import simulate_batch
-from dess.env.stepper import MissionStepper
-from dess.observations import states as column
-from dess.observations.states import CompactStates, compact_states
+from dess.envs.observations import states as column
+from dess.envs.observations.states import CompactStates, compact_states
+from dess.envs.stepper import MissionStepper
+from dess.model.batch import simulate_batch
 from dess.policies.learner.config import Phase, TrainingConfig, ranges_of
 from dess.policies.learner.network import arrays_of, network_of, tensors_of
 from dess.policies.learner.policy import LearnedPolicy
 from dess.policies.learner.trained import forms_of, observed, policy_of, require_forms
 from dess.policies.network import Weights
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 MISSIONS_PER_PHASE = 2**28

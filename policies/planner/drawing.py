@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.mission import MissionModel, simulate
+from dess.model.mission import MissionModel, simulate
+from dess.model.view import View, decide
 from dess.policies.planner.fluid import MOST_SLOTS, Plan, begin, empty_flight, fly
 from dess.policies.planner.policy import Planner, memory_of
 from dess.policies.planner.rates import rates_of
-from dess.scenario import Scenario, ScenarioSpace
-from dess.view import View, decide
+from dess.scenario.scenario import Scenario, ScenarioSpace
 
 
 class Course(NamedTuple):

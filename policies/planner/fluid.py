@@ -9,7 +9,7 @@ The fluid model: what a plan collects if every rate is its mean and data arrive 
     value = fly(mission, rates, plan, flight, 0, flight, 500, np.inf)   # the whole plan
     value = fly(mission, rates, other, flight, 5, ahead, 500, np.inf)   # again, from the sixth one
 
-The model has the rules of ``dess.rules`` as far as they matter for a plan: a cell per move,
+The model has the rules of ``dess.model.rules`` as far as they matter for a plan: a cell per move,
 batteries, the charging latch, pads and quotas. In each slot a UAV serves the node with the highest
 mean rate among those with data, and once it is empty, the next one. Flights are resumed from
 snapshots, so a plan that differs in its last waypoints from one that was simulated is simulated
@@ -21,16 +21,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.code.kernels import inlined, kernel
-from dess.guard.battery import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
-from dess.sea.chart import distance, in_zone, is_open
-from dess.sections.charging import gain
-from dess.sections.failures import working_pads
-from dess.sections.fleet import leg
-from dess.sections.landing import lands
-from dess.sections.radio import has_range
-from dess.sections.section import for_sections
-from dess.state import HOVER, STEP_X, STEP_Y, fields
+from dess.base.kernels import inlined, kernel
+from dess.model.guard.battery import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
+from dess.model.state import HOVER, STEP_X, STEP_Y, fields
+from dess.physics.charging import gain
+from dess.physics.chart import distance, in_zone, is_open
+from dess.physics.failures import working_pads
+from dess.physics.fleet import leg
+from dess.physics.landing import lands
+from dess.physics.radio import has_range
+from dess.physics.section import for_sections
 
 WAYPOINT = np.dtype(
     [
@@ -480,7 +480,7 @@ def _settle(mission, chart, v):
 
 @inlined
 def _stands(mission, chart, v):
-    """Whether a UAV stands on the ground (``dess.sections.landing``)."""
+    """Whether a UAV stands on the ground (``dess.physics.landing``)."""
     return lands(mission) and v.charging == 0 and v.action == HOVER and in_zone(chart, v.x, v.y)
 
 

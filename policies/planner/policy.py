@@ -15,16 +15,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.code.kernels import inlined, kernel
-from dess.guard import guard
-from dess.guard.battery import must_charge
+from dess.base.kernels import inlined, kernel
+from dess.model.guard import guard
+from dess.model.guard.battery import must_charge
+from dess.model.state import HOVER, STEP_X, State
+from dess.model.view import View
+from dess.physics.landing import lands
 from dess.policies.heuristics import step_towards
 from dess.policies.planner import fluid
 from dess.policies.planner.rates import rates_of
 from dess.policies.planner.search import TRIED, empty_workspace, improve
-from dess.sections.landing import lands
-from dess.state import HOVER, STEP_X, State
-from dess.view import View
 
 # The temperature of the first step of a search [data units]: for a new plan, and for one that is
 # improved.

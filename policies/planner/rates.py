@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.code.memory import check_memory
-from dess.sea.chart import Chart
-from dess.sections import wind
-from dess.state import STEP_X, STEP_Y
-from dess.view import View
+from dess.base.files.memory import check_memory
+from dess.model.state import STEP_X, STEP_Y
+from dess.model.view import View
+from dess.physics import wind
+from dess.physics.chart import Chart
 
 # Nodes kept per step. The farther ones give next to no data, and nothing is planned with them.
 _RANKS = 12

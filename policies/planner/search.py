@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess import streams
-from dess.code.kernels import inlined, kernel
+from dess.base.kernels import inlined, kernel
+from dess.model.state import STEP_X, STEP_Y
+from dess.physics import streams
+from dess.physics.chart import distance, in_zone, is_open
 from dess.policies.planner import fluid
 from dess.policies.planner.fluid import Flight, Plan
-from dess.sea.chart import distance, in_zone, is_open
-from dess.state import STEP_X, STEP_Y
 
 # The temperature [data units] falls to this in the last step.
 _COLDEST = 0.05

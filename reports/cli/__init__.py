@@ -41,8 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _check_text(words: Sequence[str]) -> None:
     """Refuse arguments that are not UTF-8, which not every library could write or print."""
-    from dess.errors import InputError, shown
-    from dess.files.reading import is_text
+    from dess.base.errors import InputError, shown
+    from dess.base.files.reading import is_text
 
     for word in words:
         if not is_text(word):
@@ -60,7 +60,7 @@ def _failed(error: BaseException, words: Sequence[str], is_interrupted: bool) ->
     from typer.exceptions import TyperException
 
     from dess import InputError
-    from dess.code.libraries import absence
+    from dess.base.libraries import absence
     from dess.reports.cli import console
 
     if isinstance(error, console.Interruption):

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dess.code.libraries import missing
-from dess.errors import InputError, one_of, shown
+from dess.base.errors import InputError, one_of, shown
+from dess.base.libraries import missing
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption, complete
 from dess.reports.cli.report import WHAT_IF, rendering

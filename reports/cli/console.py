@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
-from dess.errors import InputError, cut, printable
-from dess.files.reading import read_bytes
-from dess.files.writing import replacing_all
+from dess.base.errors import InputError, cut, printable
+from dess.base.files.reading import read_bytes
+from dess.base.files.writing import replacing_all
 
 LARGEST = 2**32  # bytes of a file for standard output
 MESSAGE = 300  # the longest line that says why a command fails
@@ -277,7 +277,7 @@ def announce_compiling() -> None:
     """Print that the simulator is compiled, the first time that this is called."""
     from numba.core.caching import NullCache
 
-    from dess.rules import launch  # any kernel
+    from dess.model.rules import launch  # any kernel
 
     when = "first run only"
     if isinstance(launch._cache, NullCache):  # no folder beside the code can be written

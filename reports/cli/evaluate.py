@@ -44,8 +44,8 @@ def evaluate(
     from dess.analysis.execution.evaluation import Asked, check_evaluation, means
     from dess.analysis.metrics import known_of
     from dess.analysis.study.study import engine_of
+    from dess.model.record import measures_of
     from dess.policies.registry import typed
-    from dess.record import measures_of
 
     space, policy = options.load_space(scenario, settings), typed(policy)
     engine = engine_of([space], engine)

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from dess.errors import InputError, cut
-from dess.files.writing import fill
+from dess.base.errors import InputError, cut
+from dess.base.files.writing import fill
 from dess.reports.cli import console, options
 from dess.reports.cli.options import JsonOption, SetOption, command, load_space
 from dess.reports.cli.simulate import FIGURES, save_figure
@@ -62,7 +62,7 @@ def show_policy(
 @scenarios.callback()
 def list_scenarios(context: typer.Context) -> None:
     """Print the list, unless one is shown."""
-    from dess.scenario import scenario_description, scenario_families, scenario_names
+    from dess.scenario.scenario import scenario_description, scenario_families, scenario_names
 
     if context.invoked_subcommand is None:
         shipped = [(name, scenario_description(name)) for name in scenario_names()]
@@ -85,7 +85,7 @@ def show_scenario(
         figure: Draw the map of the sea into this file, also if its nodes or zones are refused.
     """
     from dess.analysis.names import fields
-    from dess.scenario import draft_scenario, scenario_description
+    from dess.scenario.scenario import draft_scenario, scenario_description
 
     console.check_ending("--figure", figure, FIGURES, "a picture")
     if figure:
@@ -137,8 +137,8 @@ def new_scenario(
     """
     from dess.analysis.figures.missions import sea_figure
     from dess.analysis.names import placing
-    from dess.scenario import DRAFT, parsed_scenario
-    from dess.sea.new import NewScenario
+    from dess.scenario.new_sea import NewScenario
+    from dess.scenario.scenario import DRAFT, parsed_scenario
 
     console.check_ending("FILE.toml", path, (".toml",), "a scenario")
     if path.exists():

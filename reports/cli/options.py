@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from dess.errors import InputError, one_of, shown
-from dess.files.reading import parse_toml
+from dess.base.errors import InputError, one_of, shown
+from dess.base.files.reading import parse_toml
 from dess.reports.cli.console import say
 
 
@@ -30,7 +30,7 @@ def policies(start: str) -> list[str]:
 
 def scenarios(start: str) -> list[str]:
     """Names of shipped scenarios, and of families of generated ones up to the seed."""
-    from dess.scenario import scenario_families, scenario_names
+    from dess.scenario.scenario import scenario_families, scenario_names
 
     families = [name.removesuffix("SEED") for name in scenario_families()]
     return _beginning([*scenario_names(), *families], start)
@@ -52,8 +52,8 @@ def configs(start: str) -> list[str]:
 
 def fields(start: str) -> list[str]:
     """Fields of a scenario, as ``--set`` takes them."""
-    from dess.fields import fields_of
-    from dess.scenario import ScenarioSpace
+    from dess.scenario.fields import fields_of
+    from dess.scenario.scenario import ScenarioSpace
 
     return [f"{name}=" for name in _beginning(fields_of(ScenarioSpace), start)]
 
@@ -171,7 +171,7 @@ def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, An
 
 def is_quantity(field: str) -> bool:
     """Whether a field of a scenario has quantities, such as ``35 min``."""
-    from dess.sections.data_sheet import DataSheet
+    from dess.scenario.data_sheet import DataSheet
 
     section, _, name = field.partition(".")
     return section == "data_sheet" and name in DataSheet.model_fields
@@ -201,8 +201,8 @@ def _with_quotes(text: str) -> str:
 
 def _field(name: str, option: str = SET) -> "FieldInfo":
     """The field of a scenario; ``InputError`` if there is none."""
-    from dess.fields import fields_of
-    from dess.scenario import ScenarioSpace
+    from dess.scenario.fields import fields_of
+    from dess.scenario.scenario import ScenarioSpace
 
     fields = fields_of(ScenarioSpace)
     if name not in fields:
@@ -217,7 +217,7 @@ def _check_word(name: str, word: str, option: str = SET) -> None:
         InputError: If the field is none of those that words need no quotes for, or may not be this
             word; or if there is no such field.
     """
-    from dess.errors import choices_of, form_of, kind_of
+    from dess.base.errors import choices_of, form_of, kind_of
 
     field = _field(name, option)
     words, kind = choices_of(field), kind_of(field)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dess.errors import InputError, one_of, shown
+from dess.base.errors import InputError, one_of, shown
 from dess.reports.cli import console
 from dess.reports.cli.console import YesOption
 from dess.reports.cli.options import PAGES, PARAMETER, RESULTS, JsonOption, command, setting

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from dess.errors import InputError, one_of, shown
+from dess.base.errors import InputError, one_of, shown
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     import numpy as np
     from matplotlib.figure import Figure
 
+    from dess.model.record import MissionRecord
     from dess.policies.registry import Policy
-    from dess.record import MissionRecord
-    from dess.scenario import Scenario, ScenarioSpace
+    from dess.scenario.scenario import Scenario, ScenarioSpace
 
 LOGS = (".parquet", ".csv")
 FIGURES = (".png", ".pdf", ".svg")
@@ -73,9 +73,9 @@ def simulate(
     """
     from dess import simulate
     from dess.analysis.execution.effort import check_missions
-    from dess.files.writing import writable
+    from dess.base.files.writing import writable
+    from dess.model.state import check_seed, sample_scenario
     from dess.policies.registry import TypedByUser, load_team
-    from dess.state import check_seed, sample_scenario
 
     if of:
         _refuse_given(context, "scenario", "settings", "seed")
@@ -232,8 +232,8 @@ def _write_log(mission: _Mission, path: Path, kind: str) -> None:
     import pyarrow as pa
     from pyarrow.csv import write_csv
 
-    from dess.files.tables import parquet_of
-    from dess.files.writing import fill
+    from dess.base.files.tables import parquet_of
+    from dess.base.files.writing import fill
 
     columns = dict(mission.log)
     if names := mission.scenario.names:
@@ -267,14 +267,14 @@ def _animate(mission: _Mission, path: Path, kind: str) -> None:
 
 def _write_path(mission: _Mission, path: Path, kind: str) -> None:
     from dess.analysis.results.event_log import path_text
-    from dess.files.writing import fill
+    from dess.base.files.writing import fill
 
     fill(path, path_text(mission.log, mission.scenario, kind).encode())
 
 
 def _write_page(mission: _Mission, path: Path) -> None:
     """Write a page with the player of the mission; the same mission gives the same bytes."""
-    from dess.files import writing
+    from dess.base.files import writing
     from dess.reports import player
     from dess.reports.pages.html import fill
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dess.code.libraries import needs
-from dess.errors import InputError, one_of
+from dess.base.errors import InputError, one_of
+from dess.base.libraries import needs
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption, complete
 from dess.reports.cli.report import rendering

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from dess.code.libraries import missing, needs
-from dess.errors import InputError, shown
+from dess.base.errors import InputError, shown
+from dess.base.libraries import missing, needs
 from dess.reports.cli import console, options
 from dess.reports.cli.options import SetOption, command, setting
 

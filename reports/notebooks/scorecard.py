@@ -29,7 +29,7 @@ from dess.analysis.answers.learning import read_curves
 from dess.analysis.figures.comparison import claims
 from dess.analysis.paper import scorecard
 from dess.analysis.results.chunks import MANIFEST
-from dess.files.reading import paths_in
+from dess.base.files.reading import paths_in
 from dess.policies.learner.config import read_description
 from dess.reports.pages import html
 

@@ -22,7 +22,7 @@ from traceback import format_exception
 from typing import TYPE_CHECKING, NoReturn
 
 from dess.analysis.results.tables import keep
-from dess.errors import InputError
+from dess.base.errors import InputError
 
 if TYPE_CHECKING:  # the process that only starts this one needs no shell
     from IPython.core.interactiveshell import InteractiveShell

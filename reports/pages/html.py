@@ -33,7 +33,7 @@ from dess.analysis.results.resimulate import Evidence, learned_files
 from dess.analysis.results.tables import Results
 from dess.analysis.study.study import budget_of
 from dess.analysis.tables import Table
-from dess.errors import printable
+from dess.base.errors import printable
 from dess.reports.pages import ASKED
 from dess.reports.pages.page import FILES, STUDY, Learned, Page, hidden
 

@@ -16,7 +16,7 @@ from nbformat import from_dict
 import dess
 from dess import InputError
 from dess.analysis.results.tables import load_results
-from dess.files.writing import temporary_folder
+from dess.base.files.writing import temporary_folder
 from dess.reports.pages import ASKED, cells
 from dess.reports.pages.cells import kill
 from dess.reports.pages.notebook import Report

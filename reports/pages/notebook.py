@@ -21,8 +21,8 @@ from typing import Any
 import nbformat
 from nbformat import NotebookNode
 
-from dess.errors import InputError, one_of, shown
-from dess.files.reading import paths_in, read_text
+from dess.base.errors import InputError, one_of, shown
+from dess.base.files.reading import paths_in, read_text
 from dess.policies.registry import is_path
 
 SHIPPED = Path(__file__).parents[1] / "notebooks"

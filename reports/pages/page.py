@@ -8,8 +8,8 @@ from pathlib import Path
 from markupsafe import Markup
 
 from dess.analysis.results.resimulate import Evidence
-from dess.files.documents import Document
-from dess.files.reading import read_text
+from dess.base.files.documents import Document
+from dess.base.files.reading import read_text
 
 STUDY, FILES, CARD = "dess-study", "dess-files", "dess-card"  # what is hidden in a page
 LARGEST = 512 * 2**20  # bytes of a page that is shown in an index

@@ -27,9 +27,9 @@ from dess import InputError
 from dess.__main__ import FOLDERS
 from dess.analysis.results.chunks import MANIFEST
 from dess.analysis.results.manifest import Manifest
-from dess.files.documents import LIMIT
-from dess.files.reading import Missing, paths_in, read_bytes
-from dess.files.writing import delete, locked, write_files
+from dess.base.files.documents import LIMIT
+from dess.base.files.reading import Missing, paths_in, read_bytes
+from dess.base.files.writing import delete, locked, write_files
 from dess.reports.pages import INDEX, LOCK, PREFIX, check_pages, kernels, notebook
 from dess.reports.pages.html import fill, template
 from dess.reports.pages.kernels import Progress

@@ -20,10 +20,10 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.numbers import level
 from dess.analysis.stats.intervals import LEVEL
-from dess.fields import SAMPLED, fields_of
-from dess.record import EVENT_NAMES
+from dess.model.record import EVENT_NAMES
 from dess.reports.pages.html import Marked, code, marked, template, text
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario.fields import SAMPLED, fields_of
+from dess.scenario.scenario import Scenario, ScenarioSpace
 
 Manifest = Mapping[str, Any]
 

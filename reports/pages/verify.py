@@ -30,11 +30,11 @@ from dess.analysis.results.resimulate import (
 )
 from dess.analysis.results.store import Store
 from dess.analysis.results.tables import Results, results_of
-from dess.files.reading import paths_in
+from dess.base.files.reading import paths_in
+from dess.model.record import PARAMETER_EVENTS
 from dess.policies.registry import Policy, confirmed, load_team
-from dess.record import PARAMETER_EVENTS
 from dess.reports.pages.page import ALLOWED, LIMIT, Page
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 
 BOUNDS_CHECKED = 3  # upper bounds that are computed again at most, since each takes seconds
 

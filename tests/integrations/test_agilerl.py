@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import dess
-from dess.env.parallel import HarvestEnv
-from dess.state import HOVER
+from dess.envs.parallel import HarvestEnv
+from dess.model.state import HOVER
 
 agilerl = pytest.importorskip("agilerl")
 

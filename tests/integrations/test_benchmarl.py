@@ -13,7 +13,7 @@ import dess
 
 pytest.importorskip("benchmarl")
 
-from dess.integrations.benchmarl import HarvestTask  # noqa: E402
+from dess.envs.integrations.benchmarl import HarvestTask  # noqa: E402
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "benchmarl_mappo.py"
 SHORT = dess.load_scenario("paper", max_slots=12)

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import dess
-from dess.state import HOVER
+from dess.model.state import HOVER
 
 pytest.importorskip("pufferlib")
 torch = pytest.importorskip("torch")
 vector = pytest.importorskip("pufferlib.vector")
 
-from dess.integrations.pufferlib import HarvestPufferEnv, MaskedPolicy  # noqa: E402
+from dess.envs.integrations.pufferlib import HarvestPufferEnv, MaskedPolicy  # noqa: E402
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "pufferlib_ppo.py"
 # Batteries of 7 to 11 % and 9 slots, so that UAVs end apart; the border of the grid forbids moves.

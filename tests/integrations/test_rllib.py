@@ -10,7 +10,7 @@ import dess
 
 ray = pytest.importorskip("ray")
 
-from dess.integrations.rllib import HarvestMultiAgentEnv  # noqa: E402
+from dess.envs.integrations.rllib import HarvestMultiAgentEnv  # noqa: E402
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "rllib_ppo.py"
 # Batteries of 7 to 11 % and 9 slots, so that UAVs end apart; the border of the grid forbids moves.

@@ -8,11 +8,11 @@ import pytest
 
 import dess
 from dess import InputError, ScenarioSpace, policies
-from dess.state import HOVER
+from dess.model.state import HOVER
 
 sb3_contrib = pytest.importorskip("sb3_contrib")
 masking = pytest.importorskip("sb3_contrib.common.maskable.utils")
-sb3 = pytest.importorskip("dess.integrations.sb3")
+sb3 = pytest.importorskip("dess.envs.integrations.sb3")
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "sb3_maskable_ppo.py"
 FLEET = ScenarioSpace.of(uavs=3, flying_time=[5, 30], quota=60, max_slots=25)

@@ -13,7 +13,7 @@ stable_baselines3 = pytest.importorskip("stable_baselines3")
 vec_env = pytest.importorskip("stable_baselines3.common.vec_env")
 evaluation = pytest.importorskip("stable_baselines3.common.evaluation")
 env_util = pytest.importorskip("stable_baselines3.common.env_util")
-sb3 = pytest.importorskip("dess.integrations.sb3")
+sb3 = pytest.importorskip("dess.envs.integrations.sb3")
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "sb3_ppo.py"
 # Some UAVs fill their quota, others deplete their battery, others fly until max_slots.

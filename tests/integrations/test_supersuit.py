@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import dess
-from dess.env.parallel import HarvestEnv
+from dess.envs.parallel import HarvestEnv
 
 supersuit = pytest.importorskip("supersuit")
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import dess
-from dess.state import HOVER
+from dess.model.state import HOVER
 
 torch = pytest.importorskip("torch")
 torchrl_envs = pytest.importorskip("torchrl.envs")

@@ -8,8 +8,8 @@ import pytest
 from numpy.lib.recfunctions import repack_fields
 
 from dess import policies
-from dess.batch import simulate_batch
-from dess.scenario import load_scenario
+from dess.model.batch import simulate_batch
+from dess.scenario.scenario import load_scenario
 from tests.pins.pinned import pinned
 
 # Few pads, wind, failures and the age of the data.

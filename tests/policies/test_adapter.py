@@ -6,7 +6,7 @@ import pytest
 import dess
 from dess import InputError, ScenarioSpace
 from dess.analysis.results.provenance import team_of
-from dess.observations.observer import KINDS
+from dess.envs.observations.observer import KINDS
 from dess.policies.adapter import Adapter
 from dess.policies.registry import TypedByUser
 

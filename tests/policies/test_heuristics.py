@@ -8,15 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dess import policies
-from dess.batch import simulate_batch
-from dess.env.stepper import MissionStepper
-from dess.guard import guard
-from dess.mission import simulate
+from dess.envs.stepper import MissionStepper
+from dess.model.batch import simulate_batch
+from dess.model.guard import guard
+from dess.model.mission import simulate
+from dess.model.state import HOVER
+from dess.model.view import View
 from dess.policies.registry import HEURISTICS
-from dess.scenario import Scenario, load_scenario
-from dess.state import HOVER
-from dess.view import View
-from tests.dess.flights import assert_same_alone, cells_of
+from dess.scenario.scenario import Scenario, load_scenario
+from tests.dess.model.flights import assert_same_alone, cells_of
 from tests.drawn import NORTH, SOUTH, Checked, replications, seeds, spaces
 
 NAMES = tuple(name for name in HEURISTICS if name != "random-unguarded")

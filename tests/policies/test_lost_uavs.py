@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from dess import load_scenario
-from dess.batch import simulate_batch
+from dess.model.batch import simulate_batch
+from dess.model.state import BATTERY, END_NAMES
 from dess.policies.registry import load
-from dess.scenario import ScenarioSpace
-from dess.sea.families import FAMILIES
-from dess.state import BATTERY, END_NAMES
+from dess.scenario.families import FAMILIES
+from dess.scenario.scenario import ScenarioSpace
 
 # Seas of each family, missions of each policy on a sea, and the seed of both.
 SEAS, MISSIONS, SEED = 12, 8, 42

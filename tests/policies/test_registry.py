@@ -10,13 +10,13 @@ import pytest
 
 import dess
 from dess import InputError, policies
-from dess.mission import simulate
+from dess.model.mission import simulate
 from dess.policies import registry
 from dess.policies.heuristics import Greedy
 from dess.policies.learner.config import config_of
 from dess.policies.learner.trained import forms_of, observed, save_policy
 from dess.policies.registry import SHIPPED, Policy, TypedByUser, about
-from dess.scenario import Scenario, load_scenario, scenario_names
+from dess.scenario.scenario import Scenario, load_scenario, scenario_names
 from tests.outside import install_package
 from tests.policies.learner.tiny import refusal_of
 

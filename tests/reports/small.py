@@ -21,7 +21,7 @@ from dess.policies.planner import Budget, Planner
 from dess.reports.pages import html
 from dess.reports.pages.notebook import Report, read
 from dess.reports.player import library
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 from tests.analysis.small import grid
 
 EMBEDDED = re.compile("data:image/svg\\+xml;base64,([A-Za-z0-9+/=]+)")

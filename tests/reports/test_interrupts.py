@@ -31,7 +31,7 @@ def heeded():
 
 def during(work, monkeypatch, capsys):
     """The exit code, the output and the errors of a command while something else is done."""
-    monkeypatch.setattr("dess.mission.simulate", lambda *_, **__: work())
+    monkeypatch.setattr("dess.model.mission.simulate", lambda *_, **__: work())
     return cli.main(["simulate"]), *capsys.readouterr()
 
 
@@ -132,8 +132,8 @@ def test_a_signal_during_the_imports_ends_the_command(tmp_path):
 
 BUSY = """
 import hashlib, pathlib, sys
-import dess.mission
-from dess.files.writing import replacing
+import dess.model.mission
+from dess.base.files.writing import replacing
 from dess.reports.cli import main
 
 def busy(*_, **__):
@@ -142,7 +142,7 @@ def busy(*_, **__):
         print("busy", flush=True)
         hashlib.pbkdf2_hmac("md5", b"", b"", 2**31 - 1)
 
-dess.mission.simulate, sys.argv = busy, ["dess", "simulate"]
+dess.model.mission.simulate, sys.argv = busy, ["dess", "simulate"]
 sys.exit(main())
 """
 

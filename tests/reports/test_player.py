@@ -22,9 +22,9 @@ from dess.analysis.results.event_log import (
     residual_data,
     uav_slots,
 )
+from dess.model.state import sample_scenario
 from dess.reports.pages.html import Part
 from dess.reports.player import AGE_READING, Shown, library, player, reading
-from dess.state import sample_scenario
 
 # One UAV; three in a queue for one pad, of which one has its battery depleted long before the
 # others end; quotas that are filled at once; nothing to serve, in a mission that is truncated.

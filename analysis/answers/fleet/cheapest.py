@@ -34,7 +34,7 @@ from dess.analysis.names import DECISIONS
 from dess.analysis.results.tables import Results, once
 from dess.analysis.study.cheapest import Answer, Cheapest, CheapestChoice
 from dess.analysis.tables import INTERVALS, MOST_ROWS, Table, counts
-from dess.fields import ZONE_PADS
+from dess.scenario.fields import ZONE_PADS
 
 ALL_CONDITIONS = "all conditions"
 _WHY_NOT = {

@@ -143,16 +143,18 @@ def test_folders_without_a_common_mission_are_refused(results, tmp_path):
 
 def test_code_libraries_and_accepted_changes_that_differ_are_told(results):
     manifest = results.store.manifest
-    accepted = [provenance.Acceptance(modules={"dess.rules": ("a" * 64, "b" * 64)}, missions=7)]
+    accepted = [
+        provenance.Acceptance(modules={"dess.model.rules": ("a" * 64, "b" * 64)}, missions=7)
+    ]
     changes = {"libraries": manifest.libraries | {"numpy": "1.0"}, "accepted": accepted}
-    changes["code"] = manifest.code | {"dess.guard.moves": "0" * 64}
+    changes["code"] = manifest.code | {"dess.model.guard.moves": "0" * 64}
     store = Store(results.store.folder, manifest.model_copy(update=changes))
     other = replace(results, store=store)
     assert origins(diff(results, other)) == [
-        "code: dess.guard.moves",
+        "code: dess.model.guard.moves",
         f"libraries: numpy {manifest.libraries['numpy']} and 1.0",
-        "accepted in B: other code of dess.rules after 7 missions",
+        "accepted in B: other code of dess.model.rules after 7 missions",
     ]
     assert at_hand(results) == "made by the code, weights and libraries that are here"
-    made = "made by other code of dess.guard.moves; made with other versions of numpy"
+    made = "made by other code of dess.model.guard.moves; made with other versions of numpy"
     assert at_hand(other) == made

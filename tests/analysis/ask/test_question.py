@@ -73,7 +73,7 @@ def _cut(folder):
 
 def _accepted(folder):
     path = folder / "manifest.json"
-    change = '"accepted": [{"modules": ["dess.rules"], "missions": 3}]'
+    change = '"accepted": [{"modules": ["dess.model.rules"], "missions": 3}]'
     path.write_text(path.read_text().replace('"accepted": []', change))
 
 

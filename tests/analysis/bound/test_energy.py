@@ -6,7 +6,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dess.analysis.bound.paths import last_slot, phases_of
-from dess.scenario import Scenario
+from dess.scenario.scenario import Scenario
 
 
 def scenario(**values: object) -> Scenario:

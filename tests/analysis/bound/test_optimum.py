@@ -8,9 +8,9 @@ import pytest
 
 from dess import load_scenario, simulate_batch
 from dess.analysis.bound import upper_bound
-from dess.errors import InputError
+from dess.base.errors import InputError
 from dess.policies import load
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 from tests.analysis.bound.tiny_sea import TinySea, bound_of_data, check, contraction, gap_of
 
 # --- without shadowing ---

@@ -5,7 +5,7 @@ import pytest
 
 from dess import load_scenario
 from dess.analysis.bound.prices import Bounds, Detail, improve, known_of
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 from tests.analysis.bound.tiny_sea import bound_of_data
 
 

@@ -8,8 +8,8 @@ import pytest
 from dess import load_scenario, policies, simulate_batch
 from dess.analysis.bound import upper_bound
 from dess.analysis.bound.prices import Bounds, Detail, ceilings_memory, known_of
-from dess.errors import InputError
-from dess.scenario import ScenarioSpace
+from dess.base.errors import InputError
+from dess.scenario.scenario import ScenarioSpace
 
 TINY = {"grid": 6, "nodes": ((1, 1), (4, 2), (2, 5)), "zone": (2, 1, 2, 2), "max_slots": 60}
 

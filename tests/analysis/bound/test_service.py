@@ -6,8 +6,8 @@ from scipy.stats import norm
 
 from dess import load_scenario
 from dess.analysis.bound.service import POINTS, rates_of, spread, step_takings, step_values
-from dess.channel import world_of
-from dess.state import EAST, HOVER, constants_of
+from dess.model.channel import world_of
+from dess.model.state import EAST, HOVER, constants_of
 
 NODES = ((1, 1), (3, 1))
 

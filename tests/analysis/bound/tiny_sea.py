@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm
 
-from dess import rules
 from dess.analysis.bound import upper_bound
 from dess.analysis.bound.paths import bound_paths
 from dess.analysis.bound.prices import Bounds, Detail, known_of
-from dess.scenario import ScenarioSpace
-from dess.state import starts_of, state_of
+from dess.model import rules
+from dess.model.state import starts_of, state_of
+from dess.scenario.scenario import ScenarioSpace
 from tests import compiled
 
 # What the future of a UAV depends on.

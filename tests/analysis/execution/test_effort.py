@@ -30,7 +30,7 @@ from dess.analysis.execution.effort import (
     policies_for,
     total,
 )
-from dess.code import memory
+from dess.base.files import memory
 from dess.policies.registry import names
 from tests.analysis.execution.test_runner import precise, selecting
 from tests.analysis.small import environment, files_of, small_study

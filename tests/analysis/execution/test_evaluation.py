@@ -7,7 +7,7 @@ from dess.analysis.execution import effort, evaluation
 from dess.analysis.execution.evaluation import Asked, check_evaluation, evaluate, means
 from dess.analysis.metrics import ALWAYS
 from dess.analysis.stats.intervals import interval_of, post_stratified
-from dess.code import memory
+from dess.base.files import memory
 
 SPACE = load_scenario("paper", quota=30)
 

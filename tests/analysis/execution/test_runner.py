@@ -8,9 +8,9 @@ from dess import InputError, simulate
 from dess.analysis import load_results, run_study
 from dess.analysis.execution import jobs
 from dess.analysis.results import parquet, store
+from dess.model.record import MISSION_RECORD
 from dess.policies import load_team
 from dess.policies.heuristics import Greedy
-from dess.record import MISSION_RECORD
 from tests.analysis.small import files_of, grid, small_study
 
 

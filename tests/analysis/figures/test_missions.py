@@ -16,7 +16,7 @@ from dess import policies
 from dess.analysis.figures import missions
 from dess.analysis.figures.style import MUTED, node_colours
 from dess.analysis.results.event_log import uav_slots
-from dess.state import sample_scenario
+from dess.model.state import sample_scenario
 
 
 @pytest.fixture(scope="module")

@@ -18,10 +18,10 @@ from dess.analysis.results.event_log import (
     residual_data,
     uav_slots,
 )
-from dess.scenario import Scenario
-from dess.view import View
+from dess.model.view import View
+from dess.scenario.scenario import Scenario
 from tests import drawn
-from tests.dess.flights import CHANNEL, flown
+from tests.dess.model.flights import CHANNEL, flown
 
 
 def assert_agree(record: Any, log: pd.DataFrame) -> None:

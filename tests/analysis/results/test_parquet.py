@@ -18,7 +18,7 @@ from dess.analysis import load_results, run_study
 from dess.analysis.results import event_log, parquet
 from dess.analysis.results.chunks import name_of, short_hash
 from dess.analysis.results.store import Store
-from dess.record import PARAMETER_EVENTS
+from dess.model.record import PARAMETER_EVENTS
 from dess.reports.cli import main
 from tests.analysis.small import files_of, small_study
 
@@ -127,7 +127,7 @@ def test_a_small_file_with_very_many_rows_is_refused_before_it_is_read(sound, tm
     bomb.write_bytes(content)
     assert len(content) < 2**20
     with pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.setattr("dess.code.memory.available_memory", lambda: 2**29)
+        monkeypatch.setattr("dess.base.files.memory.available_memory", lambda: 2**29)
         with pytest.raises(InputError, match=r"4,194,304 rows: about .* GiB of memory"):
             Store.read(folder)
 

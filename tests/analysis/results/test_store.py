@@ -110,9 +110,9 @@ def _simulated_by_other_code(out, *modules):
 
 
 def test_other_code_is_refused_by_its_modules(out, tmp_path):
-    _simulated_by_other_code(out, "dess.rules", "dess.guard.moves")
+    _simulated_by_other_code(out, "dess.model.rules", "dess.model.guard.moves")
     before = files_of(out)
-    line = "made by other code of dess.guard.moves, dess.rules"
+    line = "made by other code of dess.model.guard.moves, dess.model.rules"
     with pytest.raises(InputError, match=line):
         run_study(small_study(tmp_path), out)
     assert files_of(out) == before
@@ -120,16 +120,16 @@ def test_other_code_is_refused_by_its_modules(out, tmp_path):
 
 def test_a_run_that_accepts_other_code_keeps_the_missions(out, tmp_path):
     before = files_of(out)
-    _simulated_by_other_code(out, "dess.rules")
+    _simulated_by_other_code(out, "dess.model.rules")
     more = small_study(tmp_path, missions=15, policies=["greedy", "random", "tour"])
     results = run_study(more, out, accept_code=True)
     kept = {name: content for name, content in before.items() if name != "manifest.json"}
     assert kept.items() <= files_of(out).items()
     (change,) = results.manifest["accepted"]
     assert change["missions"] == 20
-    assert change["modules"].keys() == {"dess.rules"}
-    old, new = change["modules"]["dess.rules"]
-    assert (old, new) == ("0" * 64, results.manifest["code"]["dess.rules"])
+    assert change["modules"].keys() == {"dess.model.rules"}
+    old, new = change["modules"]["dess.model.rules"]
+    assert (old, new) == ("0" * 64, results.manifest["code"]["dess.model.rules"])
     assert load_results(out).missions.equals(results.missions)
     assert results.missions.equals(run_study(more, tmp_path / "at-once").missions)
     assert results.store.manifest.key != load_results(tmp_path / "at-once").store.manifest.key
@@ -151,7 +151,7 @@ def test_a_policy_depends_on_the_modules_of_what_it_holds():
     held = {
         "dess.policies.learner.policy",
         "dess.policies.network",
-        "dess.observations.vector",
+        "dess.envs.observations.vector",
     }
     assert held <= learned.keys()
     assert not {"dess.policies.learner.training", "dess.policies.learner.network"} & learned.keys()

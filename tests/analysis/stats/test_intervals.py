@@ -25,7 +25,7 @@ from dess.analysis.stats.intervals import (
     summary,
     wilson,
 )
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 
 SAMPLES = st.lists(st.floats(0, 1), min_size=1, max_size=60)
 

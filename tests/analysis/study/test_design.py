@@ -8,11 +8,11 @@ from scipy.stats import qmc
 
 from dess import InputError
 from dess.analysis.study.design import MAX_SIZE, Design, Grid, LatinHypercube, Saltelli
-from dess.errors import validation_line
-from dess.files.reading import parse_toml
-from dess.scenario import load_scenario
-from dess.sea.families import seas_of
-from dess.streams import MAX_REPLICATION, MAX_SEED
+from dess.base.errors import validation_line
+from dess.base.files.reading import parse_toml
+from dess.physics.streams import MAX_REPLICATION, MAX_SEED
+from dess.scenario.families import seas_of
+from dess.scenario.scenario import load_scenario
 
 
 class Plan(BaseModel):

@@ -18,9 +18,9 @@ from dess.analysis.verification import balances, draws, measurements
 from dess.analysis.verification.checks import ALPHA, Check, judge, overall, poisson_fit, uniform_fit
 from dess.analysis.verification.measurements import STUDY, Log
 from dess.analysis.verification.suite import Suite
-from dess.fields import SAMPLED
-from dess.mission import simulate
-from dess.state import sample_scenario
+from dess.model.mission import simulate
+from dess.model.state import sample_scenario
+from dess.scenario.fields import SAMPLED
 from tests.analysis.small import small_study
 from tests.drawn import extended_spaces, policies, replications, seeds
 

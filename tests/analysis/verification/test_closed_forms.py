@@ -8,7 +8,7 @@ from scipy import stats
 
 from dess.analysis.stats.intervals import wilson
 from dess.analysis.verification import closed_forms
-from dess.scenario import Scenario
+from dess.scenario.scenario import Scenario
 
 
 def test_initial_data_of_few_nodes_by_hand():

@@ -2,8 +2,8 @@
 
 from hypothesis import strategies as st
 
-from dess.fields import SECTIONS, fields_of
-from dess.scenario import ScenarioSpace
+from dess.scenario.fields import SECTIONS, fields_of
+from dess.scenario.scenario import ScenarioSpace
 from tests.fuzz.strategies.values import texts, toml_values
 
 FIELDS = (*fields_of(ScenarioSpace), *SECTIONS)

@@ -13,12 +13,12 @@ from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
 from dess import InputError
+from dess.model.state import MISSION, SENSOR, UAV
 from dess.policies.learner import trained
 from dess.policies.learner.checkpoint import load_training, save_training
 from dess.policies.learner.config import CHECKPOINT, MODEL
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.trained import load_policy, save_policy
-from dess.state import MISSION, SENSOR, UAV
 from tests.analysis.small import write_scenario
 from tests.policies.learner.tiny import CPU, assert_same, refusal_of, tiny
 

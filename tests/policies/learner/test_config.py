@@ -7,7 +7,7 @@ import pytest
 
 from dess import InputError, policies
 from dess.policies.learner.config import config_names, learner_of, load_config, resume_command
-from dess.scenario import load_scenario
+from dess.scenario.scenario import load_scenario
 from tests.policies.learner.tiny import PHASES, TINY, tiny, tiny_on_seas, write_config
 
 PHASE = PHASES[0]

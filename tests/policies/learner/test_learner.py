@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch import nn
 
-from dess.observations.states import masks
+from dess.envs.observations.states import masks
 from dess.policies.learner.dqn import Batch, DQNLearner, DQNTraining
 from tests.policies.learner.tiny import CPU, PHASES, tiny
 

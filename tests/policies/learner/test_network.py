@@ -5,7 +5,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from dess.observations.sets import ACTION, MATE, MOVES, NODE, OWN, ZONE, Sets
+from dess.envs.observations.sets import ACTION, MATE, MOVES, NODE, OWN, ZONE, Sets
 from dess.policies import network as acting
 from dess.policies.learner.network import DuelingNetwork, PaperNetwork, SetNetwork, arrays_of
 

@@ -7,19 +7,19 @@ import pytest
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
-from dess.batch import simulate_batch
-from dess.channel import world_of
-from dess.env.stepper import MissionStepper
-from dess.guard import guard
-from dess.mission import simulate
-from dess.observations.sets import Sets, sea_of
-from dess.observations.states import ACTIVE, Layout, compact_states, layout_of
-from dess.observations.vector import Vector
+from dess.envs.observations.sets import Sets, sea_of
+from dess.envs.observations.states import ACTIVE, Layout, compact_states, layout_of
+from dess.envs.observations.vector import Vector
+from dess.envs.stepper import MissionStepper
+from dess.model.batch import simulate_batch
+from dess.model.channel import world_of
+from dess.model.guard import guard
+from dess.model.mission import simulate
+from dess.model.state import constants_of
 from dess.policies.learner.policy import LearnedPolicy
 from dess.policies.network import DuelingNetwork, SetNetwork, Sizes, forms_of
-from dess.scenario import ScenarioSpace, load_scenario
-from dess.state import constants_of
-from tests.dess.flights import assert_same_alone, cells_of
+from dess.scenario.scenario import ScenarioSpace, load_scenario
+from tests.dess.model.flights import assert_same_alone, cells_of
 from tests.drawn import PLAIN_SEA, Checked, Recorder, Wanderer, replications, seeds, spaces
 from tests.policies.learner.tiny import refusal_of
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import torch
 
-from dess.observations.states import layout_of, masks
+from dess.envs.observations.states import layout_of, masks
 from dess.policies.learner.checkpoint import new_training
 from dess.policies.learner.ppo import CLIP, TRACE, WORTH, ProximalTraining, _advantages, _with_range
-from dess.scenario import load_scenario
+from dess.scenario.scenario import load_scenario
 from tests.policies.learner.tiny import CPU, tiny_on_seas, weights_of
 
 

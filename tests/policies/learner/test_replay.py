@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from dess.observations.states import empty_states
+from dess.envs.observations.states import empty_states
 from dess.policies.learner.dqn import Batch, ReplayMemory
 
 SLOT, ENVIRONMENT = 0, 1  # what the columns of the missions hold here

@@ -11,7 +11,7 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
-from dess.batch import simulate_batch
+from dess.model.batch import simulate_batch
 from dess.policies.learner import trained
 from dess.policies.learner.config import CONFIG, MODEL, read_description
 from dess.policies.learner.dqn import DQNTraining

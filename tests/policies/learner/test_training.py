@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 import torch
 
-from dess.observations.states import ACTIVE, CHARGING, compact_states, masks
+from dess.envs.observations.states import ACTIVE, CHARGING, compact_states, masks
+from dess.model.record import empty_records
 from dess.policies.learner import training as module
 from dess.policies.learner.checkpoint import load_training, save_training
 from dess.policies.learner.config import MISSION_SEED
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.training import SELECT_BY, Training
-from dess.record import empty_records
-from dess.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace
 from tests.policies.learner.tiny import CPU, PHASES, assert_same, tiny, weights_of
 
 # --- stopping and going on ---

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dess import Scenario, ScenarioSpace, load_scenario, simulate
+from dess.model.view import View
 from dess.policies.planner.fluid import (
     CHARGE,
     MOST_SLOTS,
@@ -17,8 +18,7 @@ from dess.policies.planner.fluid import (
 )
 from dess.policies.planner.rates import rates_of
 from dess.policies.planner.search import BEST, TRIED, empty_workspace, improve
-from dess.view import View
-from tests.dess.flights import first_view
+from tests.dess.model.flights import first_view
 
 CALM = {"shadowing_variance": 0.0, "arrival_rate": 0.0}
 

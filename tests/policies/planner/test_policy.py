@@ -7,12 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dess import load_scenario, policies, simulate, simulate_batch
-from dess.guard import guard
+from dess.model.guard import guard
+from dess.model.view import View
 from dess.policies.planner import Planner, plan_of
 from dess.policies.planner.policy import _MEMORIES, Budget
-from dess.scenario import ScenarioSpace
-from dess.view import View
-from tests.dess.flights import assert_same_alone, cells_of
+from dess.scenario.scenario import ScenarioSpace
+from tests.dess.model.flights import assert_same_alone, cells_of
 from tests.drawn import PLAIN_SEA, Checked, extended_spaces, replications, seeds, spaces
 
 

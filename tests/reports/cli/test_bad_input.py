@@ -6,7 +6,7 @@ All checks of a command come before its first mission.
 import pytest
 
 from dess.analysis.execution import evaluation, runner
-from dess.mission import MissionModel
+from dess.model.mission import MissionModel
 
 SWEEP = "sweep --scenario small.toml --set uavs=1,2 --missions 3"
 STUDY = "study run trial.toml --out trial"

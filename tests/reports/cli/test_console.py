@@ -29,7 +29,7 @@ def test_compilation_is_announced_once(capsys):
 
 
 def test_code_that_cannot_be_kept_says_how(capsys, monkeypatch):
-    monkeypatch.setattr("dess.rules.launch._cache", NullCache())
+    monkeypatch.setattr("dess.model.rules.launch._cache", NullCache())
     console.announce_compiling.cache_clear()
     console.announce_compiling()
     assert "(in every run; NUMBA_CACHE_DIR=DIR keeps it)" in capsys.readouterr().err
@@ -110,6 +110,6 @@ def test_what_no_command_expects_of_its_input_is_a_line(monkeypatch, capsys, err
     def fail(*_):
         raise error
 
-    monkeypatch.setattr("dess.scenario.scenario_names", fail)
+    monkeypatch.setattr("dess.scenario.scenario.scenario_names", fail)
     assert cli.main(["scenarios"]) == 1
     assert line in capsys.readouterr().err

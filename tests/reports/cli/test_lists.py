@@ -10,10 +10,10 @@ from dess import ScenarioSpace, load_scenario
 from dess.analysis import load_study
 from dess.analysis.names import fields as fields_in
 from dess.analysis.study.study import study_names
-from dess.fields import fields_of
 from dess.policies.registry import SHIPPED, trained_names
 from dess.reports.cli.commands import app
-from dess.scenario import scenario_families, scenario_names
+from dess.scenario.fields import fields_of
+from dess.scenario.scenario import scenario_families, scenario_names
 
 
 def test_names_are_listed(dess):

@@ -18,8 +18,8 @@ import pytest
 from dess import load_scenario
 from dess.analysis import load_results
 from dess.analysis.figures.missions import sea_figure
-from dess.record import EventLog
-from dess.sea.places import Projection
+from dess.model.record import EventLog
+from dess.scenario.places import Projection
 from tests.analysis.small import files_of
 
 # What the JSON of a mission and a record have in common.

@@ -11,7 +11,7 @@ import tomli_w
 import torch
 
 from dess import policies
-from dess.code import memory
+from dess.base.files import memory
 from dess.policies.learner import session
 from dess.policies.learner.checkpoint import load_training
 from dess.policies.learner.config import load_config

@@ -9,9 +9,9 @@ import pytest
 from dess import load_scenario, simulate
 from dess.analysis.metrics import lasting
 from dess.analysis.results.event_log import path_text
+from dess.model.state import sample_scenario
 from dess.reports.cli import main
 from dess.reports.player import Playback
-from dess.state import sample_scenario
 from tests.analysis.small import SHEET, write_scenario
 
 SLOT, UNIT = 21.0, 21.0 * 125e3  # of SHEET: [s] and [bit]

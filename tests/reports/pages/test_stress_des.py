@@ -6,9 +6,9 @@ from typing import Any
 from dess.analysis import load_study
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.stats.intervals import LEVEL
-from dess.fields import GEOMETRY, LANDING, SECTIONS
 from dess.reports.pages import stress_des
-from dess.scenario import Scenario
+from dess.scenario.fields import GEOMETRY, LANDING, SECTIONS
+from dess.scenario.scenario import Scenario
 
 # Another value of every field of the paper's scenario.
 OTHER: dict[str, Any] = {

@@ -1,0 +1,104 @@
+"""JSON documents as models: what is not valid is refused in one line.
+
+class Notes(Document):
+    author: str = Field(max_length=100, description="who wrote them")
+
+notes = Notes.load(Path("notes.json"), "what dess notes has written")
+"""
+
+from codecs import BOM_UTF8
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from dess.base.errors import InputError, shown, validation_line
+from dess.base.files.reading import parse_json, read_bytes
+
+LIMIT = 256 * 2**20  # bytes of the largest document; a design point of a manifest takes about 150
+
+Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]  # a checksum, or a hash of code
+
+_NONE: Mapping[str, object] = MappingProxyType({})
+
+
+class Outdated(InputError):  # noqa: N818 - it may be no error
+    """A document is of another version, or of other data, than the wanted one."""
+
+
+class Document(BaseModel):
+    """A JSON document, or a part of one: frozen, of finite numbers, and without unknown fields."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The document as plain data."""
+        return self.model_dump(mode="json", by_alias=True)
+
+    @classmethod
+    def parse(
+        cls, text: str | bytes, where: str, allowed: str = "", fixed: Mapping[str, object] = _NONE
+    ) -> Self:
+        """Read a document from its JSON text.
+
+        Args:
+            text: The text.
+            where: The file or page that contains the text, for messages.
+            allowed: What messages say is allowed; by default, what the field may be.
+            fixed: Values that keys must have if they are there, such as a version. They are
+                compared first, as another version may have other fields.
+
+        Raises:
+            Outdated: If a key has not its fixed value.
+            InputError: If the text is not a valid document.
+        """
+        try:
+            data = parse_json(text, where)  # also refuses integers that cannot be printed
+            if not isinstance(data, dict):
+                raise InputError(f"{where}: is not an object; allowed: an object of JSON")
+            for key, value in fixed.items():
+                held = data.get(key, value)
+                if type(held) is not type(value) or held != value:
+                    line = f"{where}: has {key} {shown(held)}, not {shown(value)}; allowed: {value}"
+                    raise Outdated(_refused(line, allowed))
+            return cls.model_validate_json(text, strict=True)
+        except ValidationError as error:
+            raise InputError(_refused(validation_line(error, where, cls), allowed)) from None
+        except Outdated:
+            raise
+        except InputError as error:
+            raise InputError(_refused(str(error), allowed)) from None
+
+    @classmethod
+    def load(
+        cls,
+        path: Path,
+        allowed: str = "",
+        absent: str = "",
+        fixed: Mapping[str, object] = _NONE,
+        limit: int = LIMIT,
+    ) -> Self:
+        """Read a document from a file.
+
+        Args:
+            path: The file.
+            allowed: As for ``parse``.
+            absent: What messages say is allowed if the file cannot be read; by default ``allowed``.
+            fixed: As for ``parse``.
+            limit: The largest size of the file [bytes].
+
+        Raises:
+            Missing: If there is no such file.
+            Outdated: If a key has not its fixed value.
+            InputError: If the file cannot be read, or is not valid.
+        """
+        content = read_bytes(path, limit, absent or allowed or "a file")
+        return cls.parse(content.removeprefix(BOM_UTF8), str(path), allowed, fixed)
+
+
+def _refused(line: str, allowed: str) -> str:
+    """The line, with other words for what is allowed, if there are some."""
+    return f"{line.partition('; allowed:')[0]}; allowed: {allowed}" if allowed else line

@@ -1,0 +1,312 @@
+"""Writing files completely or not at all, and locks on folders.
+
+A temporary folder that a killed process has left is removed by a later one.
+"""
+
+import json
+import os
+import re
+import secrets
+import shutil
+import stat
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+from filelock import FileLock, Timeout
+from psutil import pid_exists
+
+from dess.base.errors import InputError
+from dess.base.files.reading import kind_of, paths_in
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip file can store
+_FILE, _FOLDER = 0o100644, 0o40755
+
+
+def toml_value(value: Any) -> str:
+    """A value in the syntax of TOML, on one line: as in JSON, but for tables and what is None."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml_value, value))}]"
+    if isinstance(value, dict):
+        given = {key: inner for key, inner in value.items() if inner is not None}
+        return f"{{{', '.join(f'{key} = {toml_value(inner)}' for key, inner in given.items())}}}"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def write_zip(path: Path, entries: Iterable[tuple[str, bytes]]) -> None:
+    """Write a zip file.
+
+    Args:
+        path: The file, a temporary one of ``replacing``.
+        entries: Names with their contents; the name of a folder ends with a slash.
+    """
+    with ZipFile(path, "w") as archive:
+        for name, content in entries:
+            entry = ZipInfo(name, _EPOCH)
+            entry.compress_type = ZIP_DEFLATED
+            entry.external_attr = (_FOLDER if entry.is_dir() else _FILE) << 16  # permissions
+            archive.writestr(entry, content)
+
+
+# The longest name of a file or a folder in the usual file systems [bytes].
+_LONGEST = 255
+# Temporary files: the number of their process, and a random one.
+_TEMPORARY = re.compile(r"\.dess-(\d{1,9})-[0-9a-f]+\.tmp")
+_OWN: set[Path] = set()  # temporary files of this process
+
+
+def write_file(path: Path, content: str | bytes) -> None:
+    """Write a file, completely or not at all; its folder is made if there is none.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    write_files({path: content})
+
+
+def write_files(contents: Mapping[Path, str | bytes]) -> None:
+    """Write several files as ``write_file`` does, all of them or none."""
+    for path in contents:
+        make_folder(path.parent)
+    with replacing_all([*contents]) as temporaries:
+        for (path, content), temporary in zip(contents.items(), temporaries, strict=True):
+            with writable(path):
+                fill(temporary, content)
+
+
+def fill(temporary: Path, content: str | bytes) -> None:
+    """Write the content of a file that ``replacing`` has made."""
+    temporary.write_bytes(content if isinstance(content, bytes) else content.encode())
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield a temporary path that replaces ``path`` at the end, and is deleted on an error.
+
+    So ``path`` has either its old content or all of the new content, never a part of it. A link is
+    replaced by a file; what it leads to is not changed.
+
+    Raises:
+        InputError: If no file can be written there, or if it cannot be written completely, such as
+            to a full disk.
+    """
+    with replacing_all([path]) as (temporary,):
+        yield temporary
+
+
+@contextmanager
+def replacing_all(paths: Sequence[Path]) -> Iterator[list[Path]]:
+    """Yield a temporary path for each path, as ``replacing`` does; they are replaced together.
+
+    On an error, at whatever moment, no file is left where there was none. The errors are those of
+    ``replacing``.
+    """
+    with ExitStack() as temporaries:
+        pairs = [(temporaries.enter_context(_temporary(path)), path) for path in paths]
+        yield [temporary for temporary, _ in pairs]
+        with ExitStack() as undo:
+            for temporary, path in pairs:
+                with writable(path):
+                    _check_place(path)
+                    is_new = not path.exists()
+                    os.replace(temporary, path)
+                if is_new:
+                    undo.callback(path.unlink, missing_ok=True)
+            undo.pop_all()
+
+
+@contextmanager
+def _temporary(path: Path) -> Iterator[Path]:
+    """An empty file in the folder of ``path``, deleted at the end."""
+    with writable(path):
+        _check_place(path)
+        temporary = path.with_name(f".dess-{os.getpid()}-{secrets.token_hex(4)}.tmp")
+        _OWN.add(temporary)
+        _sweep(path.parent.absolute())
+        try:
+            temporary.touch(exist_ok=False)  # an interrupt may come as soon as the file is there
+            yield temporary
+        finally:
+            temporary.unlink(missing_ok=True)
+            _OWN.discard(temporary)
+
+
+def remove_temporaries() -> None:
+    """Delete the temporary files of this process, which ends without a cleanup."""
+    for temporary in [*_OWN]:
+        temporary.unlink(missing_ok=True)
+
+
+def check_target(path: Path) -> None:
+    """Refuse a file that ``write_file`` could not write, before a long computation begins.
+
+    Raises:
+        InputError: If its folder cannot be made or written, or if it is no regular file.
+    """
+    check_folder(path.parent)
+    with writable(path):
+        _check_place(path)
+
+
+def _check_place(path: Path) -> None:
+    """Refuse to replace anything but a regular file, or a link to one."""
+    _check_name(path)
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        return
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError(f"{path}: is {kind_of(found)}; allowed: a file")
+    if path.is_symlink() and Path("/dev") in path.absolute().parents:  # such as /dev/stdout
+        raise InputError(f"{path}: is a device; allowed: a file")
+
+
+def _check_name(path: Path) -> None:
+    """Refuse a path that no file can have."""
+    if "\0" in str(path):
+        raise InputError(f"{path}: has a null character; allowed: another path")
+    if any(len(os.fsencode(part)) > _LONGEST for part in path.parts):
+        raise InputError(f"{path}: File name too long; allowed: {_LONGEST} bytes at most")
+
+
+@cache
+def _sweep(folder: Path) -> None:
+    """Delete the temporary files that processes have left which were killed, once per process."""
+    with suppress(OSError):
+        for path in folder.iterdir():
+            if (found := _TEMPORARY.fullmatch(path.name)) and not pid_exists(int(found[1])):
+                path.unlink(missing_ok=True)
+
+
+@contextmanager
+def writable(path: Path) -> Iterator[None]:
+    """Replace an ``OSError`` that is raised while ``path`` is written by a one-line message.
+
+    Raises:
+        InputError: In place of the ``OSError``.
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{path}: cannot be written: {reason}; allowed: another path") from None
+
+
+def check_folder(path: Path) -> None:
+    """Refuse a folder that cannot be made or written, before a long computation begins.
+
+    Raises:
+        InputError: If the folder cannot be made, or no file can be written into it.
+    """
+    _check_name(path)
+    # A link that leads nowhere is there: no folder can be made in its place.
+    there = next(above for above in (path, *path.absolute().parents) if os.path.lexists(above))
+    if not there.is_dir() or not os.access(there, os.W_OK):
+        reason = "Permission denied" if there.is_dir() else "Not a directory"
+        raise InputError(f"{path}: cannot be written: {reason}; allowed: another path")
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder, and those above it, unless they are there.
+
+    Raises:
+        InputError: If it cannot be made.
+    """
+    if not path.is_dir():
+        check_folder(path)
+        with writable(path):
+            path.mkdir(parents=True, exist_ok=True)
+
+
+def delete(path: Path) -> None:
+    """Delete a file, if there is one; a folder of its name stays.
+
+    Raises:
+        InputError: If it cannot be deleted.
+    """
+    if not path.is_dir():
+        with writable(path):
+            path.unlink(missing_ok=True)
+
+
+SUFFIX = ".lock"
+
+
+@contextmanager
+def locked(path: Path, busy: str, patience: float = 0.0) -> Iterator[None]:
+    """Let no other process work in a folder; the folder is made if there is none.
+
+    Args:
+        path: A file in the folder, which is there as long as the work goes on.
+        busy: What the message says if another process works there.
+        patience: How long to wait for the end of its work [s].
+
+    Raises:
+        InputError: If another process works there, or if the file cannot be written.
+    """
+    check_lock(path)
+    make_folder(path.parent)
+    lock = FileLock(path)
+    try:
+        with writable(path):
+            try:
+                lock.acquire(timeout=patience)
+            except Timeout:
+                raise InputError(f"{path.parent}: {busy}") from None
+            except NotImplementedError:  # as some network file systems
+                raise InputError(
+                    f"{path}: its file system has no locks; allowed: a folder on a local disk"
+                ) from None
+        yield
+    finally:
+        if lock.is_locked:
+            _unlink(path)
+        lock.release()
+
+
+def check_lock(path: Path) -> None:
+    """Refuse a file that cannot be the lock of a folder, before a long computation begins.
+
+    Raises:
+        InputError: If it is a link or no regular file, or if the folder cannot be written.
+    """
+    check_target(path)
+    if path.is_symlink():
+        raise InputError(f"{path}: is a link; allowed: a folder without it")
+
+
+@contextmanager
+def temporary_folder(parent: Path, prefix: str) -> Iterator[Path]:
+    """Make a new folder, which only this user can read, and remove it at the end.
+
+    A file beside the folder is locked as long as the process lives. So the next call finds the
+    folders of processes that were killed, and removes them.
+
+    Args:
+        parent: The folder in which the new folder is made.
+        prefix: The beginning of its name.
+    """
+    for left in paths_in(parent, f"{prefix}*{SUFFIX}"):
+        with suppress(Timeout, OSError), FileLock(left, timeout=0):  # its process is dead
+            _remove(left)
+    lock = parent / f"{prefix}{secrets.token_hex(4)}{SUFFIX}"
+    with FileLock(lock), ExitStack() as cleaning:
+        for _ in range(2):  # an interrupt may end the first time in the middle
+            cleaning.callback(_remove, lock)
+        folder = lock.with_suffix("")
+        folder.mkdir(mode=0o700)
+        yield folder
+
+
+def _remove(lock: Path) -> None:
+    """Remove a locked file, and the folder that belongs to it."""
+    shutil.rmtree(lock.with_suffix(""), ignore_errors=True)
+    _unlink(lock)
+
+
+def _unlink(lock: Path) -> None:
+    with suppress(OSError):  # some systems keep an open file until it is closed
+        lock.unlink()

@@ -1,0 +1,164 @@
+"""Compile functions with numba, and keep them in a cache on disk that is valid for this code.
+
+Numba's own cache keeps a compiled function as long as the file that defines it is unchanged. The
+functions of this project are inlined into functions of other files, so a cached batch engine would
+still be used after a change of ``rules.py``. Here a cached function is valid as long as the code of
+its module, and of all modules that this module imports, is unchanged (``dess.base.sources``).
+Changes of comments and line numbers do not count.
+"""
+
+import gc
+import inspect
+import math
+from collections.abc import Callable
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import config, njit
+from numba.core.caching import IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+from numba.core.types import unliteral
+from numba.extending import overload
+
+from dess.base.errors import InputError
+from dess.base.sources import code_of, combined
+
+
+class _Code(JITCodeLibrary):
+    """The code of a compiled function, optimized as a whole and not function by function."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+
+class _Compiler(Compiler):
+    """Numba's compiler without garbage collections, which would free little and take a tenth."""
+
+    library: type[JITCodeLibrary] = _Code
+
+    def _compile_core(self) -> Any:
+        state, was_enabled = self.state, gc.isenabled()
+        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        gc.disable()
+        try:
+            return super()._compile_core()
+        finally:
+            if was_enabled:
+                gc.enable()
+
+
+# Without a value of its own, a function would take over ``_nrt`` from the function that calls it.
+# Wrappers for C would take time to compile, and nothing calls them.
+_OPTIONS: dict[str, Any] = {
+    **{"nogil": True, "error_model": "numpy", "_nrt": True, "no_cfunc_wrapper": True},
+    "pipeline_class": _Compiler,
+}
+
+
+def kernel(function: Callable) -> Any:
+    """Compile a function with numba to code that does not hold Python's global lock.
+
+    The compiled function is cached on disk. If its module has no source file, or no folder for the
+    cache can be written, it is compiled again in every process.
+
+    Raises:
+        InputError: If the environment does not let numba compile.
+    """
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]
+        raise InputError("NUMBA_DISABLE_JIT: the simulator runs only compiled; allowed: unset it")
+    stamp = _code_behind(function.__module__, inspect.getfile(function))
+    try:
+        compiled = njit(cache=bool(stamp), **_OPTIONS)(function)
+    except RuntimeError:  # numba has found no folder for its cache ("no locator available")
+        return njit(**_OPTIONS)(function)
+    compiled.get_call_template = partial(_without_literals, compiled.get_call_template)
+    if stamp:
+        compiled._cache._cache_file = _cache_file(compiled._cache, stamp)
+    return compiled
+
+
+def _without_literals(template: Callable, args: Any, kws: Any) -> Any:
+    """The types with which a compiled function calls another: a number in the code is any number.
+
+    Otherwise, the function would be compiled once more for each number that calls of it contain.
+    """
+    return template([*map(unliteral, args)], {name: unliteral(kws[name]) for name in kws})
+
+
+def _cache_file(cache: Any, stamp: str) -> IndexDataCacheFile:
+    """The disk cache of a function for the present code; a cache made by other code is emptied.
+
+    Numba puts the line number of the function into the name of the cache file, which changes with
+    every comment above the function, so the number is removed here. Numba also reads an old index
+    before it compares the stamps, and that fails if a type has moved to another module; so an index
+    with another stamp is deleted first.
+    """
+    name = cache._impl.filename_base.replace(f"-{cache._impl._lineno}.", ".")
+    file = IndexDataCacheFile(cache.cache_path, name, stamp)
+    index = Path(file._index_path)
+    if index.exists() and stamp.encode() not in index.read_bytes():
+        file.flush()
+    return file
+
+
+def inlined(function: Callable, choose: Callable | None = None) -> Any:
+    """Let compiled functions call a function; its code is inlined into theirs.
+
+    The function must neither create nor return arrays, since its code does not count references to
+    arrays. For the small functions of a mission slot, counting would take longer than the functions
+    themselves. For Python, the function is not compiled.
+
+    Args:
+        function: The function.
+        choose: Returns, for the types of the arguments, the function to compile in its place.
+    """
+    options: Any = _OPTIONS | {"forceinline": True, "_nrt": False, "pipeline_class": _InlinedOnly}
+    overload(function, jit_options=options, strict=False)(choose or (lambda *args: function))
+    return function
+
+
+class _Linked(_Code):
+    """The code of an inlined function: optimized and emitted with the functions that call it.
+
+    On its own nothing would run it, and both would take half of the time of a first run.
+    """
+
+    @property
+    def codegen(self) -> "_Linked":
+        return self
+
+    def set_env(self, name: str, env: Any) -> None:
+        """What Python would need to call the function."""
+
+    def get_pointer_to_function(self, name: str) -> int:
+        return 0
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class _InlinedOnly(_Compiler):
+    """The compiler of inlined functions."""
+
+    library = _Linked
+
+
+@lru_cache
+def _code_behind(module: str, path: str) -> str:
+    """A hash of the code that the functions of a module may call; empty without a source file."""
+    code = code_of(Path(path).stem if module == "__main__" else module)
+    return combined(code) if code else ""
+
+
+# Functions of the C library on arrays. NumPy's own differ in their last bits between processors
+# with and without AVX-512, and with them records and decisions would.
+exp = np.vectorize(math.exp, otypes=[float])
+log10 = np.vectorize(math.log10, otypes=[float])

@@ -1,0 +1,108 @@
+"""Hash the code that the behaviour of a module depends on: the module and all that it imports.
+
+Results and compiled functions are kept on disk, and are valid as long as the code that made them is
+unchanged. The hash of a module is taken of its syntax tree. So every statement counts, whereas
+comments, docstrings, layout and line numbers do not. Imports, also those inside functions, are read
+from the source; no module is executed. A module that is loaded by its name (``import_module``) is
+not found this way and does not count.
+
+    >>> sorted(code_of("dess.physics.streams"))
+    ['dess.base.kernels', 'dess.base.sources', 'dess.physics.streams']
+"""
+
+import ast
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from functools import cache, lru_cache
+from hashlib import sha256
+from importlib.machinery import PathFinder
+from pathlib import Path
+
+# Imports of other distributions are not followed: their versions identify their code.
+OURS = {"dess"}
+
+
+def code_of(*modules: str) -> dict[str, str]:
+    """Hashes of the code of modules and of all that they import, by the name of the module.
+
+    Imports are followed inside the packages of ``OURS`` and inside the packages of the modules
+    themselves; from a module outside of any package, to the modules in the same folder. A package
+    counts only where something is imported from its ``__init__.py`` itself. The result is empty if
+    the modules have no source file.
+    """
+    packages = OURS | {module.partition(".")[0] for module in modules}
+    folders = {path.parent for path in map(path_of, modules) if path}
+    hashes: dict[str, str] = {}
+    waiting = [*modules]
+    while waiting:
+        module = waiting.pop()
+        path = path_of(module)
+        within = module.partition(".")[0] in packages or (path and path.parent in folders)
+        if path and within and module not in hashes:
+            hashes[module], imports = read(path, module)
+            waiting += imports
+    return dict(sorted(hashes.items()))
+
+
+def combined(hashes: Mapping[str, str]) -> str:
+    """Combine several hashes into one."""
+    return sha256(repr(sorted(hashes.items())).encode()).hexdigest()
+
+
+@lru_cache
+def read(path: Path, module: str) -> tuple[str, tuple[str, ...]]:
+    """A hash of the syntax tree of a module, and the names of all modules that it may import.
+
+    Names of functions and classes are among them, since the source alone does not tell these from
+    modules.
+    """
+    tree = ast.parse(path.read_bytes())
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    imports = tuple(dict.fromkeys(_imports(tree, package)))
+    return sha256(_outline(tree).encode()).hexdigest(), imports
+
+
+def _imports(tree: ast.Module, package: str) -> Iterator[str]:
+    """The modules that a source may import; for ``from a import b``, both ``a.b`` and ``a``."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            parents = package.split(".")
+            above = parents[: len(parents) - node.level + 1] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            members = [f"{base}.{alias.name}" for alias in node.names]
+            yield from (name for name in members if path_of(name))
+            if not all(map(path_of, members)):
+                yield base
+
+
+# What `ast.dump` says of empty fields, which differ between versions of Python, and of the context
+# of a name (whether it is read or written), which follows from its place in the tree.
+_EMPTY = re.compile(r"(, )?\b\w+=(None\b|\[\]|(Load|Store|Del)\(\))")
+
+
+def _outline(tree: ast.Module) -> str:
+    """A syntax tree as text, without positions, docstrings, contexts and empty fields."""
+    for node in ast.walk(tree):
+        if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            del node.body[0]
+    return _EMPTY.sub("", ast.dump(tree))
+
+
+_DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+@cache
+def path_of(module: str) -> Path | None:
+    """The source file of a module, looked for once, or None; its packages are not imported."""
+    found, places, names = None, None, module.split(".")
+    for end in range(len(names)):
+        found = PathFinder.find_spec(".".join(names[: end + 1]), places)
+        if found is None:
+            return None
+        imported = sys.modules.get(".".join(names[: end + 1]))  # may have added a folder
+        places = getattr(imported, "__path__", None) or found.submodule_search_locations or []
+    origin = found.origin if found else None
+    return Path(origin) if origin and origin.endswith(".py") else None

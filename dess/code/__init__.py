@@ -1,1 +1,0 @@
-"""Compiling functions with numba, and hashing the source code that results depend on."""

@@ -1,0 +1,167 @@
+"""Compact states, from which the observations are computed: a few bytes per mission and slot.
+
+The replay memory stores these states instead of observations: one state serves all UAVs of its
+mission, and the next state of a transition is a later row of the memory.
+
+    states = compact_states(view.state, view.world.chart, guarded=True)
+    masks(states, view.mission, view.uav)                        # (R, 5) allowed actions
+    Vector(layout_of(space)).encode(states, view.mission, view.uav)
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dess.base.errors import InputError
+from dess.base.kernels import kernel
+from dess.model.guard.battery import must_charge, slots_needed
+from dess.model.guard.moves import safe_moves
+from dess.model.guard.parking import parking_cell, parking_memory
+from dess.model.guard.ways import battery_home
+from dess.model.rules import data_left, legal_moves, may_act
+from dess.model.state import HOVER, State
+from dess.physics.chart import Chart, zones_of
+from dess.physics.wind import reach_of
+from dess.scenario.scenario import ScenarioSpace
+
+# Columns of ``CompactStates.missions``.
+CHARGE_START, CHARGE_COMPLETE = range(2)
+MISSION_COLUMNS = 2
+# Columns of ``CompactStates.uavs``: the cell, the battery [%], mission slots until the quota is
+# filled, whether the UAV is active, latched, charging and must charge, the battery [%] that it
+# needs to reach its parking cell, and the mask of its allowed actions as bits.
+X, Y, BATTERY, NEEDED, ACTIVE, LATCH, CHARGING, MUST_CHARGE, HOME, MASK = range(10)
+UAV_COLUMNS = 10
+
+_MOST = np.iinfo(np.int16).max
+
+
+class CompactStates(NamedTuple):
+    """The states of S missions, each at one time, with up to I UAVs and K nodes.
+
+    Attributes:
+        missions: (S, 2) int16, columns ``CHARGE_START`` and ``CHARGE_COMPLETE``.
+        uavs: (S, I, 10) int16, columns ``X`` to ``MASK``; zeros where a mission has fewer UAVs.
+        residual: (S, K) float32 [data units].
+    """
+
+    missions: np.ndarray
+    uavs: np.ndarray
+    residual: np.ndarray
+
+
+class Layout(NamedTuple):
+    """The square grid, the only zone and the nodes that all missions of a space share.
+
+    Attributes:
+        grid: Cells along one side (M).
+        zone: (4,) x, y, width and height of the charging zone [cells].
+        nodes: (K, 2) cells of the nodes.
+    """
+
+    grid: int
+    zone: np.ndarray
+    nodes: np.ndarray
+
+    @property
+    def zones(self) -> np.ndarray:
+        """``Chart.zones`` of the layout."""
+        return zones_of(self.grid, self.grid, [tuple(self.zone.tolist())], [])
+
+    def zone_slots(self, cells: np.ndarray) -> np.ndarray:
+        """(N,) slots from each of (N, 2) cells to the nearest cell of the zone."""
+        x, y, width, height = self.zone
+        nearest = np.clip(cells, [x, y], [x + width - 1, y + height - 1])
+        return np.abs(cells - nearest).sum(1)
+
+
+def layout_of(space: ScenarioSpace) -> Layout:
+    """The layout of a space.
+
+    Raises:
+        InputError: If it has no such layout.
+    """
+    misfits = [
+        ("rows", space.size[0] != space.size[1], "a square grid"),
+        ("zones", space.has("zones"), "a single zone"),
+        ("no_fly", space.has("no_fly"), "no no-fly cells"),
+    ]
+    for field, is_wrong, allowed in misfits:
+        if is_wrong:
+            raise InputError(
+                f"{field}: the observations vector and maps need {allowed}; "
+                "allowed: the observation state"
+            )
+    return Layout(space.grid, np.array(space.zone), np.array(space.nodes))
+
+
+def empty_states(count: int, uavs: int, nodes: int) -> CompactStates:
+    """Compact states filled with zeros, for that many missions, UAVs per mission and nodes."""
+    return CompactStates(
+        np.zeros((count, MISSION_COLUMNS), np.int16),
+        np.zeros((count, uavs, UAV_COLUMNS), np.int16),
+        np.zeros((count, nodes), np.float32),
+    )
+
+
+def compact_states(state: State, chart: Chart, guarded: bool) -> CompactStates:
+    """The compact states of all missions of a state.
+
+    Args:
+        state: The state of B missions.
+        chart: Their chart.
+        guarded: True for the mask of the return guard, False for the mask of all legal actions.
+    """
+    states = empty_states(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
+    reach = reach_of(state.missions, chart)
+    _fill(state.missions, state.uavs, state.residual, guarded, chart, reach, *states)
+    return states
+
+
+@kernel
+def _fill(missions, uavs, residual, guarded, chart, reach, out_missions, out_uavs, out_residual):
+    memory = parking_memory(chart, uavs.shape[1])
+    for b in range(len(missions)):
+        mission, team = missions[b], uavs[b]
+        out_missions[b, CHARGE_START] = mission.charge_start
+        out_missions[b, CHARGE_COMPLETE] = mission.charge_complete
+        out_residual[b] = residual[b]
+        data = data_left(mission, residual[b])
+        for i in range(mission.uavs):
+            u, row = team[i], out_uavs[b, i]
+            row[X], row[Y], row[BATTERY] = u.x, u.y, u.battery
+            row[NEEDED] = min(max(slots_needed(mission, u), 0), _MOST)
+            row[ACTIVE], row[LATCH], row[CHARGING] = u.active, u.latch, u.charging
+            row[MASK] = 1 << HOVER
+            if not u.active:
+                continue
+            row[MUST_CHARGE] = must_charge(mission, u, data)
+            home = parking_cell(mission, team, i, chart, memory, reach)
+            battery = battery_home(mission, team, i, chart, None, u.x, u.y, home, reach)
+            row[HOME] = min(battery, _MOST)
+            if may_act(u):
+                if guarded:
+                    charge = row[MUST_CHARGE] != 0
+                    row[MASK] = safe_moves(
+                        mission, team, i, chart, charge, home, memory.planned, reach
+                    )
+                else:
+                    row[MASK] = legal_moves(chart, u)
+
+
+def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:
+    """The (R, 5) mask of the allowed actions of UAV ``uavs[r]`` in state ``missions[r]``.
+
+    Where ``uavs[r]`` is -1, only Hover is allowed.
+    """
+    out = np.empty((len(uavs), 5), np.bool_)
+    _write_masks(states.uavs, missions, uavs, out)
+    return out
+
+
+@kernel
+def _write_masks(states, missions, uavs, out):
+    for row in range(len(uavs)):
+        bits = states[missions[row], uavs[row], MASK] if uavs[row] >= 0 else 1 << HOVER
+        for action in range(5):
+            out[row, action] = bits >> action & 1

@@ -1,0 +1,1 @@
+"""The model of a mission: its state, its rules, and the two engines that run them."""

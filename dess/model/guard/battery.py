@@ -1,0 +1,136 @@
+"""Whether the battery of a UAV lasts until its quota is filled, and the margins that are kept."""
+
+import math
+
+from dess.base.kernels import inlined
+from dess.physics.failures import working_pads
+from dess.physics.landing import flies, lands
+from dess.physics.radio import has_range
+from dess.physics.section import for_sections
+
+# Margin [cells] on the way to the zone per active teammate, since each may cause a detour.
+MARGIN_PER_TEAMMATE = 2
+# Data [data units] that a UAV collects in a slot near an average node, and the communication slots
+# that each UAV can fill with a data unit that arrives at an empty sea.
+MEAN_RATE, SLOTS_PER_PACKET = 0.3, 1.0
+# Margin [slots] for the quota when little data is left, as some slots may find no data to collect.
+SCARCE_SLOTS = 6
+# Further margin [slots] of a UAV with teammates in missions that end on the ground.
+MARGIN_LANDING = 3
+# Slots before the end of a mission without a quota in which UAVs do not leave a zone any more.
+LAST_SLOTS = 16
+
+
+@inlined
+def slots_needed(mission, u):
+    """Flying slots until the quota of UAV ``u`` is filled, if it collects data in all of them."""
+    m = mission.communication_slots
+    return (u.quota - u.communications + m - 1) // m
+
+
+@inlined
+def slots_expected(mission, u, data):
+    """Flying slots until the quota of UAV ``u`` is filled, as far as data are there for it.
+
+    A UAV collects some ``MEAN_RATE`` data units in a slot. Once the residual data are collected,
+    it may count on ``SLOTS_PER_PACKET`` communication slots for each data unit that arrives. Where
+    slots out of range do not count, it cannot tell, and expects to fly to the end.
+
+    Args:
+        mission: ``MISSION`` record.
+        u: ``UAV`` record.
+        data: Residual data of all nodes together [data units].
+    """
+    needed = slots_needed(mission, u)
+    if has_range(mission):
+        return mission.max_slots
+    if data >= MEAN_RATE * needed * mission.active:
+        return needed
+    served = data / (MEAN_RATE * mission.active)
+    arriving = SLOTS_PER_PACKET * mission.arrival_rate * mission.nodes
+    share = min(arriving / mission.communication_slots, 1.0)
+    if (needed - served) >= share * mission.max_slots:
+        return mission.max_slots
+    return int(math.ceil(served + (needed - served) / share)) + SCARCE_SLOTS
+
+
+@inlined
+def must_charge(mission, u, data):
+    """Whether UAV ``u`` cannot fill its quota with its battery and must charge first.
+
+    In wind, every move until then may cost the most. If little data is left, a communication slot
+    may find no node to serve, so a margin is added. Where flying costs no battery, or no pad will
+    ever work again, no UAV must charge. In a mission that ends on the ground, every UAV must keep
+    a zone within reach.
+
+    Args:
+        mission: ``MISSION`` record.
+        u: ``UAV`` record.
+        data: Residual data of all nodes together [data units].
+    """
+    if lands(mission):
+        return True
+    needed = slots_expected(mission, u, data)
+    if mission.pad_rate > 0.0 and mission.pad_repair == 0.0 and _all_pads(mission) == 0:
+        return False
+    # A UAV that lives until the mission is truncated is not lost.
+    needed = min(needed, mission.max_slots - mission.slot + 1)
+    return u.battery < mission.flight_cost * (needed + _most_wind(mission, u, needed))
+
+
+@inlined
+def will_charge(mission, u):
+    """Whether a UAV in the air cannot fill its quota with its battery, or has to land."""
+    needs = u.battery < mission.flight_cost * slots_needed(mission, u)
+    return flies(u) and (needs or lands(mission) or has_range(mission))
+
+
+@inlined
+def slots_left(mission, u):
+    """The slots that UAV ``u`` may fly at most: as many as it has battery [%].
+
+    If missions end on the ground, no more than to the end of the mission.
+    """
+    if not lands(mission):
+        return u.battery
+    left = mission.max_slots - mission.slot
+    return min(u.battery, left) if mission.flight_cost > 0 else left
+
+
+@inlined
+def _all_pads(mission):
+    """The working pads of all zones together."""
+    pads = 0
+    for zone in range(mission.zones):
+        pads += working_pads(mission, zone)
+    return pads
+
+
+@for_sections
+def _most_wind(mission, u, slots):
+    """The battery [%] that the wind costs at most in moves that take so many slots."""
+    return mission.wind_most * ((slots + u.slots_per_cell - 1) // u.slots_per_cell)
+
+
+@inlined
+def ends_soon(mission, u):
+    """Whether UAV ``u`` does not leave a zone any more, as it has to be on the ground soon."""
+    return lands(mission) and u.quota == 0 and mission.max_slots - mission.slot <= LAST_SLOTS
+
+
+@inlined
+def lasts(mission, u):
+    """Whether the battery lasts to the end of the mission in any wind, so that only time counts."""
+    left = mission.max_slots - mission.slot
+    return ends_soon(mission, u) and u.battery > left * (1 + mission.wind_most)
+
+
+@inlined
+def margin(mission, u):
+    """The margin [%] on the way of UAV ``u`` to the zone for detours around teammates.
+
+    A detour goes forth and back, so the wind costs the most in one direction only.
+    """
+    teammates = mission.active - 1
+    slots = teammates * (MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most)
+    return slots + MARGIN_LANDING if lands(mission) and teammates > 0 else slots

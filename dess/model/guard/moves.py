@@ -1,0 +1,173 @@
+"""The safe moves: those after which a UAV still reaches the charging zone in time."""
+
+import numpy as np
+
+from dess.base.kernels import inlined, kernel
+from dess.model.guard.battery import lasts, margin, must_charge, slots_left, will_charge
+from dess.model.guard.parking import parking_cell, parking_memory, stays
+from dess.model.guard.ways import battery_home, is_parked
+from dess.model.rules import data_left
+from dess.model.state import HOVER, STEP_X, STEP_Y
+from dess.model.view import View
+from dess.physics.chart import in_zone, is_open
+from dess.physics.landing import lands
+from dess.physics.wind import is_calm, move_surcharge, reach_of
+
+
+@inlined
+def contests(mission, uavs, i):
+    """Whether teammates of UAV ``i`` may occupy the cells that its actions lead to.
+
+    Returns:
+        Two bits for each action, as ``contest`` reads them: 0 if the cell is free; 1 if a teammate
+        that gives way is on it; 2 if a teammate with the right of way (less battery; on a tie,
+        lower index) may come or stay there; 3 if a parked teammate is on it.
+    """
+    u = uavs[i]
+    levels = 0
+    for j in range(mission.uavs):
+        o = uavs[j]
+        east, south = o.x - u.x, o.y - u.y
+        if j == i or not o.active or abs(east) + abs(south) > 2:
+            continue
+        parked = is_parked(mission, o)
+        goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
+        for action in range(5):
+            slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
+            level = 0
+            if slots == 0:
+                level = 3 if parked else 2 if goes_first else 1
+            elif slots == 1 and goes_first and not parked:
+                level = 2
+            levels += max(level - contest(levels, action), 0) << 2 * action
+    return levels
+
+
+@inlined
+def contest(levels, action):
+    """The two bits of ``contests`` for an action."""
+    return levels >> 2 * action & 3
+
+
+@inlined
+def _is_in_the_way(mission, uavs, i):
+    """Whether UAV ``i`` has just overruled a teammate that must charge and has less battery."""
+    for j in range(mission.uavs):
+        o = uavs[j]
+        blocked = o.overruled and o.overruled_by == i and o.battery < uavs[i].battery
+        if blocked and will_charge(mission, o):
+            return True
+    return False
+
+
+@inlined
+def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
+    """Find the safe actions: those after which UAV ``i`` can still reach its parking cell in time.
+
+    If there is no such action, the actions that lead nearest to the parking cell are safe, except
+    moves into a cell that a teammate with the right of way may take; the UAV may spend its margin
+    to let this teammate pass. Moves off the grid, into a no-fly cell and into the cell of a parked
+    teammate are never safe. A UAV that has just been overruled also avoids cells that a teammate
+    may occupy: otherwise two UAVs could block each other until the battery of one of them is
+    depleted. A UAV leaves its cell if a teammate that must charge has just been overruled by it.
+
+    Args:
+        mission: ``MISSION`` record.
+        uavs: (I,) ``UAV`` records.
+        i: Index of the UAV.
+        chart: ``Chart``.
+        charge: Whether the UAV must charge; if not, every legal action is safe.
+        home: The result of ``parking_cell``.
+        planned: As in ``Parking``, as ``parking_cell`` leaves it.
+        reach: The table of ``reach_of``.
+
+    Returns:
+        The safe actions, a bit for each.
+    """
+    u = uavs[i]
+    if charge and (u.pad_request >= 0 or (lands(mission) and is_parked(mission, u))):
+        return 1 << HOVER  # it would lose its place in the queue, or on the ground
+    reserve = margin(mission, u) + home.wait if charge else 0
+    # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
+    # that lead nearest to the parking cell, and those after which it is reached if the margin and
+    # the slots for a pad are spent.
+    clear = nearest = in_time = 0
+    least = 1_000_000  # battery [%] that lacks on the way to the parking cell
+    fewest = 1_000_000  # battery [%] that a move and the way from there need
+    levels = contests(mission, uavs, i)
+    for action in range(5):
+        x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
+        # Teammates fly around a parked UAV, so it need not leave its cell for any.
+        stays = action == HOVER and is_parked(mission, u)
+        contested = 0 if stays else contest(levels, action)
+        gives_way = charge and home.gives_way == 1 and action == HOVER
+        if not is_open(chart, x, y) or contested == 3 or gives_way:
+            continue
+        late = 0
+        if charge:
+            needed = battery_home(mission, uavs, i, chart, planned, x, y, home, reach)
+            needed += 1 if is_calm(reach) else _cost(mission, u, chart, action, x, y)
+            # The cheapest way in wind may lead through a parked teammate; a move must do as well.
+            if lands(mission) and not is_calm(reach) and home.cells > 0:
+                needed = max(needed, fewest + 1) if action == HOVER else needed
+                fewest = min(fewest, needed)
+            # One slot is the charging slot itself; the battery must not be depleted before it.
+            late = max(needed + 1 + reserve - slots_left(mission, u), 0)
+        bit = 1 << action
+        if contested < 2:
+            clear |= bit
+        if late <= reserve:
+            in_time |= bit
+        if late < least:
+            least, nearest = late, 0
+        if late == least:
+            nearest |= bit
+    if nearest & clear and (least > 0 or u.overruled):
+        return nearest & clear
+    elsewhere = nearest & clear & ~(1 << HOVER)
+    if elsewhere and not is_parked(mission, u) and _is_in_the_way(mission, uavs, i):
+        return elsewhere
+    if least > 0 and clear & in_time:
+        # these slots are there to wait or step aside until the teammate has passed
+        return clear & in_time
+    # Two UAVs that both insist block each other: the one without the right of way waits a slot.
+    if u.overruled and not nearest & clear and (least > 0 or nearest >> HOVER & 1):
+        return 1 << HOVER
+    return nearest or 1 << HOVER  # who gives way may have nowhere to go
+
+
+@inlined
+def _cost(mission, u, chart, action, x, y):
+    """The battery [%] for an action of a UAV that leads to a cell, in wind or at a low speed."""
+    if action == HOVER:
+        return 0 if u.latch and in_zone(chart, x, y) else 1
+    if lasts(mission, u):
+        return u.slots_per_cell
+    return u.slots_per_cell + move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
+
+
+@kernel
+def _mask(missions, uavs, residual, rows_mission, rows_uav, chart, reach):
+    masks = np.zeros((len(rows_mission), 5), np.bool_)
+    memory = parking_memory(chart, uavs.shape[1])
+    for row in range(len(rows_mission)):
+        b, i = rows_mission[row], rows_uav[row]
+        mission, team = missions[b], uavs[b]
+        charge = must_charge(mission, team[i], data_left(mission, residual[b]))
+        home = stays(team[i])
+        if charge:
+            home = parking_cell(mission, team, i, chart, memory, reach)
+        safe = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
+        for action in range(5):
+            masks[row, action] = safe >> action & 1
+    return masks
+
+
+def guard(view: View) -> np.ndarray:
+    """The (R, 5) mask of the actions after which the charging zone is still reached in time.
+
+    Every row allows at least one action. Any policy can restrict its choice to the mask.
+    """
+    state, chart = view.state, view.world.chart
+    reach = reach_of(state.missions, chart)
+    return _mask(state.missions, state.uavs, state.residual, view.mission, view.uav, chart, reach)

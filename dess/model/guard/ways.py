@@ -1,0 +1,142 @@
+"""The ways to a charging zone around parked teammates, and the battery that they take."""
+
+import numpy as np
+
+from dess.base.kernels import inlined, kernel
+from dess.model.guard.battery import ends_soon, lasts
+from dess.physics.charging import slots_to_charge
+from dess.physics.chart import distance, length_around
+from dess.physics.landing import lands
+from dess.physics.wind import is_calm
+
+# Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
+CELLS_PER_UAV = 4
+
+
+@inlined
+def is_parked(mission, u):
+    """Whether a UAV blocks its cell: it charges or is about to charge, or is grounded.
+
+    Shortly before the end of a mission that ends on the ground, it stands on the ground, too.
+    """
+    stays = u.latch
+    if lands(mission):  # there the latch is set whenever a UAV may charge
+        stays = u.charging or u.pad_request >= 0 or u.battery <= mission.charge_start
+        stays = stays or ends_soon(mission, u)
+    return u.active and (u.grounded or (stays and u.zone >= 0))
+
+
+@inlined
+def is_crowded(mission, chart, zone):
+    """Whether a zone is so small that UAVs in it close the way to its other cells."""
+    return chart.sizes[zone] < CELLS_PER_UAV * mission.uavs
+
+
+@inlined
+def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
+    """Cells that UAV ``i`` flies from one to another, with a detour around teammates.
+
+    Those are parked ones, and if ``planned`` is given, as in ``Parking``, those who will be.
+    """
+    length, between = distance(chart, x, y, to_x, to_y), 0
+    for j in range(mission.uavs):
+        closed_x, closed_y = _closed(mission, uavs, i, j, chart, planned)
+        if closed_x >= 0:
+            before = distance(chart, x, y, closed_x, closed_y)
+            between += before + distance(chart, closed_x, closed_y, to_x, to_y) == length
+    if between == 0:
+        return length
+    if between == 1 and chart.ways.size == 0 and not ends_soon(mission, uavs[i]):
+        # without no-fly cells, a way that does not follow a line has others of the same length
+        return length + 2 if x == to_x or y == to_y else length
+    return _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y)
+
+
+@inlined
+def _closed(mission, uavs, i, j, chart, planned):
+    """The cell that UAV ``j`` closes to UAV ``i``, or -1."""
+    o = uavs[j]
+    if j != i and is_parked(mission, o):
+        return o.x, o.y
+    if planned is not None and planned[j] >= 0:
+        return np.int64(chart.parking[planned[j], 0]), np.int64(chart.parking[planned[j], 1])
+    return -1, -1
+
+
+@kernel
+def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
+    """The way around all cells that teammates close.
+
+    Or, if that is shorter, the way through and the time that a teammate charges in it, unless none
+    leaves its cell any more.
+    """
+    width = chart.zones.shape[1]
+    closed, count = np.empty(mission.uavs, np.int64), 0
+    for j in range(mission.uavs):
+        closed_x, closed_y = _closed(mission, uavs, i, j, chart, planned)
+        if closed_x >= 0 and not (closed_x == to_x and closed_y == to_y):
+            closed[count] = closed_y * width + closed_x
+            count += 1
+    zones, ways, rows = chart.zones, chart.ways, chart.rows
+    around = length_around(zones, ways, rows, closed[:count], x, y, to_x, to_y)
+    if ends_soon(mission, uavs[i]):
+        return around
+    lacking = mission.charge_complete - mission.charge_start
+    through = distance(chart, x, y, to_x, to_y)
+    return min(around, through + slots_to_charge(mission, lacking))
+
+
+@inlined
+def battery_home(mission, uavs, i, chart, planned, x, y, home, reach):
+    """The battery [%] that UAV ``i`` needs from a cell to its parking cell.
+
+    Args:
+        mission: ``MISSION`` record.
+        uavs: (I,) ``UAV`` records.
+        i: Index of the UAV.
+        chart: ``Chart``.
+        x, y: The cell.
+        home: ``Home``.
+        reach: The table of ``reach_of``. A detour around parked teammates is not in it; each of
+            its cells may cost the most.
+    """
+    if is_calm(reach) and is_crowded(mission, chart, chart.zones[home.y, home.x]):
+        return path_length(mission, uavs, i, chart, planned, x, y, home.x, home.y)
+    cells = path_length(mission, uavs, i, chart, None, x, y, home.x, home.y)
+    return battery_of_way(mission, uavs[i], chart, x, y, home.x, home.y, cells, reach)
+
+
+@inlined
+def battery_of_way(mission, u, chart, x, y, home_x, home_y, cells, reach):
+    """The battery [%] for a way home of so many cells, those of a detour included."""
+    if reach is None or len(reach) == 0:
+        return cells
+    if lasts(mission, u):
+        return cells * u.slots_per_cell
+    dearest = u.slots_per_cell + mission.wind_most
+    if reach.size == 0:  # too many cells for a table
+        return cells * dearest
+    detour = cells - distance(chart, x, y, home_x, home_y)
+    home = chart.nearest[home_y, home_x]
+    return reach[home, u.slots_per_cell - 1, y, x] + detour * dearest
+
+
+@inlined
+def round_trip(mission, u, chart, x, y, home, reach):
+    """The battery [%] that UAV ``u`` needs to fly to a cell and from there to the zone.
+
+    Gusts on the way out are not considered; the safe moves are what keeps the zone in reach.
+    """
+    cells = distance(chart, x, y, home.x, home.y)
+    back = battery_of_way(mission, u, chart, x, y, home.x, home.y, cells, reach)
+    if mission.zones > 1:  # once there, another zone may be nearer
+        near = chart.parking[chart.nearest[y, x]]
+        cells = distance(chart, x, y, near[0], near[1])
+        back = min(back, battery_of_way(mission, u, chart, x, y, near[0], near[1], cells, reach))
+    cells = distance(chart, u.x, u.y, x, y)
+    if reach is None or len(reach) == 0:
+        return cells + back
+    along_x = mission.wind_east if x > u.x else mission.wind_west
+    along_y = mission.wind_south if y > u.y else mission.wind_north
+    against = max(along_x * abs(x - u.x), 0.0) + max(along_y * abs(y - u.y), 0.0)
+    return cells * u.slots_per_cell + int(against) + back

@@ -1,0 +1,289 @@
+"""The record of a mission: a row of metrics, a row per UAV and, on demand, the event log."""
+
+from dataclasses import dataclass
+from math import isnan, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dess.base.kernels import inlined, kernel
+from dess.model.rules import data_left
+from dess.model.state import BATTERY, END_NAMES, LANDED, LOST, QUOTA, fields
+from dess.physics.age import write_age
+from dess.physics.charging import write_use
+from dess.physics.failures import write_failures
+from dess.physics.section import for_sections
+from dess.scenario.scenario import Constants
+
+# One mission. Data are in data units; rewards are summed over the slots and the UAVs (eq. 14).
+MISSION_RECORD = np.dtype(
+    [
+        ("seed", np.uint64),
+        *fields(np.int64, "replication uavs flying_time charge_start charge_complete"),
+        *fields(np.int64, "slots uav_slots success"),
+        *fields(np.float64, "collection_ratio collection_ratio_and_communication"),
+        *fields(np.float64, "initial arrived collected residual reward"),
+        ("home", np.int64),  # 1 if every UAV ended with the battery for its way home, else 0
+    ]
+)
+
+# One UAV of a mission; ``quota`` are the communications counted toward it. Where a mission has
+# fewer UAVs than the array, the other rows have end 0.
+UAV_RECORD = np.dtype(
+    [
+        *fields(np.int64, "quota battery slots_flying slots_charging slots_waiting end"),
+        *fields(np.float64, "collected reward"),
+        ("way_home", np.int64),  # the battery for its shortest way to a zone cell [%]
+        ("charged", np.int64),  # the battery that its charges have added [%]
+        # 1 if it is lost: its battery was empty, it failed for good, or it floats out at sea.
+        ("down", np.int64),
+    ]
+)
+
+# What extended scenarios measure beyond the paper's metrics; nan where a scenario does not measure
+# it. Times are in mission slots, data in data units.
+OPERATIONS = np.dtype(
+    [
+        # The age of information: its mean over time and nodes, the mean of the ages just before
+        # newer data were collected, and its 99th percentile over time and nodes.
+        *fields(np.float64, "age peak_age age_p99"),
+        # Packets: their mean time from generation to delivery, its 99th percentile, and their
+        # numbers; then the data lost by full buffers and failures.
+        *fields(np.float64, "latency latency_p99 generated delivered lost_packets lost"),
+        # UAVs that wait for a pad, mean over time; their mean time from the request to its grant or
+        # withdrawal; how often they have asked; the mean share of the pads in use.
+        *fields(np.float64, "queue waiting pad_requests utilisation"),
+        *fields(np.float64, "failures slots_grounded"),  # of UAVs
+    ]
+)
+
+
+def measures_of(space: Constants) -> list[str]:
+    """The fields of ``OPERATIONS`` that a scenario measures.
+
+    In some missions one may still be nan, such as the latency where no packet was delivered.
+    """
+    measured = {
+        ("age", "peak_age", "age_p99"): space.age.measured,
+        ("latency", "latency_p99", "generated", "delivered", "lost_packets"): space.needs_events,
+        ("lost",): space.needs_events or space.failures.is_on,
+        ("queue", "waiting", "pad_requests", "utilisation"): space.charging.is_on,
+        ("failures", "slots_grounded"): space.failures.is_on,
+    }
+    return [name for names, is_measured in measured.items() if is_measured for name in names]
+
+
+class Event(NamedTuple):
+    """A row of the event log; ``docs/reference/event-log.md`` says what its columns mean."""
+
+    time: float
+    event: str
+    uav: int
+    node: int
+    value: float
+    x: float = -1.0
+    y: float = -1.0
+    battery: int = -1
+    other: int = -1
+    snr: float = nan
+    packet: int = -1
+    generated: float = nan
+
+
+# Columns of the event log, and the types of their arrays.
+_TYPES = {float: np.float64, int: np.int64, str: object}
+EVENT_COLUMNS = {name: _TYPES[kind] for name, kind in Event.__annotations__.items()}
+FAILURE_EVENTS = (
+    *("uav_failure", "uav_repair", "pad_failure", "pad_repair"),
+    *("node_failure", "node_repair", "data_lost"),
+)
+# Parameters of the mission, a row each.
+PARAMETER_EVENTS = (
+    *("mission_seed", "mission_replication", "mission_flying_time"),
+    *("mission_charge_start", "mission_charge_complete"),
+)
+# What becomes of packets in continuous time, besides ``arrival``.
+PACKET_EVENTS = ("delivery", "loss")
+EVENT_NAMES = (
+    *("mission_start", *PARAMETER_EVENTS, "move", "collision"),
+    *("charge_request", "charge_start", "charge_end", "charge_withdrawal"),
+    *("communication", "arrival", "quota_filled", "battery_empty", "landing"),
+    *(*FAILURE_EVENTS, *PACKET_EVENTS, "mission_end"),
+)
+
+
+class Records(NamedTuple):
+    """The records of N missions with up to I UAVs.
+
+    Attributes:
+        missions: (N,) ``MISSION_RECORD``.
+        uavs: (N, I) ``UAV_RECORD``.
+        operations: (N,) ``OPERATIONS`` if one of the scenarios is extended, otherwise (0,).
+    """
+
+    missions: np.ndarray
+    uavs: np.ndarray
+    operations: np.ndarray = np.zeros(0, OPERATIONS)
+
+    def mission(self, row: int, events: "EventLog | None" = None) -> "MissionRecord":
+        """The record of one mission, with its event log if there is one."""
+        metrics = self.missions[row]
+        operations = self.operations[row] if len(self.operations) else None
+        return MissionRecord(metrics, self.uavs[row, : metrics["uavs"]], events, operations)
+
+    def add(self, row: int, record: "MissionRecord") -> None:
+        """Put the record of one mission into a row."""
+        self.missions[row], self.uavs[row, : len(record.uavs)] = record.metrics, record.uavs
+        if record.operations is not None:
+            self.operations[row] = record.operations
+
+
+@kernel
+def write_records(places, state, ways, records):
+    """Write the records of the missions at these (N,) places of the state.
+
+    ``ways`` is the table of ``wind.ways_home``.
+    """
+    for row in range(len(places)):
+        b = places[row]
+        write_record(
+            state.missions[b], state.uavs[b], state.residual[b], state.sensors[b], state.teeth[b],
+            ways, records, row,
+        )  # fmt: skip
+
+
+@inlined
+def write_record(mission, uavs, residual, sensors, teeth, ways, records, row):
+    """Write the record of a mission into a row of ``Records``."""
+    record, uav_records = records.missions[row], records.uavs[row]
+    record.seed = mission.seed
+    record.replication = mission.replication
+    record.uavs = mission.uavs
+    record.flying_time = mission.flying_time
+    record.charge_start = mission.charge_start
+    record.charge_complete = mission.charge_complete
+    record.slots = mission.slot
+    record.initial = mission.initial
+    record.arrived = mission.arrived
+    record.collected = mission.collected
+    record.residual = data_left(mission, residual)
+    record.uav_slots = 0
+    record.success = record.home = 1
+    record.reward = 0.0
+    for i in range(mission.uavs):
+        u, out = uavs[i], uav_records[i]
+        out.quota = u.communications
+        out.battery = u.battery
+        out.slots_flying = u.slots_flying
+        out.slots_charging = u.slots_charging
+        out.slots_waiting = u.slots_waiting
+        out.end = u.end
+        out.collected = u.collected
+        out.reward = u.total_reward
+        record.uav_slots += u.slots_flying + u.slots_charging
+        record.reward += u.total_reward
+        if u.end != QUOTA and u.end != LANDED:
+            record.success = 0
+        way = ways[u.slots_per_cell - 1, u.y, u.x] + u.slots_left
+        out.way_home = mission.flight_cost * way
+        out.charged = u.charged
+        out.down = u.end == BATTERY or u.end == LOST or (u.grounded and way > 0)
+        if out.down or u.battery < out.way_home:
+            record.home = 0
+    total = record.initial + record.arrived
+    # Rounding may put the ratio a little below 0 or above 1; without any data it is 1.
+    record.collection_ratio = min(max(record.collected / total, 0.0), 1.0) if total > 0.0 else 1.0
+    record.collection_ratio_and_communication = record.collection_ratio * record.success
+    _write_operations(mission, uavs, sensors, teeth, records.operations, row)
+
+
+@for_sections
+def _write_operations(mission, uavs, sensors, teeth, operations, row):
+    """Write what an extended scenario measures into an ``OPERATIONS`` record filled with nan."""
+    out = operations[row]
+    if mission.age_measured != 0:
+        write_age(mission, sensors, teeth, out)
+    if mission.has_charging:
+        write_use(mission, uavs, out)
+    if mission.has_failures:
+        write_failures(mission, out)
+
+
+def empty_records(missions: int, uavs: int, is_extended: bool = False) -> Records:
+    """Zeroed records of that many missions and UAVs per mission; ``operations`` are nan."""
+    operations = np.full(missions if is_extended else 0, np.nan, OPERATIONS)
+    return Records(
+        np.zeros(missions, MISSION_RECORD), np.zeros((missions, uavs), UAV_RECORD), operations
+    )
+
+
+class EventLog(list[Event]):
+    """The events of one mission, in the order in which they happened.
+
+    Every column is also an attribute, as in ``log.time``.
+    """
+
+    def __repr__(self) -> str:
+        return f"EventLog of {len(self)} events"
+
+    def add(self, *values: Any, **others: Any) -> None:
+        """Append one event; the arguments are those of ``Event``."""
+        self.append(Event(*values, **others))
+
+    def __getattr__(self, name: str) -> list:
+        """A column as a list, as in ``log.event``."""
+        if name not in EVENT_COLUMNS:
+            raise AttributeError(name)
+        return [getattr(row, name) for row in self]
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """The log as named columns."""
+        columns = zip(*self, strict=True) if self else ([] for _ in EVENT_COLUMNS)
+        return {
+            name: np.array(column, kind)
+            for (name, kind), column in zip(EVENT_COLUMNS.items(), columns, strict=True)
+        }
+
+
+@dataclass(frozen=True)
+class MissionRecord:
+    """The record of one mission; every metric is also an attribute, as in ``record.success``.
+
+    Attributes:
+        metrics: ``MISSION_RECORD`` scalar.
+        uavs: (I,) ``UAV_RECORD`` array.
+        events: The event log, or None.
+        operations: ``OPERATIONS`` scalar of an extended scenario, or None.
+    """
+
+    metrics: np.void
+    uavs: np.ndarray
+    events: EventLog | None = None
+    operations: np.void | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        if name in (MISSION_RECORD.names or ()):
+            return self.metrics[name].item()
+        if name in (OPERATIONS.names or ()) and self.operations is not None:
+            return self.operations[name].item()
+        raise AttributeError(name)
+
+    def __repr__(self) -> str:
+        """The metrics of the paper in a line, without the rows of the UAVs and the log."""
+        shown = ("seed", "replication", "slots", "success", "collection_ratio", "home")
+        metrics = [f"{name}={self.metrics[name].item()!r}" for name in shown]
+        return f"MissionRecord({', '.join(metrics)}, events={self.events!r})"
+
+    @property
+    def measured(self) -> dict[str, float]:
+        """What was measured beyond the paper's metrics, without the columns that are nan."""
+        if self.operations is None:
+            return {}
+        values = {name: self.operations[name].item() for name in OPERATIONS.names or ()}
+        return {name: value for name, value in values.items() if not isnan(value)}
+
+    def uav_rows(self) -> list[dict[str, Any]]:
+        """A row per UAV: communications, battery [%], charging slots and how its mission ended."""
+        names = ["quota", "battery", "slots_charging", "end"]
+        rows = (dict(zip(names, row, strict=True)) for row in self.uavs[names].tolist())
+        return [row | {"end": END_NAMES[row["end"]]} for row in rows]

@@ -1,0 +1,132 @@
+"""New data in continuous time: a Poisson process per node, whose rate may change over time.
+
+The times are drawn by thinning (P. Lewis, G. Shedler: Simulation of nonhomogeneous Poisson
+processes by thinning, Naval Research Logistics 1979). Candidates arrive at the highest rate that
+the schedule allows, with exponential gaps, and each is accepted with the probability that the rate
+at its time has. Candidate number c of a node is a draw of its own, so arrivals depend neither on
+the policy nor on those of other nodes.
+"""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from dess.base.kernels import kernel
+from dess.physics import streams
+from dess.physics.section import Integer, Number, Section
+
+# The highest rate or factor, the last slot and the largest number of a schedule.
+MOST, LAST, MOST_ROWS = 100, 1_000_000, 10_000
+MOST_AMOUNT = 10**9  # initial data of a node
+
+Rate = Annotated[Number, Field(ge=0, le=MOST)]
+Amount = Annotated[Number, Field(ge=0, le=MOST_AMOUNT)]
+Time = Annotated[Number, Field(ge=0, le=LAST)]
+
+# The Poisson process of one node.
+SOURCE = np.dtype(
+    [
+        ("rate", np.float64),  # packets per slot where the factor of the schedule is 1
+        ("candidate", np.int64),  # number of the next candidate
+        ("time", np.float64),  # of the next arrival [slots]; infinite after the mission
+    ]
+)
+
+
+class Arrivals(Section):
+    """What data nodes have of their own, and packets of one data unit in continuous time.
+
+    Only the SimPy engine has arrivals in continuous time.
+    """
+
+    process: Literal["slotted", "continuous"] = Field(
+        "slotted",
+        description="when new data arrive: slotted, at the ends of mission slots (eq. 12), or "
+        "continuous, a Poisson process per node",
+    )
+    rates: tuple[Rate, ...] = Field(
+        (),
+        max_length=1024,
+        description="arrival rate per node [data units per slot]: a number 0..100 per node; "
+        "without it, arrival_rate for all",
+    )
+    initial: tuple[Amount, ...] = Field(
+        (),
+        max_length=1024,
+        description="initial data per node [data units]: a number for each; without it, "
+        "initial_data for all",
+    )
+    merged: tuple[Annotated[Integer, Field(ge=1)], ...] = Field(
+        (),
+        max_length=1024,
+        description="how many sensor nodes each node stands for: it has as many times the "
+        "arrival_rate and the initial_data",
+    )
+    schedule: tuple[tuple[Time, Rate], ...] = Field(
+        (),
+        max_length=MOST_ROWS,
+        description="factors of the rates over time: a list of [slot, factor], the factor 0..100 "
+        "from this slot on and 1 before the first",
+    )
+    buffer: Integer = Field(
+        0, ge=0, le=1_000_000, description="packets that a node can hold; 0 for no limit"
+    )
+    service: Literal["oldest", "newest"] = Field(
+        "oldest", description="which packet of a node is served first"
+    )
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        if self.process == "slotted" and (self.schedule or self.buffer or self.service != "oldest"):
+            raise ValueError(
+                "process: slotted arrivals have no schedule, buffer or service; allowed: continuous"
+            )
+        for (earlier, _), (later, _) in pairwise(self.schedule):
+            if later <= earlier:
+                raise ValueError(
+                    f"schedule: slot {later:g} comes after slot {earlier:g}; allowed: growing slots"
+                )
+        return self
+
+
+def sources_of(rates: Sequence[float]) -> np.ndarray:
+    """The (K,) ``SOURCE`` records of nodes with these rates, before their first arrival."""
+    sources = np.zeros(len(rates), SOURCE)
+    sources["rate"] = rates
+    return sources
+
+
+def factors_of(arrivals: Arrivals) -> tuple[np.ndarray, np.ndarray]:
+    """The (S,) slots from which the factors of a schedule hold, and the (S,) factors."""
+    starts, factors = np.array([(0.0, 1.0), *arrivals.schedule]).T.copy()
+    return starts, factors
+
+
+@kernel
+def draw_arrival(missions, sources, starts, factors, k):
+    """Draw the next arrival at node ``k``; its time is infinite if the mission ends before it.
+
+    Args:
+        missions: (1,) ``MISSION`` records.
+        sources: (K,) ``SOURCE`` records.
+        starts, factors: As from ``factors_of``.
+        k: Index of the node.
+    """
+    mission, source = missions[0], sources[k]
+    highest = factors.max()
+    while source.time < math.inf:
+        words = streams.block(
+            mission.seed, mission.replication, streams.ARRIVAL_TIME, 0, k, source.candidate
+        )
+        source.candidate += 1
+        source.time -= math.log(streams.uniform(words[0])) / (source.rate * highest)
+        if not source.time < mission.max_slots:
+            source.time = math.inf
+            return
+        factor = factors[np.searchsorted(starts, source.time, side="right") - 1]
+        if streams.uniform(words[1]) * highest < factor:
+            return

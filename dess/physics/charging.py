@@ -1,0 +1,155 @@
+"""The order in which UAVs are given charging pads, and the power that the pads share."""
+
+from fractions import Fraction
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from dess.base.kernels import inlined, kernel
+from dess.physics.section import Integer, Section, for_sections
+
+
+class Charging(Section):
+    """The charging pads beyond their number (``pads``) and their rate (``charge_rate``).
+
+    With the section on, the records have the use of the pads.
+    """
+
+    order: Literal["first-come", "lowest-battery"] = Field(
+        "first-come",
+        description="which waiting UAV is given the next free pad, and which charging UAV takes "
+        "its share of the power first",
+    )
+    power: Integer = Field(
+        0,
+        ge=0,
+        le=6400,
+        description="battery that all pads of a zone together can add in a slot [%]; 0 for no "
+        "limit",
+    )
+    measured: bool = Field(
+        False, description="whether records have the queue, waiting time and use of the pads"
+    )
+    plan_waits: bool = Field(
+        True,
+        description="whether the return guard allows for the wait for a pad; always with another "
+        "order, a limit of power or pads that may fail",
+    )
+
+    def constants(self) -> dict[str, Any]:
+        """The fields of ``MISSION`` that the section sets."""
+        return {
+            "has_charging": self.is_on,
+            "plans_waits": self.plan_waits or self.order != "first-come" or self.power > 0,
+            "lowest_battery_first": self.order == "lowest-battery",
+            "power": self.power,
+        }
+
+
+@inlined
+def is_before(mission, u, other):
+    """Whether ``u`` comes before ``other``, which has the lower index, for pads and power."""
+    if mission.lowest_battery_first and u.battery != other.battery:
+        return u.battery < other.battery
+    return u.pad_request < other.pad_request
+
+
+# The largest denominator of a rate: sums of as many slots as a mission has are 64-bit integers.
+_MOST_SLOTS = 10**11
+
+
+def charge_fraction(rate: Fraction) -> Fraction:
+    """The rate of charging [% per slot] as rules and planner compute with it.
+
+    It is exact for numbers of at most eleven decimals.
+    """
+    return rate.limit_denominator(_MOST_SLOTS)
+
+
+@for_sections
+def _is_fractional(mission):
+    """Whether what a charging slot adds is not whole."""
+    return mission.charge_slots > 1
+
+
+@inlined
+def charged_after(mission, k):
+    """The battery [%] that the first ``k`` slots of a charge add: ``floor(k g)`` at a rate g.
+
+    The rate is a fraction of integers, so it is exact.
+    """
+    if _is_fractional(mission):
+        return k * mission.charge_rate // mission.charge_slots
+    return k * mission.charge_rate
+
+
+@inlined
+def gain(mission, k):
+    """The battery [%] that slot ``k`` = 1, 2, ... of a charge adds."""
+    return charged_after(mission, k) - charged_after(mission, k - 1)
+
+
+@inlined
+def slots_to_charge(mission, lacking, begun=0):
+    """The least number of further slots in which a charge adds so much battery [%].
+
+    Args:
+        mission: ``MISSION`` record.
+        lacking: What is to be added [%].
+        begun: The slots of the charge until now; 0 for one that begins.
+    """
+    if _is_fractional(mission):
+        added = charged_after(mission, begun) + lacking
+        return -(-added * mission.charge_slots // mission.charge_rate) - begun
+    return (lacking + mission.charge_rate - 1) // mission.charge_rate
+
+
+@for_sections
+def share_power(mission, uavs):
+    """Charge the UAVs on the pads if the power is limited; return whether it is."""
+    if mission.power > 0:
+        for zone in range(mission.zones):
+            _share_power(mission, uavs, zone)
+    return mission.power > 0
+
+
+@kernel
+def _share_power(mission, uavs, zone):
+    """Charge the UAVs on the pads of a zone with its limited power, one after the other.
+
+    Each takes what it can take (``charge_rate``, up to ``charge_complete``) of what is left.
+    """
+    left = mission.power
+    charged = np.zeros(len(uavs), np.bool_)
+    while left > 0:
+        first = -1
+        for i in range(mission.uavs):
+            waits = uavs[i].charging and uavs[i].zone == zone and not charged[i]
+            if waits and (first < 0 or is_before(mission, uavs[i], uavs[first])):
+                first = i
+        if first < 0:
+            return
+        u = uavs[first]
+        added = min(gain(mission, u.charge_slots + 1), mission.charge_complete - u.battery, left)
+        u.battery += added
+        u.charged += added
+        left -= added
+        charged[first] = True
+
+
+@kernel
+def write_use(mission, uavs, out):
+    """Write how the pads were used into an ``OPERATIONS`` record.
+
+    A UAV waits in a slot if it has asked for a pad and has none. The number of waiting UAVs changes
+    at the starts of slots only, so that the means over time are exact.
+    """
+    waited = charged = 0
+    for i in range(mission.uavs):
+        waited += uavs[i].slots_waiting
+        charged += uavs[i].slots_charging
+    out.pad_requests = mission.pad_requests
+    out.queue = waited / mission.slot
+    out.waiting = waited / mission.pad_requests if mission.pad_requests > 0 else 0.0
+    out.utilisation = charged / (mission.pads * mission.slot)

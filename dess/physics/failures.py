@@ -1,0 +1,203 @@
+"""Failures at random times: UAVs that are lost or grounded, pads out of order, silent nodes."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from dess.base.kernels import inlined, kernel
+from dess.physics import streams
+from dess.physics.landing import is_over, stands
+from dess.physics.section import Probability, Section, Slots, for_sections
+
+MOST_PADS = 64  # charging pads that can fail: as many as the largest fleet has UAVs
+
+
+class Failures(Section):
+    """Rates of failures per mission slot, and mean durations of repairs."""
+
+    uav_rate: Probability = Field(
+        0.0, description="probability that a flying UAV fails in a mission slot"
+    )
+    uav_repair: Slots = Field(
+        0.0,
+        description="mean time until a failed UAV flies again [slots]: at least 1, or 0 if it is "
+        "lost",
+    )
+    uav_data: Literal["kept", "lost"] = Field(
+        "kept", description="whether the data that a lost UAV has collected count"
+    )
+    pad_rate: Probability = Field(
+        0.0, description="probability that a charging pad fails in a mission slot"
+    )
+    pad_repair: Slots = Field(
+        0.0,
+        description="mean time until a failed pad works again [slots]: at least 1, or 0 if it "
+        "never does",
+    )
+    node_rate: Probability = Field(
+        0.0, description="probability that a node falls silent in a mission slot"
+    )
+    node_repair: Slots = Field(
+        0.0,
+        description="mean time until a silent node answers again [slots]: at least 1, or 0 if it "
+        "never does",
+    )
+    node_data: Literal["kept", "lost"] = Field(
+        "kept", description="whether the data of a node are kept while it is silent"
+    )
+
+    def constants(self) -> dict[str, Any]:
+        """The fields of ``MISSION`` that the section sets; repairs as probabilities per slot."""
+        repairs = {name: mean for name, mean in self if name.endswith("_repair")}
+        return {
+            **dict(self),
+            **{name: 1 / mean if mean else 0.0 for name, mean in repairs.items()},
+            "has_failures": self.is_on,
+            "uav_data_lost": self.uav_data == "lost",
+            "node_data_lost": self.node_data == "lost",
+        }
+
+
+@for_sections
+def strike_if_on(mission, uavs, residual, sensors, lost):
+    """``strike``, if the section is on."""
+    if mission.has_failures:
+        strike(mission, uavs, residual, sensors, lost)
+
+
+@kernel
+def strike(mission, uavs, residual, sensors, lost):
+    """Let UAVs, pads and nodes fail and be repaired at the end of a slot, after it is settled.
+
+    Args:
+        mission: ``MISSION`` record.
+        uavs: (I,) ``UAV`` records.
+        residual: (K,) residual data that UAVs can collect [data units]; 0 at a silent node.
+        sensors: (K,) ``SENSOR`` records.
+        lost: How the mission of a lost UAV ended, ``state.LOST``.
+    """
+    for i in range(mission.uavs):
+        _strike_uav(mission, uavs[i], i, lost)
+    if mission.pad_rate > 0.0:
+        for j in range(mission.pads):
+            _strike_pad(mission, uavs, j)
+    if mission.node_rate > 0.0:
+        for k in range(mission.nodes):
+            _strike_node(mission, residual, sensors[k], k)
+            if is_over(mission):  # what is hidden is left over
+                residual[k] += sensors[k].hidden
+                sensors[k].hidden = 0.0
+
+
+@inlined
+def _happens(mission, stream, index, probability):
+    """Whether what has this probability happens in the present slot."""
+    words = streams.block(mission.seed, mission.replication, stream, 0, mission.slot, index)
+    return streams.uniform(words[0]) < probability
+
+
+@inlined
+def _strike_uav(mission, u, i, lost):
+    """A UAV fails in the air, not on the ground or a pad; then it is grounded or lost.
+
+    In the middle of a move it comes down in the cell that it flies to.
+    """
+    if not u.active:
+        return
+    if u.grounded:
+        u.grounded = not _happens(mission, streams.UAV_FAILURE, i, mission.uav_repair)
+    elif stands(mission, u) or u.charging:
+        return
+    elif _happens(mission, streams.UAV_FAILURE, i, mission.uav_rate):
+        mission.uav_failures += 1
+        u.pad_request = -1
+        u.slots_left = 0
+        u.grounded = mission.uav_repair > 0.0
+        if not u.grounded:
+            u.active = False
+            u.end = lost
+            mission.active -= 1
+            if mission.uav_data_lost:
+                mission.collected -= u.collected
+                mission.lost += u.collected
+                u.collected = 0.0
+
+
+@inlined
+def _strike_pad(mission, uavs, j):
+    """A UAV whose pad fails has to ask again, but it keeps the time of its request."""
+    out = mission.pads_out[j]
+    probability = mission.pad_repair if out else mission.pad_rate
+    if not _happens(mission, streams.PAD_FAILURE, j, probability):
+        return
+    mission.pads_out[j] = 1 - out
+    for i in range(mission.uavs):
+        if uavs[i].charging and uavs[i].pad == j:
+            uavs[i].charging = False
+            mission.pad_requests += 1
+
+
+@inlined
+def _strike_node(mission, residual, sensor, k):
+    """The data of a silent node are hidden, or lost; so are the data that arrive meanwhile."""
+    probability = mission.node_repair if sensor.silent else mission.node_rate
+    if _happens(mission, streams.NODE_FAILURE, k, probability):
+        sensor.silent = not sensor.silent
+    if not sensor.silent:
+        residual[k] += sensor.hidden
+        sensor.hidden = 0.0
+        return
+    if mission.node_data_lost:
+        mission.lost += residual[k]
+    else:
+        sensor.hidden += residual[k]
+    residual[k] = 0.0
+
+
+@inlined
+def working_pads(mission, zone):
+    """The number of charging pads of a zone that are not out of order."""
+    return mission.zone_pads[zone] - _broken_pads(mission, zone)
+
+
+@for_sections
+def _broken_pads(mission, zone):
+    broken = 0
+    if mission.pad_rate > 0.0:
+        first = first_pad(mission, zone)
+        for j in range(first, first + mission.zone_pads[zone]):
+            broken += mission.pads_out[j]
+    return broken
+
+
+@inlined
+def first_pad(mission, zone):
+    """The index of the first pad of a zone; pads are numbered zone by zone."""
+    first = 0
+    for other in range(zone):
+        first += mission.zone_pads[other]
+    return first
+
+
+@for_sections
+def take_pad(mission, uavs, u):
+    """Give a UAV the first pad of its zone that works and is free; ``charging`` is set after."""
+    if not mission.has_failures:
+        return
+    first = first_pad(mission, u.zone)
+    for j in range(first, first + mission.zone_pads[u.zone]):
+        free = mission.pads_out[j] == 0
+        for i in range(mission.uavs):
+            if uavs[i].charging and uavs[i].pad == j:
+                free = False
+        if free:
+            u.pad = j
+            return
+
+
+@kernel
+def write_failures(mission, out):
+    """Write what has failed into an ``OPERATIONS`` record."""
+    out.failures = mission.uav_failures
+    out.slots_grounded = mission.slots_grounded
+    out.lost = mission.lost

@@ -1,0 +1,90 @@
+"""Types of UAVs, for fleets whose UAVs differ.
+
+A UAV that takes s mission slots for a move holds the cell that it flies to from the first of them
+on. Until it is there, it has nothing to decide.
+"""
+
+from collections.abc import Sequence
+from math import lcm
+from typing import Any
+
+from pydantic import Field
+
+from dess.base.kernels import inlined
+from dess.physics.section import Integer, Number, Section
+
+
+class UavType(Section):
+    """A type of UAV; UAV i of a mission has type ``i % len(fleet)``."""
+
+    flying_time: Integer | None = Field(
+        None, ge=1, le=100, description="battery at the start [%]; without it, that of the scenario"
+    )
+    slots_per_cell: Integer = Field(
+        1, ge=1, le=8, description="mission slots that a move to the next cell takes"
+    )
+    quota: Integer | None = Field(
+        None,
+        ge=1,
+        le=1_000_000,
+        description="communication slots that the UAV must fill; without it, those of the scenario",
+    )
+    rate: Number = Field(
+        1.0, ge=0.001, le=1000, description="factor of the rate at which the UAV collects data"
+    )
+
+
+Fleet = Sequence[UavType]
+
+
+def type_of(fleet: Fleet, uav: int) -> UavType:
+    """The type of a UAV by its index."""
+    return fleet[uav % len(fleet)] if fleet else UavType.off()
+
+
+def slowest(fleet: Fleet) -> int:
+    """The most slots that a UAV takes for a cell."""
+    return max((kind.slots_per_cell for kind in fleet), default=1)
+
+
+def legs(fleet: Fleet) -> int:
+    """The number of different legs: the mission slots of a move, for each speed up to the slowest.
+
+    A move that takes s slots has s legs (``leg``).
+    """
+    return slowest(fleet) * (slowest(fleet) + 1) // 2
+
+
+def places_per_slot(fleet: Fleet) -> int:
+    """The least number L so that each UAV flies a whole number of (1/L) cells in a mission slot."""
+    return lcm(*(kind.slots_per_cell for kind in fleet))
+
+
+@inlined
+def leg(u):
+    """The number of a UAV's leg in the present slot, from 0 on; the only one of s = 1 is 0."""
+    s = u.slots_per_cell
+    return s * (s - 1) // 2 + s - 1 - u.slots_left
+
+
+@inlined
+def continue_move(u):
+    """Whether a UAV is in the middle of a move; if so, let it fly on for one slot."""
+    if u.slots_left == 0:
+        return False
+    u.slots_left -= 1
+    u.action = u.executed
+    u.overruled = False
+    return True
+
+
+@inlined
+def begins_move(u):
+    """Whether a UAV that moves begins its move in the present slot."""
+    return u.slots_left == u.slots_per_cell - 1
+
+
+def share_of_move(m: int, u: Any, n: int) -> float:
+    """The share of its move that is behind a UAV at communication slot ``n`` = 1..m."""
+    s = u.slots_per_cell
+    return ((s - 1 - u.slots_left) * m + n) / (s * m)

@@ -1,0 +1,379 @@
+"""The fields of a scenario: all constants of the model, and what follows from them alone."""
+
+from fractions import Fraction
+from functools import cache
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
+from pydantic.fields import FieldInfo
+
+from dess.base.errors import InputError, shown
+from dess.physics.age import Age
+from dess.physics.arrivals import MOST_AMOUNT, Arrivals
+from dess.physics.charging import Charging, charge_fraction
+from dess.physics.chart import MOST_CHARTED, Cell, Chart, Rectangle, chart_at
+from dess.physics.failures import Failures
+from dess.physics.fleet import UavType
+from dess.physics.radio import Radio
+from dess.physics.section import Integer, Number, Section, Strict, tuples
+from dess.physics.wind import Wind
+from dess.scenario.data_sheet import DataSheet, Units
+
+# Section VI-A: all combinations of five columns and five rows.
+PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 26))
+
+# The largest scenario: cells along a side of the grid, nodes, mission slots and UAVs.
+MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS = 256, 1024, 100_000, 64
+
+MOST_ZONES = 8  # charging zones
+
+# Largest amount of initial data of a node [data units].
+MOST_DATA = MOST_AMOUNT
+
+# The fields that go beyond the paper.
+SECTIONS = ("arrivals", "age", "charging", "radio", "failures", "wind", "fleet", "data_sheet")
+# The fields of seas that the paper does not have; records are the same with and without them.
+GEOMETRY = ("rows", "zones", "no_fly", "names", "moved", "centre")
+LANDING = "landing"
+ZONE_PADS = "zones.pads"  # sets the pads of the zones of ``zones``, and leaves their cells
+
+# The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
+SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
+
+# A reward per event. Sums of many of them are still finite, and so are their squares.
+Reward = Annotated[Number, Field(ge=-(10**9), le=10**9)]
+
+Longitude = Annotated[Number, Field(ge=-180, le=180)]
+Latitude = Annotated[Number, Field(ge=-90, le=90)]
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is an integer or a float, and no truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _whole(value: float) -> float:
+    """A number without a fraction as an integer: compiled code has one type for all of them."""
+    return int(value) if value == int(value) else value
+
+
+# Lets a single number stand for a range of one element.
+AS_RANGE = BeforeValidator(lambda value: (value, value) if is_number(value) else value)
+
+
+class Zone(Strict):
+    """A further charging zone."""
+
+    cells: Rectangle = Field(description="[x, y, width, height] in cells")
+    pads: Integer | None = Field(
+        None,
+        ge=1,
+        description="charging pads of a further zone; without it, as many as the zone has cells",
+    )
+
+
+class Fields(Strict):
+    """The constants of a mission, which are never sampled."""
+
+    # World
+    grid: Integer = Field(
+        32, ge=2, le=MOST_CELLS, description="cells of the grid from west to east (M)"
+    )
+    rows: Integer | None = Field(
+        None,
+        ge=2,
+        le=MOST_CELLS,
+        description="cells of the grid from north to south; without it, as many as from west to "
+        "east",
+    )
+    cell_size: Number = Field(800.0, ge=0.01, le=100_000, description="side of a cell [m] (c)")
+    altitude: Number = Field(10.0, ge=0.01, le=100_000, description="flying altitude [m] (h)")
+    nodes: tuple[Cell, ...] = Field(
+        PAPER_NODES,
+        min_length=1,
+        max_length=MOST_NODES,
+        description="cells of the sensor nodes: [x, y] for each",
+    )
+    names: tuple[str, ...] = Field(
+        (), max_length=MOST_NODES, description="names of the sensor nodes: one for each"
+    )
+    moved: tuple[Integer, ...] = Field(
+        (),
+        max_length=MOST_NODES,
+        description="nodes that are not in their own cells: their numbers, from 0",
+    )
+    zone: Rectangle = Field(
+        (26, 2, 4, 4), description="start and charging zone (L): [x, y, width, height] in cells"
+    )
+    pads: Integer | None = Field(
+        None, ge=1, description="charging pads; without it, as many as the zone has cells"
+    )
+    zones: tuple[Zone, ...] = Field(
+        (),
+        max_length=MOST_ZONES - 1,
+        description="further charging zones: a table of cells and pads for each",
+    )
+    no_fly: tuple[Cell, ...] = Field(
+        (), description="cells that no UAV may enter, such as islands: [x, y] for each"
+    )
+    centre: tuple[Longitude, Latitude] | None = Field(
+        None, description="centre of the grid [degrees]: [lon, lat]"
+    )
+    forbid_swaps: bool = Field(False, description="cancel the moves of two UAVs that swap cells")
+
+    # Time
+    slot_length: Number = Field(
+        1.0, ge=1e-6, le=1_000_000, description="length of a mission slot (delta_t)"
+    )
+    communication_slots: Integer = Field(
+        4, ge=1, le=64, description="communication slots in a mission slot (m)"
+    )
+    max_slots: Integer = Field(
+        500, ge=1, le=MOST_SLOTS, description="mission slots after which a mission is truncated"
+    )
+    landing: bool = Field(
+        False,
+        description="whether missions end on the ground: UAVs stand in a zone for nothing, and "
+        "land when their quota is filled",
+    )
+
+    # Energy
+    charge_rate: Annotated[Integer | Number, AfterValidator(_whole)] = Field(
+        10,
+        ge=0.01,
+        le=100,
+        description="battery gained in a charging slot [%]; what is not whole waits for the next",
+    )
+    flight_cost: Integer = Field(
+        1,
+        ge=0,
+        le=1,
+        description="battery spent in a slot without charging [%]; 0 to fly without battery "
+        "decrease (Algorithm 1, phase I)",
+    )
+
+    # Channel
+    edge_snr: Number = Field(
+        -25.0,
+        ge=-300,
+        le=300,
+        description="mean SNR at half the grid's diagonal, or at radio.anchor [dB]",
+    )
+    path_loss_exponent: Number = Field(
+        2.27, ge=0.01, le=10, description="path loss exponent (alpha)"
+    )
+    shadowing_variance: Number = Field(
+        2.0, ge=0, le=400, description="variance of shadowing [dB^2]"
+    )
+
+    # Data
+    initial_data: Annotated[tuple[Number, Number], AS_RANGE] = Field(
+        (5.0, 20.0), description="initial data per node [data units]: a number or [low, high]"
+    )
+    arrival_rate: Number = Field(
+        0.02, ge=0, le=100, description="new data per node and mission slot [data units] (lambda)"
+    )
+    quota: Integer = Field(
+        440,
+        ge=0,
+        le=1_000_000,
+        description="communication slots that a UAV must fill (U_C); 0, with landing, for none: "
+        "UAVs work, and the mission lasts, until max_slots",
+    )
+
+    # Reward (Table III)
+    reward_data: Reward = Field(
+        1.3, description="reward per data unit that the team collects (alpha)"
+    )
+    reward_overruled: Reward = Field(
+        -1.0, description="reward of an action that the safety controller overrules (beta)"
+    )
+    reward_depleted: Reward = Field(
+        -300.0, description="reward of a UAV whose battery is empty before its quota is filled (nu)"
+    )
+    reward_charging: Reward = Field(0.05, description="reward per charging slot (c)")
+    reward_quota: Reward = Field(100.0, description="reward of a UAV that fills its quota (omega)")
+    reward_step: Reward = Field(-0.1, description="reward per mission slot (zeta)")
+
+    # Beyond the paper; off by default
+    arrivals: Arrivals = Arrivals.off()
+    age: Age = Age.off()
+    charging: Charging = Charging.off()
+    radio: Radio = Radio.off()
+    failures: Failures = Failures.off()
+    wind: Wind = Wind.off()
+    fleet: tuple[UavType, ...] = Field(
+        (),
+        max_length=MOST_UAVS,
+        description="types of UAVs: a table for each; UAV i has type i modulo their number",
+    )
+    data_sheet: DataSheet = DataSheet.off()
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """The cells of the grid from west to east, and from north to south."""
+        return self.grid, self.grid if self.rows is None else self.rows
+
+    @property
+    def rectangles(self) -> tuple[Rectangle, ...]:
+        """The cells of all charging zones, the start zone first."""
+        return (self.zone, *(zone.cells for zone in self.zones))
+
+    @property
+    def chart(self) -> Chart:
+        """The zones, the no-fly cells and the ways between cells."""
+        nodes = self.nodes if self.size[0] * self.size[1] > MOST_CHARTED else ()
+        return chart_at(*self.size, self.rectangles, self.no_fly, nodes)
+
+    @property
+    def aim(self) -> str:
+        """What every UAV of a successful mission has done, in words."""
+        return "landed" if self.landing else "filled their quota"
+
+    @property
+    def zone_cells(self) -> int:
+        """Number of cells of the start and charging zone."""
+        return self.zone[2] * self.zone[3]
+
+    @property
+    def zone_pads(self) -> tuple[int, ...]:
+        """The charging pads of each zone; by default, as many as the zone has cells."""
+        pads = self.pads, *(zone.pads for zone in self.zones)
+        cells = zip(self.rectangles, pads, strict=True)
+        return tuple(width * height if n is None else n for (*_, width, height), n in cells)
+
+    @property
+    def charging_pads(self) -> int:
+        """Number of charging pads of all zones together."""
+        return sum(self.zone_pads)
+
+    @property
+    def charge_fraction(self) -> Fraction:
+        """The battery gained in a charging slot [%], exactly as it or the data sheet was typed."""
+        sheet = self.data_sheet
+        given = sheet.charge_rate if sheet.is_on else Fraction(str(self.charge_rate))
+        return charge_fraction(given)
+
+    @property
+    def is_extended(self) -> bool:
+        """Whether the scenario goes beyond the paper, so that records have ``OPERATIONS``."""
+        return any(self.has(name) for name in (*SECTIONS, LANDING)) or self.charge_rate % 1 > 0
+
+    @property
+    def units(self) -> Units | None:
+        """What a slot, a cell and a data unit are; None without a data sheet."""
+        return self.data_sheet.units if self.data_sheet.is_on else None
+
+    def has(self, section: str) -> bool:
+        """Whether a section is on."""
+        value = getattr(self, section)
+        return value.is_on if isinstance(value, Section) else bool(value)
+
+    @property
+    def needs_events(self) -> bool:
+        """Whether only the SimPy engine can simulate the scenario."""
+        return self.arrivals.process != "slotted"
+
+    @property
+    def packets(self) -> float:
+        """The packets of a mission with continuous arrivals at their highest rate; otherwise 0."""
+        if not self.needs_events:
+            return 0.0
+        highest = max([1.0, *(factor for _, factor in self.arrivals.schedule)])
+        return sum(self.node_rates) * highest * self.max_slots
+
+    @property
+    def node_rates(self) -> tuple[float, ...]:
+        """The arrival rate of each node [data units per slot]."""
+        merged = self.arrivals.merged or (1,) * len(self.nodes)
+        return self.arrivals.rates or tuple(self.arrival_rate * count for count in merged)
+
+    @property
+    def node_data(self) -> tuple[tuple[float, float], ...]:
+        """The range of the initial data of each node [data units]."""
+        if self.arrivals.initial:
+            return tuple((amount, amount) for amount in self.arrivals.initial)
+        low, high = self.initial_data
+        merged = self.arrivals.merged or (1,) * len(self.nodes)
+        return tuple((low * count, high * count) for count in merged)
+
+    def value(self, field: str) -> Any:
+        """The value of a field; ``failures.uav_rate`` is the field of a section."""
+        if field == ZONE_PADS:
+            return self.zone_pads[1:]
+        section, _, name = field.rpartition(".")
+        return getattr(getattr(self, section) if section else self, name)
+
+    def plain_value(self, field: str) -> Any:
+        """The value of a field as JSON has it: lists for tuples, a dictionary for a type of UAV."""
+        return TypeAdapter(Any).dump_python(self.value(field), mode="json")
+
+    @property
+    def numeric(self) -> list[str]:
+        """The fields that hold a number, or a range of numbers."""
+        others = (*SAMPLED, "initial_data", "pads", *([ZONE_PADS] if self.zones else []))
+        return [
+            name for name in fields_of(type(self)) if name in others or is_number(self.value(name))
+        ]
+
+
+# What all nodes have in common, and what each has in its place: who sets the first means all.
+_EACH = {"arrival_rate": "arrivals.rates", "initial_data": "arrivals.initial"}
+
+
+def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
+    """Values on top of others; ``failures.uav_rate`` and a table replace parts of a section.
+
+    ``zones.pads`` replaces the pads of the further zones: a number for all, or one for each. A rate
+    or an amount for all nodes replaces those of each.
+
+    Raises:
+        InputError: If ``zones.pads`` has another length than ``zones``.
+    """
+    result: dict[str, Any] = {}
+    below, above = dotted(base), dotted(values)
+    replaced = {each for for_all, each in _EACH.items() if for_all in above}
+    if "nodes" in values:  # the names are those of others
+        replaced |= {"names", "moved"}
+    below = {name: value for name, value in below.items() if name not in replaced}
+    for name, value in (below | above).items():
+        section, _, part = name.partition(".")
+        table = result.setdefault(section, {}) if part and section in SECTIONS else None
+        if isinstance(table, dict):
+            table[part] = value
+        else:
+            result[name] = value
+    if ZONE_PADS in result:
+        pads, zones = tuples(result.pop(ZONE_PADS)), result.get("zones") or ()
+        each = pads if isinstance(pads, list | tuple) else [pads] * len(zones)
+        if not zones or len(each) != len(zones):
+            allowed = f"a number, or a list of {len(zones)}" if zones else "with further zones"
+            raise InputError(f"{ZONE_PADS}: {shown(pads)} does not fit; allowed: {allowed}")
+        result["zones"] = [{**zone, "pads": n} for zone, n in zip(zones, each, strict=True)]
+    return result
+
+
+def dotted(values: dict[str, Any]) -> dict[str, Any]:
+    """Values by field: the table of a section becomes fields such as ``failures.uav_rate``."""
+    fields: dict[str, Any] = {}
+    for name, value in values.items():
+        if name in (*SECTIONS, "zones") and isinstance(value, dict):
+            fields |= {f"{name}.{part}": of_part for part, of_part in value.items()}
+        else:
+            fields[name] = value
+    return fields
+
+
+@cache
+def fields_of(model: type[Fields]) -> dict[str, FieldInfo]:
+    """The fields of a kind of scenario; those of sections are named as ``failures.uav_rate``."""
+    found: dict[str, FieldInfo] = {}
+    for name, field in model.model_fields.items():
+        kind = field.annotation
+        if isinstance(kind, type) and issubclass(kind, Section):
+            found |= {f"{name}.{part}": inner for part, inner in kind.model_fields.items()}
+        else:
+            found[name] = field
+        if name == "zones":
+            found[ZONE_PADS] = Zone.model_fields["pads"]
+    return found

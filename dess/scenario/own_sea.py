@@ -1,0 +1,167 @@
+"""A user's own sea: what the files and degrees of a scenario become on its grid.
+
+nodes = "buoys.csv"     # in the TOML file of a scenario
+no_fly = "land.geojson"
+zone = {lon = 8.70, lat = 53.87, width = 4, height = 3}
+"""
+
+from collections.abc import Callable, Mapping, Set
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from dess.base.errors import InputError, validated
+from dess.physics.arrivals import MOST, MOST_AMOUNT
+from dess.physics.chart import Rectangle
+from dess.physics.section import Integer, Number, Strict
+from dess.scenario.no_fly import NoFlyFile, no_fly_in, zones_in
+from dess.scenario.nodes import DATA, RATES, Amounts, NodesFile, NodesFound
+from dess.scenario.places import Projection
+
+# What stands for a field in a scenario whose files are not read yet.
+_UNREAD = {"nodes": [[0, 0]], "no_fly": [], "zone": [0, 0, 1, 1]}
+
+
+class ZonePlace(Strict):
+    """A charging zone about a place on the Earth."""
+
+    lon: Number = Field(ge=-180, le=180, description="longitude of its middle [degrees]")
+    lat: Number = Field(ge=-90, le=90, description="latitude of its middle [degrees]")
+    width: Integer = Field(ge=1, description="cells from west to east")
+    height: Integer = Field(ge=1, description="cells from north to south")
+
+
+def unread(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields that name files or degrees, each with what stands for it."""
+    found = {key: of for key, of in _UNREAD.items() if _is_named(values.get(key))}
+    return found | ({"zones": []} if _are_places(values.get("zones")) else {})
+
+
+def _is_named(value: Any) -> bool:
+    """Whether a field, or an item of it, names a file or degrees."""
+    items = value if isinstance(value, list | tuple) else [value]
+    return any(isinstance(item, str | dict) for item in items)
+
+
+def _are_places(zones: Any) -> bool:
+    """Whether a further zone has degrees in the place of cells."""
+    tables = zones if isinstance(zones, list | tuple) else []
+    return any(isinstance(of, dict) and isinstance(of.get("cells"), dict) for of in tables)
+
+
+class OwnSea(NamedTuple):
+    """An own sea whose files are not read yet.
+
+    Attributes:
+        where: The name of its scenario, for messages.
+        beside: The path of a file that a field names.
+        grid: Its scenario with what ``unread`` says in the place of files and degrees.
+        replaced: The fields, those of sections dotted, that replace those of its file.
+    """
+
+    where: str
+    beside: Callable[[str, str], Path]
+    grid: Any
+    replaced: Set[str] = frozenset()
+
+    def placed(self, values: Mapping[str, Any], of_nodes: Any) -> dict[str, Any]:
+        """The fields that name files or degrees, as cells.
+
+        Args:
+            values: The fields of the scenario.
+            of_nodes: What the scenario's file has for the nodes, which may be others in ``values``.
+
+        Raises:
+            InputError: If a file cannot be read, or does not fit.
+        """
+        found, projection, about = None, None, (self.grid.size, self.grid.cell_size)
+        if _is_named(of_nodes):
+            source = self._file(NodesFile, of_nodes, "nodes")
+            found = NodesFound.read(self.beside("nodes", source.file), source)
+            projection = found.projection(*about)
+        if self.grid.centre:
+            projection = Projection(self.grid.centre, *about)
+        placed = self._zones(values, projection) | self._no_fly(values, projection)
+        placed |= {"centre": projection.centre} if projection else {}
+        if found and values["nodes"] is of_nodes:
+            closed = np.zeros(self.grid.size[::-1], np.bool_)
+            for x, y in placed.get("no_fly", self.grid.no_fly):
+                closed[y : y + 1, x : x + 1] = True  # none for a cell that is refused later
+            amounts = [kind for kind in self._amounts(found.source) if not self._replaces(kind)]
+            is_cell_fixed = self.grid.data_sheet.is_on
+            size = self.grid.size
+            placed |= found.fields(size, projection, closed, amounts, is_cell_fixed)
+        return placed
+
+    def _replaces(self, kind: Amounts) -> bool:
+        """Whether a field that replaces those of the file says what its nodes have."""
+        return not self.replaced.isdisjoint({kind.field, kind.for_all})
+
+    def _amounts(self, source: NodesFile) -> list[Amounts]:
+        """The rates and the data that a file may give to each node."""
+        sheet, arrivals = self.grid.data_sheet, self.grid.arrivals
+        rates, data = (source.rate, RATES), (source.data, DATA)
+        if not sheet.is_on:
+            low, high = self.grid.initial_data
+            amount = low if low == high else None
+            most = (0, MOST_AMOUNT)
+            rate = self.grid.arrival_rate
+            has_rates = bool(arrivals.rates)
+            has_data = bool(arrivals.initial)
+            return [
+                Amounts("arrivals.rates", *rates, "", (0, MOST), "arrival_rate", rate, has_rates),
+                Amounts("arrivals.initial", *data, "", most, "initial_data", amount, has_data),
+            ]
+        kinds = []
+        for name, columns, missing in (("data_rate", rates, None), ("backlog", data, 0.0)):
+            field, of_sheet = f"data_sheet.{name}", getattr(sheet, name)
+            is_listed = isinstance(of_sheet, tuple)
+            otherwise = missing if is_listed or not of_sheet else sheet.number(name)
+            unit, limits = sheet.extra(name)["units"], sheet.extra(name)["limits"][0]
+            kinds.append(Amounts(field, *columns, unit, limits, field, otherwise, is_listed))
+        return kinds
+
+    def _no_fly(self, values: Mapping[str, Any], projection: Projection | None) -> dict[str, Any]:
+        """The no-fly cells, row by row."""
+        if not _is_named(of := values.get("no_fly")):
+            return {}
+        closed = np.zeros(self.grid.size[::-1], np.bool_)
+        for one in of if isinstance(of, list) else [of]:
+            source = self._file(NoFlyFile, one, "no_fly")
+            path = self.beside("no_fly", source.file)
+            closed |= no_fly_in(path, self.grid.size, projection, source)
+        return {"no_fly": [(x, y) for y, x in np.argwhere(closed).tolist()]}
+
+    def _zones(self, values: Mapping[str, Any], projection: Projection | None) -> dict[str, Any]:
+        """The charging zones."""
+        zone, zones = values.get("zone"), values.get("zones")
+        if isinstance(zone, str):
+            zone, *others = zones_in(self.beside("zone", zone), self.grid.size)
+            zones = zones or [{"cells": cells} for cells in others]
+        elif isinstance(zone, dict):
+            zone = self._rectangle(zone, "zone", projection)
+        if zones and _are_places(zones):
+            zones = [
+                of | {"cells": self._rectangle(of["cells"], f"zones.{n}.cells", projection)}
+                if _are_places([of])
+                else of
+                for n, of in enumerate(zones)
+            ]
+        return {key: of for key, of in (("zone", zone), ("zones", zones)) if of}
+
+    def _rectangle(self, of: Any, key: str, projection: Projection | None) -> Rectangle:
+        """The cells of a charging zone about a place."""
+        where = f"{self.where}: {key}"
+        place = validated(ZonePlace, of, where)
+        if projection is None:
+            allowed = "[x, y, width, height], nodes from a file with degrees, or centre"
+            raise InputError(f"{where}: has degrees, and the nodes are cells; allowed: {allowed}")
+        [middle] = projection.cells(np.array([[place.lon, place.lat]]))
+        x, y = np.round(middle - np.array([place.width, place.height]) / 2).astype(int).tolist()
+        return x, y, place.width, place.height
+
+    def _file(self, model: type[BaseModel], of: Any, key: str) -> Any:
+        """A file that a field names, by its name or in a table."""
+        return validated(model, {"file": of} if isinstance(of, str) else of, f"{self.where}: {key}")

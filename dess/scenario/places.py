@@ -1,0 +1,339 @@
+"""Places of users in files: rows of CSV files, and features of GeoJSON, with their projection.
+
+    read_places(Path("buoys.csv"))       # the places of a file, degrees or cells
+
+Columns of CSV files are known by their names, whatever the case (``COLUMNS``). Degrees are
+projected about the centre of the grid (equirectangular projection).
+"""
+
+import csv
+import io
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, Self
+
+import numpy as np
+from pydantic import Field
+
+from dess.base.errors import InputError, one_of, shown, validated
+from dess.base.files.documents import Document
+from dess.base.files.reading import TEXT_LIMIT, read_text
+from dess.physics.chart import Cell
+from dess.physics.section import Strict
+from dess.scenario.quantities import may_part_thousands
+
+EARTH_RADIUS = 6_371_008.8  # mean radius of WGS 84 [m]
+
+# The pairs of columns, and the largest number of each; cells off the grid are refused later.
+GEOGRAPHIC = ("lon", "lat")
+LIMITS = {("x", "y"): (99_999, 99_999), GEOGRAPHIC: (180, 90)}
+# What columns of a place are called; letters may be small or large.
+COLUMNS = {"lon": ("lon", "lng", "long", "longitude"), "lat": ("lat", "latitude")}
+COLUMNS |= {"x": ("x",), "y": ("y",)}
+_ROUNDING = 1e-6  # degrees by which a file may be beyond a limit
+# An edge that is longer [degrees] crosses the 180th meridian instead.
+_LONGEST = 270
+
+# What a feature consists of, as GeoJSON calls it.
+POINT, LINE, POLYGON = "Point", "LineString", "Polygon"
+_GEOJSON = "a GeoJSON FeatureCollection"
+
+Size = tuple[int, int]  # cells of the grid from west to east, and from north to south
+Shape = tuple[str, list[np.ndarray]]  # POINT, LINE or POLYGON, and its rings of (K, 2) places
+
+
+class Projection(NamedTuple):
+    """The projection of a sea.
+
+    Attributes:
+        centre: Longitude and latitude of the centre of the grid [degrees].
+        size: Cells of the grid from west to east and from north to south.
+        cell_size: Side of a cell [m].
+    """
+
+    centre: tuple[float, float]
+    size: Size
+    cell_size: float
+
+    @classmethod
+    def about(cls, degrees: np.ndarray, size: Size, cell_size: float) -> Self:
+        """The projection about the centre of the bounding box of (K, 2) places on the Earth."""
+        if np.ptp(degrees[:, 0]) > 180:  # on both sides of the 180th meridian
+            degrees = degrees + [360, 0] * (degrees < 0)
+        lon, lat = (degrees.min(0) + degrees.max(0)) / 2
+        if lon > 180:
+            lon -= 360
+        return cls((float(lon), float(lat)), size, cell_size)
+
+    @property
+    def _degree(self) -> np.ndarray:
+        """A degree to the east and one to the north [cells]; y grows south."""
+        degree = math.radians(1) * EARTH_RADIUS / self.cell_size
+        return np.array([degree * math.cos(math.radians(self.centre[1])), -degree])
+
+    def cells(self, degrees: np.ndarray) -> np.ndarray:
+        """The (K, 2) places on the grid [cells] of (K, 2) places on the Earth."""
+        away = degrees - self.centre
+        away[:, 0] -= 360 * np.round(away[:, 0] / 360)  # the short way around the Earth
+        return np.array(self.size) / 2 + away * self._degree
+
+    def degrees(self, places: np.ndarray) -> np.ndarray:
+        """The (K, 2) places on the Earth of (K, 2) places on the grid [cells].
+
+        Longitudes go on beyond 180 degrees where the grid does, so that no path jumps by 360.
+        """
+        return (places - np.array(self.size) / 2) / self._degree + self.centre
+
+    def shapes(self, rings: list[np.ndarray]) -> Iterator[list[np.ndarray]]:
+        """The rings of a shape on the grid [cells]; once more for each turn around the Earth.
+
+        A ring is unwrapped as a whole: its first place may be anywhere, the others follow it.
+        """
+        rings = [_unwrapped(ring) for ring in rings]
+        middles = [(ring[:, 0].min() + ring[:, 0].max()) / 2 for ring in rings]
+        turns = np.round((np.array(middles) - middles[0]) / 360)  # of holes, away from the outer
+        first = np.round((middles[0] - self.centre[0]) / 360)
+        for turn in (-1, 0, 1):
+            degrees = [
+                ring - self.centre - [360 * (first + of_ring - turn), 0]
+                for ring, of_ring in zip(rings, turns, strict=True)
+            ]
+            yield [np.array(self.size) / 2 + ring * self._degree for ring in degrees]
+
+
+def _unwrapped(ring: np.ndarray) -> np.ndarray:
+    """A ring or line whose long edges cross the 180th meridian instead.
+
+    An edge of 360 degrees is one of a map that is cut there, and a ring that does not close any
+    more goes around a pole: both stay as they are.
+    """
+    steps = np.diff(ring[:, 0])
+    is_long = (np.abs(steps) > _LONGEST) & (np.abs(steps) < 360)
+    turns = np.cumsum(-np.sign(steps) * is_long)
+    if len(turns) and turns[-1] and (ring[0] == ring[-1]).all():
+        return ring
+    return ring + np.stack([360 * np.append(0, turns), np.zeros(len(ring))], axis=1)
+
+
+class Place(NamedTuple):
+    """A row of a CSV file, or a feature.
+
+    Attributes:
+        where: Where it stands in the file, such as ``line 3``.
+        properties: The columns or the properties.
+        shapes: What it consists of; none if it is empty.
+    """
+
+    where: str
+    properties: Mapping[str, Any]
+    shapes: list[Shape]
+
+    def property(self, name: str, known: Iterable[str] = ()) -> Any:
+        """The property of this name, or else the first of the known ones, whatever the case.
+
+        Raises:
+            InputError: If it has none of this name.
+        """
+        if name and name not in self.properties:
+            raise InputError(f"{self.where}: has no {name}{one_of(name, self.properties)}")
+        lower = {str(key).lower(): value for key, value in self.properties.items()}
+        found = [self.properties[name]] if name else [lower.get(key) for key in known]
+        return next((value for value in found if value not in (None, "")), None)
+
+
+class Places(NamedTuple):
+    """The places of a file, degrees or cells."""
+
+    is_geographic: bool
+    places: list[Place]
+
+
+class Source(Strict):
+    """A file that a scenario names, and what is taken of it."""
+
+    file: str = Field(description="the name of a file beside the scenario, or in a folder there")
+    where: dict[str, str] = Field(
+        default={}, description="the properties of what is taken, e.g. {Country = 'DK*'}"
+    )
+
+    def chosen(self, places: list[Place]) -> list[Place]:
+        """The places that have the wanted properties; ``*`` and ``?`` stand for other letters."""
+        return [
+            place
+            for place in places
+            if all(fnmatchcase(str(place.properties.get(k)), v) for k, v in self.where.items())
+        ]
+
+
+def reader(path: Path, readers: Mapping[str, Callable[..., Any]]) -> Callable[..., Any]:
+    """The function that reads files of this ending.
+
+    Raises:
+        InputError: If there is none.
+    """
+    if path.suffix.lower() not in readers:
+        raise InputError(f"{path}: has no known file ending; allowed: {', '.join(readers)}")
+    return readers[path.suffix.lower()]
+
+
+def is_on_grid(cell: Cell, size: Size) -> bool:
+    """Whether a cell is on the grid."""
+    return 0 <= cell[0] < size[0] and 0 <= cell[1] < size[1]
+
+
+def read_table(path: Path) -> Places:
+    """The places in a CSV file, in the order of its lines; commas, semicolons or tabs part columns.
+
+    Raises:
+        InputError: If it cannot be read, has other columns, or a place is no number.
+    """
+    try:
+        text = read_text(path, TEXT_LIMIT, "utf-8-sig", "a CSV file").lstrip("\r\n")
+        first = text.partition("\n")[0]
+        lines = csv.reader(io.StringIO(text), strict=True, delimiter=max(",;\t", key=first.count))
+        columns = [name.strip() for name in next(lines, [])]
+        rows = [(f"line {lines.line_num}", row) for row in lines if any(map(str.strip, row))]
+    except csv.Error as error:
+        raise InputError(f"{path}: is not a CSV file: {error}; allowed: CSV with commas") from None
+    axes = {axis: [c for c in columns if c.lower() in COLUMNS[axis]] for axis in COLUMNS}
+    found = [pair for pair in LIMITS if all(len(axes[axis]) == 1 for axis in pair)]
+    if len(found) != 1:
+        there = ", ".join(columns) or "none"
+        raise InputError(f"{path}: has columns {there}; allowed: x and y, or lon and lat")
+    is_geographic, places = found == [GEOGRAPHIC], []
+    for line, texts in rows:
+        filled = zip(columns, map(str.strip, texts), strict=False)
+        values = dict.fromkeys(columns, "") | dict(filled)
+        numbers = [
+            _number(values[axes[axis][0]], f"{path}: {line}: {axis}", most, is_geographic)
+            for axis, most in zip(found[0], LIMITS[found[0]], strict=True)
+        ]
+        places.append(Place(line, values, [(POINT, [np.array([numbers])])]))
+    return Places(is_geographic, places)
+
+
+def number_of(text: str, place: str) -> float:
+    """A number, be it with a decimal comma.
+
+    Raises:
+        InputError: If it is none; ``place`` says where it stands.
+    """
+    try:
+        return float(text.replace(",", "."))
+    except ValueError:
+        raise InputError(f"{place} is {shown(text)}; allowed: a number") from None
+
+
+def amount_of(text: str, place: str) -> float:
+    """A number whose comma, if it has one, parts decimals for certain.
+
+    Raises:
+        InputError: If it is none, or ``1,000`` could be a thousand; ``place`` says where it stands.
+    """
+    if may_part_thousands(text.strip()):
+        allowed = f"{text.replace(',', '')} or {text.replace(',', '.')}"
+        problem = "has a comma that may part thousands or decimals"
+        raise InputError(f"{place}: {shown(text)} {problem}; allowed: {allowed}")
+    return number_of(text, place)
+
+
+def _number(text: str, place: str, most: int, is_geographic: bool) -> float:
+    """A number of at most this size; a cell has integers."""
+    number = number_of(text, place)
+    if not -most - _ROUNDING <= number <= most + _ROUNDING:
+        raise InputError(f"{place} is {number:g}; allowed: {-most:,}..{most:,}")
+    if not is_geographic and not number.is_integer():
+        raise InputError(
+            f"{place} is {number:g}; allowed: an integer (a cell); degrees are lon and lat"
+        )
+    return min(max(number, -most), most)
+
+
+class _Geometry(Document, extra="ignore"):
+    type: Literal[
+        "Point", "MultiPoint", "LineString", "MultiLineString", "Polygon", "MultiPolygon",
+        "GeometryCollection",
+    ]  # fmt: skip
+    coordinates: list[Any] = Field([], description="positions, or lists of them")
+    geometries: list[dict[str, Any]] = Field([], description="geometries")
+
+
+class _Feature(Document, extra="ignore"):
+    id: str | int | float | None = None
+    geometry: _Geometry | None = Field(None, description="a geometry")
+    properties: dict[str, Any] | None = None
+
+
+class Features(Document, extra="ignore"):
+    """A GeoJSON file."""
+
+    features: tuple[_Feature, ...] = Field(min_length=1, description=_GEOJSON)
+
+
+def read_geojson(path: Path) -> Places:
+    """The features of a GeoJSON file; those without a geometry have no shapes.
+
+    Raises:
+        InputError: If it cannot be read, or is no GeoJSON.
+    """
+    places = []
+    features = Features.load(path, absent=_GEOJSON, limit=TEXT_LIMIT).features
+    for number, feature in enumerate(features):
+        where = f"features.{number}"
+        shapes = _shapes(feature.geometry, f"{path}: {where}.geometry") if feature.geometry else ()
+        places.append(Place(where, {"id": feature.id} | (feature.properties or {}), [*shapes]))
+    return Places(True, places)
+
+
+def _shapes(geometry: _Geometry, place: str) -> Iterator[Shape]:
+    """The parts of a geometry of GeoJSON, those that are empty left out."""
+    for number, inner in enumerate(geometry.geometries):
+        where = f"{place}.geometries.{number}"
+        yield from _shapes(validated(_Geometry, inner, where), where)
+    kind, place = geometry.type.removeprefix("Multi"), f"{place}.coordinates"
+    parts = {place: geometry.coordinates}
+    if kind != geometry.type:
+        parts = {f"{place}.{n}": part for n, part in enumerate(geometry.coordinates)}
+    for where, part in parts.items():
+        if part and kind == POLYGON:
+            rings = part if isinstance(part, list) else [part]
+            yield kind, [_ring(ring, f"{where}.{n}") for n, ring in enumerate(rings)]
+        elif part and kind == LINE:
+            yield kind, [_line(part, where)]
+        elif part:
+            yield kind, [_positions([part], where)]
+
+
+def _ring(value: Any, place: str) -> np.ndarray:
+    ring = _positions(value, place)
+    if len(ring) < 4 or (ring[0] != ring[-1]).any():
+        allowed = "four positions or more, the last as the first"
+        raise InputError(f"{place}: is no ring; allowed: {allowed}")
+    return ring
+
+
+def _line(value: Any, place: str) -> np.ndarray:
+    line = _positions(value, place)
+    if len(line) < 2:
+        raise InputError(f"{place}: is no line; allowed: two positions or more")
+    return line
+
+
+def _positions(value: Any, place: str) -> np.ndarray:
+    """The (K, 2) degrees of a list of positions."""
+    try:
+        found = np.array([position[:2] for position in value], float).reshape(len(value), 2)
+    except (TypeError, ValueError, OverflowError, KeyError):
+        raise InputError(f"{place}: has not two numbers; allowed: [lon, lat]") from None
+    most = np.array(LIMITS[GEOGRAPHIC])
+    for number, axis in np.argwhere(~(np.abs(found) <= most + _ROUNDING)):
+        where = f"{place}.{number}" if len(found) > 1 else place
+        name, limit = GEOGRAPHIC[axis], most[axis]
+        line = f"{name} is {found[number, axis]:g}; allowed: -{limit}..{limit}"
+        raise InputError(f"{where}: {line}")
+    return np.clip(found, -most, most)
+
+
+READERS = {".csv": read_table, ".tsv": read_table, ".geojson": read_geojson, ".json": read_geojson}

@@ -1,0 +1,354 @@
+"""Scenarios: all constants of the model, and the ranges from which missions draw parameters.
+
+space = load_scenario("paper", uavs=3)             # Table II, with three UAVs
+space = ScenarioSpace.of(space, quota=200)         # the same with another quota
+scenario = Scenario.of(uavs=2, forbid_swaps=True)  # a single scenario; Table III for the rest
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import cache, partial
+from itertools import chain
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import tomli_w
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    model_serializer,
+    model_validator,
+)
+
+from dess.base.errors import InputError, check_type, form_of, one_of, shown, validated
+from dess.base.files.reading import Shipped, parse_toml
+from dess.physics.section import Integer, Section
+from dess.scenario.consistency import problems
+from dess.scenario.data_sheet import OPEN, DataSheet
+from dess.scenario.families import FAMILIES, is_generated, sea_of
+from dess.scenario.fields import (
+    AS_RANGE,
+    GEOMETRY,
+    LANDING,
+    MOST_DATA,
+    MOST_UAVS,
+    SAMPLED,
+    SECTIONS,
+    ZONE_PADS,
+    Fields,
+    dotted,
+    fields_of,
+    is_number,
+    merged,
+)
+from dess.scenario.no_fly import notes_after
+from dess.scenario.nodes import AMOUNTS
+from dess.scenario.own_sea import OwnSea, unread
+
+# What a design calls the scenario of its points, if it differs from point to point.
+SEA = "scenario"
+
+_SCENARIOS = Shipped("scenario", "dess", "scenarios")
+
+# The context of a scenario whose cells may be where they must not be.
+DRAFT = "draft"
+
+
+class Constants(Fields):
+    """The common base of both kinds of scenario: their fields agree with each other."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _follow_the_data_sheet(cls, values: Any) -> Any:
+        """Add the fields that follow from the data sheet, which may not be given as well."""
+        sheet = values.get("data_sheet") if isinstance(values, dict) else None
+        try:
+            found = DataSheet.model_validate(sheet) if sheet else None
+        except ValidationError:  # it is told where the field is validated
+            return values
+        if not (found and found.is_on):
+            return values
+        values = {n: dict(of) if isinstance(of, Section) else of for n, of in values.items()}
+        following = found.fields()
+        for name in sorted(following.keys() & dotted(values).keys() - {*OPEN}):
+            raise InputError(f"{name}: follows from the data sheet; allowed: without this field")
+        for name, value in following.items():
+            _check_following(found, name, value)
+        return merged(following, values)
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_off(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out the sections that are off: so scenarios without them are stored as before.
+
+        What follows from a data sheet is left out as well.
+        """
+        optional = (*SECTIONS, *GEOMETRY, *(() if self.data_sheet.is_on else (LANDING,)))
+        off = [name for name in optional if not self.has(name)]
+        values = {name: value for name, value in handler(self).items() if name not in off}
+        if not self.data_sheet.is_on:
+            return values
+        follows = {
+            name
+            for name, value in self.data_sheet.fields().items()
+            if self.value(name) in (value, (value, value))
+        }
+        return merged({n: of for n, of in dotted(values).items() if n not in follows}, {})
+
+    @model_validator(mode="after")
+    def _is_consistent(self, info: ValidationInfo) -> Self:
+        found = chain(problems(self), _out_of_range(self))
+        for problem in () if info.context == DRAFT else found:
+            raise ValueError(problem)
+        return self
+
+    @classmethod
+    def of(cls, scenario: "AnyScenario | None" = None, **values: Any) -> Self:
+        """A scenario of the given values, on top of another one (default: the paper's).
+
+        Raises:
+            InputError: For unknown names and keys, wrong types and values out of range.
+        """
+        base = loaded(scenario).model_dump() if scenario is not None else {}
+        return validated(cls, merged(base, values), "scenario")
+
+    def limits(self, field: str) -> tuple[float, float]:
+        """The least and the largest value that a numeric field may have, infinite without a limit.
+
+        Constraints between fields, such as ``charge_start < charge_complete``, are not included.
+
+        Raises:
+            InputError: If the field does not exist, or holds no numbers.
+        """
+        if field not in SAMPLED and field not in self.numeric:
+            raise InputError(f"field: {field!r} is not a number{one_of(field, self.numeric)}")
+        between = {
+            "uavs": (1, min(self.zone_cells, MOST_UAVS)),
+            "pads": (1, self.zone_cells),
+            ZONE_PADS: (1, min((w * h for *_, w, h in self.rectangles[1:]), default=1)),
+            "initial_data": (0, MOST_DATA),
+        }
+        limits = fields_of(Scenario)[field].metadata
+        least = [m.ge for m in limits if hasattr(m, "ge")]
+        most = [m.le for m in limits if hasattr(m, "le")]
+        return between.get(field) or (max(least, default=-inf), min(most, default=inf))
+
+    def to_toml(self) -> str:
+        """The scenario as TOML text that ``load_scenario`` reads back to an equal one."""
+        return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
+
+
+class Scenario(Constants):
+    """Every constant of one mission (Sections II and VI-A of the paper), frozen and validated.
+
+    Raises:
+        InputError: From ``Scenario.of``, for unknown keys, wrong types and values out of range.
+    """
+
+    uavs: Integer = Field(2, ge=1, description="number of UAVs (I)")
+    flying_time: Integer = Field(75, ge=1, le=100, description="battery at the start [%] (b(0))")
+    charge_start: Integer = Field(
+        30, ge=10, le=100, description="battery at which charging may start [%] (C_S)"
+    )
+    charge_complete: Integer = Field(
+        80, ge=10, le=100, description="battery at which charging ends [%] (C_C)"
+    )
+
+
+IntegerRange = Annotated[tuple[Integer, Integer], AS_RANGE]
+
+
+class ScenarioSpace(Constants):
+    """The ranges from which a mission draws its parameters (Table II), both ends included.
+
+    A single value is a range with one element. If one range is narrowed or fixed, the draws of the
+    other parameters do not change.
+    """
+
+    uavs: IntegerRange = Field((1, 3), description="number of UAVs (I): an integer or [low, high]")
+    flying_time: IntegerRange = Field(
+        (70, 80), description="battery at the start [%] (b(0)): an integer or [low, high]"
+    )
+    charge_start: IntegerRange = Field(
+        (10, 50),
+        description="battery at which charging may start [%] (C_S): an integer or [low, high]",
+    )
+    charge_complete: IntegerRange = Field(
+        (60, 100), description="battery at which charging ends [%] (C_C): an integer or [low, high]"
+    )
+
+    def scenario_at(self, **parameters: int) -> Scenario:
+        """The scenario with the given value for each sampled parameter."""
+        return Scenario.of(self, **parameters)
+
+
+def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> ScenarioSpace:
+    """A shipped scenario by name, a generated one by family and seed, or one from a TOML file.
+
+    Args:
+        name_or_path: One of ``scenario_names()``, a sea such as ``archipelago:7``
+            (``dess.scenario.families``), or the path of a TOML file. In such a file, ``nodes`` and
+            ``no_fly`` may name files in its folder, and zones may have degrees
+            (``dess.scenario.own_sea``).
+        **overrides: Values that replace those of the file. A sampled field that is set to a single
+            value is no longer sampled.
+
+    Raises:
+        InputError: If there is no such scenario, or it is not valid.
+    """
+    return _load(name_or_path, overrides)
+
+
+def draft_scenario(name_or_path: str | Path, /, **overrides: Any) -> ScenarioSpace:
+    """The scenario that ``load_scenario`` loads or refuses for where its cells are, to be drawn."""
+    return _load(name_or_path, overrides, DRAFT)
+
+
+def parsed_scenario(text: str, path: Path, context: str = "") -> ScenarioSpace:
+    """The scenario that ``load_scenario`` would load if a file had this text.
+
+    Args:
+        text: The text.
+        path: The file, in whose folder those lie that the text names.
+        context: ``DRAFT`` for one that is loaded wherever its cells are.
+    """
+    return _load(path, {}, context, (str(path), parse_toml(text, str(path))))
+
+
+def _load(
+    name_or_path: str | Path, overrides: dict[str, Any], context: str = "", found: Any = None
+) -> ScenarioSpace:
+    where, read = found or _read(name_or_path)
+    with notes_after():
+        return _of_values(name_or_path, where, read, overrides, context)
+
+
+def _of_values(
+    name_or_path: str | Path, where: str, read: dict[str, Any], overrides: Any, context: str
+) -> ScenarioSpace:
+    """The scenario of the values that its file has, and of those that replace them."""
+    read.pop("description", None)
+    values = merged(read, overrides)
+    if named := unread(read) | unread(values):
+        draft = validated(ScenarioSpace, values | named, where, DRAFT)
+        beside = partial(_SCENARIOS.beside, name_or_path)
+        own = OwnSea(where, beside, draft, dotted(overrides).keys())
+        given = {field: of for field, of in values.items() if field not in unread(values)}
+        placed = own.placed(values, read.get("nodes"))
+        of_nodes = {field: placed.pop(field) for field in AMOUNTS if field in placed}
+        values = merged(placed, given)
+        values = merged(values, of_nodes)
+    return validated(ScenarioSpace, values, where, context)
+
+
+# What a function takes for a scenario: one, or what ``load_scenario`` takes.
+AnyScenario = Constants | str | Path
+_NAMED = "a name such as paper, or the path of a TOML file"
+
+
+def loaded(scenario: AnyScenario) -> Constants:
+    """A scenario, or the one that has this name or path.
+
+    Raises:
+        InputError: If there is no such scenario, or this is neither a scenario nor a name.
+    """
+    check_type("scenario", scenario, AnyScenario, f"{_NAMED}, Scenario or ScenarioSpace")
+    return load_scenario(scenario) if isinstance(scenario, str | Path) else scenario
+
+
+def scenario_names() -> list[str]:
+    """The names of the shipped scenarios."""
+    return _SCENARIOS.names()
+
+
+def scenario_at(base: str | Path, values: Mapping[str, Any], /, **overrides: Any) -> ScenarioSpace:
+    """The scenario of a design point: ``scenario`` among its values names another sea.
+
+    Args:
+        base: The scenario if the values name none.
+        values: Fields of the scenario, and perhaps ``scenario``.
+        **overrides: Fields that are set in both.
+
+    Raises:
+        InputError: If it does not exist, is a file, or is not valid.
+    """
+    name = values.get(SEA, base)
+    if SEA in values and not (isinstance(name, str) and is_scenario_name(name)):
+        known = [*scenario_names(), *scenario_families()]
+        raise InputError(f"{SEA}: {shown(name)} is unknown{one_of(name, known)}")
+    fields = {field: value for field, value in values.items() if field != SEA}
+    return load_scenario(name, **overrides, **fields)
+
+
+def scenario_families() -> dict[str, str]:
+    """The families of generated seas as ``FAMILY:SEED``, each with its description."""
+    return {f"{name}:SEED": f"{f.description}, e.g. {name}:7" for name, f in FAMILIES.items()}
+
+
+def is_scenario_name(name: str) -> bool:
+    """Whether a scenario is named by what is shipped or generated, and not by its file."""
+    return name in scenario_names() or is_generated(name)
+
+
+def scenario_description(name_or_path: str | Path) -> str:
+    """What a scenario is about, as its file says under ``description``.
+
+    Raises:
+        InputError: If there is no such scenario.
+    """
+    return str(_read(name_or_path)[1].get("description", ""))
+
+
+def _read(name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
+    """The name or path of a scenario, for messages, and its fields."""
+    check_type("scenario", name_or_path, str | Path, _NAMED)
+    name = str(name_or_path)
+    if is_generated(name):
+        return f"scenario {name}", sea_of(name)
+    return _SCENARIOS.load(name_or_path, others=scenario_families())
+
+
+# How what follows from a data sheet is checked, where another field has the same limits.
+_LIMITED = {"initial_data": "arrivals.initial"}
+
+
+@cache
+def _adapter(name: str) -> TypeAdapter:
+    field = fields_of(Fields)[name]
+    kind: Any = Annotated[field.annotation, field]
+    return TypeAdapter(kind)
+
+
+def _check_following(sheet: DataSheet, name: str, value: Any) -> None:
+    """Refuse a data sheet from which a value follows that its field may not have."""
+    limited = _LIMITED.get(name, name)
+    if limited not in fields_of(Fields):
+        return  # it is checked beside the others, whose limits it has
+    try:
+        _adapter(limited).validate_python(value)
+    except ValidationError as error:
+        number = error.errors()[0]["input"]
+        raise InputError(
+            f"data_sheet: with {sheet.origin(name)}, {name} is {number:,g}; allowed: "
+            f"{form_of(fields_of(Fields)[limited])}"
+        ) from None
+
+
+def _out_of_range(c: Constants) -> Iterator[str]:
+    """The sampled parameters lie within their limits, and C_S is below C_C."""
+    values = {name: getattr(c, name) for name in SAMPLED}
+    ends = {name: (of, of) if is_number(of) else of for name, of in values.items()}
+    for name, (low, high) in ends.items():
+        least, most = c.limits(name)
+        if not least <= low <= high <= most:
+            given = low if low == high else [low, high]
+            reason = f" (cells of the zone, at most {MOST_UAVS})" if name == "uavs" else ""
+            yield f"{name}: {given} is out of range; allowed: {least}..{most}{reason}"
+    start, complete = ends["charge_start"][1], ends["charge_complete"][0]
+    if start >= complete:
+        yield (
+            f"charge_start: {start} is not below charge_complete {complete}; "
+            "allowed: 10 <= charge_start < charge_complete <= 100 (eq. 1)"
+        )

@@ -1,0 +1,263 @@
+"""The return guard: UAVs that follow it reach the charger in time."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dess import policies
+from dess.envs.observations.states import HOME, compact_states
+from dess.model.batch import simulate_batch
+from dess.model.guard import guard
+from dess.model.state import BATTERY, HOVER
+from dess.model.view import View
+from dess.scenario.scenario import load_scenario
+from tests import compiled
+from tests.dess.envs.episodes import placed
+from tests.drawn import EAST, NORTH, SOUTH, WEST
+
+
+def _mask(*uavs: dict[str, Any], **scenario: Any) -> np.ndarray:
+    """The guard's masks for UAVs in given states, 400 communications short of the quota."""
+    rows = np.zeros(len(uavs), int), np.arange(len(uavs))
+    state, chart = placed([*uavs], **scenario)
+    world = SimpleNamespace(chart=chart)
+    return guard(View(state, world, *rows))
+
+
+WALL = [[24, y] for y in range(12)]  # from the northern edge, between the UAV and the zone
+FAR: dict[str, Any] = {"x": 20, "y": 10}
+WAITING = {"x": 27, "y": 4, "battery": 20, "latch": True, "pad_request": 3}
+
+
+@pytest.mark.parametrize(
+    ("uavs", "no_fly", "moves"),
+    [
+        # The corner of the zone (26, 5) is 6 + 5 = 11 steps away, then one slot to charge in.
+        ([FAR | {"battery": 12}], [], [NORTH, EAST]),
+        ([FAR | {"battery": 60}], [], [NORTH, EAST, SOUTH, WEST, HOVER]),
+        # The edge of the grid and parked teammates are closed.
+        ([{"x": 0, "y": 0}], [], [EAST, SOUTH, HOVER]),
+        (
+            [{"x": 25, "y": 3}, {"x": 26, "y": 3, "latch": True, "battery": 20}],
+            *([], [NORTH, SOUTH, WEST, HOVER]),
+        ),
+        # Behind an island the way around it counts: 8 cells south, 6 east and 7 north.
+        ([{"x": 20, "y": 4, "battery": 22}], WALL, [EAST, SOUTH]),
+        ([{"x": 23, "y": 4, "battery": 60}], WALL, [NORTH, SOUTH, WEST, HOVER]),
+        ([{"x": 20, "y": 4, "battery": 22}], [], [NORTH, EAST, SOUTH, WEST, HOVER]),
+        # A UAV that waits in the queue keeps its place.
+        ([WAITING], [], [HOVER]),
+    ],
+)
+def test_the_moves_that_are_left_to_a_uav(uavs, no_fly, moves):
+    assert np.nonzero(_mask(*uavs, no_fly=no_fly)[0])[0].tolist() == moves
+
+
+def test_the_guard_closes_in_little_by_little_and_never_before_it_must():
+    opened = [_mask(FAR | {"battery": b})[0].sum() for b in range(12, 30)]
+    assert opened == sorted(opened)
+    assert opened[3:] == [5] * len(opened[3:])
+
+
+def test_who_has_been_overruled_leaves_contested_cells_to_the_right_of_way():
+    # Both want the cell between them; the one with less battery goes first.
+    first, second = {"x": 10, "y": 10, "battery": 50}, {"x": 10, "y": 12, "battery": 60}
+    open_to_both = _mask(first, second)
+    assert open_to_both[0, SOUTH] and open_to_both[1, NORTH]
+    collided = _mask(first | {"overruled": True}, second | {"overruled": True})
+    assert collided[0, SOUTH] and not collided[1, NORTH]
+    assert collided[1, [EAST, SOUTH, WEST, HOVER]].all()
+
+
+# --- islands and zones ---
+
+ROW = [[x, 5] for x in range(17, 24)]  # 4 cells around either end
+NEAR = {"zones": [{"cells": [20, 8, 1, 1]}]}
+PADS_FAIL = {"failures": {"pad_rate": 0.1}}
+HERE, THERE = {"x": 20, "y": 4}, {"x": 20, "y": 8, "latch": True}
+# A zone of 3 x 3 cells in the corner of the grid, with a coast to the north of it.
+COAST: dict[str, Any] = {"grid": 8, "zone": [0, 2, 3, 3], "nodes": [[7, 7]]}
+COAST |= {"no_fly": [[0, 1], [1, 1], [2, 1]], "charge_complete": 80}
+PARKED = {"x": 2, "y": 2, "latch": True}
+# A zone at the end of a corridor, in the first row.
+CORRIDOR = COAST | {"zone": [0, 0, 4, 1], "no_fly": [[x, 1] for x in range(6)]}
+MOUTH = {"x": 3, "y": 0, "latch": True}
+# Two zones of which the second has one cell, and its only pad is that of the first UAV.
+LAST_PAD: dict[str, Any] = {"grid": 6, "rows": 5, "zone": [3, 2, 2, 2], "pads": 1}
+LAST_PAD |= {"zones": [{"cells": [3, 4, 1, 1]}], "nodes": [[0, 0]], "charge_complete": 80}
+POOR = [{"x": x, "y": y, "battery": b} for x, y, b in ((3, 1, 11), (1, 4, 7), (1, 1, 8))]
+
+
+@pytest.mark.parametrize(
+    ("uavs", "scenario", "home"),
+    [
+        ([HERE], {}, (26, 4, 6)),
+        ([HERE], NEAR, (20, 8, 4)),
+        ([HERE], NEAR | {"no_fly": ROW}, (26, 4, 6)),  # around it, it is 4 + 4 + 4 cells away
+        ([HERE, THERE], NEAR, (26, 4, 6)),  # it is full
+        ([HERE | {"battery": 70}, {"x": 20, "y": 10}], NEAR, (26, 4, 6)),  # less battery first
+        ([HERE], NEAR | PADS_FAIL, (26, 4, 6)),  # its pad is out of order for good
+        # It will be repaired, but a pad works two cells farther.
+        ([HERE], NEAR | {"failures": {"pad_rate": 0.1, "pad_repair": 9.0}}, (26, 4, 6)),
+        # Parked teammates are islands: from (3, 1) the only way of 3 cells to (1, 2) is over one.
+        ([{"x": 3, "y": 1}, PARKED], COAST, (2, 3, 3)),
+        # No way leads around a teammate, which is charged after 5 slots at most.
+        ([{"x": 7, "y": 0}, MOUTH], CORRIDOR, (2, 0, 5 + 5)),
+        # Who is parked keeps its cell, although teammates with less battery choose before it.
+        ([{"x": 3, "y": 4, "battery": 9, "latch": True}, *POOR], LAST_PAD, (3, 4, 0)),
+    ],
+)
+def test_a_uav_charges_at_the_cell_where_it_can_soonest(uavs, scenario, home):
+    state, chart = placed(uavs, **scenario)
+    state.missions["pads_out"][0, 16] = 1  # the first pad of the second zone
+    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[:3] == home
+
+
+def test_the_battery_to_a_zone_farther_than_the_nearest_is_that_of_the_way_there():
+    for uavs, needed in (([HERE, {}], 8), ([HERE, THERE], 12)):  # two slots per cell
+        states = compact_states(*placed(uavs, **NEAR, fleet=[{"slots_per_cell": 2}]), True)
+        assert states.uavs[0, 0, HOME] == needed
+
+
+@pytest.mark.parametrize("sea", ["archipelago:1", "corridor:7"])
+def test_hardly_any_guarded_uav_runs_dry_among_islands_and_no_lone_one_does(sea):
+    space = load_scenario(sea, uavs=[1, 4], initial_data=1e6, max_slots=300)
+    records = simulate_batch(space, policies.load("random"), 3, 400)
+    dry = (records.uavs["end"] == BATTERY).sum(1)
+    assert dry.sum() <= 0.01 * records.missions["uavs"].sum()
+    assert not dry[records.missions["uavs"] == 1].any()
+
+
+# --- pads ---
+
+# C_S 30, C_C 80, 10 % per slot. UAV 0 is two cells from the zone and asks for a pad in two slots.
+QUEUE: dict[str, Any] = {"charge_start": 30, "charge_complete": 80, "pads": 1}
+OFF: dict[str, Any] = {"charging": {"plan_waits": False}}
+
+
+@pytest.mark.parametrize(
+    ("batteries", "asked", "scenario", "slots"),
+    [
+        ([32, 30, 32], [1], OFF, 0),
+        ([32, 30, 32], [1], OFF | {"failures": {"pad_rate": 0.1}}, 3),
+        ([32, 30, 40], [1], {"charging": {"measured": True}}, 3),
+        ([32, 30, 40], [1], {}, 3),  # 50 % in 5 slots
+        ([50, 30, 60], [1], {}, 0),  # it may ask in 20 slots
+        ([32, 70, 70], [], {}, 0),  # it comes first
+        # 60 % in 6 slots, then another 6 as 31 - 6 % are left; its own cell is 3 slots away
+        ([32, 20, 31], [1], {}, 9),
+        # On a tie the lower index, its own, comes first; the other must be charged after it.
+        ([32, 20, 32], [1], {}, 8),
+        ([32, 36, 50], [], {}, 4),  # 8 slots to charge, and the next battery lasts for 4 more
+        ([32, 32, 32], [], {}, 16),
+        ([32, 32, 32], [], {"pads": 2}, 8),  # only the third waits for it
+        ([32, 20, 10], [1, 2], {"pads": 2}, 4),
+        ([32, 20, 20], [1], {"pads": 3}, 0),
+        ([32, 20, 20], [1, 2], {"charging": {"power": 5}}, 25),  # 12 slots, and 15 for 72 %
+        ([32, 20, 20], [1, 2], {"charging": {"power": 1}}, 29),  # C_S - 1 at most
+        ([20, 20, 20], [0, 1], {}, 0),  # it has asked
+        ([32, 31, 31], [], {"quota": 40}, 0),  # they need not charge
+        ([32, 30, 40], [1], {"zones": [{"cells": [0, 0, 9, 9]}]}, 3),  # too far off
+        ([32, 30, 32], [1], {"zones": [{"cells": [24, 8, 1, 1]}]}, 0),  # 4 slots, not 2 + 3
+    ],
+)
+def test_the_time_that_a_uav_expects_to_wait(batteries, asked, scenario, slots):
+    uavs = [
+        {"battery": b, "pad_request": -1, "communications": 0, "x": 24, "y": 4} for b in batteries
+    ]
+    for i in asked:
+        uavs[i] |= {"pad_request": 0, "x": 26 + i, "y": 2, "latch": True}
+    state, chart = placed(uavs, **QUEUE | scenario)
+    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[3] == slots
+
+
+def test_two_parked_teammates_side_by_side_are_flown_around():
+    """Without no-fly cells, too, they close all shortest ways to the cells behind them."""
+    side_by_side = [{"x": x, "y": 5, "latch": True} for x in (26, 27)]
+    state, chart = placed([{"x": 27, "y": 6}, *side_by_side])
+    assert compiled.path(state.missions[0], state.uavs[0], 0, chart, 26, 4) == 5
+
+
+def test_a_uav_stays_in_its_parking_cell_whoever_is_near():
+    """Its teammate has the right of way, but flies around it: both must not move on and on."""
+    team = {"x": 27, "y": 6, "battery": 5}, {"x": 27, "y": 5, "battery": 5, "latch": True}
+    assert _mask(*team)[1, HOVER]
+
+
+def test_where_no_pad_will_ever_work_no_uav_must_charge():
+    state, _ = placed([{"battery": 5}], **QUEUE, failures={"pad_rate": 0.1})
+    mission, u = state.missions[0], state.uavs[0, 0]
+    assert compiled.must_charge(mission, u, 1e6)
+    mission["pads_out"][0] = 1
+    assert not compiled.must_charge(mission, u, 1e6)
+    mission["pad_repair"] = 0.5
+    assert compiled.must_charge(mission, u, 1e6)
+
+
+@pytest.mark.parametrize(("uavs", "pads"), [(2, 1), (4, 2)])
+def test_with_a_pad_for_two_uavs_the_second_comes_early_enough_to_wait(uavs, pads):
+    space = load_scenario("paper", uavs=uavs, pads=pads)
+    missions = simulate_batch(space, policies.load("greedy"), 777301, 200).missions
+    assert missions["success"].mean() >= 0.99
+
+
+# --- what killed UAVs that had a way to live ---
+
+WIND = {"wind": {"strength": 0.8, "direction": 37, "gusts": 0.4, "seed": 1}}
+SHARED: dict[str, Any] = {"uavs": 2, "pads": 1}
+SHARED |= {"wind": {"strength": 0.2, "direction": 268, "gusts": 0.1, "seed": 79}}
+
+
+@pytest.mark.parametrize(
+    ("sea", "changes", "policy", "replication"),
+    [
+        # The sea is empty: the arrivals that are left fill the quota too late.
+        ("clustered:900307", {"uavs": [3, 5], "pads": 3}, "any", 2),
+        # A third UAV would wait for longer than its battery lasts; another zone is in reach.
+        ("corridor:900002", {"uavs": [5, 6], "pads": 4}, "any", 9),
+        # The own cell is behind others of the zone, in wind.
+        ("clustered:900701", WIND, "any", 3),
+        # The zone that is nearest by cells is not the one that is nearest by battery.
+        ("coast:900701", WIND, "greedy", 2),
+        # Four UAVs insist on cells beside each other.
+        ("archipelago:700023", {"uavs": 6, "pads": 6}, "greedy", 4),
+        # Two UAVs share a pad: the one with more battery comes first, and takes it too late.
+        ("scattered:910028", SHARED, "greedy", 1),
+        # Three UAVs come to a zone of six cells at once, and two of them close its side.
+        ("clustered:910027", {"uavs": 3, "pads": 2}, "greedy", 6),
+        # One of two UAVs takes the pad of the only zone that the other reaches.
+        ("large:700014", {"uavs": 2, "pads": 1}, "any", 1),
+        # Two UAVs come to a pad in the same slot, and the one with less battery cannot wait.
+        ("large:1230002", {"uavs": 2, "pads": 1}, "greedy", 0),
+        # Six UAVs collect the last data faster than they did on the whole.
+        ("clustered:970026", {"uavs": 6, "pads": 3}, "planner-short", 2),
+    ],
+)
+def test_a_uav_that_has_a_way_to_live_lives(sea, changes, policy, replication):
+    space = load_scenario(sea, **changes)
+    assert simulate_batch(space, policies.load(policy), 2600, [replication]).missions["success"][0]
+
+
+def test_a_uav_must_charge_if_no_data_are_left_for_its_quota_unless_it_lives_to_the_end():
+    state, _ = placed([{"battery": 60}], arrival_rate=0.0, quota=440)
+    mission, u = state.missions[0], state.uavs[0, 0]
+    u["communications"] = 400  # 10 slots are enough if there are data
+    assert not compiled.must_charge(mission, u, 1e6)
+    assert compiled.must_charge(mission, u, 0.0)
+    mission["slot"] = mission["max_slots"] - 60
+    assert compiled.must_charge(mission, u, 0.0)
+    mission["slot"] += 1
+    assert not compiled.must_charge(mission, u, 0.0)
+
+
+def test_a_uav_that_can_reach_two_zones_leaves_the_pad_to_one_that_can_reach_one():
+    """The batteries are equal, so the first UAV would choose first."""
+    team: list[dict[str, Any]] = [{"x": x, "y": 1, "battery": 15} for x in (12, 15)]
+    sea: dict[str, Any] = {"grid": 24, "rows": 3, "zone": [0, 0, 1, 3], "pads": 1}
+    sea |= {"zones": [{"cells": [22, 0, 2, 3], "pads": 1}]}
+    sea |= {"nodes": [[12, 0]], "charge_start": 20, "charge_complete": 80}
+    state, chart = placed(team, **sea)
+    zones = [compiled.parking_cell(state.missions[0], state.uavs[0], i, chart)[0] for i in (0, 1)]
+    assert zones == [0, 22]

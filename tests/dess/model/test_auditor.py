@@ -1,0 +1,36 @@
+"""An event log tells the whole mission: an auditor that knows only the page can replay it."""
+
+from math import isnan
+
+import pytest
+from hypothesis import given
+
+from dess.model.mission import simulate
+from dess.model.record import MISSION_RECORD, measures_of
+from tests.dess.model.auditor import audit
+from tests.drawn import continuous_spaces, extended_spaces, policies, replications, seeds, spaces
+
+# Nothing was delivered, no age has come to its end, or no UAV has asked for a pad.
+NOT_ALWAYS = {"latency", "latency_p99", "peak_age", "waiting"}
+
+
+@given(spaces() | extended_spaces() | continuous_spaces(), policies, seeds, replications)
+def test_an_auditor_finds_the_record_in_the_log(space, policy, seed, replication):
+    record = simulate(space, policy, seed % 2**53, replication, events=True)
+    assert record.events is not None
+    report = audit(record.events.columns(), space.model_dump())
+    metrics = report["metrics"]
+    if space.wind.is_on:  # the auditor does not know what the way home costs
+        metrics["home"] = record.home
+    wanted = {name: pytest.approx(record.metrics[name], abs=1e-6) for name in metrics}
+    assert metrics == wanted and {*metrics} == {*(MISSION_RECORD.names or ())}
+    measured = {n: v for n, v in report["measured"].items() if not isnan(v)}
+    assert measured == pytest.approx(record.measured, abs=1e-6)
+    known = {*measures_of(space)}
+    assert known - NOT_ALWAYS <= {*measured} <= known
+    for u, row, found in zip(record.uavs, record.uav_rows(), report["uavs"], strict=True):
+        assert (found["end"], found["communications"]) == (row["end"], row["quota"])
+        for name in ("battery", "slots_flying", "slots_charging", "slots_waiting", "charged"):
+            assert found[name] == u[name]
+        for name in ("collected", "reward"):
+            assert found[name] == pytest.approx(u[name], abs=1e-6)

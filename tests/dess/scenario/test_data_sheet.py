@@ -1,0 +1,240 @@
+"""The data sheet: what follows from it, recomputed by hand, and what is refused."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+
+from dess import InputError, load_scenario, simulate
+from dess.analysis.verification import closed_forms
+from dess.model.channel import world_of
+from dess.model.state import constants_of
+from dess.physics.wind import MOST, largest_wind, moves_in
+from dess.scenario.quantities import printed
+from dess.scenario.scenario import ScenarioSpace
+from tests.drawn import Script
+
+SHEET = {
+    **{"endurance": "35 min", "cruise": "15 m/s", "charging": "40 min", "data_rate": "3 MB/h"},
+    **{"bandwidth": "125 kHz", "snr": "12 dB at 2 km", "wind": "10 m/s from SW"},
+}
+
+
+def _space(sheet: dict[str, Any] | None = None, **values: Any) -> ScenarioSpace:
+    merged = {name: of for name, of in (SHEET | (sheet or {})).items() if of is not None}
+    return ScenarioSpace.of(data_sheet=merged, **values)
+
+
+def test_the_list_of_an_engineer_is_recomputed_by_hand():
+    space = _space({"range": "2 km", "horizon": "8 h", "max_rate": "6 bit/s/Hz", "mtbf": "30 d"})
+    slot = 35 * 60 / 100
+    assert (space.units.slot, space.units.cell, space.units.data) == (21, 15 * 21, 125e3 * 21)
+    assert str(space.units) == "a slot is 21 s, a cell 315 m, a data unit 328.1 kB"
+    assert space.cell_size == 315 and space.max_slots == math.floor(8 * 3600 / slot) == 1371
+    assert space.charge_rate == pytest.approx(100 * slot / (40 * 60)) == 0.875
+    assert space.arrival_rate == pytest.approx(3e6 * 8 / 3600 / 125e3)
+    assert space.failures.uav_rate == pytest.approx(slot / (30 * 86400))
+    # The rate at 2 km [data units per slot] is that of an SNR of 12 dB.
+    rate = float(closed_forms.rate(space, closed_forms.mean_snr(space, 2000.0)))
+    assert 4 * rate == pytest.approx(math.log2(1 + 10**1.2))
+    # A wind of 10 m/s from the south-west: south and west are against it, at 45 degrees.
+    along = 10 / math.sqrt(2)
+    ground = math.sqrt(15**2 - along**2) - along
+    assert space.wind.moves == pytest.approx((0, 0, 15 / ground - 1, 15 / ground - 1))
+    assert space.landing and space.quota == 0
+    assert space.flying_time == space.charge_complete == (100, 100)
+
+
+def test_a_link_budget_gives_the_snr_of_friis_equation():
+    budget = {"snr": None, "tx_power": "100 mW", "noise_figure": "6 dB", "frequency": "868 MHz"}
+    space = _space(budget | {"free_space": "100 m"})
+    wavelength = 299_792_458 / 868e6
+    loss = 20 * math.log10(4 * math.pi * 100 / wavelength)
+    noise = 10 * math.log10(1.380649e-23 * 290 * 125e3 * 1000) + 6
+    assert space.edge_snr == pytest.approx(20 - loss - noise)
+    assert space.radio.anchor == 100
+    assert float(closed_forms.mean_snr(space, 1000.0)) == pytest.approx(space.edge_snr - 22.7)
+
+
+def test_the_snr_is_that_of_the_distance_and_not_of_the_grid():
+    """A larger exponent lowers the SNR beyond its distance, and raises it nearer."""
+    small, large = (_space({"range": "3 km"}, grid=grid) for grid in (32, 60))
+    assert np.array_equal(world_of(small).mean_snr[:8, :8], world_of(large).mean_snr[:8, :8])
+    steep = world_of(ScenarioSpace.of(small, path_loss_exponent=3.5)).mean_snr
+    plain = world_of(small).mean_snr
+    far, near = 8, 3  # 2.5 km and 945 m
+    assert steep[0, 4 * far] < plain[0, 4 * far] and steep[0, 4 * near] > plain[0, 4 * near]
+    assert plain[0, 4 * 10] == -math.inf  # 3.15 km
+
+
+def test_a_charge_adds_whole_percents_that_add_up_to_its_rate():
+    values = {"uavs": 1, "flying_time": 20, "charge_complete": 90, "charge_rate": 0.875}
+    space = ScenarioSpace.of(**values, charge_start=30, zone=[0, 0, 2, 2], landing=True, quota=9)
+    events = simulate(space, Script("." * 200), 1, events=True).events
+    assert events is not None
+    battery = [e.battery for e in events if e.event == "move"]
+    assert battery[:81] == [20 + min(math.floor(0.875 * k), 70) for k in range(1, 82)]
+
+
+def test_out_of_range_no_node_is_served_and_no_slot_counts():
+    values = {"nodes": [[5, 0]], "uavs": 1, "zone": [0, 0, 1, 1], "initial_data": 1e6}
+    space = ScenarioSpace.of(**values, cell_size=100, radio={"range": 210.0, "max_rate": 0.5})
+    record = simulate(space, Script("EEEE...."), 1, events=True)
+    assert record.events is not None
+    served = [e for e in record.events if e.event == "communication"]
+    # From 0 to 4 cells; 209.5 m away at most is less than 2.1 cells from the node.
+    assert min(e.x for e in served) == pytest.approx(3.0) and served[0].time == 3.0
+    assert record.uavs["quota"].tolist() == [len(served)]
+    assert max(e.value for e in served) <= 0.5 / 4 + 1e-12
+
+
+def test_the_largest_wind_is_the_one_that_costs_the_most():
+    for direction in (0.0, 30.0, 45.0, 225.0, 300.0):
+        assert max(moves_in(largest_wind(direction, 15), direction, 15)) == pytest.approx(MOST)
+
+
+def test_a_scenario_with_a_sheet_is_stored_and_changed_by_its_sheet():
+    space = _space({"reserve": "20 %", "backlog": "20 MB"}, uavs=2, landing=False, quota=50)
+    assert ScenarioSpace.of(space) == space and "cell_size" not in space.model_dump()
+    assert space.charge_complete == space.flying_time == (80, 80)
+    assert space.initial_data[0] == pytest.approx(20e6 * 8 / (125e3 * 21))
+    calm = ScenarioSpace.of(space, **{"data_sheet.wind": "0 m/s from N"})
+    assert calm.wind.moves == (0, 0, 0, 0) and (calm.quota, calm.landing) == (50, False)
+    assert not ScenarioSpace.of().units and "radio" not in ScenarioSpace.of().model_dump()
+
+
+def _sea(folder: Path, rows: str, **sheet: Any) -> Path:
+    """A scenario with a sheet that reads its nodes from a file."""
+    (folder / "buoys.csv").write_text(rows)
+    given = {name: of for name, of in (SHEET | sheet).items() if of is not None}
+    text = tomli_w.dumps({"nodes": "buoys.csv", "data_sheet": given})
+    (folder / "sea.toml").write_text(text)
+    return folder / "sea.toml"
+
+
+MEGABYTE_PER_HOUR = 8e6 / 3600 / 125e3  # in units of the bandwidth of SHEET
+
+
+def test_nodes_of_a_file_have_their_own_rates_in_units(tmp_path):
+    rows = "name,x,y,data_rate,backlog\na,1,1,3 MB/h,1 MB\nb,4,4,6 MB/h,0 MB\n"
+    _sea(tmp_path, rows, data_rate=None)
+    space = load_scenario(tmp_path / "sea.toml")
+    assert (
+        space.arrivals.rates[1]
+        == pytest.approx(2 * space.arrivals.rates[0])
+        == 6e6 * 8 / 3600 / 125e3
+    )
+    assert space.arrivals.initial == pytest.approx((8e6 / (125e3 * 21), 0))
+    (tmp_path / "buoys.csv").write_text(rows.replace("3 MB/h", "3"))
+    with pytest.raises(
+        InputError, match="line 2: data_rate: '3' has no unit; allowed: a data rate"
+    ):
+        load_scenario(tmp_path / "sea.toml")
+
+
+def test_a_field_of_a_node_wins_and_the_sheet_is_for_those_that_have_none(tmp_path):
+    rows = "name;x;y;data_rate;backlog\na;1;1;3,5 MB/h;20 MB\nb;4;4;;\n"
+    space = load_scenario(sea := _sea(tmp_path, rows, data_rate="2 MB/h"))
+    assert space.arrivals.rates == pytest.approx((3.5 * MEGABYTE_PER_HOUR, 2 * MEGABYTE_PER_HOUR))
+    assert space.arrivals.initial == pytest.approx((20 * 8e6 / (125e3 * 21), 0))
+    # What is set for the scenario is for all nodes, also through a table of the section.
+    for values in ({"data_sheet.data_rate": "1 MB/h"}, {"data_sheet": {"data_rate": "1 MB/h"}}):
+        space = load_scenario(sea, **values)
+        assert (space.arrivals.rates, space.arrival_rate) == ((), pytest.approx(MEGABYTE_PER_HOUR))
+    with pytest.raises(InputError, match="line 3: data_rate: is empty; allowed: a data rate, such"):
+        load_scenario(_sea(tmp_path, rows, data_rate=None))
+    listed = _sea(tmp_path, rows, data_rate=["1 MB/h", "2 MB/h"])
+    with pytest.raises(InputError, match="has the column data_rate, and the scenario lists"):
+        load_scenario(listed)
+    below = rows.replace("20 MB", "-1 MB")
+    with pytest.raises(InputError, match="line 2: backlog: '-1 MB' is out of range; allowed: 0"):
+        load_scenario(_sea(tmp_path, below, data_rate="2 MB/h"))
+    both = "x,y,rate,data_rate\n1,1,1 MB/h,2 MB/h\n4,4,3 MB/h,4 MB/h\n"
+    with pytest.raises(InputError, match="has the columns data_rate and rate for one field"):
+        load_scenario(_sea(tmp_path, both))
+
+
+def test_no_other_cell_size_is_advised_where_it_follows_from_the_sheet(tmp_path):
+    near, far = "lon,lat\n8,54\n8.02,54.02\n8,54.0001\n", "lon,lat\n0,0\n0,0.2\n"
+    for rows, line in ((near, "in one cell"), (far, "off the grid")):
+        with pytest.raises(InputError, match=line) as error:
+            load_scenario(_sea(tmp_path, rows))
+        assert "cell_size" not in str(error.value).partition("; allowed: ")[2]
+
+
+class Unreadable:
+    """Like a quantity of pint with a single number, whose method for arrays fails."""
+
+    def __repr__(self):
+        return "<Quantity(35, 'minute')>"
+
+    def tolist(self):
+        raise AttributeError("Magnitude 'int' does not support tolist.")
+
+
+@pytest.mark.parametrize("field", ["data_sheet.endurance", "data_sheet.data_rate", "cell_size"])
+def test_a_quantity_of_another_library_is_refused_in_a_line(field):
+    with pytest.raises(InputError, match=rf"{field}: <Quantity\(35, 'minute'\)> is .*; allowed: "):
+        load_scenario("jade-bight" if "." in field else "paper", **{field: Unreadable()})
+
+
+@pytest.mark.parametrize(
+    ("sheet", "values", "message"),
+    [
+        ({"endurance": 35}, {}, 'endurance: 35 has no unit; allowed: a time, such as "35 min"'),
+        ({"endurance": "35"}, {}, "'35' has no unit"),
+        ({"endurance": "35 m"}, {}, "'35 m' has a unit of another kind"),
+        ({"endurance": "35 minits"}, {}, "'35 minits' has an unknown unit"),
+        ({"endurance": None}, {}, "endurance: is missing; allowed: flying time"),
+        ({"data_rate": None}, {}, "data_sheet.data_rate: is missing; allowed: new data"),
+        ({"data_rate": ["3 MB/h"] * 2}, {}, "arrivals.rates: there are 2; allowed: 25"),
+        ({"wind": "14.5 m/s from SW"}, {}, "is too strong for 15 m/s; allowed: 14 m/s"),
+        ({"wind": "14 m/s"}, {}, "is not a speed and where it comes from"),
+        ({"horizon": "60 d"}, {}, "is 246,857 slots of 21 s; allowed: 24.31 d at most"),
+        ({"charging": "10 s"}, {}, "is less than a slot of 21 s; allowed: 21 s or more"),
+        (
+            {"range": "200 m"},
+            {},
+            "is less than a cell of 315 m, the way of a slot at 15 m/s; allowed: 315 m or more",
+        ),
+        ({"tx_power": "20 dBm"}, {}, "snr: follows from tx_power"),
+        ({"repair": "2 h"}, {}, "mtbf: is missing"),
+        ({"reserve": "80 %"}, {}, "reserve: '80 %' is out of range; allowed: 0..60"),
+        ({"reserve": "20 %"}, {"flying_time": 90}, "more than the reserve leaves; allowed: 80"),
+        (
+            {"snr": "12 dB at 0 m"},
+            {},
+            "snr: '12 dB at 0 m' is out of range; allowed: 0.01..1e+06 m",
+        ),
+        ({"snr": "12 dB at -2 km"}, {}, "is out of range; allowed: 0.01..1e+06 m"),
+        ({"snr": "12 dB at 2000 km"}, {}, "is out of range; allowed: 0.01..1e+06 m"),
+        ({"wind": "5 m/s from 400 deg"}, {}, "is out of range; allowed: -360..360 deg"),
+        # What follows is refused in the words of the sheet.
+        ({"cruise": "1000 km/s", "wind": None}, {}, "endurance '35 min', cruise '1000 km/s', cell"),
+        ({"data_rate": "3 TB/s"}, {}, "data_sheet: with data_rate '3 TB/s', bandwidth '125 kHz'"),
+        ({"bandwidth": "1 Hz", "backlog": "90 TB"}, {}, "data_sheet: with backlog '90 TB', end"),
+        ({}, {"cell_size": 315.0}, "cell_size: follows from the data sheet"),
+        ({}, {"initial_data": 3.0}, "initial_data: follows from the data sheet"),
+        ({}, {"arrivals": {"rates": [0.1] * 25}}, "arrivals.rates: follows from the data sheet"),
+    ],
+)
+def test_what_a_sheet_cannot_be_is_refused(sheet, values, message):
+    with pytest.raises(InputError) as raised:
+        _space(sheet, **values)
+    assert message in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_amounts_are_printed_in_the_unit_that_suits_them():
+    assert [printed(n, "s") for n in (0.5, 21, 2100, 28800)] == ["0.5 s", "21 s", "35 min", "8 h"]
+    assert [printed(n, "m") for n in (315, 2000)] == ["315 m", "2 km"]
+
+
+def test_the_bay_with_a_sheet_has_its_constants():
+    bay = load_scenario("jade-bight")
+    mission = constants_of(bay)[0]
+    assert (mission["charge_rate"], mission["charge_slots"]) == (7, 8)
+    assert mission["max_rate"] == 6 and mission["range"] == 2000
+    assert len(bay.nodes) == 23 and len(bay.rectangles) == 2 and bay.names[0] == "Jade 1"
