@@ -58,7 +58,9 @@ class Adapter:
         Raises:
             InputError: If the file of weights cannot be read.
         """
-        self.name, self.observation, self.guarded = name, observation, guarded
+        self.name = name
+        self.observation = observation
+        self.guarded = guarded
         self._choose = act
         self.weights = sha256(read_bytes(Path(weights), LIMIT)).hexdigest() if weights else ""
 
@@ -68,7 +70,8 @@ class Adapter:
         Raises:
             InputError: If there is no such observation, or the function returns no actions.
         """
-        fleet, sea = view.state.uavs.shape[1], geometry(view.world.chart)
+        fleet = view.state.uavs.shape[1]
+        sea = geometry(view.world.chart)
         nodes = view.world.nodes.tolist()
         observer = _observer(self.observation, self.guarded, fleet, repr((sea, nodes)))
         seen = observer.observe(view.state, view.mission, view.uav)

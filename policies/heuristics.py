@@ -65,7 +65,9 @@ class _Heuristic:
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
-        state, nodes, chart = view.state, view.world.nodes, view.world.chart
+        state = view.state
+        nodes = view.world.nodes
+        chart = view.world.chart
         circuit = _NO_CIRCUIT
         if self._kind == _TOUR:
             circuit = _circuit(nodes.tobytes(), chart.zones.tobytes(), chart.zones.shape)
@@ -116,7 +118,9 @@ def _choose(missions, uavs, allowed, rows_mission, rows_uav):
     """Random allowed moves into uncontested cells; Hover where there is none."""
     actions = np.empty(len(rows_mission), np.int64)
     for row in range(len(rows_mission)):
-        i, mission, team = rows_uav[row], missions[rows_mission[row]], uavs[rows_mission[row]]
+        i = rows_uav[row]
+        mission = missions[rows_mission[row]]
+        team = uavs[rows_mission[row]]
         levels = contests(mission, team, i)
         moves = count = 0
         for action in range(4):
@@ -144,11 +148,14 @@ def _decide(
     chart = Chart(zones, parking, sizes, nearest, ways, rows)  # takes longer as an argument
     actions = np.empty(len(rows_mission), np.int64)
     memory = parking_memory(chart, uavs.shape[1])
-    last, left = -1, 0.0
+    last = -1
+    left = 0.0
     for row in range(len(rows_mission)):
-        b, i = rows_mission[row], rows_uav[row]
+        b = rows_mission[row]
+        i = rows_uav[row]
         if b != last:
-            last, left = b, data_left(missions[b], residual[b])
+            last = b
+            left = data_left(missions[b], residual[b])
         actions[row] = _action(
             kind, missions[b], uavs[b], i, residual[b], left, sensors[b], nodes, circuit, chart,
             reach, memory,
@@ -168,7 +175,8 @@ def _action(kind, mission, team, i, data, left, sensors, nodes, circuit, chart, 
     goal_x, goal_y = home.x, home.y
     node = _goal(kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach)
     if node >= 0:
-        goal_x, goal_y = np.int64(nodes[node, 0]), np.int64(nodes[node, 1])
+        goal_x = np.int64(nodes[node, 0])
+        goal_y = np.int64(nodes[node, 1])
     return step_towards(mission, team, i, chart, safe, goal_x, goal_y)
 
 
@@ -177,15 +185,18 @@ def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
     """The safe action that brings UAV ``i`` nearest to its goal; contested cells cost more."""
     u = team[i]
     levels = contests(mission, team, i)
-    best, least = HOVER, 1e18
+    best = HOVER
+    least = 1e18
     for action in range(5):
         if not safe >> action & 1:
             continue
-        x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
+        x = u.x + STEP_X[action]
+        y = u.y + STEP_Y[action]
         cost = path_length(mission, team, i, chart, None, x, y, goal_x, goal_y)
         cost += _CONTEST_COST[contest(levels, action)]
         if cost < least:
-            best, least = action, cost
+            best = action
+            least = cost
     return best
 
 
@@ -199,7 +210,8 @@ def _goal(
     if charge:
         spare = slots_left(mission, u) - 1 - margin(mission, u) - home.wait
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
-    best, node = 0.0, -1
+    best = 0.0
+    node = -1
     for k in range(mission.nodes):
         if data[k] <= 0.0:
             continue
@@ -225,7 +237,8 @@ def _goal(
         if kind != _AGE and data[k] < worth:
             score *= 1e-3
         if score > best:
-            best, node = score, k
+            best = score
+            node = k
     return node
 
 
@@ -275,7 +288,8 @@ _NO_CIRCUIT = np.zeros(0, np.int64)
 @lru_cache(maxsize=64)
 def _circuit(nodes: bytes, zones: bytes, shape: tuple[int, int]) -> np.ndarray:
     """The (K,) position of each node on a short round trip (nearest neighbour, then 2-opt)."""
-    cells, chart = np.frombuffer(nodes, np.int64).reshape(-1, 2), np.frombuffer(zones, np.int8)
+    cells = np.frombuffer(nodes, np.int64).reshape(-1, 2)
+    chart = np.frombuffer(zones, np.int8)
     places = cells @ [1, shape[1]]
     ways = [spread(chart.reshape(shape), cell[None])[0][places] for cell in cells]
     return _round_trip(np.stack(ways).astype(np.int64))

@@ -50,7 +50,8 @@ class PaperNetwork:
             shapes: Shapes of one row of each input.
             hidden: Widths of the hidden layers of the other networks; not used.
         """
-        width, size = sum(shapes[2]), (KERNEL_SIZE, KERNEL_SIZE)
+        width = sum(shapes[2])
+        size = (KERNEL_SIZE, KERNEL_SIZE)
         sizes: Sizes = {}
         for name, (layers, rows, columns) in zip(("local", "far"), shapes[:2], strict=True):
             sizes |= {f"{name}.0": (KERNELS, layers, *size), f"{name}.2": (KERNELS, KERNELS, *size)}
@@ -138,11 +139,13 @@ class SetNetwork:
 
     def __call__(self, own: np.ndarray, actions: np.ndarray, *sets: np.ndarray) -> np.ndarray:
         """The values (R, 5) of the actions, from the arrays of ``Sets.encode``."""
-        (matrix, bias), rows = self._own, len(own)
+        matrix, bias = self._own
+        rows = len(own)
         state = np.empty((rows, len(matrix)), own.dtype)
         moves = np.empty((HOVER, rows, len(self._moves)), own.dtype)
         at = own.shape[1], actions.shape[2]
-        state[:, : at[0]], moves[..., : at[1]] = own, actions[:, :HOVER].swapaxes(0, 1)
+        state[:, : at[0]] = own
+        moves[..., : at[1]] = actions[:, :HOVER].swapaxes(0, 1)
         for layers, lines, factors in zip(self._sets, sets[::2], sets[1::2], strict=True):
             context, (inputs, _), layer, (values, shift) = layers
             each = lines.reshape(-1, lines.shape[2]) @ inputs
@@ -211,7 +214,8 @@ def _convolved(maps: np.ndarray, first: Layer, second: Layer) -> np.ndarray:
     _convolve(maps, *first, seen.reshape(len(maps), rows, columns, KERNELS))
     matrix, bias = second
     windows = sliding_window_view(seen, KERNEL_SIZE * KERNELS, axis=2)[:, :, ::KERNELS]
-    height, width = rows - KERNEL_SIZE + 1, windows.shape[2]
+    height = rows - KERNEL_SIZE + 1
+    width = windows.shape[2]
     windows = windows.reshape(len(maps), rows * width, -1)
     # Of a window only a row is copied; the five products are added.
     out = np.zeros((len(maps) * height * width, KERNELS), maps.dtype)
@@ -224,7 +228,8 @@ def _convolved(maps: np.ndarray, first: Layer, second: Layer) -> np.ndarray:
 @kernel
 def _convolve(maps, matrix, bias, out):
     """Convolve (R, layers, rows, columns), most of which are 0; make sums 0 or more."""
-    zero, (layers, height, width) = bias.dtype.type(0), maps.shape[1:]
+    zero = bias.dtype.type(0)
+    layers, height, width = maps.shape[1:]
     for r in range(len(maps)):
         out[r] = zero
         for layer in range(layers):
@@ -249,7 +254,8 @@ def _convolve(maps, matrix, bias, out):
 @kernel
 def _rectify(values, shifts, each):
     """Add (S, C) shifts, each to so many rows in turn, to (R, C) values; make them 0 or more."""
-    zero, count = values.dtype.type(0), len(shifts)
+    zero = values.dtype.type(0)
+    count = len(shifts)
     for row in range(len(values)):
         shift = row // each % count
         for c in range(values.shape[1]):
@@ -263,8 +269,11 @@ def _pool(values, bias, factors, state, moves, at):
     Those of the last factors are columns of the state (R, :) from ``at[0]`` on. Those of the eight
     before, in which a move has two, are columns of the moves (4, R, :) from ``at[1]`` on.
     """
-    zero, width, count = values.dtype.type(0), len(bias), values.shape[1]
-    best, chosen = np.empty(width, values.dtype), np.empty(count, np.int64)
+    zero = values.dtype.type(0)
+    width = len(bias)
+    count = values.shape[1]
+    best = np.empty(width, values.dtype)
+    chosen = np.empty(count, np.int64)
     for row in range(len(values)):
         for part in range(9):
             found = 0

@@ -139,7 +139,8 @@ def load(name: str | Path) -> Policy:
         InputError: If the policy does not exist, cannot be loaded, or is a class of a Python file
             that no user has typed.
     """
-    is_typed, name = isinstance(name, TypedByUser), str(name)
+    is_typed = isinstance(name, TypedByUser)
+    name = str(name)
     if name in SHIPPED:
         module = f"dess.policies.{'planner' if name in PLANNERS else 'heuristics'}"
         return _made(name, module, lambda: _class_of(module, SHIPPED[name][0]))
@@ -156,7 +157,8 @@ def load(name: str | Path) -> Policy:
                 f"policy: {shown(name)} is a Python file, which is run only if you name it; "
                 "allowed: --policy FILE.py:CLASS, if you trust the file"
             )
-        path, kind = Path(file["path"]), file["kind"]
+        path = Path(file["path"])
+        kind = file["kind"]
         if not os.path.isfile(path):  # False for a name that no file can have
             raise InputError(f"policy: {path}: no such file; allowed: FILE.py:CLASS")
         return _made(kind, str(path), lambda: _class_of(_importable(path), kind))
@@ -335,7 +337,8 @@ def about(name: str) -> About:
     Raises:
         InputError: If it does not exist or cannot be loaded.
     """
-    policy, folder = load(TypedByUser(name)), folder_of(name)
+    policy = load(TypedByUser(name))
+    folder = folder_of(name)
     described = read_description(folder) if folder else None
     requires = described.layout.model_dump() if described and described.layout else {}
     scenarios = {known: load_scenario(known).model_dump(mode="json") for known in scenario_names()}
@@ -360,7 +363,8 @@ def departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) -> list
         policies: The names of policies and teams.
         spaces: The scenarios in which they act.
     """
-    lines, here = [], ranges_of(spaces)
+    lines = []
+    here = ranges_of(spaces)
     for name in dict.fromkeys(name for team in policies for name in team.split(",")):
         with suppress(InputError):  # whoever loads it says what is wrong
             folder = folder_of(name)

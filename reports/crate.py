@@ -127,7 +127,8 @@ def _without_none(value: Any) -> Any:
 
 
 def _description(results: Results) -> str:
-    manifest, asked = results.store.manifest, results.study.description
+    manifest = results.store.manifest
+    asked = results.study.description
     made = f"{len(results.missions):,} missions of {numbers.words(results.policies)}"
     points = f"{len(manifest.points):,} design point{'s' if len(manifest.points) > 1 else ''}"
     end = "." if asked and asked[-1] not in ".?!" else ""

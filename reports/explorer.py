@@ -37,7 +37,8 @@ class Grid:
         Raises:
             InputError: If the study is not a full grid of two fields or more.
         """
-        self.results, self.values = results, varied(results)
+        self.results = results
+        self.values = varied(results)
         table = points(results)
         places = {field: table[field].map(of.index) for field, of in self.values.items()}
         self._places = pd.DataFrame(places).sort_values([*places])

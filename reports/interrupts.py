@@ -43,7 +43,8 @@ class Interrupts(AbstractContextManager["Interrupts"]):
             is_last: Whether the process ends after the block. The signals are ignored from then on,
                 so that a second signal does not disturb the end.
         """
-        self.is_last, self.received = is_last, False
+        self.is_last = is_last
+        self.received = False
         self._hook = sys.unraisablehook
         self._handlers: dict[int, Any] = {}
 

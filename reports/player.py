@@ -87,7 +87,8 @@ class Playback:
         Raises:
             InputError: If the log is not that of a complete mission of this scenario.
         """
-        self._log, self.scenario = pd.DataFrame(events), scenario
+        self._log = pd.DataFrame(events)
+        self.scenario = scenario
         _check(self._log, scenario)
         self.residual = event_log.residual_data(self._log).to_numpy()
         self.end = len(self.residual) - 1
@@ -96,7 +97,8 @@ class Playback:
         self.node_colours = node_colours(len(scenario.nodes))
 
     def _fleet(self) -> dict[str, np.ndarray]:
-        slots, levels = event_log.uav_slots(self._log), event_log.battery_levels(self._log)
+        slots = event_log.uav_slots(self._log)
+        levels = event_log.battery_levels(self._log)
         first = slots.groupby("uav", as_index=False).first()
         full = levels.groupby("uav")["battery"].first().to_numpy()
         absent = {"node": -1, "charging": False, "waiting": False}
@@ -115,9 +117,12 @@ class Playback:
         pads = self.scenario.charging_pads
         queue = f", {waiting} waiting" if waiting else ""
         used = f"{charging} of {pads} pad{'s' * (pads != 1)} in use{queue}"
-        left, units = self.residual[slot].sum(), self.scenario.units
+        left = self.residual[slot].sum()
+        units = self.scenario.units
         if units:
-            now, end, data = lasting(slot, units), lasting(self.end, units), size_of("MB", units)
+            now = lasting(slot, units)
+            end = lasting(self.end, units)
+            data = size_of("MB", units)
             return f"{now} of {end} · {left * data:,.3g} MB left · {used}"
         return f"slot {slot} of {self.end} · {left:.1f} data units left · {used}"
 
@@ -186,7 +191,8 @@ def _corners(x: np.ndarray, y: np.ndarray) -> list[tuple[int, int]]:
     """The cells at which a path begins, turns and ends."""
     cells = np.column_stack([x, y])
     moves = np.diff(cells, axis=0)
-    cells, moves = cells[np.r_[True, moves.any(axis=1)]], moves[moves.any(axis=1)]
+    cells = cells[np.r_[True, moves.any(axis=1)]]
+    moves = moves[moves.any(axis=1)]
     turns = np.r_[True, (moves[1:] != moves[:-1]).any(axis=1), True] if len(moves) else [True]
     return [(int(x), int(y)) for x, y in cells[turns]]
 
@@ -357,11 +363,13 @@ class Film:
 
     def __init__(self, events: event_log.Events, scenario: Scenario, title: str = ""):
         self.playback = Playback(events, scenario)
-        self.end, curves = self.playback.end, missions.curves(scenario)
+        self.end = self.playback.end
+        curves = missions.curves(scenario)
         self.figure = Figure(figsize=(WIDTH / DPI, HEIGHT * len(curves) / DPI), dpi=DPI)
         self.figure.set_layout_engine("constrained", rect=(0, 0, 0.95, 1))  # notes at the right
         self.figure.suptitle(title, x=0.012, ha="left", fontsize=11)
-        widths, heights = (1.05, 1), [*curves.values()]
+        widths = (1.05, 1)
+        heights = [*curves.values()]
         grid = self.figure.add_gridspec(len(curves), 2, width_ratios=widths, height_ratios=heights)
         self.sea = self.figure.add_subplot(grid[:, 0])
         missions.chart(scenario, self.sea)
@@ -395,7 +403,8 @@ class Film:
 
     def moving(self, slot: int) -> Iterator[Artist]:
         """All that moves, as it is after a number of slots, from the bottom to the top."""
-        playback, fleet = self.playback, self.playback.fleet
+        playback = self.playback
+        fleet = self.playback.fleet
         cells = np.stack([fleet["x"], fleet["y"]], 2)
         for uav, colour in enumerate(playback.uav_colours):
             way = cells[max(slot - TRAIL, 0) : slot + 1, uav].T

@@ -220,7 +220,8 @@ def _forms(training: Training, finished: int) -> Arrays:
         training: The training, with its progress restored.
         finished: The number of missions that ended since the last evaluation.
     """
-    config, forms = training.config, _arrays(training)
+    config = training.config
+    forms = _arrays(training)
     for optimizer, of_optimizer in training.learner.optimizers.items():
         if training.tick - training.phase_start <= training.learner.waits(optimizer):
             continue
@@ -284,13 +285,17 @@ def _check_state(state: State, space: ScenarioSpace) -> None:
         ValueError: If a value is out of range.
     """
     missions, uavs = state.missions, state.uavs
-    constants, fleet = constants_of(space), uavs.shape[1]
+    constants = constants_of(space)
+    fleet = uavs.shape[1]
     for name in sorted(set(constants.dtype.names or ()) - {*SAMPLED, *_OF_MISSIONS}):
         if (missions[name] != constants[name]).any():
             raise ValueError(f"missions: {name} is not that of the scenario")
     is_there = np.arange(fleet) < missions["uavs"][:, None]
-    edge, slots, kinds = max(space.size) - 1, space.max_slots, types_of(space, fleet)
-    cells, actions = ("x", "y", "from_x", "from_y"), ("action", "executed")
+    edge = max(space.size) - 1
+    slots = space.max_slots
+    kinds = types_of(space, fleet)
+    cells = ("x", "y", "from_x", "from_y")
+    actions = ("action", "executed")
     truths = dict.fromkeys(("active", "latch", "charging", "grounded", "overruled"), (0, 1))
     of_uavs = {
         **dict.fromkeys(cells, (-1, edge)),
@@ -326,7 +331,8 @@ def _check_replay(arrays: Mapping[str, np.ndarray], grid: int) -> None:
     Raises:
         ValueError: If a value is out of range.
     """
-    cells, actions = arrays["uavs"][..., [column.X, column.Y]], arrays["action"]
+    cells = arrays["uavs"][..., [column.X, column.Y]]
+    actions = arrays["action"]
     for values, count in ((cells, grid), (actions, len(ACTION_NAMES))):
         if (values < 0).any() or (values >= count).any():
             raise ValueError("replay memory: a cell or an action is out of range")

@@ -443,5 +443,6 @@ def read_description(folder: Path) -> Description:
     Raises:
         InputError: If there is none, or it is damaged or of another version.
     """
-    absent, fixed = "the folder of a trained policy", {"format": FORMAT}
+    absent = "the folder of a trained policy"
+    fixed = {"format": FORMAT}
     return Description.load(folder / CONFIG, "", absent, fixed, LIMIT)

@@ -55,7 +55,9 @@ class ReplayMemory:
     """
 
     def __init__(self, capacity: int, num_envs: int, uavs: int, nodes: int):
-        self.capacity, self.num_envs, self.uavs = capacity, num_envs, uavs
+        self.capacity = capacity
+        self.num_envs = num_envs
+        self.uavs = uavs
         self.count = 0
         self._states = empty_states(capacity * num_envs, uavs, nodes)
         kinds: dict[str, type] = {"action": np.int8, "reward": np.float32}
@@ -128,8 +130,10 @@ class ReplayMemory:
             rows.append(row[keep])
             uavs.append(uav[keep])
             missing -= len(keep)
-        row, uav = np.concatenate(rows), np.concatenate(uavs)
-        later, reward = np.empty(size, np.int64), np.empty(size, np.float32)
+        row = np.concatenate(rows)
+        uav = np.concatenate(uavs)
+        later = np.empty(size, np.int64)
+        reward = np.empty(size, np.float32)
         factor = np.empty(size, np.float32)
         known = (self.arrays[name] for name in ("reward", "terminated", "truncated"))
         _returns(row, uav, n_step, discount, self.num_envs, *known, later, reward, factor)
@@ -148,7 +152,8 @@ def _returns(
     """
     size = len(rewards)
     for b in range(len(rows)):
-        row, i = rows[b], uavs[b]
+        row = rows[b]
+        i = uavs[b]
         value, weight = 0.0, 1.0
         for _ in range(n_step):
             if truncated[row, i] or weight == 0.0:
@@ -156,7 +161,9 @@ def _returns(
             value += weight * rewards[row, i]
             weight = 0.0 if terminated[row, i] else weight * discount
             row = (row + num_envs) % size
-        later[b], total[b], factor[b] = row, value, weight
+        later[b] = row
+        total[b] = value
+        factor[b] = weight
 
 
 def double_dqn_target(
@@ -260,7 +267,9 @@ class DQNTraining(training.Training):
         return DQNLearner(network, self.observation, self.config, self.device)
 
     def _begin_missions(self) -> None:
-        config, fleet, zones = self.config, self.space.uavs[1], self.space.chart.zones
+        config = self.config
+        fleet = self.space.uavs[1]
+        zones = self.space.chart.zones
         seed = MISSION_SEED + config.seed
         self.stepper = MissionStepper(self._in_phase(self.space), config.num_envs, seed)
         self.stepper.start_at(seed, self.phase_index * training.MISSIONS_PER_PHASE)
@@ -343,7 +352,9 @@ class DQNTraining(training.Training):
         The actions lead nearer to the zone; in the zone, a latched UAV hovers.
         """
         rows = states.uavs[missions, uavs]
-        x, y = rows[:, column.X] + 1, rows[:, column.Y] + 1  # the table has a border
+        # the table has a border
+        x = rows[:, column.X] + 1
+        y = rows[:, column.Y] + 1
         home = self.home[y, x]
         reserve = rows[:, column.BATTERY] - states.missions[missions, column.CHARGE_START]
         due = self.early[missions, uavs] & (rows[:, column.MUST_CHARGE] > 0) & (reserve <= home)
@@ -361,7 +372,8 @@ def _lower_batteries(missions, uavs, residual, environments, draws):
     communications fits the battery that was used, and a random share of the nodes is empty.
     """
     for n in range(len(environments)):
-        mission, data = missions[environments[n]], residual[environments[n]]
+        mission = missions[environments[n]]
+        data = residual[environments[n]]
         span = mission.charge_start - 5 + 1
         battery = min(5 + int(draws[n, 0] * span), mission.charge_start)
         slots_flown = max(mission.flying_time - battery, 0)

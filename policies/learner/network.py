@@ -105,7 +105,8 @@ class DuelingNetwork(nn.Module):
         self.precision = precision
         sizes = [inputs, *hidden]
         self.hidden = _dense(sizes)
-        self.value, self.advantage = nn.Linear(sizes[-1], 1), nn.Linear(sizes[-1], ACTIONS)
+        self.value = nn.Linear(sizes[-1], 1)
+        self.advantage = nn.Linear(sizes[-1], ACTIONS)
 
     def forward(self, vector: Tensor) -> Tensor:
         """The values (R, 5) of the actions, from vectors (R, inputs)."""
@@ -148,15 +149,18 @@ class SetNetwork(nn.Module):
         self.sets = nn.ModuleList(
             _Pool(own, of_row, width, joint) for of_row, width in zip(columns, widths, strict=True)
         )
-        self.own, self.action = nn.Linear(own, joint), nn.Linear(action, joint, bias=False)
+        self.own = nn.Linear(own, joint)
+        self.action = nn.Linear(action, joint, bias=False)
         self.state = nn.Linear(joint, joint)
         self.hidden = nn.Linear(joint, joint // 2)
-        self.value, self.advantage = nn.Linear(joint, 1), nn.Linear(joint // 2, 1)
+        self.value = nn.Linear(joint, 1)
+        self.advantage = nn.Linear(joint // 2, 1)
 
     def forward(self, own: Tensor, actions: Tensor, *sets: Tensor) -> Tensor:
         """The values (R, 5) of the actions, from the arrays of ``Sets.encode``."""
         with _hidden_precision(self, self.precision, own):
-            state, each = self.own(own), self.action(actions)
+            state = self.own(own)
+            each = self.action(actions)
             for number, pool in enumerate(self.sets):
                 of_all, of_moves = pool(own, *sets[2 * number : 2 * number + 2])
                 state += of_all
@@ -183,7 +187,8 @@ class _Pool(nn.Module):
         super().__init__()
         self.context = nn.Linear(own, width)
         self.inputs = nn.Linear(columns, width, bias=False)
-        self.layer, self.values = nn.Linear(width, width), nn.Linear(width, 2 * width)
+        self.layer = nn.Linear(width, width)
+        self.values = nn.Linear(width, 2 * width)
         self.of_all, self.nearer, self.along = (
             nn.Linear(2 * width, joint, bias=False) for _ in range(3)
         )
@@ -191,7 +196,8 @@ class _Pool(nn.Module):
     def forward(self, own: Tensor, rows: Tensor, moves: Tensor) -> tuple[Tensor, Tensor]:
         """What (R, N, columns) mean for the state (R, joint) and for the moves (R, 4, joint)."""
         pooled = highest(self.each(own, rows), moves)
-        nearer, along = self.nearer(pooled[:, :4]), self.along(pooled[:, 4:8])
+        nearer = self.nearer(pooled[:, :4])
+        along = self.along(pooled[:, 4:8])
         return self.of_all(pooled[:, 8]), nearer.add_(along)
 
     def of_state(self, own: Tensor, rows: Tensor, moves: Tensor) -> Tensor:
@@ -221,9 +227,11 @@ class _Highest(torch.autograd.Function):
     @staticmethod
     def forward(context: Any, values: Tensor, factors: Tensor) -> Tensor:
         """Compute the products; remember which rows have the highest."""
-        values, factors = values.contiguous(), factors.to(values.dtype).contiguous()
+        values = values.contiguous()
+        factors = factors.to(values.dtype).contiguous()
         shape = len(values), factors.shape[1], values.shape[2]
-        out, best = torch.zeros(shape, dtype=values.dtype), torch.full(shape, -1, dtype=torch.int16)
+        out = torch.zeros(shape, dtype=values.dtype)
+        best = torch.full(shape, -1, dtype=torch.int16)
         arrays = (tensor.detach().numpy() for tensor in (values, factors, out, best))
         _pool(*arrays)
         context.save_for_backward(factors, best)
@@ -245,7 +253,9 @@ def _pool(values, factors, out, best):
         for number in range(values.shape[1]):
             value = values[row, number]
             for move in range(factors.shape[1]):
-                factor, to, place = factors[row, move, number], out[row, move], best[row, move]
+                factor = factors[row, move, number]
+                to = out[row, move]
+                place = best[row, move]
                 if factor > 0:
                     for c in range(len(value)):
                         product = factor * value[c]

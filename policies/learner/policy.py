@@ -46,7 +46,9 @@ class LearnedPolicy:
         layout: Layout | None,
     ):
         """Make the policy of one of the networks of ``dess.policies.network``, with its weights."""
-        self.name, self.observation, self.guarded = name, observation, guarded
+        self.name = name
+        self.observation = observation
+        self.guarded = guarded
         self.layout = layout
         self._network, self._exact = (network(weights, t) for t in (np.float32, np.float64))
         self._last: tuple[World | None, bytes, Any] = None, b"", observation
@@ -94,10 +96,11 @@ class LearnedPolicy:
 
     def _encoder(self, mission: np.void, world: World) -> Any:
         """The encoder of the sea of a mission; the last one is kept for the next slot."""
-        (known, constants, encoder), needed = self._last, sea_constants(mission)
-        if known is not world or constants != needed:
+        last_world, last_constants, encoder = self._last
+        constants = sea_constants(mission)
+        if last_world is not world or last_constants != constants:
             encoder = self.observation(sea_of(mission, world))
-            self._last = world, needed, encoder
+            self._last = world, constants, encoder
         return encoder
 
     def _require_layout(self, view: View, layout: Layout) -> None:

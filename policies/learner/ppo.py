@@ -224,7 +224,8 @@ class ProximalTraining(training.Training):
             place: The place of these missions in their tick.
             number: The number of the sea.
         """
-        config, (space, encoder) = self.config, self._sea(number)
+        config = self.config
+        space, encoder = self._sea(number)
         generator = np.random.default_rng([config.seed, self.tick, place])
         if generator.random() < config.short_ranges:
             space = _with_range(space, generator.uniform(*RANGES))
@@ -233,7 +234,8 @@ class ProximalTraining(training.Training):
         first = place_in_phase * config.num_envs % training.MISSIONS_PER_PHASE
         stepper.start_at(stepper.seed, self.phase_index * training.MISSIONS_PER_PHASE + first)
         stepper.launch(stepper.indices)
-        missions, records = stepper.state.missions, np.zeros(config.num_envs, MISSION_RECORD)
+        missions = stepper.state.missions
+        records = np.zeros(config.num_envs, MISSION_RECORD)
         collected = [np.zeros(config.num_envs)]
         seen: list[CompactStates] = []
         decided: list[tuple[np.ndarray, ...]] = []
@@ -271,7 +273,8 @@ class ProximalTraining(training.Training):
             records: (N,) the missions.
         """
         slots, missions, uavs, actions, likelihoods, values = columns
-        products, fleet = WORTH * records[training.SELECT_BY], states.uavs.shape[1]
+        products = WORTH * records[training.SELECT_BY]
+        fleet = states.uavs.shape[1]
         so_far = earned[slots, missions]
         advantages = _advantages(missions, uavs, so_far, values, products, fleet)
         centred = (advantages - advantages.mean()).astype(np.float32)
@@ -310,10 +313,12 @@ def _with_range(space: ScenarioSpace, times: float) -> ScenarioSpace:
 
     The quota shrinks with the battery. If the battery is smaller already, nothing changes.
     """
-    zones, nodes = space.chart.zones, np.array(space.nodes)
+    zones = space.chart.zones
+    nodes = np.array(space.nodes)
     ways = spread(zones, space.chart.parking)[0].reshape(zones.shape)
     far = ways[nodes[:, 1], nodes[:, 0]].max()
-    least, fields = space.charge_start[0], ("flying_time", "charge_start", "charge_complete")
+    least = space.charge_start[0]
+    fields = ("flying_time", "charge_start", "charge_complete")
     share = max(times * far / np.mean(space.charge_complete), 2 * least / space.charge_complete[0])
     if share >= 1.0:
         return space
@@ -335,5 +340,7 @@ def _advantages(missions, uavs, earned, values, products, fleet):
     for r in range(len(missions) - 1, -1, -1):
         of_uav = later[missions[r], uavs[r]]
         out[r] = of_uav[2] - earned[r] + of_uav[1] - values[r] + TRACE * of_uav[0]
-        of_uav[0], of_uav[1], of_uav[2] = out[r], values[r], earned[r]
+        of_uav[0] = out[r]
+        of_uav[1] = values[r]
+        of_uav[2] = earned[r]
     return out

@@ -85,13 +85,15 @@ def sizes_of(config: TrainingConfig) -> Sizes:
 
     A checkpoint is written from a copy, so what it holds counts twice.
     """
-    spaces, has_replay = config.spaces(), config.algorithm == "dqn"
+    spaces = config.spaces()
+    has_replay = config.algorithm == "dqn"
 
     def memory(space: ScenarioSpace) -> int:
         # Missions with charging last about twice as long as it takes to fill the quota.
         needed = ceil(space.quota / space.communication_slots) or space.max_slots
         flown = min(2 * needed, space.max_slots)
-        slots, missions = config.replay if has_replay else flown, config.num_envs
+        slots = config.replay if has_replay else flown
+        missions = config.num_envs
         missions *= config.seas_per_tick
         return ReplayMemory.bytes_for(slots, missions, space.uavs[1], len(space.nodes))
 
@@ -155,7 +157,8 @@ def train(
             folder has no training, or one of another config; if another process trains into the
             folder; if the folder cannot be written; if the machine's memory is too small.
     """
-    path, place = out / CHECKPOINT, device_of(device)
+    path = out / CHECKPOINT
+    place = device_of(device)
     _check_folder(out, resume)
     sizes = sizes_of(config)
     if not accept_size:
@@ -206,9 +209,13 @@ def _threads(training: Training) -> Iterator[None]:
 def _run(training: Training, out: Path, progress: Callable[[Training, int], None] | None) -> None:
     """Train until the end or a signal; save a checkpoint now and then, and every better policy."""
     with _tensorboard(out / EVENTS, training) as show, _stop_signal() as stopped:
-        saved, took = time.monotonic(), [0.0, 0.0]  # the last ticks without and with an evaluation
+        # the last ticks without and with an evaluation
+        saved = time.monotonic()
+        took = [0.0, 0.0]
         while not training.done and not stopped():
-            rows, evaluates, began = len(training.curve), _evaluates(training), time.monotonic()
+            rows = len(training.curve)
+            evaluates = _evaluates(training)
+            began = time.monotonic()
             training.run(1)
             now = time.monotonic()
             took[evaluates] = now - began

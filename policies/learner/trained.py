@@ -272,7 +272,8 @@ def weights_of(folder: Path) -> Arrays:
 
 def _read(folder: Path) -> tuple[bytes, Description]:
     """The content of the file of weights, and its description."""
-    path, description = folder / MODEL, read_description(folder)
+    path = folder / MODEL
+    description = read_description(folder)
     content = read_bytes(path, MODEL_LIMIT, "the folder of a trained policy")
     sums = description.model_sha256
     if sums is not None and _sha256(content) not in sums:
@@ -288,7 +289,8 @@ def _read(folder: Path) -> tuple[bytes, Description]:
 @lru_cache(maxsize=4)
 def _policy(folder: Path, content: bytes, text: str) -> LearnedPolicy:
     """The policy of these weights and their description; every process loads one many times."""
-    path, where = folder / MODEL, folder / CONFIG
+    path = folder / MODEL
+    where = folder / CONFIG
     description = Description.model_validate_json(text)
     config = description.training
     values = description.layout and description.layout.model_dump()

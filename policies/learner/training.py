@@ -46,10 +46,12 @@ class Learner:
     """
 
     def __init__(self, config: TrainingConfig, device: torch.device, **networks: nn.Module | None):
-        self.config, self.device = config, device
+        self.config = config
+        self.device = device
         made = {name: each for name, each in networks.items() if each is not None}
         self.networks = {name: each.to(device) for name, each in made.items()}
-        self.online, self.average = self.networks["online"], self.networks.get("average")
+        self.online = self.networks["online"]
+        self.average = self.networks.get("average")
         self.restart()
 
     def restart(self) -> None:
@@ -92,7 +94,8 @@ class Training:
     learner: Learner
 
     def __init__(self, config: TrainingConfig, device: torch.device):
-        self.config, self.device = config, device
+        self.config = config
+        self.device = device
         self.generator = np.random.default_rng(config.seed)
         torch.manual_seed(config.seed)
         self.spaces = config.spaces()
@@ -182,7 +185,8 @@ class Training:
 
     def enter_phase(self, index: int) -> None:
         """Begin a phase with new missions and new optimizers."""
-        self.phase_index, self.phase_start = index, self.tick
+        self.phase_index = index
+        self.phase_start = self.tick
         self._begin_missions()
         self.learner.restart()
         self.scores: list[float] = []
@@ -201,7 +205,8 @@ class Training:
         average = float(np.mean(self.scores))
         is_best = not settled or self.best_score is None or average > self.best_score
         if is_best:
-            self.best, self.best_score = _weights(self.learner.evaluated), average
+            self.best = _weights(self.learner.evaluated)
+            self.best_score = average
         self.curve.append(self._row(records, average, is_best))
         self.finished, self.losses = [], []
 

@@ -80,7 +80,8 @@ class _Watched:
     """A planner whose plans for a mission are kept."""
 
     def __init__(self, planner: Planner):
-        self.planner, self.name = planner, planner.name
+        self.planner = planner
+        self.name = planner.name
         self.plans: dict[int, list[Course]] = {}
 
     def act(self, view: View) -> np.ndarray:
@@ -91,13 +92,17 @@ class _Watched:
 
 def _courses(view: View, planner: Planner) -> list[Course]:
     """The courses of a planner's present plan for the mission of a view."""
-    state, rates = view.state, rates_of(view)
-    mission, uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
+    state = view.state
+    rates = rates_of(view)
+    mission = state.missions[0]
+    uavs = state.uavs[0]
+    residual = state.residual[0]
     memory = memory_of(state, planner.budget)
     plan = Plan(memory.waypoints[0].copy(), memory.lengths[0].copy())
     flight = empty_flight(MOST_SLOTS, len(uavs), len(residual))
     begin(mission, uavs, residual, flight)
-    crafts, slots = [flight.team[0].copy()], min(mission["max_slots"] - mission["slot"], MOST_SLOTS)
+    crafts = [flight.team[0].copy()]
+    slots = min(mission["max_slots"] - mission["slot"], MOST_SLOTS)
     for slot in range(1, int(slots) + 1):
         fly(mission, rates, plan, flight, 0, flight, slot, np.inf)
         if flight.last[1] < slot:

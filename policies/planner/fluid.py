@@ -41,7 +41,8 @@ WAYPOINT = np.dtype(
         ("begun", np.int64),  # slot in which that leg begins, ``NEVER`` if it does not
     ]
 )
-CHARGE, NEVER = -1, 1 << 40
+CHARGE = -1
+NEVER = 1 << 40
 # The most waypoints of a UAV. One record more tells when the last one is done with.
 MOST_WAYPOINTS = 48
 
@@ -103,7 +104,10 @@ def remove(plan, i, place):
 @inlined
 def set_waypoint(w, x, y, stay, turned):
     """Set all of a waypoint but when its leg begins, which belongs to its place in the plan."""
-    w.x, w.y, w.stay, w.turned = x, y, stay, turned
+    w.x = x
+    w.y = y
+    w.stay = stay
+    w.turned = turned
 
 
 # The data of a flight are records: the compiled code passes them on without counting references,
@@ -177,16 +181,23 @@ def empty_flight(slots: int, uavs: int, nodes: int) -> Flight:
 def begin(mission, uavs, residual, flight):
     """Make the present state the first snapshot of a flight."""
     for i in range(mission.uavs):
-        u, v = uavs[i], flight.team[0, i]
+        u = uavs[i]
+        v = flight.team[0, i]
         v.x, v.y, v.battery, v.counted = u.x, u.y, u.battery, u.communications
-        v.charging, v.latch, v.active = u.charging, u.latch, u.active and not u.grounded
-        v.next, v.stayed, v.slots_left, v.action = 0, 0, u.slots_left, u.executed
+        v.charging = u.charging
+        v.latch = u.latch
+        v.active = u.active and not u.grounded
+        v.next = 0
+        v.stayed = 0
+        v.slots_left = u.slots_left
+        v.action = u.executed
         v.quota, v.slots_per_cell, v.rate = u.quota, u.slots_per_cell, u.rate
         v.charge_slots = u.charge_slots
     wait = _revival(mission)
     for k in range(mission.nodes):
         node = flight.sea[0, k]
-        node.base, node.since = residual[k], 0 if residual[k] > 0.0 else wait
+        node.base = residual[k]
+        node.since = 0 if residual[k] > 0.0 else wait
     flight.sums[0, 0] = flight.sums[0, 1] = 0.0
 
 
@@ -233,16 +244,21 @@ def fly(mission, rates, plan, source, first, flight, slots, lag):
         [data units]. Data that arrive because the mission lasts longer lower it. It is minus
         infinity if the flight was given up.
     """
-    waypoints, team, sea = plan.waypoints, flight.team[-1], flight.sea[-1]
+    waypoints = plan.waypoints
+    team = flight.team[-1]
+    sea = flight.sea[-1]
     copy_snapshot(mission, source, first, flight, -1)
     collected, penalty = source.sums[first, 0], source.sums[first, 1]
     active = 0
     for i in range(mission.uavs):
         _take(plan, i, team[i], first)
         active += team[i].active
-    total, rate = mission.initial + mission.arrived, mission.arrival_rate
-    present, arriving = total - mission.collected - mission.lost, rate * mission.nodes
-    wait, t = _revival(mission), first * STRIDE
+    total = mission.initial + mission.arrived
+    rate = mission.arrival_rate
+    present = total - mission.collected - mission.lost
+    arriving = rate * mission.nodes
+    wait = _revival(mission)
+    t = first * STRIDE
     while t < slots:
         if t % STRIDE == 0:
             s = t // STRIDE
@@ -251,7 +267,8 @@ def fly(mission, rates, plan, source, first, flight, slots, lag):
                 if behind > lag:
                     return -math.inf
             copy_snapshot(mission, flight, -1, flight, s)
-            flight.sums[s, 0], flight.sums[s, 1] = collected, penalty
+            flight.sums[s, 0] = collected
+            flight.sums[s, 1] = penalty
         if active == 0:
             break
         data_left = present + arriving * t - collected
@@ -289,7 +306,8 @@ def fly(mission, rates, plan, source, first, flight, slots, lag):
         penalty += _not_landed(mission, rates.chart, team)
     s = (t + STRIDE - 1) // STRIDE
     copy_snapshot(mission, flight, -1, flight, s)
-    flight.last[0], flight.last[1] = s, t
+    flight.last[0] = s
+    flight.last[1] = t
     share = (mission.collected + collected) / max(total + arriving * t, 1e-9)
     return share * total - penalty
 
@@ -297,7 +315,8 @@ def fly(mission, rates, plan, source, first, flight, slots, lag):
 @inlined
 def _take(plan, i, v, first):
     """Let a UAV follow a plan from a snapshot on."""
-    v.waypoints, v.last_charge = plan.lengths[i], last_charge(plan, i)
+    v.waypoints = plan.lengths[i]
+    v.last_charge = last_charge(plan, i)
     for number in range(v.waypoints + 1):
         w = plan.waypoints[i, number]
         if number > v.next:
@@ -322,7 +341,10 @@ def _act(mission, rates, waypoints, team, i, t, active):
     if v.slots_left > 0:
         v.slots_left -= 1
         return 0.0
-    v.action, flies_on, penalty, turned = HOVER, False, 0.0, 0
+    v.action = HOVER
+    flies_on = False
+    penalty = 0.0
+    turned = 0
     x, y = v.x, v.y
     while v.next < v.waypoints:
         w = waypoints[i, v.next]
@@ -362,9 +384,13 @@ def _act(mission, rates, waypoints, team, i, t, active):
 @inlined
 def _collect(mission, rates, sea, v, t, wait, data_left):
     """Let a UAV serve one node after another for a slot, and return what it collects."""
-    candidates, (rows, columns) = rates.candidates, rates.chart.zones.shape
+    candidates = rates.candidates
+    rows, columns = rates.chart.zones.shape
     row = ((leg(v) * 5 + v.action) * rows + v.y) * columns + v.x
-    rate, left, collected, rank = mission.arrival_rate, mission.communication_slots, 0.0, 0
+    rate = mission.arrival_rate
+    left = mission.communication_slots
+    collected = 0.0
+    rank = 0
     v.counted += left
     while left > 0 and rank < candidates.shape[1]:
         c = candidates[row, rank]
@@ -374,7 +400,8 @@ def _collect(mission, rates, sea, v, t, wait, data_left):
             break
         if t < node.since:
             continue
-        held, amount = node.base + rate * t, c.rate * v.rate
+        held = node.base + rate * t
+        amount = c.rate * v.rate
         if left * amount < held:
             node.base -= left * amount
             collected += left * amount
@@ -382,7 +409,8 @@ def _collect(mission, rates, sea, v, t, wait, data_left):
         # the communication slot in which a node is emptied has no time for another one
         left -= int(math.ceil(held / amount))
         collected += held
-        node.base, node.since = -rate * t, t + wait
+        node.base = -rate * t
+        node.since = t + wait
     is_empty = rate * mission.nodes < _SOME_ARRIVE and data_left - collected < _NOTHING
     if is_empty or (has_range(mission) and left > 0):
         v.counted -= left
@@ -392,7 +420,9 @@ def _collect(mission, rates, sea, v, t, wait, data_left):
 @inlined
 def _unplanned(mission, v, active, data_left):
     """The penalty if the guard would send a UAV home for a charge that is not in its plan."""
-    m, lacking, spare = mission.communication_slots, v.quota - v.counted, v.battery
+    m = mission.communication_slots
+    lacking = v.quota - v.counted
+    spare = v.battery
     if data_left * m < 0.2 * lacking * active:
         spare -= SCARCE_SLOTS * mission.flight_cost
     return _UNPLANNED if spare * m < lacking * mission.flight_cost else 0.0
@@ -418,7 +448,8 @@ def _towards(chart, v, x, y, turned):
 @inlined
 def _is_nearer(chart, v, x, y, action):
     """Whether an action leads to an open cell that is nearer to a cell."""
-    after_x, after_y = v.x + STEP_X[action], v.y + STEP_Y[action]
+    after_x = v.x + STEP_X[action]
+    after_y = v.y + STEP_Y[action]
     before = distance(chart, v.x, v.y, x, y)
     return is_open(chart, after_x, after_y) and distance(chart, after_x, after_y, x, y) < before
 
@@ -426,7 +457,8 @@ def _is_nearer(chart, v, x, y, action):
 @inlined
 def _blocks(chart, v, other, has_moved):
     """Whether a teammate, which will move away unless it charges, is where an action leads."""
-    x, y = v.x + STEP_X[v.action], v.y + STEP_Y[v.action]
+    x = v.x + STEP_X[v.action]
+    y = v.y + STEP_Y[v.action]
     if other.x != x or other.y != y or other.active == 0:
         return False
     return has_moved or other.charging != 0 or (other.latch != 0 and in_zone(chart, x, y))
@@ -435,7 +467,8 @@ def _blocks(chart, v, other, has_moved):
 @inlined
 def _has_pad(mission, chart, team, v):
     """Whether the zone in which a UAV is has a free pad."""
-    zone, taken = chart.zones[v.y, v.x], 0
+    zone = chart.zones[v.y, v.x]
+    taken = 0
     for i in range(mission.uavs):
         taken += team[i].charging != 0 and chart.zones[team[i].y, team[i].x] == zone
     return taken < working_pads(mission, zone)
@@ -452,7 +485,9 @@ def _charge(mission, v):
 def _begin_to_charge(mission, v, active):
     """Let a UAV charge, and return the penalty if its battery is below the guard's reserve."""
     before = v.battery + mission.flight_cost
-    v.charging, v.charge_slots, v.battery = 1, 0, before
+    v.charging = 1
+    v.charge_slots = 0
+    v.battery = before
     _charge(mission, v)
     return _LATE * max(1 + _reserve(mission, v, active) - before, 0)
 
@@ -509,17 +544,21 @@ def _reserve(mission, v, active):
 @inlined
 def _free_cell(mission, chart, team, i):
     """The nearest zone cell that no teammate is on; its own cell if there is none."""
-    v, least = team[i], NEVER
+    v = team[i]
+    least = NEVER
     best_x, best_y = v.x, v.y
     for cell in range(len(chart.parking)):
-        x, y = np.int64(chart.parking[cell, 0]), np.int64(chart.parking[cell, 1])
+        x = np.int64(chart.parking[cell, 0])
+        y = np.int64(chart.parking[cell, 1])
         way = distance(chart, v.x, v.y, x, y)
         is_taken = way >= least
         for j in range(mission.uavs):
             o = team[j]
             is_taken = is_taken or (j != i and o.active != 0 and o.x == x and o.y == y)
         if not is_taken:
-            best_x, best_y, least = x, y, way
+            best_x = x
+            best_y = y
+            least = way
     return best_x, best_y
 
 

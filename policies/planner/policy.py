@@ -92,12 +92,15 @@ class Planner:
         """Choose the (R,) actions for the rows of the view."""
         state = view.state
         slots = int(state.missions["max_slots"].max())
-        rates, safe = rates_of(view), guard(view)
+        rates = rates_of(view)
+        safe = guard(view)
         memory = memory_of(state, self.budget)
-        fleet, m = state.uavs.shape[1], int(state.missions["communication_slots"][0])
+        fleet = state.uavs.shape[1]
+        m = int(state.missions["communication_slots"][0])
         edits = max(_WORK // (min(slots, fluid.MOST_SLOTS) * fleet * (fleet + m)), 1)
         workspace = empty_workspace(slots, fleet, state.residual.shape[1])
-        actions, decided = np.empty(len(view), np.int64), 0
+        actions = np.empty(len(view), np.int64)
+        decided = 0
         while decided < len(view):
             decided = _decide(
                 state.missions, state.uavs, state.residual, view.world.nodes, rates,
@@ -123,7 +126,8 @@ class LongPlanner(Planner):
 
 def memory_of(state: State, budget: Budget) -> Memory:
     """The plans of the missions in a state by a planner with this budget."""
-    missions, shape = state.missions, state.uavs.shape
+    missions = state.missions
+    shape = state.uavs.shape
     key = (id(missions), budget)
     if key not in _MEMORIES:
         memory = Memory(
@@ -148,8 +152,11 @@ def _decide(
     for row in range(decided, len(rows_mission)):
         if most <= 0:
             return row
-        b, i = rows_mission[row], rows_uav[row]
-        mission, team, made = missions[b], uavs[b], memory.made[b]
+        b = rows_mission[row]
+        i = rows_uav[row]
+        mission = missions[b]
+        team = uavs[b]
+        made = memory.made[b]
         plan = fluid.Plan(memory.waypoints[b], memory.lengths[b])
         slot = np.uint64(mission.slot + 1)
         is_same = made[0] == mission.seed and made[1] == np.uint64(mission.replication)
@@ -181,14 +188,18 @@ def _decide(
                 memory.sea[b, k] = ahead.sea[ahead.last[0], k].base
             for j in range(mission.uavs):
                 memory.first[b, j] = ahead.team[ahead.last[0], j]
-            made[0], made[1], made[2] = mission.seed, np.uint64(mission.replication), slot
+            made[0] = mission.seed
+            made[1] = np.uint64(mission.replication)
+            made[2] = slot
         action = memory.first[b, i].action
         if _must_charge_here(
             mission, team[i], residual[b].sum(), plan.waypoints[i], plan.lengths[i]
         ):
             action = HOVER
         if not safe[row, action]:
-            x, y, number = team[i].x, team[i].y, memory.first[b, i].next
+            x = team[i].x
+            y = team[i].y
+            number = memory.first[b, i].next
             if number < plan.lengths[i]:
                 x, y = plan.waypoints[i, number].x, plan.waypoints[i, number].y
             moves = 0
@@ -203,12 +214,14 @@ def _decide(
 @kernel
 def _departs(mission, uavs, residual, memory, b, slots):
     """Whether a mission is no longer what its plan, made that many slots ago, was made for."""
-    departs, arrived = False, mission.arrival_rate * slots
+    departs = False
+    arrived = mission.arrival_rate * slots
     for k in range(mission.nodes):
         memory.surplus[b, k] += residual[k] - memory.sea[b, k] - arrived
         departs = departs or abs(memory.surplus[b, k]) > _TOLERANCE
     for i in range(mission.uavs):
-        u, v = uavs[i], memory.first[b, i]
+        u = uavs[i]
+        v = memory.first[b, i]
         is_at_work = u.active and not u.grounded
         is_elsewhere = u.x != v.x or u.y != v.y or u.charging != v.charging
         departs = departs or is_at_work != v.active or (is_at_work and is_elsewhere)
@@ -246,7 +259,8 @@ def _take_up(mission, uavs, plan, planned):
     If UAVs have begun to charge, or have been charged since, their plans follow.
     """
     for i in range(mission.uavs):
-        u, v = uavs[i], planned[i]
+        u = uavs[i]
+        v = planned[i]
         if not u.active:
             plan.lengths[i] = 0
             continue

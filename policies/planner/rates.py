@@ -47,7 +47,9 @@ class Rates(NamedTuple):
 
 def rates_of(view: View) -> Rates:
     """The tables of the sea that a view is about."""
-    mission, snr, chart = view.state.missions[0], view.world.mean_snr, view.world.chart
+    mission = view.state.missions[0]
+    snr = view.world.mean_snr
+    chart = view.world.chart
     rows, columns = chart.zones.shape
     candidates = _candidates(
         view.world.nodes.tobytes(),
@@ -71,10 +73,13 @@ def _candidates(
     nodes: bytes, mean_snr: bytes, size: tuple[int, int], m: int, slowest: int, length: float,
     deviation: float, most: float,
 ) -> np.ndarray:  # fmt: skip
-    cells, snr = np.frombuffer(nodes, np.int64).reshape(-1, 2), np.frombuffer(mean_snr)
-    (columns, rows), longest = size, max(size)
+    cells = np.frombuffer(nodes, np.int64).reshape(-1, 2)
+    snr = np.frombuffer(mean_snr)
+    columns, rows = size
+    longest = max(size)
     rates = _mean_rate(snr.reshape(longest, -1), length, deviation, most)
-    kept, legs = min(_RANKS, len(cells)), slowest * (slowest + 1) // 2
+    kept = min(_RANKS, len(cells))
+    legs = slowest * (slowest + 1) // 2
     check_memory(
         f"planner: a grid of {columns:,} x {rows:,} cells",
         5 * legs * columns * rows * kept * CANDIDATE.itemsize,
@@ -90,7 +95,8 @@ def _candidates(
             mean = _of_steps(rates, parts, cells, action, y, ahead, columns)
             best = np.argsort(-mean, axis=1, kind="stable")[:, :kept]
             row = table[s * (s - 1) // 2 + stage, action, y]
-            row["node"], row["rate"] = best, np.take_along_axis(mean, best, 1)
+            row["node"] = best
+            row["rate"] = np.take_along_axis(mean, best, 1)
     return table.reshape(-1, kept)
 
 
@@ -100,9 +106,13 @@ def _of_steps(
 ) -> np.ndarray:  # fmt: skip
     """The (W, K) mean rates of the nodes during an action that leads to the cells of a row."""
     dx, dy = np.broadcast_arrays(np.arange(columns)[:, None] - cells[:, 0], y - cells[:, 1])
-    step, along, across = STEP_X[action], dx, dy
+    step = STEP_X[action]
+    along = dx
+    across = dy
     if STEP_Y[action] != 0:
-        step, along, across = STEP_Y[action], dy, dx
+        step = STEP_Y[action]
+        along = dy
+        across = dx
     fine = np.abs(parts * along[..., None] - step * ahead)
     farthest = rates.shape[1] - 1  # beyond it are moves that begin off the grid
     return rates[np.abs(across)[..., None], np.minimum(fine, farthest)].mean(-1)

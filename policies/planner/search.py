@@ -88,7 +88,8 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         search has ended.
     """
     present, trial, flight, ahead, course = workspace
-    slots, first = fluid.planned_slots(mission), int(course[TRIED])
+    slots = fluid.planned_slots(mission)
+    first = int(course[TRIED])
     if first == 0:
         fluid.begin(mission, uavs, residual, flight)
         course[VALUE] = course[BEST] = fluid.fly(
@@ -100,7 +101,8 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
     value, best, heat = course[VALUE], course[BEST], course[HEAT]
     lag = _LAG if mission.uavs > 1 else math.inf
     words = np.empty(4, np.uint64)
-    cooling, last = (_COLDEST / hottest) ** (1.0 / max(steps, 1)), min(first + most, steps)
+    cooling = (_COLDEST / hottest) ** (1.0 / max(steps, 1))
+    last = min(first + most, steps)
     for step in range(first, last):
         heat *= cooling
         words[0], words[1], words[2], words[3] = streams.block(
@@ -116,7 +118,8 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
             continue
         luck = streams.uniform(words[0] >> _HIGH << _HIGH | words[3] & _LOW)
         least = heat * math.log(luck)
-        snapshot, behind = slot // fluid.STRIDE, lag - least
+        snapshot = slot // fluid.STRIDE
+        behind = lag - least
         new = fluid.fly(mission, rates, trial, flight, snapshot, ahead, slots, behind)
         if new >= value or new - value > least:
             value = new
@@ -131,7 +134,9 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         else:
             fluid.copy_plan(mission, present, trial)
     course[TRIED] = last if last < steps else 0
-    course[VALUE], course[BEST], course[HEAT] = value, best, heat
+    course[VALUE] = value
+    course[BEST] = best
+    course[HEAT] = heat
     return last - first
 
 
@@ -140,7 +145,8 @@ def _first_unplanned(mission, present, trial):
     """The first slot after the last charge of a UAV in one plan, if it is another in the other."""
     slot = fluid.NEVER
     for i in range(mission.uavs):
-        one, other = fluid.last_charge(present, i), fluid.last_charge(trial, i)
+        one = fluid.last_charge(present, i)
+        other = fluid.last_charge(trial, i)
         if one != other:
             slot = min(slot, present.waypoints[i, min(one, other) + 1].begun)
     return slot
@@ -170,7 +176,8 @@ def _pick_low(word, count):
 @kernel
 def _edit(mission, uavs, nodes, chart, flight, plan, words):
     """Edit a plan at random; return the first slot that this may change, or ``_NO_EDIT``."""
-    kind, i = _KINDS[_pick(words[0], len(_KINDS))], _pick(words[1], mission.uavs)
+    kind = _KINDS[_pick(words[0], len(_KINDS))]
+    i = _pick(words[1], mission.uavs)
     if not uavs[i].active:
         return _NO_EDIT
     length = plan.lengths[i]
@@ -193,20 +200,24 @@ def _edit(mission, uavs, nodes, chart, flight, plan, words):
         w.stay += 1 if w.stay == 0 or _pick(words[2], 2) == 0 else -1
     elif kind == _NUDGE:
         action = _pick(words[2], 4)
-        x, y = w.x + STEP_X[action], w.y + STEP_Y[action]
+        x = w.x + STEP_X[action]
+        y = w.y + STEP_Y[action]
         if not is_open(chart, x, y) or (w.stay == fluid.CHARGE and not in_zone(chart, x, y)):
             return _NO_EDIT
-        w.x, w.y = x, y
+        w.x = x
+        w.y = y
     elif kind == _REPLACE:
         if w.stay == fluid.CHARGE:
             return _NO_EDIT
-        k, other = _pick(words[2], mission.nodes), _pick_low(words[2], mission.nodes)
+        k = _pick(words[2], mission.nodes)
+        other = _pick_low(words[2], mission.nodes)
         w.x, w.y = _nearer(w, nodes[k], nodes[other])
     elif kind == _REVERSE:
         q = min(p + 1 + _pick(words[2], 5), length - 1)
         while p < q:
             _swap(plan.waypoints[i, p], plan.waypoints[i, q])
-            p, q = p + 1, q - 1
+            p += 1
+            q -= 1
     else:
         j = _pick(words[2], mission.uavs)
         if not uavs[j].active:
@@ -233,7 +244,8 @@ def _move(chart, flight, plan, i, p, j, words):
     count = min(1 + _pick_low(words[3], _MOST_MOVED), plan.lengths[i] - p)
     if plan.lengths[j] + count > fluid.MOST_WAYPOINTS:
         return _NO_EDIT
-    moved, has_charge = np.empty((_MOST_MOVED, 4), np.int64), False
+    moved = np.empty((_MOST_MOVED, 4), np.int64)
+    has_charge = False
     slot = plan.waypoints[i, p].begun
     for number in range(count):
         w = plan.waypoints[i, p + number]
@@ -274,8 +286,10 @@ def _swap_with(plan, i, p, j, q):
 def _cross(plan, i, p, j, q):
     """Swap all waypoints of UAV ``i`` from ``p`` on with those of UAV ``j`` from ``q`` on."""
     slot = min(plan.waypoints[i, p].begun, plan.waypoints[j, q].begun)
-    own, other = plan.lengths[i] - p, plan.lengths[j] - q
-    count, charges = max(own, other), 0
+    own = plan.lengths[i] - p
+    other = plan.lengths[j] - q
+    count = max(own, other)
+    charges = 0
     if j == i or max(p, q) + count > fluid.MOST_WAYPOINTS:
         return _NO_EDIT
     for number in range(own):
@@ -286,7 +300,8 @@ def _cross(plan, i, p, j, q):
         return _NO_EDIT
     for number in range(count):
         _swap(plan.waypoints[i, p + number], plan.waypoints[j, q + number])
-    plan.lengths[i], plan.lengths[j] = p + other, q + own
+    plan.lengths[i] = p + other
+    plan.lengths[j] = q + own
     return slot
 
 
@@ -295,7 +310,8 @@ def _insert_node(mission, nodes, chart, flight, plan, i, p, words):
     """Insert a node into the plan of UAV ``i``: of two random ones, that which keeps more data."""
     if plan.lengths[i] == fluid.MOST_WAYPOINTS:
         return _NO_EDIT
-    k, other = _pick(words[2], mission.nodes), _pick_low(words[2], mission.nodes)
+    k = _pick(words[2], mission.nodes)
+    other = _pick_low(words[2], mission.nodes)
     end = flight.last[0]
     if flight.sea[end, other].base > flight.sea[end, k].base:
         k = other
@@ -315,7 +331,8 @@ def _edit_charge(mission, chart, plan, i, p, words):
     w = plan.waypoints[i, p]
     slot = w.begun
     if p < plan.lengths[i] and w.stay == fluid.CHARGE:
-        w.x, w.y = x, y
+        w.x = x
+        w.y = y
     elif plan.lengths[i] == fluid.MOST_WAYPOINTS or mission.flight_cost == 0:
         slot = _NO_EDIT
     else:
@@ -326,7 +343,8 @@ def _edit_charge(mission, chart, plan, i, p, words):
 @kernel
 def _shortest_detour(chart, flight, plan, i, x, y):
     """Where in the plan of UAV ``i`` a cell is the shortest detour."""
-    least, place = fluid.NEVER, 0
+    least = fluid.NEVER
+    place = 0
     from_x, from_y = flight.team[0, i].x, flight.team[0, i].y
     for p in range(plan.lengths[i] + 1):
         detour = distance(chart, from_x, from_y, x, y)
@@ -335,7 +353,8 @@ def _shortest_detour(chart, flight, plan, i, x, y):
             detour += distance(chart, w.x, w.y, x, y) - distance(chart, w.x, w.y, from_x, from_y)
             from_x, from_y = w.x, w.y
         if detour < least:
-            least, place = detour, p
+            least = detour
+            place = p
     return place
 
 

@@ -102,7 +102,8 @@ def sweep(
         raise InputError(f"--metric: {shown(metric)} is not measured{allowed}")
     page = f"{PREFIX}{question.study.name}"
     found = _run(question, page, out, workers, dry_run, yes)
-    answer, parameters = Sweep(question, found), {"metric": ranking} if metric else {}
+    answer = Sweep(question, found)
+    parameters = {"metric": ranking} if metric else {}
     changes = around.around(found, question.study.scenario) if question.study.selection else None
     if changes:
         _run(changes, page, out, workers, dry_run, yes)
@@ -161,10 +162,8 @@ def what_if(
     from dess.analysis.ask.question import what_if_question
     from dess.analysis.ask.what_if import VARIATION, WhatIf, best_policy, check_shown
 
-    changes, fixed = (
-        options.all_settings(settings, options.SET),
-        options.all_settings(baseline or [], "--baseline"),
-    )
+    changes = options.all_settings(settings, options.SET)
+    fixed = options.all_settings(baseline or [], "--baseline")
     question = what_if_question(changes, fixed, scenario, policy, missions, seed, results)
     check_shown(question, shown)
     found = _run(question, WHAT_IF, out, workers, dry_run, yes)

@@ -121,13 +121,15 @@ def answers(
     """
     for name, answer in given.items():
         check(name, answer)
-    found, asked = dict(given), [name for name in questions if name not in given]
+    found = dict(given)
+    asked = [name for name in questions if name not in given]
     missing = [name for name in asked if questions[name][1] is None]
     if missing and not sys.stdin.isatty():
         allowed = f"--set {missing[0]}=..., or a terminal, where it is asked"
         raise InputError(f"{', '.join(missing)}: missing; allowed: {allowed}")
     while asked:
-        name, (meaning, default) = asked[0], questions[asked[0]]
+        name = asked[0]
+        meaning, default = questions[asked[0]]
         answer = input(f"{name}: {meaning}? ").strip() if sys.stdin.isatty() else ""
         try:
             check(name, answer or default or "")
@@ -154,7 +156,8 @@ def outputs(paths: Sequence[Path]) -> Iterator[list[Path]]:
             yield temporaries
             return
         with TemporaryDirectory() as folder:
-            buffer, rest = Path(folder, "stdout"), iter(temporaries)
+            buffer = Path(folder, "stdout")
+            rest = iter(temporaries)
             yield [buffer if is_stdout(path) else next(rest) for path in paths]
             sys.stdout.buffer.write(read_bytes(buffer, LARGEST))
             sys.stdout.flush()

@@ -47,7 +47,8 @@ def evaluate(
     from dess.model.record import measures_of
     from dess.policies.registry import typed
 
-    space, policy = options.load_space(scenario, settings), typed(policy)
+    space = options.load_space(scenario, settings)
+    policy = typed(policy)
     engine = engine_of([space], engine)
     if out:
         study: dict[str, Any] = {"scenario": scenario, "policies": policy, "missions": missions}

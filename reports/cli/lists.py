@@ -94,7 +94,8 @@ def show_scenario(
         with console.outputs([figure]) as [temporary]:
             sea = draft_scenario(name, **dict(map(options.setting, settings or [])))
             save_figure(sea_figure(sea), temporary, figure.suffix[1:])
-    space, description = load_space(name, settings), scenario_description(name)
+    space = load_space(name, settings)
+    description = scenario_description(name)
     if as_json:
         rows = [field._asdict() for field in fields(space)]
         shown = {"scenario": name, "description": description, "fields": rows}

@@ -68,7 +68,8 @@ if TYPE_CHECKING:
     from dess import ScenarioSpace
 
 SET = "--set"
-RESULTS, PAGES = Path("results"), Path("build/reports")
+RESULTS = Path("results")
+PAGES = Path("build/reports")
 FIELD = "a field of the scenario and a value in TOML syntax, e.g. uavs=2 or initial_data=[5, 20]"
 PARAMETER = (
     "a parameter of the notebooks and a value in TOML syntax, e.g. missions=500, "
@@ -220,7 +221,8 @@ def _check_word(name: str, word: str, option: str = SET) -> None:
     from dess.base.errors import choices_of, form_of, kind_of
 
     field = _field(name, option)
-    words, kind = choices_of(field), kind_of(field)
+    words = choices_of(field)
+    kind = kind_of(field)
     if word in words or kind == "text in quotes":
         return
     if words:
@@ -292,7 +294,8 @@ def _range(field: str, text: str, low: str, high: str, count: str | None) -> Any
     """The values of ``low..high`` or ``low..high:count``."""
     from dess.analysis.study.design import INTEGERS
 
-    first, last = _number(text, low), _number(text, high)
+    first = _number(text, low)
+    last = _number(text, high)
     if first > last:
         number = "" if count is None else f":{count}"
         turned = f"{field}={high.strip()}..{low.strip()}{number}"

@@ -117,7 +117,8 @@ def simulate(
     options.note_departures([asked.policy], [asked.space])
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
-        others, told = _metrics(mission).items(), _told(record.measured, mission)
+        others = _metrics(mission).items()
+        told = _told(record.measured, mission)
         metrics |= {k: value for k, value in others if k not in (*asked.names, *metrics, "uavs")}
         measured = {"operations": told} if record.operations is not None else {}
         print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
@@ -161,7 +162,8 @@ def _of_study(
     from dess.policies.registry import TypedByUser, load_team
 
     manifest = Manifest.read(folder / MANIFEST)
-    policies, named = [team.policy for team in manifest.policies], [policy] if policy else []
+    policies = [team.policy for team in manifest.policies]
+    named = [policy] if policy else []
     typed = TypedByUser(policy) if policy else None
     policy = _chosen("policy", typed, policies, ", ".join(policies))
     points = range(len(manifest.points))

@@ -261,7 +261,8 @@ def _document(
 
 def _with_values(results: "Results", means: "pd.DataFrame") -> "pd.DataFrame":
     """Means with a column per field that the design sets; a list of values is JSON."""
-    table, values = means.copy(), results.store.manifest.values
+    table = means.copy()
+    values = results.store.manifest.values
     for place, field in enumerate(values[0], 2):
         column = [of_point[field] for of_point in values]
         texts = [json.dumps(v) if isinstance(v, list | bool) else v for v in column]
@@ -336,7 +337,8 @@ def export(
     from dess.reports.pages.render import render_study
 
     console.check_ending("--crate", crate, (".zip",), "a zip file", is_stream=True)
-    results, licence = _results(folder), licence_of(licence)
+    results = _results(folder)
+    licence = licence_of(licence)
     if page:
         check_page(page, results)
     with console.outputs([crate]) as (temporary,), TemporaryDirectory() as pages:

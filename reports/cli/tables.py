@@ -36,7 +36,8 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
             for text in cheapest.sentences(results):
                 console.say(f" {text.translate(str.maketrans('', '', '*`'))}")
         if len(results.checks):
-            means, checks = summary.checks(results), study.selection.check
+            means = summary.checks(results)
+            checks = study.selection.check
             if is_search:
                 pairs = means[["policy", "point"]].itertuples(index=False)
                 means = means.assign(policy=[setting_of(results, *pair) for pair in pairs])
@@ -115,7 +116,8 @@ def _print_costs(table: pd.DataFrame, currency: str) -> None:
 
 def _print_precisions(results: Results, table: pd.DataFrame) -> None:
     """The precision of each estimate beside its target, with the design points in words."""
-    cells, points = summary.precision_table(table, most=None).cells, in_words(results)
+    cells = summary.precision_table(table, most=None).cells
+    points = in_words(results)
     cells["Point"] = cells["Point"].map(points.__getitem__)
     _print_titled("precision:", cells)
 
@@ -232,7 +234,8 @@ MANY, FIELDS = 10, 4  # rows on differences, and fields of a mission, that are p
 
 def print_diff(found: diff.Diff, most: int) -> None:
     """Print how many missions of two results differ, by how much, and the most changed ones."""
-    missions, differ = len(found.missions), len(found.changed)
+    missions = len(found.missions)
+    differ = len(found.changed)
     if found.unpaired is not None:
         console.say(f"{len(found.unpaired):,} missions of both, with different random draws")
     elif found.identical:

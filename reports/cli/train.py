@@ -120,9 +120,11 @@ def _bar(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
         def show(training: "Training", done: int) -> None:
             nonlocal first, is_said
             first = first or (training.tick, training.seconds)
-            ticks_done, seconds = training.tick - first[0], training.seconds - first[1]
+            ticks_done = training.tick - first[0]
+            seconds = training.seconds - first[1]
             if not is_said and ticks_done >= 2 and seconds > MEASURED:
-                each, is_said = seconds / ticks_done, True
+                each = seconds / ticks_done
+                is_said = True
                 rest = numbers.duration(each * (ticks - training.tick))
                 bar.write(
                     f"on this machine: {numbers.seconds(each)} a tick, about {rest} to go",

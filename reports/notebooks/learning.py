@@ -28,8 +28,10 @@ from dess.reports.pages import html
 # %%
 folder = Path(str(trained or TRAINED))
 trainings = answers.read_curves(folder / "curves.parquet")
-last, baseline = answers.finals(trainings), answers.BASELINE
-rungs, equal = answers.ladder(last), answers.of_equal_budget(last, baseline)
+last = answers.finals(trainings)
+baseline = answers.BASELINE
+rungs = answers.ladder(last)
+equal = answers.of_equal_budget(last, baseline)
 
 # %%
 html.answer(answers.answer(rungs))

@@ -34,8 +34,10 @@ from dess.reports.player import READING, Shown, library, player, together
 CHOICES = 5  # missions that the first player offers at most; each is 35 kB of the page
 
 fig1, fig4 = (load_results(f"{results}/{name}") for name in ("fig1", "fig4"))
-ranked, best = summary.ranked_policies(fig4.missions), summary.best_policy(fig1.missions)
-shown_policy, seed = policy or ranked[0], fig4.manifest["seed"]
+ranked = summary.ranked_policies(fig4.missions)
+best = summary.best_policy(fig1.missions)
+shown_policy = policy or ranked[0]
+seed = fig4.manifest["seed"]
 points = range(len(fig4.manifest["points"]))
 shown = [Mission.of(fig4, shown_policy, point, replication) for point in points]
 example = Mission.of(fig1, best, 0, replication)

@@ -63,7 +63,8 @@ html.rendered("assumptions.html", lines=assumptions(found)) if sea.units else No
 html.show(cheapest.fleet_table(found), html.say("{reasons}", reasons=study.reasons(found)))
 
 # %%
-policy, point = cheapest.best_policy(found), cheapest.shown_point(found)
+policy = cheapest.best_policy(found)
+point = cheapest.shown_point(found)
 mission = resimulate(found, policy, point, 0)
 map_of_mission = mission_figure(mission.events, mission.scenario)
 about_mission = map_caption(mission, costs.fleets(found)[point])

@@ -37,7 +37,8 @@ effects = main_effects.effects(fig5)
 effects = effects[effects["policy"].isin(policies)]
 changes = main_effects.changes_by_field(fig5, effects)
 ratios = main_effects.changes_by_field(fig5, effects, metrics.RATIO)
-level, checks = numbers.level(LEVEL), summary.checks(sweet)
+level = numbers.level(LEVEL)
+checks = summary.checks(sweet)
 
 # %%
 html.answer(main_effects.answer(effects, policies))

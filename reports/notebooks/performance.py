@@ -34,7 +34,8 @@ from dess.reports.pages import html
 table4, fig4 = (load_results(Path(results) / name) for name in ("table4", "fig4"))
 policies = questions.ranked_policies(table4.missions)
 overall = summary(table4.missions, by=["policy"]).set_index("policy").loc[policies].reset_index()
-fleets, fig4_fleets = questions.by_fleet(table4.missions), questions.by_fleet(fig4.missions)
+fleets = questions.by_fleet(table4.missions)
+fig4_fleets = questions.by_fleet(fig4.missions)
 bounded = optimality.results_in(Path(results) / "gap")
 caption = f"n = {numbers.span(overall['n'])} missions per policy; bars are 95 % intervals."
 

@@ -34,7 +34,8 @@ from dess.reports.pages import study as page
 # %%
 study = load_results(Path(results))
 by = page.leading_metric(study, metric)
-metrics, called = page.shown_metrics(study, by), metric_of(by).within
+metrics = page.shown_metrics(study, by)
+called = metric_of(by).within
 
 # %% tags=["if-cheapest"]
 html.answer(cheapest.answer(study))
@@ -217,11 +218,13 @@ html.show(summary.learner_table(study))
 # ## Single missions
 
 # %% tags=["if-answer"]
-missions, whose = settings.at_best(study, ranked), f"every policy at its best setting by {called}"
+missions = settings.at_best(study, ranked)
+whose = f"every policy at its best setting by {called}"
 worst = summary.worst(study, best["policy"], point=best["point"])
 
 # %% tags=["if-cheapest"]
-missions, whose = cheapest.shown_missions(study), "the fleet of the answer"
+missions = cheapest.shown_missions(study)
+whose = "the fleet of the answer"
 worst = summary.worst(study, cheapest.best_policy(study), point=cheapest.shown_point(study))
 
 # %% tags=["if-ranked"]

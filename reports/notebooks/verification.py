@@ -31,7 +31,8 @@ from dess.reports.pages import html, stress_des
 
 # %%
 suite = Suite(results)
-space, level = suite.space, numbers.level(LEVEL)
+space = suite.space
+level = numbers.level(LEVEL)
 judged = checks.judge(suite.checks(block))
 band = f"the band below, which contains all dots in {level} of such figures."
 

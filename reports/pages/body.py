@@ -78,7 +78,8 @@ class _Writer(IPythonRenderer):
 
 def page_of(report: Report) -> Page:
     """The page of a report that has been run."""
-    writer, card = _Writer(), _card(report)
+    writer = _Writer()
+    card = _card(report)
     filters = {"explained": writer.explained, "indexed": indexed, "markdown": writer.markdown}
     exporter = TemplateExporter(
         template_file="report.html",
@@ -111,7 +112,8 @@ def _card(report: Report) -> Card:
     for number, figure in enumerate(figures, 1):
         figure |= {"number": number, "name": figure["name"] or f"figure-{number}"}
     said = next((part for part in parts if "sentence" in part), {})
-    finding, number = said.get("sentence", report.description), said.get("number", "")
+    finding = said.get("sentence", report.description)
+    number = said.get("number", "")
     picture = None
     if report.name == SCORECARD and figures:
         picture = Picture(**{name: figures[0][name] for name in Picture.model_fields})

@@ -47,7 +47,8 @@ def _serve() -> None:
         with suppress(InputError):  # will be that of the notebook
             keep(folder)
     set_start_method("fork" if hasattr(os, "fork") else "spawn")
-    waiting, running = iter(enumerate(codes)), set[Connection]()
+    waiting = iter(enumerate(codes))
+    running = set[Connection]()
     while True:
         for number, cells in islice(waiting, AT_ONCE - len(running)):
             here, there = Pipe(duplex=False)

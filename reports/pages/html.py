@@ -62,7 +62,8 @@ _MARKUP = re.compile(
 # A figure without anything.
 _BARE = dict.fromkeys(("name", "alt", "source", "narrow", "player", "caption", "links"), "")
 # The coordinates in a figure, a number with many decimals, the space around a command of a path.
-_PLACES, _DIGITS = re.compile(rb' (?:d|x|y)="[^"]*"'), re.compile(rb"(\.\d)\d+")
+_PLACES = re.compile(rb' (?:d|x|y)="[^"]*"')
+_DIGITS = re.compile(rb"(\.\d)\d+")
 _CELL = re.compile(r"<td>(.*?)</td>", re.S)
 # In a cell: the number at its beginning up to the decimal point; a number before its unit; an
 # interval.

@@ -76,7 +76,8 @@ def _fail(report: Report, kind: str, error: str, traceback: str) -> None:
     """Store the error of a cell in its report, or raise it if the notebook refuses its input."""
     if kind == InputError.__name__:
         raise InputError(f"report {report.name}: {error}")
-    report.failure, report.traceback = f"{_cell(report)}: {kind}: {error}", traceback
+    report.failure = f"{_cell(report)}: {kind}: {error}"
+    report.traceback = traceback
 
 
 def _cell(report: Report) -> str:

@@ -197,7 +197,8 @@ def report_of(name: str, original: NotebookNode) -> Report:
     notebook = deepcopy(original)
     del notebook.cells[0]  # the header of the page shows them
     about = original.metadata["dess"]
-    results, scripts = (about["studies"], about.get("optional", [])), about.get("scripts", False)
+    results = (about["studies"], about.get("optional", []))
+    scripts = about.get("scripts", False)
     description = " ".join(description.split())
     return Report(name, title, description, *results, scripts, original, notebook)
 
@@ -213,7 +214,8 @@ def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:
     Raises:
         InputError: If there is one, or ``own-sea`` lacks some that belong to its scenario.
     """
-    reports, names = [*reports], [*names]
+    reports = [*reports]
+    names = [*names]
     lacking = [name for name in OF_EXAMPLE if name not in names]
     if "scenario" in names and lacking and any(r.name == "own-sea" for r in reports):
         raise InputError(
@@ -266,8 +268,10 @@ def with_values(source: str, values: Mapping[str, Any]) -> str:
     lines = source.encode().split(b"\n")  # columns of a syntax tree count bytes
     for name, node in reversed([*_assignments(source)]):
         if name in values and values[name] != before[name]:
-            first, last = node.lineno - 1, (node.end_lineno or node.lineno) - 1
-            head, tail = lines[first][: node.col_offset], lines[last][node.end_col_offset :]
+            first = node.lineno - 1
+            last = (node.end_lineno or node.lineno) - 1
+            head = lines[first][: node.col_offset]
+            tail = lines[last][node.end_col_offset :]
             lines[first : last + 1] = [head + repr(values[name]).encode() + tail]
     return b"\n".join(lines).decode()
 

@@ -211,7 +211,9 @@ def render(
         ReportError: If a notebook fails; after all others. Its page is written under another name,
             up to the cell that failed.
     """
-    results, out, given = Path(results), Path(out), parameters or {}
+    results = Path(results)
+    out = Path(out)
+    given = parameters or {}
     values = {name: notebook.with_paths(value, os.path.abspath) for name, value in given.items()}
     asked = [*dict.fromkeys(names)]
     reports = [notebook.read(name, notebooks) for name in asked or notebook.names_in(notebooks)]
@@ -264,7 +266,9 @@ def render_study(
             ``out`` cannot be written. Nothing is written then.
         ReportError: If the notebook fails, as in ``render``.
     """
-    folder, out, values = Path(folder), Path(out), parameters or {}
+    folder = Path(folder)
+    out = Path(out)
+    values = parameters or {}
     report = report_of(folder, values)
     notebook.check_parameters([report], values)
     report.set({"results": str(folder.absolute()), **values})

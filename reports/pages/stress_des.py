@@ -56,7 +56,8 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
     """
     space = ScenarioSpace.of(**manifest["scenario"])
     x, y, width, height = space.zone
-    libraries, about = dict(manifest["libraries"]), metadata.metadata("dess")
+    libraries = dict(manifest["libraries"])
+    about = metadata.metadata("dess")
     ranges = {field: getattr(space, field) for field in SAMPLED}
     values = {
         "base": manifest,

@@ -28,7 +28,8 @@ _MOST_VALUES = 12  # the largest number of values of a field in a list
 def simulated(results: Results) -> html.Marked:
     """What was simulated: scenario, policies, design and missions, as a list."""
     manifest = results.store.manifest
-    study, points = manifest.study, len(manifest.points)
+    study = manifest.study
+    points = len(manifest.points)
     fixed = [f"{parameter(field).within} {_set(value)}" for field, value in study.set.items()]
     policies = numbers.words([html.code(policy) for policy in results.policies])
     missions = numbers.span(n for of_policy in manifest.missions for n in of_policy)
@@ -175,7 +176,8 @@ def report_of(folder: Path, values: Mapping[str, Any] = MappingProxyType({})) ->
     results = load_results(folder)
     settings.ranking_metric(results, values.get("metric"))
     settings.baseline(results, values.get("baseline", 0))
-    study, original = results.study, notebook.parsed(NOTEBOOK)
+    study = results.study
+    original = notebook.parsed(NOTEBOOK)
     kept = parts(results)
     original.cells = [
         cell for cell in original.cells if all(kept.get(tag, True) for tag in tags_of(cell))
@@ -191,11 +193,14 @@ def report_of(folder: Path, values: Mapping[str, Any] = MappingProxyType({})) ->
 
 def parts(results: Results) -> dict[str, bool]:
     """For each tag, whether the page of a study has the cells of the notebook with this tag."""
-    manifest, study = results.store.manifest, results.study
-    several, fields = len(manifest.points) > 1, len(settings.varied(results))
+    manifest = results.store.manifest
+    study = results.study
+    several = len(manifest.points) > 1
+    fields = len(settings.varied(results))
     kind = results.design  # a design that varies one field at most is a grid
     kind = kind if kind in ("saltelli", "latin-hypercube") or fields > 1 else "grid"
-    is_ranked, is_search = kind != "saltelli", isinstance(study.selection, Cheapest)
+    is_ranked = kind != "saltelli"
+    is_search = isinstance(study.selection, Cheapest)
     is_scan = kind == "grid" or (kind == "table" and fields <= 2)
     return {
         # Several design points with as many missions each: settings to rank.

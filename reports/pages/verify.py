@@ -113,7 +113,8 @@ def verify_page(
     if not page.has_seal:
         raise InputError(f"{path}: is not a page of dess; allowed: {_ALLOWED}")
     altered = [] if page.is_sealed else ["the page has been altered"]
-    files, studies = [_check_files(learned.files) for learned in page.learned], page.evidence
+    files = [_check_files(learned.files) for learned in page.learned]
+    studies = page.evidence
     notes = [] if studies else ["contains no missions to simulate again"]
     sampling = _Sampling(missions, seed, named, yes)
     drawn = [_drawn(evidence, sampling) for evidence in studies]  # all, before any is simulated
@@ -199,7 +200,8 @@ def _compared(evidence: Evidence, drawn: _Drawn, named: Collection[str] = ()) ->
 
 def _check_logs(store: Store, sampling: _Sampling) -> Check:
     """Simulate some missions with a stored event log again, and compare the logs."""
-    manifest, lines = store.manifest, []
+    manifest = store.manifest
+    lines = []
     logged = sampling.drawn(store.logged)
     what = f"study {manifest.study.name}"
     sampling.admit(what, [manifest.scenarios[cell.point] for cell, _ in logged])
@@ -218,7 +220,8 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
 
 def _check_bounds(results: Results, sampling: _Sampling) -> Check:
     """Compute a few upper bounds again, and compare them bit for bit."""
-    drawn, lines = sampling.drawn([*results.bounds])[:BOUNDS_CHECKED], []
+    drawn = sampling.drawn([*results.bounds])[:BOUNDS_CHECKED]
+    lines = []
     for point, replication in drawn:
         stored = results.bounds[point, replication]
         seed = results.store.manifest.seed

@@ -26,7 +26,9 @@ from dess.analysis.metrics import PRODUCT, RATIO, SUCCESS, metric_of
 from dess.reports.pages import html
 
 # %%
-study, rate, repair = load_results(f"{results}/failures"), operations.RATE, operations.REPAIR
+study = load_results(f"{results}/failures")
+rate = operations.RATE
+repair = operations.REPAIR
 metrics = [PRODUCT, SUCCESS, RATIO]
 counts = [c for c in ("failures", "slots_grounded", "lost") if c in study.missions]
 counts = [c for c in counts if study.missions[c].max() > 0]
