@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 from dess.envs.registration import register
 
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
+    from dess.api import simulate as simulate
+    from dess.api import simulate_batch as simulate_batch
     from dess.base.errors import InputError as InputError
     from dess.envs.parallel import parallel_env as parallel_env
     from dess.envs.single import single_env as single_env
     from dess.envs.vector import vector_env as vector_env
-    from dess.model.batch import simulate_batch as simulate_batch
-    from dess.model.mission import simulate as simulate
     from dess.scenario.scenario import Scenario as Scenario
     from dess.scenario.scenario import ScenarioSpace as ScenarioSpace
     from dess.scenario.scenario import load_scenario as load_scenario
@@ -35,8 +35,8 @@ _HOME = {
     "ScenarioSpace": "scenario.scenario",
     "load_scenario": "scenario.scenario",
     "scenario_names": "scenario.scenario",
-    "simulate": "model.mission",
-    "simulate_batch": "model.batch",
+    "simulate": "api",
+    "simulate_batch": "api",
     "parallel_env": "envs.parallel",
     "single_env": "envs.single",
     "vector_env": "envs.vector",

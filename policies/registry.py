@@ -22,14 +22,13 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from importlib import import_module, invalidate_caches
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, entry_points, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-import dess
 from dess.base.errors import InputError, one_of, shown
 from dess.base.files.reading import Missing, paths_in, read_text
 from dess.base.sources import path_of
@@ -394,7 +393,7 @@ def _card(folder: Path | None) -> str:
 def _origin(name: str) -> str:
     """Where a policy comes from, in words."""
     if name in (*SHIPPED, *trained_names()):
-        return f"shipped with dess {dess.__version__}"
+        return f"shipped with dess {version('dess')}"
     if folder := folder_of(name):
         return f"the folder {folder}"
     if file := FILE.fullmatch(name):

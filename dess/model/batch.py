@@ -50,8 +50,7 @@ def simulate_batch(
     Args:
         scenario: One scenario or space for all missions, or one per mission; or what
             ``load_scenario`` takes.
-        policy: A policy, or a list of policies; UAV i follows ``policy[i % len(policy)]``. A name
-            stands for what ``dess.policies.load_team`` loads.
+        policy: A policy, or a list of policies; UAV i follows ``policy[i % len(policy)]``.
         seed: Seed of all missions.
         replications: The replication numbers, or a number n for the replications 0 to n - 1.
         workers: Number of threads; the compiled code does not hold Python's global lock.
@@ -65,7 +64,7 @@ def simulate_batch(
     Raises:
         InputError: If the seed or a replication is out of range, if the team has more policies
             than the largest fleet has UAVs, or if a scenario needs the SimPy engine; if there is no
-            scenario or policy of a name.
+            scenario of a name.
         ValueError: If a policy does not return actions.
     """
     numbers = _numbers(replications)

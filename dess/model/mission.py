@@ -148,8 +148,7 @@ def simulate(
     Args:
         scenario: The scenario, or the space from which the replication draws its parameters; or
             what ``load_scenario`` takes.
-        policy: A policy, or a list of policies; UAV i follows ``policy[i % len(policy)]``. A name
-            stands for what ``dess.policies.load_team`` loads.
+        policy: A policy, or a list of policies; UAV i follows ``policy[i % len(policy)]``.
         seed: Seed of the study.
         replication: Number of the replication.
         events: Whether to keep the event log.
@@ -159,7 +158,7 @@ def simulate(
 
     Raises:
         InputError: If the seed or the replication is out of range, or if the team has more policies
-            than the largest fleet has UAVs; if there is no scenario or policy of a name.
+            than the largest fleet has UAVs; if there is no scenario of a name.
         ValueError: If a policy does not return actions.
     """
     check_seed(seed, replication)

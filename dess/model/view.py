@@ -6,8 +6,6 @@ view.own["battery"], view.residual, view.legal
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
-from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -133,15 +131,16 @@ def team_of(policy: Any, spaces: Sequence[ScenarioSpace]) -> list[Any]:
     """The team of one policy, or of a list or tuple of policies.
 
     Args:
-        policy: The policy or policies; a name stands for what ``dess.policies.load_team`` loads.
+        policy: The policy or policies.
         spaces: The scenarios that the team is to act in.
 
     Raises:
         InputError: If there are no policies, or more than UAVs in the largest fleet of all
-            scenarios; if something is neither a policy nor the name of one.
+            scenarios; if something is not a policy.
     """
-    given = policy if isinstance(policy, list | tuple) else [policy]
-    team = [member for part in given for member in _members(part)]
+    team = [*policy] if isinstance(policy, list | tuple) else [policy]
+    for member in team:
+        _check_policy(member)
     if not team:
         raise InputError(f"policy: the team is empty; allowed: at least one policy, {_POLICY}")
     if spaces:
@@ -149,15 +148,11 @@ def team_of(policy: Any, spaces: Sequence[ScenarioSpace]) -> list[Any]:
     return team
 
 
-def _members(policy: Any) -> Sequence[Any]:
-    """A policy, or those that a name stands for."""
-    if isinstance(policy, str | Path):
-        # The package above this one, imported by name alone, and only here.
-        return import_module("dess.policies").load_team(str(policy))
+def _check_policy(policy: Any) -> None:
+    """Refuse what is not a policy."""
     if isinstance(policy, type) or not callable(getattr(policy, "act", None)):
         kind = type(policy).__name__
         raise InputError(f"policy: {shown(policy)} is of type {kind}; allowed: {_POLICY}")
-    return [policy]
 
 
 def check_team(policies: int, spaces: Iterable[ScenarioSpace]) -> None:

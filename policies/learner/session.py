@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.metadata import version
 from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,7 +19,6 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 import torch
 
-import dess
 from dess.base.errors import InputError, shown
 from dess.base.files.memory import check_memory
 from dess.base.files.reading import paths_in
@@ -265,7 +265,7 @@ def _save_results(out: Path, training: Training) -> None:
     """Write the policy so far, and the learning curves from the first evaluation on."""
     cuda = training.device.type == "cuda"
     run = {
-        "dess": dess.__version__,
+        "dess": version("dess"),
         "torch": torch.__version__,
         "device": torch.cuda.get_device_name(training.device) if cuda else "cpu",
         "threads": torch.get_num_threads(),

@@ -1,0 +1,9 @@
+"""The former name of ``dess.envs``, which can be imported for one more release."""
+
+import sys
+import warnings
+
+from dess import envs
+
+warnings.warn("dess.env has become dess.envs", DeprecationWarning, stacklevel=2)
+sys.modules[__name__] = envs
