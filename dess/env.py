@@ -5,5 +5,6 @@ import warnings
 
 from dess import envs
 
-warnings.warn("dess.env has become dess.envs", DeprecationWarning, stacklevel=2)
+MESSAGE = "dess.env has become dess.envs"
+warnings.warn(MESSAGE, DeprecationWarning, stacklevel=2)
 sys.modules[__name__] = envs

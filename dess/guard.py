@@ -5,5 +5,6 @@ import warnings
 
 from dess.model import guard
 
-warnings.warn("dess.guard has become dess.model.guard", DeprecationWarning, stacklevel=2)
+MESSAGE = "dess.guard has become dess.model.guard"
+warnings.warn(MESSAGE, DeprecationWarning, stacklevel=2)
 sys.modules[__name__] = guard

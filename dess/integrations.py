@@ -5,7 +5,6 @@ import warnings
 
 from dess.envs import integrations
 
-warnings.warn(
-    "dess.integrations has become dess.envs.integrations", DeprecationWarning, stacklevel=2
-)
+MESSAGE = "dess.integrations has become dess.envs.integrations"
+warnings.warn(MESSAGE, DeprecationWarning, stacklevel=2)
 sys.modules[__name__] = integrations

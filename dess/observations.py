@@ -5,7 +5,6 @@ import warnings
 
 from dess.envs import observations
 
-warnings.warn(
-    "dess.observations has become dess.envs.observations", DeprecationWarning, stacklevel=2
-)
+MESSAGE = "dess.observations has become dess.envs.observations"
+warnings.warn(MESSAGE, DeprecationWarning, stacklevel=2)
 sys.modules[__name__] = observations
