@@ -33,9 +33,9 @@ class Metric:
         horizons: The largest value that a mission can have, as a share of the longest that it may
             last; 0 if it is not known.
         least: The smallest value that a mission can have.
-        most: The largest value that a mission can have. Of a time, ``known_in`` finds it.
+        most: The largest value that a mission can have. Of a time, ``metric_in_missions`` finds it.
         failure: By how much a failure changes it, where the range is not known; 0 if that is not
-            known either. Of a cost, ``known_in`` finds it.
+            known either. Of a cost, ``metric_in_missions`` finds it.
     """
 
     column: str
@@ -102,32 +102,38 @@ class Metric:
 
     @property
     def axis(self) -> str:
-        """The unit in which an axis of a figure is written, as for ``style.in_units``."""
+        """The unit in which an axis of a figure is written, as for ``style.set_axis_unit``."""
         return "%" if self.in_percent else ""
 
     @property
     def write(self) -> Callable[[float], str]:
         """Writes a value."""
-        return self._with_unit(numbers.percent if self.in_percent else numbers.quantity)
+        return self._with_unit(
+            numbers.format_percent if self.in_percent else numbers.format_quantity
+        )
 
     @property
     def written(self) -> Callable[[float, float, float], str]:
         """Writes an estimate and the ends of its interval."""
         if self.kind == "cost":
-            return numbers.amounts
-        return self._with_unit(numbers.interval if self.in_percent else numbers.quantities)
+            return numbers.format_amounts
+        return self._with_unit(
+            numbers.format_interval if self.in_percent else numbers.format_quantities
+        )
 
     @property
     def amount(self) -> Callable[[float], str]:
         """Writes a value that somebody asks for, with its unit."""
         if self.in_percent:
-            return numbers.level
-        return lambda value: f"{numbers.quantity(value)} {self.unit}".rstrip()
+            return numbers.format_level
+        return lambda value: f"{numbers.format_quantity(value)} {self.unit}".rstrip()
 
     @property
     def change(self) -> Callable[[float, float, float], str]:
         """Writes a difference and the ends of its interval."""
-        return self._with_unit(numbers.points if self.in_percent else numbers.quantities)
+        return self._with_unit(
+            numbers.format_points if self.in_percent else numbers.format_quantities
+        )
 
     def _with_unit(self, write: Callable[..., str]) -> Callable[..., str]:
         return (lambda *ends: f"{write(*ends)} {self.unit}") if self.is_told else write
@@ -164,14 +170,16 @@ _OTHERS = (
 MOST_SLOTS, MOST_LOST = "most_slots", "most_lost"
 
 
-def _time(column: str, name: str, told: str = "h", horizons: float = 1.0) -> Metric:
+def _time_metric(column: str, name: str, told: str = "h", horizons: float = 1.0) -> Metric:
     """A time of which less is better; 0 ``horizons`` if it is a sum over UAVs."""
     return Metric(
         column, name, _SLOTS, less_is_better=True, told=told, horizons=horizons, least=0.0
     )
 
 
-def _amount(column: str, name: str, unit: str = "", told: str = "", less: bool = False) -> Metric:
+def _amount_metric(
+    column: str, name: str, unit: str = "", told: str = "", less: bool = False
+) -> Metric:
     """A number that is not negative."""
     return Metric(column, name, unit, less_is_better=less, told=told, least=0.0)
 
@@ -179,32 +187,32 @@ def _amount(column: str, name: str, unit: str = "", told: str = "", less: bool =
 # Those of ``OPERATIONS``, which only extended scenarios measure.
 _MEASURED = (
     # An age grows with time, so the mean of a node that nothing reaches is half of the horizon.
-    _time(AGE, "Age of information", horizons=0.5),
-    _time("peak_age", "Peak age of information"),
-    _time("age_p99", "99th percentile of the age"),
-    _time("latency", "Latency"),
-    _time("latency_p99", "99th percentile of the latency"),
-    _amount("generated", "Packets generated"),
-    _amount("delivered", "Packets delivered"),
-    _amount("lost_packets", "Packets lost", less=True),
-    _amount("lost", "Data lost", _DATA, "MB", less=True),
-    _amount("queue", "UAVs waiting for a pad", less=True),
-    _time("waiting", "Waiting time for a pad", "min"),
-    _amount("pad_requests", "Requests for a pad"),
+    _time_metric(AGE, "Age of information", horizons=0.5),
+    _time_metric("peak_age", "Peak age of information"),
+    _time_metric("age_p99", "99th percentile of the age"),
+    _time_metric("latency", "Latency"),
+    _time_metric("latency_p99", "99th percentile of the latency"),
+    _amount_metric("generated", "Packets generated"),
+    _amount_metric("delivered", "Packets delivered"),
+    _amount_metric("lost_packets", "Packets lost", less=True),
+    _amount_metric("lost", "Data lost", _DATA, "MB", less=True),
+    _amount_metric("queue", "UAVs waiting for a pad", less=True),
+    _time_metric("waiting", "Waiting time for a pad", "min"),
+    _amount_metric("pad_requests", "Requests for a pad"),
     Metric("utilisation", "Utilisation of the pads", kind="share"),
-    _amount("failures", "Failures of UAVs", less=True),
-    _time("slots_grounded", "Time under repair", horizons=0.0),
+    _amount_metric("failures", "Failures of UAVs", less=True),
+    _time_metric("slots_grounded", "Time under repair", horizons=0.0),
 )
 # What records have in slots and data units; there is a metric of each where it is told in units.
 _RECORDED = (
-    _time("slots", "Length of the mission"),
-    _time(MOST_SLOTS, "Longest that the mission may last"),
-    _time("uav_slots", "UAV-hours", horizons=0.0),
-    _amount("collected", "Data collected", _DATA, "MB"),
-    _amount("collected_per_uav", "Data collected per UAV", _DATA, "MB"),
-    _amount("residual", "Data left", _DATA, "MB", less=True),
-    _time("charging_per_uav", "Charging per UAV", "min"),
-    _time("waiting_per_uav", "Waiting per UAV", "min"),
+    _time_metric("slots", "Length of the mission"),
+    _time_metric(MOST_SLOTS, "Longest that the mission may last"),
+    _time_metric("uav_slots", "UAV-hours", horizons=0.0),
+    _amount_metric("collected", "Data collected", _DATA, "MB"),
+    _amount_metric("collected_per_uav", "Data collected per UAV", _DATA, "MB"),
+    _amount_metric("residual", "Data left", _DATA, "MB", less=True),
+    _time_metric("charging_per_uav", "Charging per UAV", "min"),
+    _time_metric("waiting_per_uav", "Waiting per UAV", "min"),
 )
 _IN_UNITS = {metric.in_units.column: metric.in_units for metric in _MEASURED}
 _TOLD = {metric.column: metric.in_units.column for metric in (*_MEASURED, *_RECORDED)}
@@ -230,7 +238,7 @@ def metric_of(column: str | Metric) -> Metric:
     return _KNOWN.get(column) or Metric(column, column.replace("_", " ").capitalize())
 
 
-def known_of(column: str, slots: int, units: Units | None) -> Metric:
+def metric_for_length(column: str, slots: int, units: Units | None) -> Metric:
     """The metric of a column of missions of at most this length, with its range.
 
     Args:
@@ -242,7 +250,7 @@ def known_of(column: str, slots: int, units: Units | None) -> Metric:
     return of.lasting(slots * size_of(of.unit, units) if units and of.is_told else slots)
 
 
-def known_in(missions: pd.DataFrame, column: str) -> Metric:
+def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
     """The metric of a column of missions, with the range that it has in these missions.
 
     Args:
@@ -266,12 +274,12 @@ def in_either(*columns: str) -> list[str]:
     return [*columns, *(_TOLD[column] for column in columns)]
 
 
-def told(column: str, missions: Container[str]) -> str:
+def column_as_told(column: str, missions: Container[str]) -> str:
     """The column in which a table of missions tells a metric: in units if there is a data sheet."""
     return of if (of := _TOLD.get(column, column)) in missions else column
 
 
-def in_units(missions: Mapping[str, Any], units: Units) -> dict[str, Any]:
+def columns_in_units(missions: Mapping[str, Any], units: Units) -> dict[str, Any]:
     """The columns of missions that are told in units, of missions with a data sheet.
 
     Args:
@@ -288,7 +296,7 @@ def size_of(unit: str, units: Units) -> float:
     return of / _SIZES[unit]
 
 
-def lasting(slots: int, units: Units | None) -> str:
+def format_length(slots: int, units: Units | None) -> str:
     """The length of a mission, as ``215 mission slots`` or ``1.25 h``."""
     return printed(slots * units.slot, "s") if units else f"{slots} mission slots"
 
@@ -298,7 +306,7 @@ def measured_in(missions: Container[str]) -> list[str]:
 
     Those that are told in units come in the place of those in slots and data units.
     """
-    return [told(name, missions) for name in OPERATIONS.names or () if name in missions]
+    return [column_as_told(name, missions) for name in OPERATIONS.names or () if name in missions]
 
 
 def metrics_in(missions: Container[str]) -> list[str]:

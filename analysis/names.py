@@ -46,12 +46,12 @@ class Field:
     @property
     def label(self) -> str:
         """The name with its unit as a label in a figure, with indices in TeX (``parse_math``)."""
-        return _tex(f"{self.name} [{self.unit}]".removesuffix(" []"))
+        return _tex_name(f"{self.name} [{self.unit}]".removesuffix(" []"))
 
     @property
     def tick(self) -> str:
         """The short name in a figure, with indices in TeX (``parse_math``)."""
-        return _tex(self.short)
+        return _tex_name(self.short)
 
     def words(self, value: Any) -> str:
         """A value in words: ``3 UAVs``, ``failed UAVs lost for good``, ``arrival rate 0.02``."""
@@ -130,7 +130,7 @@ DECISIONS = (
 )
 
 
-def parameter(field: str) -> Field:
+def field_named(field: str) -> Field:
     """The field of this key; one that nothing is known of is named after it.
 
     A value of a data sheet has its unit.
@@ -160,23 +160,23 @@ class Declared(NamedTuple):
     value: Any
 
 
-def fields(space: ScenarioSpace) -> list[Declared]:
+def declared_fields(space: ScenarioSpace) -> list[Declared]:
     """Every field of a scenario, in the order of the model."""
     default = ScenarioSpace.of()
     follows = space.data_sheet.fields() if space.units else {}
     return [
         Declared(
             name,
-            _meaning(name)[0] + (", from the data sheet" if name in follows else ""),
-            _meaning(name)[1],
-            _allowed(space, name),
-            *(_single(side.plain_value(name)) for side in (default, space)),
+            _meaning_of_field(name)[0] + (", from the data sheet" if name in follows else ""),
+            _meaning_of_field(name)[1],
+            _allowed_values(space, name),
+            *(_single_value(side.plain_value(name)) for side in (default, space)),
         )
         for name in fields_of(ScenarioSpace)
     ]
 
 
-def _meaning(name: str) -> tuple[str, str]:
+def _meaning_of_field(name: str) -> tuple[str, str]:
     """What a field is, and its unit, from its description ``meaning [unit] (symbol): form``."""
     description = fields_of(ScenarioSpace)[name].description or ""
     meaning = description.partition(": ")[0]
@@ -184,7 +184,7 @@ def _meaning(name: str) -> tuple[str, str]:
     return (meaning.replace(unit[0], ""), unit[1]) if unit else (meaning, "")
 
 
-def _allowed(space: ScenarioSpace, name: str) -> str:
+def _allowed_values(space: ScenarioSpace, name: str) -> str:
     """The allowed values in words, such as ``an integer 1..16 or [low, high]``."""
     if name not in (*SAMPLED, "pads"):
         return form_of(fields_of(ScenarioSpace)[name])
@@ -193,13 +193,13 @@ def _allowed(space: ScenarioSpace, name: str) -> str:
     return f"{kind} {low:g}..{high:g}" + (" or [low, high]" if name in SAMPLED else "")
 
 
-def _single(value: Any) -> Any:
+def _single_value(value: Any) -> Any:
     """A range of one value as this value."""
     is_range = isinstance(value, list) and len(value) == 2
     return value[0] if is_range and value[0] == value[1] else value
 
 
-def placing(space: ScenarioSpace) -> str:
+def node_placing_sentence(space: ScenarioSpace) -> str:
     """How nodes of a file that share cells are placed, in a sentence to be added to others."""
     if merged := space.arrivals.merged:
         return (
@@ -228,5 +228,5 @@ def value_text(value: object) -> str:
     return value if isinstance(value, str) else "none" if value is None else f"{value:g}"
 
 
-def _tex(text: str) -> str:
+def _tex_name(text: str) -> str:
     return re.sub(r"\bC_[SC]\b", r"$\g<0>$", text)

@@ -18,14 +18,15 @@ def why_nan(cells: Iterable[object]) -> str:
     return "nan: the missions are too few, or too similar, to estimate it" if found else ""
 
 
-def percent(value: float) -> str:
+def format_percent(value: float) -> str:
     """``0.9731`` as ``97.3 %``."""
-    return f"{minus(f'{100 * value:.1f}')} %"
+    return f"{format_minus(f'{100 * value:.1f}')} %"
 
 
-def interval(mean: float, low: float, high: float) -> str:
+def format_interval(mean: float, low: float, high: float) -> str:
     """A mean and its interval as ``97.3 % [96.1, 98.1]``."""
-    return f"{percent(mean)} [{minus(f'{100 * low:.1f}')}, {minus(f'{100 * high:.1f}')}]"
+    ends = [format_minus(f"{100 * end:.1f}") for end in (low, high)]
+    return f"{format_percent(mean)} [{', '.join(ends)}]"
 
 
 def with_ends(write: Callable[[float], str], mean: float, low: float, high: float) -> str:
@@ -33,28 +34,28 @@ def with_ends(write: Callable[[float], str], mean: float, low: float, high: floa
     return f"{write(mean)} [{write(low)}, {write(high)}]"
 
 
-def estimate(row: pd.Series) -> str:
+def format_estimate(row: pd.Series) -> str:
     """A row of estimates (``mean``, ``low``, ``high``) as ``97.3 % [96.1, 98.1]``."""
-    return interval(row["mean"], row["low"], row["high"])
+    return format_interval(row["mean"], row["low"], row["high"])
 
 
-def difference(value: float, reference: float) -> str:
+def format_difference(value: float, reference: float) -> str:
     """A value minus a reference value in percentage points, as ``+7.4`` or ``−2.1``."""
     points = round(100 * (value - reference), 1) or 0.0  # no −0.0
-    return minus(f"{points:+.1f}") if points else "0.0"
+    return format_minus(f"{points:+.1f}") if points else "0.0"
 
 
-def points(value: float, low: float, high: float) -> str:
+def format_points(value: float, low: float, high: float) -> str:
     """A difference and its interval in percentage points, as ``+7.4 [6.9, 7.9]``."""
-    return with_ends(lambda points: difference(points, 0), value, low, high)
+    return with_ends(lambda points: format_difference(points, 0), value, low, high)
 
 
-def decimals(value: float, low: float, high: float, digits: int = 3) -> str:
+def format_decimals(value: float, low: float, high: float, digits: int = 3) -> str:
     """An estimate and its interval as ``1.0123 [0.9868, 1.0378]``, with ``digits`` decimals."""
-    return with_ends(lambda number: minus(f"{number:.{digits}f}"), value, low, high)
+    return with_ends(lambda number: format_minus(f"{number:.{digits}f}"), value, low, high)
 
 
-def quantity(value: float) -> str:
+def format_quantity(value: float) -> str:
     """A number with about four digits, as ``1,042`` or ``12.35``; 0 if it is but rounding of 0."""
     if abs(value) < _ROUNDING:
         return "0"
@@ -62,87 +63,87 @@ def quantity(value: float) -> str:
     return text.replace("-", "−")
 
 
-def quantities(mean: float, low: float, high: float) -> str:
+def format_quantities(mean: float, low: float, high: float) -> str:
     """An estimate and its interval as ``1,042 [1,010, 1,074]``."""
-    return with_ends(quantity, mean, low, high)
+    return with_ends(format_quantity, mean, low, high)
 
 
-def estimates(
-    rows: pd.DataFrame, name: str, write: Callable[[float, float, float], str] = interval
+def format_estimates(
+    rows: pd.DataFrame, name: str, write: Callable[[float, float, float], str] = format_interval
 ) -> pd.Series:
     """The column ``NAME`` of estimates with its ends ``NAME_low`` and ``NAME_high``, as text."""
     ends = rows[[name, f"{name}_low", f"{name}_high"]].to_numpy(float)
     return pd.Series([write(*row) for row in ends], rows.index, dtype=object)
 
 
-def minus(number: str) -> str:
+def format_minus(number: str) -> str:
     """A number with a typographic minus sign (U+2212), and without a sign if it is zero."""
     is_zero = not float(number.replace(",", ""))
     return number.replace("-", "") if is_zero else number.replace("-", "−")
 
 
-def margin(share: float) -> str:
+def format_margin(share: float) -> str:
     """A difference between shares in words, as ``1 point`` or ``0.5 points``."""
     return f"{100 * share:g} point{'' if share == 0.01 else 's'}"
 
 
-def level(share: float) -> str:
+def format_level(share: float) -> str:
     """A confidence level, as ``95 %``."""
     return f"{100 * share:g} %"
 
 
-def p_value(p: float) -> str:
+def format_p_value(p: float) -> str:
     """A p-value, as ``0.094``, or ``< 0.001``."""
     return f"{p:.3f}" if p >= 0.001 else "< 0.001"
 
 
-def money(amount: float, currency: str) -> str:
+def format_money(amount: float, currency: str) -> str:
     """An amount as ``69,000 EUR``; with two decimals below 100."""
-    return f"{minus(f'{amount:,.0f}' if abs(amount) >= 100 else f'{amount:.2f}')} {currency}"
+    return f"{format_minus(f'{amount:,.0f}' if abs(amount) >= 100 else f'{amount:.2f}')} {currency}"
 
 
-def amounts(mean: float, low: float, high: float) -> str:
+def format_amounts(mean: float, low: float, high: float) -> str:
     """A cost and its interval as ``69,120 [68,400, 69,840]``; with two decimals below 100.
 
     A cost that is the same in every mission has no interval.
     """
     digits = 0 if abs(mean) >= 100 else 2
     if low == high:
-        return minus(f"{mean:,.{digits}f}")
-    return with_ends(lambda amount: minus(f"{amount:,.{digits}f}"), mean, low, high)
+        return format_minus(f"{mean:,.{digits}f}")
+    return with_ends(lambda amount: format_minus(f"{amount:,.{digits}f}"), mean, low, high)
 
 
-def seconds(time: float) -> str:
+def format_seconds(time: float) -> str:
     """A time [s] with at most three digits, as ``2.35 µs`` or ``1.1 ms``."""
     units = (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9))
     unit, size = next((pair for pair in units if time >= pair[1]), units[-1])
     return f"{float(f'{time / size:.3g}'):g} {unit}"
 
 
-def duration(time: float) -> str:
+def format_duration(time: float) -> str:
     """A long time [s] in its largest unit, as ``50 seconds``, ``12 minutes`` or ``1,200 days``."""
     units = (("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0), ("seconds", 1.0))
     unit, size = next((pair for pair in units if time >= 2 * pair[1]), units[-1])
     return f"{time / size:,.0f} {unit}"
 
 
-def span(values: Iterable[float], form: str = "{:,}") -> str:
+def format_span(values: Iterable[float], form: str = "{:,}") -> str:
     """The smallest and the largest of some numbers, as ``20 to 1,200``, or ``300`` if equal."""
     ordered = sorted(values)
     return " to ".join(dict.fromkeys(map(form.format, (ordered[0], ordered[-1]))))
 
 
-def counted(number: int, what: str) -> str:
+def format_count(number: int, what: str) -> str:
     """A number of things, as ``1 UAV`` or ``3 UAVs``."""
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
-def words(names: Sequence[str], last: str = "and") -> str:
+def join_words(names: Sequence[str], last: str = "and") -> str:
     """A list of names as ``a, b and c``; another word may come before the last."""
     return f" {last} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def csv(frame: pd.DataFrame, form: str | None = None) -> str:
+def write_csv(frame: pd.DataFrame, form: str | None = None) -> str:
     """A table in CSV; a text that a spreadsheet would take as a formula begins with an apostrophe.
 
     A spreadsheet runs formulas when it opens a file, and they may read and send other cells.
@@ -155,11 +156,11 @@ def csv(frame: pd.DataFrame, form: str | None = None) -> str:
     return safe.to_csv(index=False, float_format=form and form.__mod__)
 
 
-def wide(
+def estimates_as_text(
     table: pd.DataFrame,
     index: str | list[str],
     columns: str = "metric",
-    write: Callable[[float, float, float], str] = interval,
+    write: Callable[[float, float, float], str] = format_interval,
 ) -> pd.DataFrame:
     """Turn a long table of estimates into a wide table of text.
 

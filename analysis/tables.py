@@ -1,18 +1,23 @@
 """Tables of text with their captions, as a page, the terminal, CSV and LaTeX show them."""
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.metrics import HOME, METRICS, PRODUCT, metric_of
-from dess.analysis.names import parameter, value_text
+from dess.analysis.metrics import (
+    HOME,
+    METRICS,
+    PRODUCT,
+    metric_of,
+)
+from dess.analysis.names import field_named, value_text
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.verdict import MARKS, position_by_test
 
-INTERVALS = f"{numbers.level(LEVEL)} intervals"
+INTERVALS = f"{numbers.format_level(LEVEL)} intervals"
 MARKED = "▲ better, ▼ worse, ≈ inconclusive"
 CHECKED = f"The check of the selected settings: means with {INTERVALS}"
 MOST_ROWS = 25  # the largest number of rows of a table on a page; its data have all rows
@@ -35,16 +40,16 @@ class Table(NamedTuple):
     data: pd.DataFrame
 
 
-def counts(numbers_of: pd.Series) -> pd.Series:
+def format_counts(numbers_of: pd.Series) -> pd.Series:
     """Whole numbers as text, as ``1,200``."""
     return numbers_of.map("{:,}".format)
 
 
-def estimates(
+def estimate_cells(
     rows: pd.DataFrame,
     index: Sequence[str],
     columns: str = "metric",
-    write: Callable[[float, float, float], str] = numbers.interval,
+    write: Callable[[float, float, float], str] = numbers.format_interval,
 ) -> pd.DataFrame:
     """Rows with ``mean``, ``low`` and ``high``: a cell per estimate, empty where there is none.
 
@@ -58,24 +63,26 @@ def estimates(
     """
 
     order, known = rows[columns].unique(), rows[rows["mean"].notna()]
-    table = numbers.wide(known, [*index], columns, write)
+    table = numbers.estimates_as_text(known, [*index], columns, write)
     table = table[[name for name in order if name in table]].fillna("").reset_index()
     for name in index:
-        table[name] = counts(table[name]) if name == "n" else table[name].map(parameter(name).cell)
-    heads = {field: parameter(field).name for field in index} | _HEADS
+        table[name] = (
+            format_counts(table[name]) if name == "n" else table[name].map(field_named(name).cell)
+        )
+    heads = {field: field_named(field).name for field in index} | _HEADS
     return table.rename(columns=lambda name: heads.get(name) or value_text(name))
 
 
-def means(
+def means_table(
     rows: pd.DataFrame,
     caption: str = f"Means with {INTERVALS}",
     metrics: Sequence[str] = tuple(METRICS),
 ) -> Table:
     """Rows of ``dess.analysis.summary`` by policy: a column per metric, as those of the paper."""
-    return Table(estimates(rows[rows["metric"].isin(metrics)], ["policy", "n"]), caption, rows)
+    return Table(estimate_cells(rows[rows["metric"].isin(metrics)], ["policy", "n"]), caption, rows)
 
 
-def compared(rows: pd.DataFrame, of: str) -> pd.DataFrame:
+def comparison_cells(rows: pd.DataFrame, of: str) -> pd.DataFrame:
     """Rows of ``dess.analysis.compare``: all differences, and the p-value of the product.
 
     The mark of a difference says whether it is significant, by its adjusted p-value.
@@ -87,21 +94,21 @@ def compared(rows: pd.DataFrame, of: str) -> pd.DataFrame:
     """
     sides = map(position_by_test, rows["difference"], rows["p_adjusted"])
     ends = rows[["difference", "low", "high"]].to_numpy()
-    texts = [f"{numbers.points(*e)} {MARKS[s]}" for e, s in zip(ends, sides, strict=True)]
+    texts = [f"{numbers.format_points(*e)} {MARKS[s]}" for e, s in zip(ends, sides, strict=True)]
     heads = rows["metric"].map(METRICS)
     cells = rows.assign(text=texts, head=heads).pivot(index=of, columns="head", values="text")
     product = rows[rows["metric"] == PRODUCT].set_index(of)
     shown = cells.loc[product.index, heads.unique()].rename_axis(columns=None)
     if "trainings" in rows:
         new = product[["difference", "new_low", "new_high"]].to_numpy()
-        texts = [numbers.points(*e).partition(" ")[2] for e in new]
+        texts = [numbers.format_points(*e).partition(" ")[2] for e in new]
         shown["One new training"] = np.where(product["trainings"] > 1, texts, "unknown")
         shown["Trainings"] = product["trainings"]
-    shown["p of the product, corrected"] = product["p_adjusted"].map(numbers.p_value)
+    shown["p of the product, corrected"] = product["p_adjusted"].map(numbers.format_p_value)
     return shown.reset_index(names=of.capitalize())
 
 
-def allowed_for(what: str, plain: str, wide: str, n: int) -> str:
+def allowance_sentence(what: str, plain: str, wide: str, n: int) -> str:
     """That intervals allow for failures that the missions do not show, with an example.
 
     If none of n missions fails, a share of failures of 3 / n is just not ruled out at 95 %.
@@ -117,3 +124,8 @@ def allowed_for(what: str, plain: str, wide: str, n: int) -> str:
         f"without one do not rule out a failure in {max(round(n / 3), 1):,} missions. Without this "
         f"allowance (Student's t), {what} would be known to {plain}; with it, to {wide}."
     )
+
+
+def stack_by_policy(tables: Mapping[Any, pd.DataFrame]) -> pd.DataFrame:
+    """The rows of all policies, with the column ``policy``."""
+    return pd.concat(tables, names=["policy"]).reset_index("policy").reset_index(drop=True)

@@ -12,7 +12,7 @@ import time
 import numpy as np
 
 from dess import load_scenario
-from dess.analysis.bound.prices import ITERATIONS, Detail, improve, known_of
+from dess.analysis.bound.prices import ITERATIONS, Detail, improve_prices, known_of
 
 FINE = tuple(np.linspace(0, 1, 15))
 VARIANTS = {
@@ -38,12 +38,12 @@ def main() -> None:
     given = parser.parse_args()
     space = load_scenario("paper", uavs=1)
     known = [known_of(space, given.seed, number) for number in range(given.missions)]
-    improve(known[0], 1, Detail())  # compiles
+    improve_prices(known[0], 1, Detail())  # compiles
     print("| variant | mean bound [%] | difference | CPU [s] |\n| --- | --- | --- | --- |")
     first = None
     for name, detail in VARIANTS.items():
         start = time.process_time()
-        ratios = [improve(mission, given.iterations, detail).ratio for mission in known]
+        ratios = [improve_prices(mission, given.iterations, detail).ratio for mission in known]
         seconds = (time.process_time() - start) / len(known)
         mean = 100 * float(np.mean(ratios))
         first = mean if first is None else first

@@ -16,7 +16,7 @@ from dess.analysis import load_study, numbers
 from dess.analysis.answers.learning import read_curve
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.paper import values
-from dess.analysis.stats.differences import paired
+from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.intervals import interval_of, post_stratified
 from dess.base.files.reading import read_text
 from dess.base.files.writing import write_file
@@ -57,7 +57,7 @@ def card(folder: Path, command: str, missions: int) -> str:
     environment = Environment(
         loader=FileSystemLoader(BENCHMARKS), undefined=StrictUndefined, trim_blocks=True
     )
-    environment.filters |= {"percent": numbers.percent, "whole": "{:,.0f}".format}
+    environment.filters |= {"percent": numbers.format_percent, "whole": "{:,.0f}".format}
     evaluated = {"success": "evaluation_success", "product": f"evaluation_{PRODUCT}"}
     shown = np.unique(np.linspace(0, len(curve) - 1, ROWS).round().astype(int))
     return environment.get_template("model_card.md").render(
@@ -73,9 +73,9 @@ def card(folder: Path, command: str, missions: int) -> str:
         gains={
             name: tuple(
                 100 * x
-                for x in paired(*(_values(of, PRODUCT) for of in (learned, other)), metric=PRODUCT)[
-                    :3
-                ]
+                for x in compare_pairs(
+                    *(_values(of, PRODUCT) for of in (learned, other)), metric=PRODUCT
+                )[:3]
             )
             for name, other in others.items()
         },
@@ -88,7 +88,8 @@ def _means(of: dict[str, np.ndarray]) -> dict[str, list[str]]:
     """Success, collection ratio and product of missions, with their intervals."""
     return {
         name: [
-            numbers.interval(*interval_of(metric, _values(missions, metric))) for metric in METRICS
+            numbers.format_interval(*interval_of(metric, _values(missions, metric)))
+            for metric in METRICS
         ]
         for name, missions in of.items()
     }

@@ -21,7 +21,7 @@ from mkdocs.structure.pages import Page
 from typer.cli import get_docs_for_click
 
 import dess
-from dess.analysis.names import fields
+from dess.analysis.names import declared_fields
 from dess.reports.cli.commands import app
 
 ROOT = Path(__file__).parents[1]
@@ -44,7 +44,7 @@ def scenario_fields() -> str:
     heads = ("field", "meaning", "unit", "allowed", "default")
     rows = [
         (f"`{f.name}`", f.meaning, f.unit, f.allowed, _default(f.default))
-        for f in fields(dess.load_scenario("paper"))
+        for f in declared_fields(dess.load_scenario("paper"))
     ]
     lines = [heads, ["---"] * len(heads), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)

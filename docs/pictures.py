@@ -125,7 +125,7 @@ def sea() -> Figure:
     figure = missions.sea_figure(space)
     (ax,) = figure.axes
     x, y, width, _ = space.zone
-    with style.look():
+    with style.figure_look():
         note = {"fontsize": 9, "arrowprops": {"arrowstyle": "->", "color": style.INK}}
         zone = (x + width / 2 - 0.5, y - 0.5)
         ax.annotate("start and charging zone", zone, (x - 5, -2), ha="right", va="center",
@@ -141,7 +141,7 @@ def slot() -> Figure:
     count = load_scenario("paper").communication_slots
     at_start = "all UAVs act\nmoves are resolved\npads are granted"
     at_end = "data arrive at the nodes\nrewards are computed\nUAVs that are done end"
-    with style.look():
+    with style.figure_look():
         figure = style.Picture(figsize=(7.2, 2.2), dpi=style.DPI, layout="constrained")
         ax = figure.subplots()
         for number in range(count):
@@ -171,7 +171,7 @@ def battery() -> Figure:
     low, high = space.charge_start[0], space.charge_complete[0]
     latched = curve.loc[curve["battery"] <= low, "time"].min()
     charging = slots.loc[slots["charging"], "slot"]
-    with style.look():
+    with style.figure_look():
         figure = style.Picture(figsize=(7.2, 3.2), dpi=style.DPI, layout="constrained")
         ax = figure.subplots()
         style.grid_of("y", ax)

@@ -19,7 +19,7 @@ from packaging.licenses import InvalidLicenseExpression, canonicalize_license_ex
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.results.chunks import BOUNDS, MANIFEST, partition
+from dess.analysis.results.chunks import BOUNDS, MANIFEST, partition_name
 from dess.analysis.results.parquet import files_in
 from dess.analysis.results.tables import Results
 from dess.base.files import documents, tables
@@ -112,7 +112,7 @@ def _files(results: Results, page: Path) -> dict[str, bytes]:
 def _tables(results: Results) -> Iterator[tuple[str, bytes]]:
     """The names and contents of the tables: their files, and nothing else that lies there."""
     yield from ((f"results/{name}", b"") for name in ("", *(f"{table}/" for table in _TABLES)))
-    places = [Path(name, partition(policy)) for name in _TABLES for policy in results.policies]
+    places = [Path(name, partition_name(policy)) for name in _TABLES for policy in results.policies]
     for place in (*places, Path(BOUNDS)):
         for path in files_in(results.store.folder / place):
             name = Path("results", place, path.name).as_posix()
@@ -129,7 +129,7 @@ def _without_none(value: Any) -> Any:
 def _description(results: Results) -> str:
     manifest = results.store.manifest
     asked = results.study.description
-    made = f"{len(results.missions):,} missions of {numbers.words(results.policies)}"
+    made = f"{len(results.missions):,} missions of {numbers.join_words(results.policies)}"
     points = f"{len(manifest.points):,} design point{'s' if len(manifest.points) > 1 else ''}"
     end = "." if asked and asked[-1] not in ".?!" else ""
     return f"{asked}{end} {made} at {points}, simulated by dess {manifest.version}.".strip()

@@ -1,7 +1,7 @@
 """The explorer: a slider for each field of a grid, and the metrics of every policy.
 
-It shows the estimates of ``answers.summary.means`` for one design point at a time. A page can
-contain one explorer. It needs only a browser with JavaScript; without JavaScript it shows the
+It shows the estimates of ``answers.summary.means_of_points`` for one design point at a time. A page
+can contain one explorer. It needs only a browser with JavaScript; without JavaScript it shows the
 setting at which the sliders start.
 
     explorer(load_results("results/explorer"))
@@ -17,7 +17,7 @@ from IPython.display import HTML
 from dess import InputError
 from dess.analysis import metrics, names, numbers
 from dess.analysis.answers import summary
-from dess.analysis.answers.settings import in_words, points, varied
+from dess.analysis.answers.settings.points import points_in_words, values_of_points, varied_values
 from dess.analysis.figures import style
 from dess.analysis.results.tables import Results
 from dess.reports.pages.html import rendered
@@ -38,8 +38,8 @@ class Grid:
             InputError: If the study is not a full grid of two fields or more.
         """
         self.results = results
-        self.values = varied(results)
-        table = points(results)
+        self.values = varied_values(results)
+        table = values_of_points(results)
         places = {field: table[field].map(of.index) for field, of in self.values.items()}
         self._places = pd.DataFrame(places).sort_values([*places])
         settings = math.prod(map(len, self.values.values()))
@@ -62,7 +62,7 @@ class Grid:
 
         Design points are in the order of the sliders; the value of the last slider varies fastest.
         """
-        table = summary.means(self.results)
+        table = summary.means_of_points(self.results)
         table = table[table["metric"].isin([*metrics.METRICS])]
         order = {point: number for number, point in enumerate(self._places.index)}
         return table.sort_values("point", key=lambda p: p.map(order), kind="stable")
@@ -75,14 +75,16 @@ class Grid:
         """The policies at the design point ``start``, which it names, the best first."""
         rows = self.at_start()
         best = rows[rows["metric"] == metrics.PRODUCT].sort_values("mean", ascending=False)
-        parts = [f"{row.policy} {numbers.percent(row.mean)}" for row in best.itertuples()]
-        setting = in_words(self.results)[self.start]
-        counted = numbers.span(best["n"])
-        return f"With {setting}, the product is {numbers.words(parts)} (n = {counted} missions)."
+        parts = [f"{row.policy} {numbers.format_percent(row.mean)}" for row in best.itertuples()]
+        setting = points_in_words(self.results)[self.start]
+        counted = numbers.format_span(best["n"])
+        return (
+            f"With {setting}, the product is {numbers.join_words(parts)} (n = {counted} missions)."
+        )
 
     def table(self) -> pd.DataFrame:
         """The means of all settings: the fields, then the columns of ``dess.analysis.summary``."""
-        return self.means.join(points(self.results), on="point")[
+        return self.means.join(values_of_points(self.results), on="point")[
             [*self._places, "policy", "metric", "mean", "low", "high", "n"]
         ]
 
@@ -106,11 +108,14 @@ def explorer(results: Results) -> HTML:
     colours = style.policy_colours(results.policies)
     looks = {policy: colours[policy][0] for policy in results.policies}
     texts = {
-        (row.metric, row.policy): f"{numbers.interval(row.mean, row.low, row.high)}, n = {row.n:,}"
+        (
+            row.metric,
+            row.policy,
+        ): f"{numbers.format_interval(row.mean, row.low, row.high)}, n = {row.n:,}"
         for row in grid.at_start().itertuples()
     }
     columns = ["mean", "low", "high", "n"]
-    fields = [names.parameter(field) for field in grid.values]
+    fields = [names.field_named(field) for field in grid.values]
     data = {
         "sliders": [
             {
@@ -132,5 +137,5 @@ def explorer(results: Results) -> HTML:
 
 
 def _tenths(share: float) -> int:
-    """A share in tenths of a percent, rounded like ``numbers.percent``."""
+    """A share in tenths of a percent, rounded like ``numbers.format_percent``."""
     return round(10 * float(f"{100 * share:.1f}"))

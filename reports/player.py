@@ -31,7 +31,7 @@ from PIL import Image
 from dess import InputError
 from dess.analysis.figures import missions, style
 from dess.analysis.figures.style import node_colours, uav_colours
-from dess.analysis.metrics import lasting, size_of
+from dess.analysis.metrics import format_length, size_of
 from dess.analysis.results import event_log
 from dess.reports.pages.html import Part, figures, template
 from dess.scenario.scenario import Scenario
@@ -120,8 +120,8 @@ class Playback:
         left = self.residual[slot].sum()
         units = self.scenario.units
         if units:
-            now = lasting(slot, units)
-            end = lasting(self.end, units)
+            now = format_length(slot, units)
+            end = format_length(self.end, units)
             data = size_of("MB", units)
             return f"{now} of {end} · {left * data:,.3g} MB left · {used}"
         return f"slot {slot} of {self.end} · {left:.1f} data units left · {used}"
@@ -182,7 +182,7 @@ class Playback:
             "residual": self.residual.round(2).tolist(),
             "status": [self.status(slot) for slot in range(self.end + 1)],
             "events": [*self.jumps()],
-            "ages": event_log.ages(log).round(2).to_numpy().tolist() if aged else None,
+            "ages": event_log.ages_of_nodes(log).round(2).to_numpy().tolist() if aged else None,
             "meanAge": event_log.mean_age(log).round(2).to_numpy().tolist() if aged else None,
         }
 
@@ -296,7 +296,7 @@ def write_animation(
     """
     if kind == MP4:
         check_ffmpeg()
-    with style.look():
+    with style.figure_look():
         film = Film(events, scenario, title)
         (_write_gif if kind == GIF else _write_video)(film, file)
 
@@ -307,7 +307,7 @@ def check_ffmpeg() -> None:
     Raises:
         InputError: If it is missing.
     """
-    with style.look():  # whatever program a matplotlibrc in the working directory names
+    with style.figure_look():  # whatever program a matplotlibrc in the working directory names
         is_available = FFMpegWriter.isAvailable()
     if not is_available:
         raise InputError(
@@ -344,7 +344,7 @@ def _write_video(film: "Film", file: str | Path) -> None:
 
 
 class Film:
-    """A mission as a figure; made inside ``style.look``.
+    """A mission as a figure; made inside ``style.figure_look``.
 
     All that stays is drawn once, and what moves is drawn on it for every slot.
 
@@ -364,7 +364,7 @@ class Film:
     def __init__(self, events: event_log.Events, scenario: Scenario, title: str = ""):
         self.playback = Playback(events, scenario)
         self.end = self.playback.end
-        curves = missions.curves(scenario)
+        curves = missions.curves_of_mission(scenario)
         self.figure = Figure(figsize=(WIDTH / DPI, HEIGHT * len(curves) / DPI), dpi=DPI)
         self.figure.set_layout_engine("constrained", rect=(0, 0, 0.95, 1))  # notes at the right
         self.figure.suptitle(title, x=0.012, ha="left", fontsize=11)
@@ -372,7 +372,7 @@ class Film:
         heights = [*curves.values()]
         grid = self.figure.add_gridspec(len(curves), 2, width_ratios=widths, height_ratios=heights)
         self.sea = self.figure.add_subplot(grid[:, 0])
-        missions.chart(scenario, self.sea)
+        missions.plot_chart(scenario, self.sea)
         self.sea.set_title(" ")  # the place of the status
         self.curves = [self.figure.add_subplot(grid[row, 1]) for row in range(len(curves))]
         for ax, draw in zip(self.curves, curves, strict=True):

@@ -25,9 +25,8 @@ ROOMS = {
     ),
     "analysis": (
         *("names", "numbers", "metrics", "stats", "tables", "bound", "study", "results"),
-        *("execution", "figures", "answers.fleet.requirements", "answers.fleet.home"),
-        *("answers.settings", "answers.costs", "answers.fleet.cheapest", "answers.summary"),
-        *("answers.main_effects", "figures.settings", "answers", "paper", "verification", "ask"),
+        *("execution", "figures", "answers.settings", "answers.fleet", "answers", "paper"),
+        *("verification", "ask"),
     ),
     "reports": (
         *("pages", "player", "explorer", "crate"),
@@ -101,8 +100,8 @@ SOURCES = {
 LIBRARY = {name: tree for name, tree in SOURCES.items() if ".notebooks." not in name}
 NOTEBOOKS = sorted((ROOT / "reports" / "notebooks").rglob("*.py"))
 # Functions that simulate missions.
-SIMULATING = {"simulate", "simulate_batch", "evaluate", "resimulate", "run_study", "measure"}
-SIMULATING |= {"mission_of", "sweep", "what_if"}
+SIMULATING = {"simulate", "simulate_batch", "evaluate", "resimulate", "run_study"}
+SIMULATING |= {"measure_decision_times", "mission_of", "sweep", "what_if"}
 ASKING = {"what_if", "sweep", "own_sea"}  # the notebooks that ask, and so simulate
 
 

@@ -321,7 +321,7 @@ def test_the_readme_says_how_often_uavs_have_the_battery_for_the_way_home(capsys
     arguments = ["evaluate", "--policy", "greedy", "--policy", "ddqn", "--missions", "1000"]
     rows = evaluated(arguments, capsys)
     for row, policy in zip(rows, ("greedy", "ddqn"), strict=True):
-        text = numbers.interval(*row["home"].values())
+        text = numbers.format_interval(*row["home"].values())
         assert re.search(rf"{re.escape(text)}\s+(of the missions )?with `{policy}`", README)
 
 

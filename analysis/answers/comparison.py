@@ -11,19 +11,25 @@ import numpy as np
 import pandas as pd
 import scipy
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 from threadpoolctl import threadpool_limits
 
 from dess import InputError, simulate, simulate_batch
 from dess.analysis import numbers
 from dess.analysis.answers.missions import FOLDER
-from dess.analysis.answers.summary import corrected, learners, ranked_policies
+from dess.analysis.answers.summary import (
+    correct_for_all_tests,
+    rank_policies,
+    trained_policies_by_learner,
+)
 from dess.analysis.figures import Drawing, style
-from dess.analysis.figures.comparison import middle
+from dess.analysis.figures.comparison import central_range
+from dess.analysis.figures.style import plot_front
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
-from dess.analysis.names import PARAMETERS, parameter, value_text
+from dess.analysis.names import PARAMETERS, field_named, value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import compare, for_choice, paired, with_adjusted
-from dess.analysis.stats.intervals import LEVEL, by_replication, values_within, wilson
+from dess.analysis.stats.differences import add_adjusted, compare, compare_pairs, for_choice
+from dess.analysis.stats.intervals import LEVEL, by_replication, values_within, wilson_interval
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, on_front, position_by_test
 from dess.analysis.study.stopping import Text
 from dess.base.errors import one_of
@@ -79,8 +85,11 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
             raise InputError(f"{name}: {given!r} is not in the study{allowed}")
     means = by_replication(results.missions, PRODUCT, ["policy", "point"]).mean()
     means = means.groupby("policy").mean()
-    trained = sorted(learners(results).values(), key=lambda trainings: -means[trainings].mean())
-    ranked, of_learners = ranked_policies(results.missions), {*sum(trained, [])}
+    trained = sorted(
+        trained_policies_by_learner(results).values(),
+        key=lambda trainings: -means[trainings].mean(),
+    )
+    ranked, of_learners = rank_policies(results.missions), {*sum(trained, [])}
     firsts = [trainings[0] for trainings in trained]
     others = [policy for policy in ranked if policy not in of_learners]
     if not firsts or not others:
@@ -95,24 +104,24 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
     return Pair(*pairs[0], len({frozenset(pair) for pair in pairs}))
 
 
-def answer(comparison: pd.DataFrame, missions: pd.DataFrame, pair: Pair) -> str:
+def pair_sentence(comparison: pd.DataFrame, missions: pd.DataFrame, pair: Pair) -> str:
     """By how much a policy is ahead of the other one on average, and in how many missions.
 
     Args:
-        comparison: The rows of ``overall``.
-        missions: The rows of ``duels``.
+        comparison: The rows of ``compare_pair``.
+        missions: The rows of ``pair_missions``.
         pair: The policies.
     """
     row = comparison.set_index("metric").loc[PRODUCT]
-    share = numbers.percent((missions["difference"] > 0).mean())
+    share = numbers.format_percent((missions["difference"] > 0).mean())
     return (
         f"The product of {pair.policy} minus that of {pair.baseline} is "
-        f"{numbers.points(*row[['difference', 'low', 'high']])} points on average over "
+        f"{numbers.format_points(*row[['difference', 'low', 'high']])} points on average over "
         f"{len(missions):,} missions; {pair.policy} is ahead in {share} of them."
     )
 
 
-def duels(results: Results, pair: Pair) -> pd.DataFrame:
+def pair_missions(results: Results, pair: Pair) -> pd.DataFrame:
     """Two policies in the same missions.
 
     Returns:
@@ -138,32 +147,32 @@ def duels(results: Results, pair: Pair) -> pd.DataFrame:
     return both.assign(difference=difference.where(difference.abs() > _ROUNDING, 0.0))
 
 
-def distribution(missions: pd.DataFrame, pair: Pair) -> Drawing:
+def draw_difference_distribution(missions: pd.DataFrame, pair: Pair) -> Drawing:
     """The distribution function of the difference: the share of the missions up to each value.
 
     The 95 % band is for the complete curve (Dvoretzky, Kiefer and Wolfowitz). A share of ``EDGE``
     of the missions is beyond each end of the axis.
 
     Args:
-        missions: Rows of ``duels``.
+        missions: Rows of ``pair_missions``.
         pair: The policies.
     """
     values = np.sort(missions["difference"].to_numpy(float))
-    lowest, highest = (numbers.difference(end, 0) for end in values[[0, -1]])
+    lowest, highest = (numbers.format_difference(end, 0) for end in values[[0, -1]])
     caption = (
         f"Share of the missions (n = {len(values):,}) with at most the difference on the axis, "
         f"with a 95 % band for the whole curve; from {lowest} to {highest} points."
     )
     title = f"Distribution of the difference {pair.title} of the product over the missions"
-    return Drawing(_distribution(values, pair), title, caption)
+    return Drawing(_plot_distribution(values, pair), title, caption)
 
 
-def _distribution(values: np.ndarray, pair: Pair) -> Figure:
+def _plot_distribution(values: np.ndarray, pair: Pair) -> Figure:
     half = float(np.sqrt(np.log(2 / (1 - LEVEL)) / (2 * len(values))))
-    low, high = middle([pd.Series(values)], EDGE)
+    low, high = central_range([pd.Series(values)], EDGE)
     x = np.array([min(values[0], low) - 1, *values, max(values[-1], high) + 1])
     y = np.array([0, *np.arange(1, len(values) + 1) / len(values), 1])
-    with style.panels(3.9) as (figure, ax):
+    with style.new_panels(3.9) as (figure, ax):
         for start, end, outcome in ((x[0], 0, BEHIND), (0, x[-1], AHEAD)):
             ax.axvspan(start, end, color=COLOURS[outcome], alpha=0.11, linewidth=0, zorder=0)
         band = np.clip([y - half, y + half], 0, 1)
@@ -177,26 +186,29 @@ def _distribution(values: np.ndarray, pair: Pair) -> Figure:
         ax.set_title("Difference in every mission", pad=22)
         ax.set(xlim=(low, high), ylim=(0, 1), ylabel="share of the missions")
         ax.set_xlabel(f"{pair.title}, at most [points]")
-        style.in_units(ax.xaxis, "points", 7)
-        style.in_units(ax.yaxis, "%")
+        style.set_axis_unit(ax.xaxis, "points", 7)
+        style.set_axis_unit(ax.yaxis, "%")
     return figure
 
 
-def overall(results: Results, pair: Pair) -> pd.DataFrame:
+def compare_pair(results: Results, pair: Pair) -> pd.DataFrame:
     """The policy compared with the baseline in every metric, over all missions.
 
     Returns:
-        A row per metric, as ``dess.analysis.compare`` returns it, ``summary.corrected``.
+        A row per metric, as ``dess.analysis.compare`` returns it,
+        ``summary.correct_for_all_tests``.
     """
     missions = results.missions[results.missions["policy"].isin(pair[:2])]
-    return corrected(results, compare(missions, pair.baseline, [*METRICS], correction=None))
+    return correct_for_all_tests(
+        results, compare(missions, pair.baseline, [*METRICS], correction=None)
+    )
 
 
-def pairing(comparison: pd.DataFrame) -> str:
+def pairing_sentence(comparison: pd.DataFrame) -> str:
     """How many independent missions would give equally narrow intervals, as a sentence.
 
     Args:
-        comparison: The rows of ``overall``.
+        comparison: The rows of ``compare_pair``.
     """
     reduction = comparison.set_index("metric").loc[PRODUCT, "variance_reduction"]
     many = "infinitely many"
@@ -206,7 +218,7 @@ def pairing(comparison: pd.DataFrame) -> str:
     return f"{many} independent missions would be as precise"
 
 
-def outcomes(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
+def pair_outcome_table(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
     """A table to print: in how many missions each policy is ahead, and fails alone."""
     gap = missions["difference"]
     more = missions[SUCCESS] - missions[SUCCESS + OF_BASELINE]
@@ -218,37 +230,37 @@ def outcomes(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
         f"only {pair.baseline} fails": more > 0,
     }
     counts = pd.DataFrame(cases).sum()
-    shares = [numbers.interval(*wilson(count, len(missions))) for count in counts]
+    shares = [numbers.format_interval(*wilson_interval(count, len(missions))) for count in counts]
     columns = {"Outcome": counts.index, "Missions": counts.map("{:,}".format), "Share": shares}
     return pd.DataFrame(columns).reset_index(drop=True)
 
 
-def worst(missions: pd.DataFrame, count: int) -> pd.DataFrame:
-    """The missions of ``duels`` with the policy's lowest product.
+def worst_pair_missions(missions: pd.DataFrame, count: int) -> pd.DataFrame:
+    """The missions of ``pair_missions`` with the policy's lowest product.
 
     The worst mission is first; among equal ones, the one with the lowest collection ratio.
     """
     return missions.sort_values([PRODUCT, RATIO], kind="stable").head(count)
 
 
-def drawn(missions: pd.DataFrame, pair: Pair) -> list[tuple[str, int]]:
-    """The missions to draw: the worst two of ``duels``, each with both policies."""
-    replications = worst(missions, 2)["replication"]
+def missions_to_draw(missions: pd.DataFrame, pair: Pair) -> list[tuple[str, int]]:
+    """The missions to draw: the worst two of ``pair_missions``, each with both policies."""
+    replications = worst_pair_missions(missions, 2)["replication"]
     return [(policy, int(n)) for n in replications for policy in (pair.policy, pair.baseline)]
 
 
 def most_lost(missions: pd.DataFrame, count: int) -> pd.DataFrame:
-    """The missions of ``duels`` in which the policy is furthest behind, if it is behind."""
+    """The missions of ``pair_missions`` in which the policy is furthest behind, if it is behind."""
     lost = missions[missions["difference"] < 0]
     return lost.sort_values("difference", kind="stable").head(count)
 
 
-def depleted(results: Results, policy: str, replications: Iterable[int]) -> int:
+def count_depleted_uavs(results: Results, policy: str, replications: Iterable[int]) -> int:
     """The number of UAVs of a policy whose battery is depleted in the air."""
-    return int(_ends(results, policy, replications)["battery"].sum())
+    return int(_count_mission_ends(results, policy, replications)["battery"].sum())
 
 
-def commands(results: Results, policy: str, replications: Iterable[int]) -> list[str]:
+def mission_commands(results: Results, policy: str, replications: Iterable[int]) -> list[str]:
     """The commands that simulate missions again, from the usual results folder, and draw them."""
     folder = results.usual_folder
     return [
@@ -258,7 +270,7 @@ def commands(results: Results, policy: str, replications: Iterable[int]) -> list
 
 
 def outcome_table(missions: pd.DataFrame, results: Results, pair: Pair) -> pd.DataFrame:
-    """Missions of ``duels`` as a table to print: parameters, and the outcome of both policies.
+    """Missions of ``pair_missions`` as a table to print: parameters, and how both policies fared.
 
     The column that tells how many UAVs ended well has what they had to do as its head: to fill
     their quota, or to land.
@@ -267,18 +279,18 @@ def outcome_table(missions: pd.DataFrame, results: Results, pair: Pair) -> pd.Da
     table = missions.reset_index(drop=True)
     columns = {("", "Mission"): table["replication"].astype(str)}
     for field in PARAMETERS:
-        columns["", parameter(field).short] = table[field].map("{:.3g}".format)
-    columns["", "Points"] = table["difference"].map(lambda gap: numbers.difference(gap, 0))
+        columns["", field_named(field).short] = table[field].map("{:.3g}".format)
+    columns["", "Points"] = table["difference"].map(lambda gap: numbers.format_difference(gap, 0))
     for policy, end in ((pair.policy, ""), (pair.baseline, OF_BASELINE)):
-        ends = _ends(results, policy, table["replication"])
+        ends = _count_mission_ends(results, policy, table["replication"])
         ended_well = [f"{count} of {n}" for count, n in ends[["quota", "all"]].to_numpy()]
         columns[policy, "Success"] = table[SUCCESS + end].map({1: "yes", 0: "no"})
         columns[policy, done] = pd.Series(ended_well, dtype=object)
-        columns[policy, "Collected"] = table[RATIO + end].map(numbers.percent)
+        columns[policy, "Collected"] = table[RATIO + end].map(numbers.format_percent)
     return pd.DataFrame(columns)
 
 
-def _ends(results: Results, policy: str, replications: Iterable[int]) -> pd.DataFrame:
+def _count_mission_ends(results: Results, policy: str, replications: Iterable[int]) -> pd.DataFrame:
     """How the UAVs of missions end: a row per mission, and a column of counts per kind of end."""
     uavs = results.uavs[results.uavs["policy"] == policy]
     end = uavs["end"].replace("landed", "quota")  # who has landed has filled the quota
@@ -294,12 +306,12 @@ VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}
 COLOURS = {AHEAD: style.BETTER, BEHIND: style.WORSE, INCONCLUSIVE: style.MUTED}
 
 
-def varied(missions: pd.DataFrame) -> list[str]:
-    """The parameters that differ between the missions of ``duels``."""
+def varying_parameters(missions: pd.DataFrame) -> list[str]:
+    """The parameters that differ between the missions of ``pair_missions``."""
     return [field for field in PARAMETERS if missions[field].nunique() > 1]
 
 
-def bins(values: pd.Series, most: int = BINS) -> tuple[np.ndarray, list[str]]:
+def divide_into_bins(values: pd.Series, most: int = BINS) -> tuple[np.ndarray, list[str]]:
     """Divide values into at most ``most`` bins: one per value if possible, else by quantiles.
 
     Returns:
@@ -314,43 +326,43 @@ def bins(values: pd.Series, most: int = BINS) -> tuple[np.ndarray, list[str]]:
     return codes, [_range_text(array[codes == code]) for code in range(codes.max() + 1)]
 
 
-def along(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
+def differences_along_parameters(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
     """The mean difference along every parameter that varies.
 
     Bins of fewer than ``LEAST`` missions would show nothing and are left out, and so is a parameter
     of which fewer than two bins are left.
 
     Args:
-        missions: Rows of ``duels``.
+        missions: Rows of ``pair_missions``.
         candidates: Number of pairs among which the two policies were chosen.
 
     Returns:
         A row per parameter and bin; a parameter has at most ``BINS`` bins of about equally many
         missions. The columns are ``field``, ``position``, ``value`` in words, and those of a
-        comparison: ``mean``, ``low``, ``high`` (by ``paired``, 95 %), ``p``, ``p_adjusted``
+        comparison: ``mean``, ``low``, ``high`` (by ``compare_pairs``, 95 %), ``p``, ``p_adjusted``
         (Holm over all rows, Bonferroni for the choice of the pair), ``n`` and ``verdict``.
     """
     rows = []
-    for field in varied(missions):
-        bin_of, names = bins(missions[field], max(1, min(BINS, len(missions) // LEAST)))
+    for field in varying_parameters(missions):
+        bin_of, names = divide_into_bins(missions[field], max(1, min(BINS, len(missions) // LEAST)))
         large = np.flatnonzero(np.bincount(bin_of) >= LEAST)
         for position, code in enumerate(large if len(large) > 1 else []):
             part, value = missions[bin_of == code], names[code]
             ours, theirs = (values_within(part, PRODUCT + end, ()) for end in ("", OF_BASELINE))
-            found = paired(ours, theirs, metric=PRODUCT)
+            found = compare_pairs(ours, theirs, metric=PRODUCT)
             rows.append((field, position, value, *found[:4], found.n))
     columns = ["field", "position", "value", "mean", "low", "high", "p", "n"]
-    table = with_adjusted(pd.DataFrame(rows, columns=columns), "holm")
+    table = add_adjusted(pd.DataFrame(rows, columns=columns), "holm")
     table = for_choice(table, candidates)
     sides = zip(table["mean"], table["p_adjusted"], strict=True)
     return table.assign(verdict=[VERDICTS[position_by_test(*side)] for side in sides])
 
 
 def colours_in_words(lead: pd.DataFrame, pair: Pair) -> str:
-    """What the colours of the dots in ``leads`` mean, of those that occur.
+    """What the colours in ``draw_differences_along_parameters`` mean, of those that occur.
 
     Args:
-        lead: Rows of ``along``.
+        lead: Rows of ``differences_along_parameters``.
         pair: The policies.
     """
     meanings = {
@@ -361,83 +373,86 @@ def colours_in_words(lead: pd.DataFrame, pair: Pair) -> str:
     shown = [words for verdict, words in meanings.items() if verdict in {*lead["verdict"]}]
     if not shown:
         return ""
-    return (
-        f"By Holm's test over all bins, {numbers.words(shown)}. Dashed: the mean of all missions."
-    )
+    verdicts = numbers.join_words(shown)
+    return f"By Holm's test over all bins, {verdicts}. Dashed: the mean of all missions."
 
 
-def leads(missions: pd.DataFrame, lead: pd.DataFrame, pair: Pair, note: str = "") -> list[Drawing]:
+def draw_differences_along_parameters(
+    missions: pd.DataFrame, lead: pd.DataFrame, pair: Pair, note: str = ""
+) -> list[Drawing]:
     """The mean difference along each parameter: for each bin a dot with its interval.
 
     All have the same axis; the mean difference over all missions is a dashed line.
 
     Args:
-        missions: Rows of ``duels``.
-        lead: Rows of ``along``.
+        missions: Rows of ``pair_missions``.
+        lead: Rows of ``differences_along_parameters``.
         pair: The policies.
         note: The beginning of the captions.
     """
     overall = values_within(missions, "difference", ()).mean()
     return [
         Drawing(
-            _lead(rows, overall, style.ends(lead, zero=True)),
+            _plot_difference_along(rows, overall, style.axis_ends(lead, zero=True)),
             f"Mean difference {pair.title} against {field}",
-            f"{note}n = {numbers.span(rows['n'])} missions per dot.",
+            f"{note}n = {numbers.format_span(rows['n'])} missions per dot.",
         )
         for field, rows in lead.groupby("field", sort=False)
     ]
 
 
-def _lead(rows: pd.DataFrame, overall: float, ends: tuple[float, float]) -> Figure:
-    with style.panels(3.5, values="y") as (figure, ax):
+def _plot_difference_along(rows: pd.DataFrame, overall: float, ends: tuple[float, float]) -> Figure:
+    with style.new_panels(3.5, values="y") as (figure, ax):
         ax.axhline(0, **style.ZERO)
         ax.axhline(overall, color=style.MUTED, linestyle="--", zorder=1, gid="overall")
         for verdict, part in rows.groupby("verdict"):
             fillstyle = "none" if verdict == INCONCLUSIVE else "full"
-            ax.errorbar(part["position"], part["mean"], yerr=style.arms(part), linestyle="",
-                        **style.dot((COLOURS[verdict], "o")), fillstyle=fillstyle)  # fmt: skip
-        ax.set_title(parameter(rows["field"].iloc[0]).label, parse_math=True)
+            arms = style.error_bar_arms(part)
+            dot = style.dot_style((COLOURS[verdict], "o"))
+            ax.errorbar(part["position"], part["mean"], yerr=arms, linestyle="",
+                        **dot, fillstyle=fillstyle)  # fmt: skip
+        ax.set_title(field_named(rows["field"].iloc[0]).label, parse_math=True)
         ax.set(ylabel="mean difference [points]", ylim=ends)
         ax.set_xticks(rows["position"], rows["value"])
-        style.in_units(ax.yaxis, "points")
+        style.set_axis_unit(ax.yaxis, "points")
     return figure
 
 
-def dependence(missions: pd.DataFrame) -> pd.DataFrame:
+def dependence_on_parameters(missions: pd.DataFrame) -> pd.DataFrame:
     """Whether the difference depends on each parameter.
 
     Returns:
         A row per parameter that varies, the one that explains most first: ``field``, ``explained``
-        (share of the variance between the bins of ``along``), ``p`` (Alexander and Govern's test
-        of equal means, which lets the variances differ; 1 where the data are too few) and
-        ``p_adjusted`` (Holm).
+        (share of the variance between the bins of ``differences_along_parameters``), ``p``
+        (Alexander and Govern's test of equal means, which lets the variances differ; 1 where the
+        data are too few) and ``p_adjusted`` (Holm).
     """
     rows = []
     difference = missions["difference"]
     total = float(difference.var(ddof=0))
-    for field in varied(missions):
-        groups = difference.groupby(bins(missions[field])[0])
+    for field in varying_parameters(missions):
+        groups = difference.groupby(divide_into_bins(missions[field])[0])
         between = float(groups.transform("mean").var(ddof=0))
         rows.append((field, between / total if total else 0.0, _equal_means(groups)))
     table = pd.DataFrame(rows, columns=["field", "explained", "p"])
-    return with_adjusted(table, "holm").sort_values(
+    return add_adjusted(table, "holm").sort_values(
         "explained", ascending=False, kind="stable", ignore_index=True
     )
 
 
-def spread(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFrame:
+def dependence_table(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFrame:
     """How the difference depends on every parameter, as a table to print.
 
     Args:
-        lead: Rows of ``along``.
-        dependences: Rows of ``dependence``.
+        lead: Rows of ``differences_along_parameters``.
+        dependences: Rows of ``dependence_on_parameters``.
     """
     lines = []
     for row in dependences[dependences["field"].isin(lead["field"])].itertuples():
         rows = lead[lead["field"] == row.field].sort_values("mean", kind="stable")
-        bins_ = [f"{_points(one)} at {one.value}" for one in rows.itertuples()]
-        shown = numbers.percent(row.explained), numbers.p_value(row.p_adjusted)
-        lines.append((parameter(row.field).name, bins_[0], bins_[-1], *shown))
+        bins_ = [f"{_format_points(one)} at {one.value}" for one in rows.itertuples()]
+        shown = numbers.format_percent(row.explained), numbers.format_p_value(row.p_adjusted)
+        lines.append((field_named(row.field).name, bins_[0], bins_[-1], *shown))
     heads = ["Parameter", "Lowest difference", "Highest difference", "Variance explained"]
     return pd.DataFrame(lines, columns=[*heads, "p, adjusted"])
 
@@ -454,8 +469,8 @@ def _range_text(values: np.ndarray) -> str:
     return value_text(ends if ends[0] < ends[1] else ends[0])
 
 
-def _points(row: Any) -> str:
-    return numbers.points(row.mean, row.low, row.high)
+def _format_points(row: Any) -> str:
+    return numbers.format_points(row.mean, row.low, row.high)
 
 
 CALLS = 60  # calls of every policy that are timed at least: those of about one mission
@@ -495,7 +510,9 @@ class Times(Document):
     costs: list[Cost]
 
 
-def make(folder: str | Path, results: Results, progress: Progress | None = None) -> None:
+def ensure_decision_times(
+    folder: str | Path, results: Results, progress: Progress | None = None
+) -> None:
     """Measure the times and write them, unless the folder has those of this study.
 
     Args:
@@ -506,26 +523,28 @@ def make(folder: str | Path, results: Results, progress: Progress | None = None)
     Raises:
         InputError: If the times cannot be written.
     """
-    path = _file(folder, results)
+    path = _decision_times_file(folder, results)
     if not path.exists():
         check_target(path)
-        write_file(path, measure(results, progress=progress).model_dump_json(indent=1))
+        write_file(
+            path, measure_decision_times(results, progress=progress).model_dump_json(indent=1)
+        )
 
 
-def read(folder: str | Path, results: Results) -> Times:
-    """Read the times that ``make`` has written.
+def read_decision_times(folder: str | Path, results: Results) -> Times:
+    """Read the times that ``ensure_decision_times`` has written.
 
     Raises:
         InputError: If there are none, or they are damaged.
     """
-    return Times.load(_file(folder, results), "what is made by: dess report")
+    return Times.load(_decision_times_file(folder, results), "what is made by: dess report")
 
 
-def _file(folder: str | Path, results: Results) -> Path:
+def _decision_times_file(folder: str | Path, results: Results) -> Path:
     return Path(folder, FOLDER, f"times-{results.store.manifest.key}.json")
 
 
-def measure(
+def measure_decision_times(
     results: Results, clock: Clock = perf_counter, progress: Progress | None = None
 ) -> Times:
     """Measure the times of a study's policies: one mission at a time, on one thread.
@@ -545,7 +564,7 @@ def measure(
         except InputError:
             team = []
         if team:
-            seconds = _calls(team, results, clock)
+            seconds = _time_calls(team, results, clock)
             median, slow = np.quantile(seconds, [0.5, SLOW]).tolist()
             batch = _in_batches(team, results, clock)
             costs.append(
@@ -553,10 +572,10 @@ def measure(
             )
         if progress:
             progress(done, len(results.policies))
-    return Times(processor=_processor(), costs=costs)
+    return Times(processor=_processor_model(), costs=costs)
 
 
-def _calls(team: list[Policy], results: Results, clock: Clock) -> list[float]:
+def _time_calls(team: list[Policy], results: Results, clock: Clock) -> list[float]:
     """The times of the calls of a team [s], in as many whole missions as ``CALLS`` calls take."""
     calls: list[float] = []
     timed = [_Timed(policy, clock, calls) for policy in team]
@@ -600,7 +619,7 @@ class _Timed:
         return actions
 
 
-def _processor() -> str:
+def _processor_model() -> str:
     """The model of the processor, as the operating system names it."""
     try:
         lines = read_text(Path("/proc/cpuinfo")).splitlines()
@@ -610,7 +629,7 @@ def _processor() -> str:
     return next(filter(None, [*models, platform.processor(), platform.machine()]), "unknown")
 
 
-def front(means: pd.DataFrame, seconds: Mapping[str, float | None]) -> pd.DataFrame:
+def decision_time_front(means: pd.DataFrame, seconds: Mapping[str, float | None]) -> pd.DataFrame:
     """The policies that were timed, the fastest first, with their times and the Pareto front.
 
     Args:
@@ -631,16 +650,16 @@ def time_table(times: Times) -> pd.DataFrame:
     return pd.DataFrame(
         {
             "Policy": cost.policy,
-            "Median": numbers.seconds(cost.median),
-            "95 % below": numbers.seconds(cost.slow),
+            "Median": numbers.format_seconds(cost.median),
+            "95 % below": numbers.format_seconds(cost.slow),
             "Calls": f"{cost.calls:,}",
-            "In batches, per UAV": numbers.seconds(cost.batch) if cost.batch else "",
+            "In batches, per UAV": numbers.format_seconds(cost.batch) if cost.batch else "",
         }
         for cost in times.costs
     )
 
 
-def remarks(times: Times, results: Results, pair: Pair) -> str:
+def decision_time_sentences(times: Times, results: Results, pair: Pair) -> str:
     """On what decisions were timed, how a pair of policies compares, and what was not timed."""
     medians = {cost.policy: cost.median for cost in times.costs}
     text = f"Measured once, on one core of a processor {times.processor}."
@@ -648,4 +667,27 @@ def remarks(times: Times, results: Results, pair: Pair) -> str:
         ratio = medians[pair.policy] / medians[pair.baseline]
         text += f" {pair.policy} takes {ratio:,.3g} times as long as {pair.baseline}."
     missing = [policy for policy in results.policies if policy not in medians]
-    return text + f" Not timed: {numbers.words(missing)}." * bool(missing)
+    return text + f" Not timed: {numbers.join_words(missing)}." * bool(missing)
+
+
+def plot_decision_times(table: pd.DataFrame) -> Figure:
+    """Decision time against the product of all policies, and their Pareto front.
+
+    Args:
+        table: Rows of ``answers.comparison.decision_time_front``.
+    """
+    looks = style.policy_colours(table["policy"])
+    best = table[table["on_front"]].sort_values("seconds")
+    with style.new_panels(4.2) as (figure, ax):
+        plot_front(best["seconds"], best["mean"], "Pareto front", ax)
+        for _, row in table.iterrows():
+            arms = style.error_bar_arms(row)
+            ax.errorbar(row["seconds"], row["mean"], yerr=arms, label=row["policy"],
+                        linestyle="", **style.dot_style(looks[row["policy"]]))  # fmt: skip
+        ax.set(xscale="log", title="Decision time against quality", ylabel=METRICS[PRODUCT])
+        ax.set_xlabel("time of a decision for one mission, median")
+        ax.set_xlim(table["seconds"].min() / 2, table["seconds"].max() * 2)
+        ax.xaxis.set_major_formatter(lambda time, _: numbers.format_seconds(time))
+        ax.xaxis.set_minor_locator(NullLocator())
+        style.set_axis_unit(ax.yaxis, "%")
+    return figure

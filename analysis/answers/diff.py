@@ -1,7 +1,7 @@
 """Compare two results folders, mission by mission: the effect of changed code or weights.
 
-    found = diff(load_results("results/before"), load_results("results/after"))
-    found.identical, found.changed, effects(found)
+    found = diff_results(load_results("results/before"), load_results("results/after"))
+    found.identical, found.changed, estimate_differences(found)
 
 A mission is in both folders if policy, scenario, seed and replication are the same. Then it has the
 same random draws in both, so that every difference is an effect of the change. If no scenario is in
@@ -18,13 +18,13 @@ import numpy as np
 import pandas as pd
 
 from dess import InputError
-from dess.analysis.answers.settings import in_words
+from dess.analysis.answers.settings.points import points_in_words
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, REWARD
 from dess.analysis.results.chunks import check_parts
-from dess.analysis.results.provenance import differing
+from dess.analysis.results.provenance import differing_modules
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import Paired, compare, unpaired, with_adjusted
-from dess.analysis.stats.intervals import groups
+from dess.analysis.stats.differences import Paired, add_adjusted, compare, compare_unpaired
+from dess.analysis.stats.intervals import group_rows
 from dess.base.errors import shown
 from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD
 from dess.scenario.fields import dotted
@@ -75,7 +75,7 @@ class Diff:
         return rows.loc[order].reset_index(drop=True)
 
 
-def diff(a: Results, b: Results) -> Diff:
+def diff_results(a: Results, b: Results) -> Diff:
     """Compare two results, mission by mission.
 
     If each has a single policy, the two policies are compared, whatever their names are; otherwise
@@ -86,16 +86,16 @@ def diff(a: Results, b: Results) -> Diff:
     Raises:
         InputError: If no mission is in both; with different seeds, no policy at a design point.
     """
-    both, is_paired = f"{a.store.folder} and {b.store.folder}", len(_seeds(a, b)) == 1
+    both, is_paired = f"{a.store.folder} and {b.store.folder}", len(_distinct_seeds(a, b)) == 1
     keys = _KEYS if is_paired else _KEYS[:2]
     single = len(a.policies) == len(b.policies) == 1
     teams = dict(zip(b.policies, a.policies if single else b.policies, strict=True))
-    of_a, of_b = _scenarios(a, b)
-    missions_a = _missions(a, {name: name for name in a.policies}, of_a)
-    missions_b = _missions(b, teams, of_b)
+    of_a, of_b = _number_scenarios(a, b)
+    missions_a = _numbered_missions(a, {name: name for name in a.policies}, of_a)
+    missions_b = _numbered_missions(b, teams, of_b)
     alone = [
-        _alone("A", a, missions_a, missions_b, keys),
-        _alone("B", b, missions_b, missions_a, keys),
+        _rows_of_one_side("A", a, missions_a, missions_b, keys),
+        _rows_of_one_side("B", b, missions_b, missions_a, keys),
     ]
     cells = [m.drop_duplicates(_KEYS[:2]) for m in (missions_a, missions_b)]
     cells = cells[0].merge(cells[1], on=_KEYS[:2], suffixes=("_a", "_b"))
@@ -109,7 +109,7 @@ def diff(a: Results, b: Results) -> Diff:
         rows = pd.concat([missions_a.assign(side="a"), missions_b.assign(side="b")])
         common, sides = common[:0], rows.merge(cells, on=_KEYS[:2])
     numbered = common[_KEYS].assign(mission=np.arange(len(common)))
-    uavs = [_uavs(a, missions_a, numbered), _uavs(b, missions_b, numbered)]
+    uavs = [_uavs_of_missions(a, missions_a, numbered), _uavs_of_missions(b, missions_b, numbered)]
     pairs = uavs[0].merge(uavs[1], on=["mission", "uav"], how="outer", suffixes=("_a", "_b"))
     common.insert(0, "fields", _differing_fields(common, pairs))
     points = cells[["point_a", "point_b"]].drop_duplicates()
@@ -120,11 +120,11 @@ def diff(a: Results, b: Results) -> Diff:
 _ALLOWED = "results folders that share policies, scenarios and replications"
 
 
-def effects(found: Diff, by: Sequence[str] = ("policy_a",)) -> pd.DataFrame:
+def estimate_differences(found: Diff, by: Sequence[str] = ("policy_a",)) -> pd.DataFrame:
     """The differences B - A: of pairs, over the missions that both folders have, or unpaired.
 
     Args:
-        found: The result of ``diff``.
+        found: The result of ``diff_results``.
         by: The columns that form groups: ``policy_a``, or ``policy_a`` and ``point_a``.
 
     Returns:
@@ -148,15 +148,15 @@ def effects(found: Diff, by: Sequence[str] = ("policy_a",)) -> pd.DataFrame:
 
 
 def _unpaired_effects(missions: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """The table of ``effects`` without pairs; its counts are those of both folders together."""
+    """``estimate_differences`` without pairs; its counts are those of both folders together."""
     rows = []
-    for group, part in groups(missions, by):
+    for group, part in group_rows(missions, by):
         of_side = dict([*part.groupby("side")])
         for metric in METRICS:
-            compared = unpaired(of_side["b"][metric], of_side["a"][metric], metric)
+            compared = compare_unpaired(of_side["b"][metric], of_side["a"][metric], metric)
             rows.append((*group, len(part), len(part), metric, *compared))
     columns = [*by, "missions", "differ", "metric", *Paired._fields]
-    return with_adjusted(pd.DataFrame(rows, columns=columns), "holm")
+    return add_adjusted(pd.DataFrame(rows, columns=columns), "holm")
 
 
 def most_changed(found: Diff, missions: int) -> pd.DataFrame:
@@ -174,16 +174,16 @@ def most_changed(found: Diff, missions: int) -> pd.DataFrame:
     return rows
 
 
-def origins(found: Diff) -> list[str]:
+def differing_origins(found: Diff) -> list[str]:
     """In what the origins of the two results differ, with a line for each part."""
     a, b = found.a.store.manifest, found.b.store.manifest
-    modules = sorted({*differing(a.code, b.code), *differing(b.code, a.code)})
+    modules = sorted({*differing_modules(a.code, b.code), *differing_modules(b.code, a.code)})
     teams = found.missions[["policy_a", "policy_b"]].drop_duplicates().itertuples(index=False)
     weights_a, weights_b = ({t.policy: t.weights for t in m.policies} for m in (a, b))
     changed = [" and ".join({p: None, q: None}) for p, q in teams if weights_a[p] != weights_b[q]]
     names = [n for n in {**a.libraries, **b.libraries} if a.libraries.get(n) != b.libraries.get(n)]
     libraries = [f"{n} {a.libraries.get(n, '-')} and {b.libraries.get(n, '-')}" for n in names]
-    seeds, constants = _seeds(found.a, found.b), _constants(found)
+    seeds, constants = _distinct_seeds(found.a, found.b), _differing_constants(found)
     parts = {
         "seeds": [f"{' and '.join(map(str, seeds))}, so that missions are compared without pairs"]
         * (len(seeds) > 1),
@@ -207,12 +207,12 @@ def at_hand(results: Results) -> str:
     return "; ".join(changes) or "made by the code, weights and libraries that are here"
 
 
-def _seeds(a: Results, b: Results) -> list[int]:
+def _distinct_seeds(a: Results, b: Results) -> list[int]:
     """The seed of both, or the two seeds."""
     return [*dict.fromkeys((a.store.manifest.seed, b.store.manifest.seed))]
 
 
-def _constants(found: Diff) -> list[tuple[str, str, str]]:
+def _differing_constants(found: Diff) -> list[tuple[str, str, str]]:
     """The fields in which the scenarios of compared design points differ, with their values."""
     differ: dict[tuple[str, str, str], None] = {}
     for points in found.points.itertuples(index=False):
@@ -224,7 +224,7 @@ def _constants(found: Diff) -> list[tuple[str, str, str]]:
     return [*differ]
 
 
-def _scenarios(a: Results, b: Results) -> tuple[np.ndarray, np.ndarray]:
+def _number_scenarios(a: Results, b: Results) -> tuple[np.ndarray, np.ndarray]:
     """A number for every design point: the same for equal scenarios or, without any, values."""
     texts = [[s.model_dump_json() for s in r.store.manifest.scenarios] for r in (a, b)]
     if not {*texts[0]} & {*texts[1]}:
@@ -233,7 +233,9 @@ def _scenarios(a: Results, b: Results) -> tuple[np.ndarray, np.ndarray]:
     return numbers[: len(texts[0])], numbers[len(texts[0]) :]
 
 
-def _missions(results: Results, teams: Mapping[str, str], scenarios: np.ndarray) -> pd.DataFrame:
+def _numbered_missions(
+    results: Results, teams: Mapping[str, str], scenarios: np.ndarray
+) -> pd.DataFrame:
     """All missions with the columns that match them; equal design points count once."""
     rows = pd.concat([results.missions, results.checks], ignore_index=True)
     rows = rows.reindex(columns=["policy", "point", "replication", *_MISSION_FIELDS])
@@ -241,7 +243,9 @@ def _missions(results: Results, teams: Mapping[str, str], scenarios: np.ndarray)
     return rows.drop_duplicates(_KEYS, ignore_index=True)
 
 
-def _uavs(results: Results, missions: pd.DataFrame, numbered: pd.DataFrame) -> pd.DataFrame:
+def _uavs_of_missions(
+    results: Results, missions: pd.DataFrame, numbered: pd.DataFrame
+) -> pd.DataFrame:
     """The UAVs of the numbered missions."""
     manifest, tables = results.store.manifest, [results.uavs]
     for number, policy in enumerate(results.policies):
@@ -257,15 +261,15 @@ def _differing_fields(missions: pd.DataFrame, uavs: pd.DataFrame) -> np.ndarray:
     """For every mission the names of the fields that differ; fields of UAVs are ``uav quota``."""
     differ = np.zeros((len(missions), len(_MISSION_FIELDS) + len(_UAV_FIELDS)), bool)
     for column, name in enumerate(_MISSION_FIELDS):
-        differ[:, column] = _differs(missions, name)
+        differ[:, column] = _field_differs(missions, name)
     for column, name in enumerate(_UAV_FIELDS, len(_MISSION_FIELDS)):
-        differ[uavs["mission"].to_numpy()[_differs(uavs, name)], column] = True
+        differ[uavs["mission"].to_numpy()[_field_differs(uavs, name)], column] = True
     names = np.array([*_MISSION_FIELDS, *(f"uav {name}" for name in _UAV_FIELDS)])
     patterns, which = np.unique(differ, axis=0, return_inverse=True)
     return np.array([", ".join(names[pattern]) for pattern in patterns], object)[which.ravel()]
 
 
-def _differs(pairs: pd.DataFrame, name: str) -> np.ndarray:
+def _field_differs(pairs: pd.DataFrame, name: str) -> np.ndarray:
     """For every mission, whether a field of A and B differs in any bit."""
     a, b = (pairs[f"{name}_{side}"] for side in "ab")
     if not pd.api.types.is_numeric_dtype(a):
@@ -274,7 +278,7 @@ def _differs(pairs: pd.DataFrame, name: str) -> np.ndarray:
     return (bits[0] != bits[1]) & ~(a.isna() & b.isna()).to_numpy()  # nan: not measured
 
 
-def _alone(
+def _rows_of_one_side(
     side: str, results: Results, missions: pd.DataFrame, others: pd.DataFrame, keys: list[str]
 ) -> pd.DataFrame:
     """What only one side has: complete policies, complete design points, or replications."""
@@ -282,7 +286,7 @@ def _alone(
     found = missions[keys].merge(known, how="left", indicator="found")["found"]
     rows = missions[found.to_numpy() != "both"]
     scenario = f"the scenario of study {results.study.name}"
-    words = pd.Series([setting or scenario for setting in in_words(results)])
+    words = pd.Series([setting or scenario for setting in points_in_words(results)])
     points, no_policy = rows["point"].map(words), ~rows["team"].isin(others["team"])
     no_point = ~rows["scenario"].isin(others["scenario"])
     cells = "policy " + rows["policy"] + " at " + points

@@ -14,14 +14,14 @@ import scipy
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.answers.settings import in_words
-from dess.analysis.answers.summary import learners
+from dess.analysis.answers.settings.points import points_in_words
+from dess.analysis.answers.summary import trained_policies_by_learner
 from dess.analysis.figures import Drawing
 from dess.analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import adjust
+from dess.analysis.stats.differences import adjust_p_values
 from dess.analysis.stats.intervals import LEVEL, Interval, mean_interval
-from dess.analysis.stats.verdict import INCONCLUSIVE, MARKS, above, judged, position
+from dess.analysis.stats.verdict import INCONCLUSIVE, MARKS, judge_parts, position_of, verdict_above
 from dess.base.errors import one_of
 from dess.base.files.reading import paths_in
 from dess.base.files.tables import read_table
@@ -52,37 +52,37 @@ ONE_LESS = {
 }
 
 
-def finals(curves: pd.DataFrame) -> pd.DataFrame:
+def last_rows(curves: pd.DataFrame) -> pd.DataFrame:
     """The last row of every training, which has the metrics of the selected weights."""
     return curves.groupby(["variant", "seed"], sort=False, as_index=False).last()
 
 
 def of_equal_budget(last: pd.DataFrame, baseline: str) -> pd.DataFrame:
-    """Those of ``finals`` that have made as many updates as the trainings of the baseline."""
+    """Those of ``last_rows`` that have made as many updates as the trainings of the baseline."""
     budget = last.loc[last["variant"] == baseline, "updates"].max()
     return last[last["updates"] == budget]
 
 
-def ladder(last: pd.DataFrame) -> pd.DataFrame:
-    """Those of ``finals`` whose variants are in ``LADDER``, in its order, by what they add."""
+def rows_of_ladder(last: pd.DataFrame) -> pd.DataFrame:
+    """Those of ``last_rows`` whose variants are in ``LADDER``, in its order, by what they add."""
     rungs = {variant: rung for rung, variant in LADDER.items()}
     named = last[last["variant"].isin(rungs)].replace({"variant": rungs})
     return named.sort_values("variant", key=lambda names: names.map([*LADDER].index), kind="stable")
 
 
-def ablation(last: pd.DataFrame, baseline: str) -> pd.DataFrame:
+def compare_variants(last: pd.DataFrame, baseline: str) -> pd.DataFrame:
     """The final product of every variant, and its difference from the baseline.
 
     Args:
-        last: Rows of ``finals``.
+        last: Rows of ``last_rows``.
         baseline: The variant with which the others are compared.
 
     Returns:
         A row per variant, the highest mean first: ``variant``, ``n`` trainings; ``mean``, ``low``,
         ``high`` of the expected result; ``new_low`` and ``new_high`` of one new training (nan with
         one training; the ends are cut at 0 and 1); ``difference``,
-        ``difference_low``, ``difference_high``, ``p`` and ``p_adjusted`` (Holm), of ``difference``;
-        nan for the baseline.
+        ``difference_low``, ``difference_high``, ``p`` and ``p_adjusted`` (Holm), of
+        ``difference_of_trainings``; nan for the baseline.
     """
     values = {v: part[FINAL].to_numpy() for v, part in last.groupby("variant", sort=False)}
     rows = []
@@ -93,13 +93,13 @@ def ablation(last: pd.DataFrame, baseline: str) -> pd.DataFrame:
         ends = np.full(4, np.nan) if alone else np.clip(mean + room, 0.0, 1.0)
         gap, p = Interval(np.nan, np.nan, np.nan), np.nan
         if variant != baseline:
-            gap, p = difference(sample, values[baseline])
+            gap, p = difference_of_trainings(sample, values[baseline])
         rows.append((variant, len(sample), mean, *ends, *gap, p))
     columns = ["variant", "n", "mean", "low", "high", "new_low", "new_high"]
     columns += ["difference", "difference_low", "difference_high", "p"]
     table = pd.DataFrame(rows, columns=columns)
     known = table["p"].notna()
-    table.loc[known, "p_adjusted"] = adjust(table.loc[known, "p"].to_numpy(), "holm")
+    table.loc[known, "p_adjusted"] = adjust_p_values(table.loc[known, "p"].to_numpy(), "holm")
     return table.sort_values("mean", ascending=False, kind="stable", ignore_index=True)
 
 
@@ -107,23 +107,25 @@ def ablation(last: pd.DataFrame, baseline: str) -> pd.DataFrame:
 OFF = 0.5
 
 
-def methods(rungs: pd.DataFrame) -> Drawing:
+def draw_method_ladder(rungs: pd.DataFrame) -> Drawing:
     """The product that trainings reach with each further method.
 
     Args:
-        rungs: Rows of ``ladder``.
+        rungs: Rows of ``rows_of_ladder``.
     """
     order = rungs["variant"].unique()
-    table = ablation(rungs, order[-1]).set_index("variant").loc[order].reset_index()
-    return variants(table, rungs, order[-1], "The product that trainings reach, method by method")
+    table = compare_variants(rungs, order[-1]).set_index("variant").loc[order].reset_index()
+    return draw_variants(
+        table, rungs, order[-1], "The product that trainings reach, method by method"
+    )
 
 
-def variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str, alt: str) -> Drawing:
+def draw_variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str, alt: str) -> Drawing:
     """The product of every variant: trainings as dots, their mean with interval as a diamond.
 
     Args:
-        table: Rows of ``ablation``.
-        last: Rows of ``finals``.
+        table: Rows of ``compare_variants``.
+        last: Rows of ``last_rows``.
         baseline: The variant whose mean is drawn as a line. Variants of which no training reaches
             ``OFF`` times as much are an arrow at the edge, unless another has some that do.
         alt: What the figure shows.
@@ -133,10 +135,10 @@ def variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str, alt: str) -
         f"(Student's t). Dashed: the mean of {baseline}. An arrow: all trainings are left of the "
         "axis."
     )
-    return Drawing(_variants(table, last, baseline), alt, caption, table)
+    return Drawing(_plot_variants(table, last, baseline), alt, caption, table)
 
 
-def _variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> "Figure":
+def _plot_variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> "Figure":
     from dess.analysis.figures import style
 
     values = last.groupby("variant")[FINAL]
@@ -146,7 +148,7 @@ def _variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> "Figure
     ends = drawn[drawn >= (0 if split else OFF * level)].agg(["min", "max"])
     room = 0.06 * (ends["max"] - ends["min"]) or 0.01
     left, right = max(ends["min"] - room, -0.02), min(ends["max"] + room, 1.02)
-    with style.panels(0.9 + 0.42 * len(table), values="x") as (figure, ax):
+    with style.new_panels(0.9 + 0.42 * len(table), values="x") as (figure, ax):
         ax.axvline(level, color=style.INK, linestyle="--", linewidth=1, zorder=1, gid="baseline")
         for y, (_, row) in enumerate(table.iterrows()):
             name, reached = row["variant"], values.get_group(row["variant"])
@@ -156,13 +158,13 @@ def _variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> "Figure
                 ax.scatter(reached, np.full(len(reached), y + 0.18 * (row["n"] > 1)), s=18,
                            color=style.MUTED, zorder=3, gid=name)  # fmt: skip
                 if row["n"] > 1:
-                    look = style.dot((style.palette()[0], "D"))
-                    ax.errorbar(row["mean"], y - 0.14, xerr=style.arms(row), **look)
+                    look = style.dot_style((style.readable_palette()[0], "D"))
+                    ax.errorbar(row["mean"], y - 0.14, xerr=style.error_bar_arms(row), **look)
             style.note_at_right(f"{row['mean']:.1%}, n = {row['n']}", y, ax)
         names = ["\n".join(textwrap.wrap(variant, 22)) for variant in table["variant"]]
         ax.set_yticks(range(len(table)), names)
         ax.set(title=METRICS[PRODUCT], ylim=(len(table) - 0.4, -0.6))
-        style.in_units(ax.xaxis, "%", 5)
+        style.set_axis_unit(ax.xaxis, "%", 5)
         ax.set_xlim(left, right)
     return figure
 
@@ -170,11 +172,11 @@ def _variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> "Figure
 def without_each(last: pd.DataFrame) -> str:
     """How many trainings that lack one of the methods learn to charge, in a sentence.
 
-    What a method adds depends on those that are there before it. So the steps of ``ladder`` do not
-    say which method matters most; this says whether any single one is needed.
+    What a method adds depends on those that are there before it. So the steps of ``rows_of_ladder``
+    do not say which method matters most; this says whether any single one is needed.
 
     Args:
-        last: Rows of ``finals``.
+        last: Rows of ``last_rows``.
     """
     learned = (last[f"final_{SUCCESS}"] > LEARNED).groupby(last["variant"], sort=False)
     counts = learned.agg(learning="sum", trainings="size")
@@ -184,7 +186,7 @@ def without_each(last: pd.DataFrame) -> str:
     parts = [
         f"{row.learning} of {row.trainings} {ONE_LESS[row.Index]}" for row in counts.itertuples()
     ]
-    text = f"Of the trainings that lack one method, {numbers.words(parts)} learn to charge"
+    text = f"Of the trainings that lack one method, {numbers.join_words(parts)} learn to charge"
     if (counts["learning"] == counts["trainings"]).all():
         return f"{text}: no single method is needed for it."
     return f"{text}."
@@ -196,15 +198,15 @@ def learning_to_charge(last: pd.DataFrame, variant: str) -> str:
     return f"{(successes > LEARNED).sum()} of {len(successes)}"
 
 
-def answer(rungs: pd.DataFrame) -> str:
+def methods_sentence(rungs: pd.DataFrame) -> str:
     """What the methods add up to, in a sentence.
 
     Args:
-        rungs: Rows of ``ladder``.
+        rungs: Rows of ``rows_of_ladder``.
     """
     by_rung = rungs.groupby("variant", sort=False)
     means = by_rung[FINAL].mean()
-    reached = [f"{numbers.percent(mean)} ({rung})" for rung, mean in means.items()]
+    reached = [f"{numbers.format_percent(mean)} ({rung})" for rung, mean in means.items()]
     if len(reached) == 1:
         return f"Trainings reach a product of {reached[0]}."
     learned = by_rung[f"final_{SUCCESS}"].agg(lambda shares: (shares > LEARNED).sum())
@@ -214,11 +216,11 @@ def answer(rungs: pd.DataFrame) -> str:
     ]
     return (
         f"Trainings reach a mean product of {reached[0]} and of {reached[-1]}. "
-        f"Of them learn to charge: {numbers.words(counts[:3])}."
+        f"Of them learn to charge: {numbers.join_words(counts[:3])}."
     )
 
 
-def difference(
+def difference_of_trainings(
     a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray, level: float = LEVEL
 ) -> tuple[Interval, float]:
     """The mean of A minus the mean of B, over independent trainings (Welch's t).
@@ -242,38 +244,40 @@ def difference(
 
 
 def ablation_table(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> pd.DataFrame:
-    """The rows of ``ablation`` as a table of text.
+    """The rows of ``compare_variants`` as a table of text.
 
     Args:
-        table: Rows of ``ablation``.
-        last: Rows of ``finals``, for the means of the other metrics.
+        table: Rows of ``compare_variants``.
+        last: Rows of ``last_rows``, for the means of the other metrics.
         baseline: The variant with which the others are compared.
     """
     means = last.groupby("variant")[[f"final_{SUCCESS}", f"final_{RATIO}"]].mean()
-    others = means.loc[table["variant"]].map(numbers.percent).to_numpy()
+    others = means.loc[table["variant"]].map(numbers.format_percent).to_numpy()
     gaps = table[["difference", "difference_low", "difference_high"]].to_numpy()
     columns = {
         "Variant": table["variant"],
         "n": table["n"],
-        METRICS[PRODUCT]: [*map(_interval, table["mean"], table["low"], table["high"])],
+        METRICS[PRODUCT]: [*map(_format_interval, table["mean"], table["low"], table["high"])],
         "One new training": [
-            _interval(*ends).partition(" % ")[2]
+            _format_interval(*ends).partition(" % ")[2]
             for ends in table[["mean", "new_low", "new_high"]].to_numpy()
         ],
         f"Difference from {baseline} [points]": [
-            f"{numbers.points(*gap)} {MARKS[position(Interval(*gap))]}" if gap[0] == gap[0] else ""
+            f"{numbers.format_points(*gap)} {MARKS[position_of(Interval(*gap))]}"
+            if gap[0] == gap[0]
+            else ""
             for gap in gaps
         ],
-        "p (Holm)": table["p_adjusted"].map(numbers.p_value, na_action="ignore"),
+        "p (Holm)": table["p_adjusted"].map(numbers.format_p_value, na_action="ignore"),
         METRICS[SUCCESS]: others[:, 0],
         METRICS[RATIO]: others[:, 1],
     }
     return pd.DataFrame(columns)
 
 
-def _interval(mean: float, low: float, high: float) -> str:
+def _format_interval(mean: float, low: float, high: float) -> str:
     """A mean with its interval, if it has one with a length."""
-    return numbers.interval(mean, low, high) if low < high else numbers.percent(mean)
+    return numbers.format_interval(mean, low, high) if low < high else numbers.format_percent(mean)
 
 
 # The metrics that are evaluated while training, and their names.
@@ -334,7 +338,7 @@ class Transfer:
         return f"is above {where}"
 
 
-def smoothed(curves: pd.DataFrame, metric: str) -> pd.DataFrame:
+def smooth_curves(curves: pd.DataFrame, metric: str) -> pd.DataFrame:
     """The exponential moving average of every training, started again in every phase.
 
     For evaluations x(t) it is e(t) = (1 - ALPHA) e(t - 1) + ALPHA x(t). At the first evaluation of
@@ -344,7 +348,7 @@ def smoothed(curves: pd.DataFrame, metric: str) -> pd.DataFrame:
         A row per evaluation: ``variant``, ``seed``, ``phase``, ``updates``, ``value``.
     """
     keys = ["variant", "seed", "phase"]
-    averages = curves.groupby(keys, sort=False)[metric].transform(_average)
+    averages = curves.groupby(keys, sort=False)[metric].transform(_moving_average)
     return curves[[*keys, "updates"]].assign(value=averages)
 
 
@@ -363,17 +367,17 @@ def transfer_drawings(curves: pd.DataFrame) -> list[Drawing]:
     pairs = pairs_in(curves)
     return [
         Drawing(
-            trainings(curves, metric, dict(zip(pairs[name], _SIDES, strict=True))),
+            plot_trainings(curves, metric, dict(zip(pairs[name], _SIDES, strict=True))),
             f"{SHOWN[metric]} against training step, {name}, with and without transfer",
             f"Trainings with {name}.",
-            smoothed(curves[curves["variant"].isin(pairs[name])], metric),
+            smooth_curves(curves[curves["variant"].isin(pairs[name])], metric),
         )
         for name in dict.fromkeys([[*pairs][0], [*pairs][-1]])
         for metric in SHOWN
     ]
 
 
-def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> "Figure":
+def plot_trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> "Figure":
     """A metric against the training step, a line for each training: Fig. 3.
 
     Phases before the last one are dotted, and a vertical line marks the beginning of the last
@@ -387,9 +391,9 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> "
     from dess.analysis.figures import style
 
     drawn = curves[curves["variant"].isin(labels)]
-    averages = smoothed(drawn, metric)
-    looks = zip(labels.items(), style.palette(), style.LINES, strict=False)
-    with style.panels(3.9, values="y", legend=2) as (figure, ax):
+    averages = smooth_curves(drawn, metric)
+    looks = zip(labels.items(), style.readable_palette(), style.LINES, strict=False)
+    with style.new_panels(3.9, values="y", legend=2) as (figure, ax):
         for (variant, label), colour, line in looks:
             of_variant = averages[averages["variant"] == variant]
             last, n = of_variant["phase"].iloc[-1], of_variant["seed"].nunique()
@@ -405,7 +409,7 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> "
                             **style.OUTLINED)  # fmt: skip
         low, high = averages["value"].min(), averages["value"].max()
         room = 0.12 * (high - low) or 0.1
-        style.in_units(ax.yaxis, "%" if metric == LEARNED_PRODUCT else "")
+        style.set_axis_unit(ax.yaxis, "%" if metric == LEARNED_PRODUCT else "")
         ax.set(title=SHOWN[metric], ylim=(low - room, high + room))
         _steps_axis(drawn, ax)
     return figure
@@ -428,14 +432,14 @@ def last_phase(averages: pd.DataFrame, variant: str) -> pd.DataFrame:
     return curves.pivot(index="updates", columns="seed", values="value").dropna()
 
 
-def transfer(averages: pd.DataFrame, using: str, without: str, shortest: int) -> Transfer:
+def compare_transfer(averages: pd.DataFrame, using: str, without: str, shortest: int) -> Transfer:
     """Whether a variant with transfer learning overtakes the one without it and ends higher.
 
     They are compared in the last phase of both, in which both train in missions with battery
     decrease.
 
     Args:
-        averages: Rows of ``smoothed``.
+        averages: Rows of ``smooth_curves``.
         using: The variant with transfer learning.
         without: The variant without it.
         shortest: Trainings of fewer steps are inconclusive.
@@ -446,25 +450,27 @@ def transfer(averages: pd.DataFrame, using: str, without: str, shortest: int) ->
     behind = np.flatnonzero(lead <= 0)
     first = behind[-1] + 1 if len(behind) else 0
     since = int(steps[first]) if first < len(steps) else None
-    last = difference(a.loc[steps[-1]].to_numpy(), b.loc[steps[-1]].to_numpy(), BAND)[0]
+    last = difference_of_trainings(a.loc[steps[-1]].to_numpy(), b.loc[steps[-1]].to_numpy(), BAND)[
+        0
+    ]
     length = int(steps[-1])
-    verdict = judged(above(last)) if length >= shortest else INCONCLUSIVE
+    verdict = judge_parts(verdict_above(last)) if length >= shortest else INCONCLUSIVE
     return Transfer(verdict, since, not len(behind), last, length, (a.shape[1], b.shape[1]))
 
 
-def transfers(
+def compare_all_transfers(
     curves: pd.DataFrame, metrics: Iterable[str], shortest: int
 ) -> dict[tuple[str, str], Transfer]:
-    """``transfer`` of all pairs of variants, by the name of the pair and the metric."""
-    averages = {metric: smoothed(curves, metric) for metric in metrics}
+    """``compare_transfer`` of all pairs of variants, by the name of the pair and the metric."""
+    averages = {metric: smooth_curves(curves, metric) for metric in metrics}
     return {
-        (name, metric): transfer(averages[metric], *pair, shortest)
+        (name, metric): compare_transfer(averages[metric], *pair, shortest)
         for name, pair in pairs_in(curves).items()
         for metric in averages
     }
 
 
-def settled(averages: pd.Series, margin: float) -> int:
+def settling_position(averages: pd.Series, margin: float) -> int:
     """The position from which on the averages stay within a margin of the last one."""
     far = np.flatnonzero((averages - averages.iloc[-1]).abs() > margin)
     return int(far[-1]) + 1 if len(far) else 0
@@ -482,7 +488,7 @@ def transfer_table(
     rows = []
     for (name, metric), compared in transfers.items():
         last, named = compared.last, "Reward" if metric == LEARNED_REWARD else "Product"
-        write = numbers.points if metric == LEARNED_PRODUCT else _rewards
+        write = numbers.format_points if metric == LEARNED_PRODUCT else _format_rewards
         difference_at_end = write(*last)
         if last.low == last.high:
             difference_at_end = f"{difference_at_end.split()[0]}, the same in all trainings"
@@ -493,11 +499,11 @@ def transfer_table(
     return pd.DataFrame(rows, columns=[*head, "Difference at the end"])
 
 
-def _rewards(*ends: float) -> str:
-    return numbers.with_ends(lambda value: numbers.minus(f"{value:+.0f}"), *ends)
+def _format_rewards(*ends: float) -> str:
+    return numbers.with_ends(lambda value: numbers.format_minus(f"{value:+.0f}"), *ends)
 
 
-def _average(values: pd.Series) -> pd.Series:
+def _moving_average(values: pd.Series) -> pd.Series:
     return values.ewm(alpha=ALPHA, adjust=False).mean()
 
 
@@ -602,14 +608,14 @@ def marl_eval_data(results: Results, metrics: Sequence[str] = (*METRICS,)) -> di
                 name.replace(",", "+"): {f"run_{r + 1}": steps(name, r, task) for r in runs[name]}
                 for name in runs
             }
-            for task, setting in enumerate(in_words(results))
+            for task, setting in enumerate(points_in_words(results))
         }
     }
 
 
 def _policies_of_runs(results: Results) -> dict[str, list[str]]:
     """For every algorithm the policy of each run."""
-    trained = learners(results)
+    trained = trained_policies_by_learner(results)
     others = set(results.policies).difference(*trained.values())
     algorithms = trained | {policy: [policy] for policy in results.policies if policy in others}
     counts = {len(policies) for policies in algorithms.values()} - {1}
@@ -659,7 +665,9 @@ def curves_by_learner(policies: Iterable[Trained]) -> pd.DataFrame:
     for policy in policies:
         learners.setdefault(learner_of(policy.config), []).append(policy)
     return pd.concat(
-        policy.curve.assign(variant=numbers.words([p.name for p in group]), seed=policy.config.seed)
+        policy.curve.assign(
+            variant=numbers.join_words([p.name for p in group]), seed=policy.config.seed
+        )
         for group in learners.values()
         for policy in group
     )
@@ -670,7 +678,7 @@ def shipped_drawings(policies: Iterable[Trained]) -> list[Drawing]:
     curves = curves_by_learner(policies)
     labels = {name: name for name in curves["variant"].unique()}
     return [
-        Drawing(trainings(curves, metric, labels), f"{SHOWN[metric]} of the shipped policies")
+        Drawing(plot_trainings(curves, metric, labels), f"{SHOWN[metric]} of the shipped policies")
         for metric in SHOWN
     ]
 
@@ -678,19 +686,19 @@ def shipped_drawings(policies: Iterable[Trained]) -> list[Drawing]:
 def course_in_words(policy: Trained, margin: float) -> str:
     """Where a training ends, and since when it has stayed within a margin: a Markdown item."""
     end = policy.curve.iloc[-1]
-    averages = last_phase(smoothed(curves_by_learner([policy]), LEARNED_PRODUCT), policy.name)[
+    averages = last_phase(smooth_curves(curves_by_learner([policy]), LEARNED_PRODUCT), policy.name)[
         policy.config.seed
     ]
-    near = policy.curve.iloc[settled(averages, margin) - len(averages)]
+    near = policy.curve.iloc[settling_position(averages, margin) - len(averages)]
     return (
-        f"- **{policy.name}**: {numbers.percent(averages.iloc[-1])} after {end['updates']:,} "
-        f"updates ({end['uav_slots'] / 1e6:.1f} million UAV-slots, {end['seconds'] / 60:.0f} "
-        f"minutes); within {numbers.margin(margin)} of it from update {near['updates']:,} on "
-        f"({near['seconds'] / 60:.0f} minutes)."
+        f"- **{policy.name}**: {numbers.format_percent(averages.iloc[-1])} after "
+        f"{end['updates']:,} updates ({end['uav_slots'] / 1e6:.1f} million UAV-slots, "
+        f"{end['seconds'] / 60:.0f} minutes); within {numbers.format_margin(margin)} of it from "
+        f"update {near['updates']:,} on ({near['seconds'] / 60:.0f} minutes)."
     )
 
 
-def commands(policies: Iterable[Trained]) -> list[str]:
+def training_commands(policies: Iterable[Trained]) -> list[str]:
     """The commands that train the policies again."""
     return [
         shlex.join(

@@ -3,32 +3,37 @@
 The functions are for designs that vary one parameter at a time, like the paper's Fig. 5. All values
 of a parameter are simulated in the same replications, so they are compared mission by mission:
 
-    table = effects(results)
-    pairs = changes(results, table, "greedy", "uavs", PRODUCT)
-    shape(pairs).words  # "rises"
+    table = means_by_field(results)
+    pairs = compare_values(results, table, "greedy", "uavs", PRODUCT)
+    shape_of_changes(pairs).words  # "rises"
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
+from textwrap import fill
 from typing import NamedTuple
 
 import pandas as pd
+from matplotlib.figure import Figure
 
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers import summary
-from dess.analysis.metrics import PRODUCT
-from dess.analysis.names import parameter, value_text
+from dess.analysis.answers.settings.figures import counted_missions, panel_grid
+from dess.analysis.figures import Drawing, style
+from dess.analysis.metrics import METRICS, PRODUCT, metric_of
+from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import paired, with_adjusted
+from dess.analysis.stats.differences import add_adjusted, compare_pairs
 from dess.analysis.stats.intervals import LEVEL, by_replication
+from dess.analysis.tables import INTERVALS
 
 _ENDS = ["difference", "low", "high"]
 LEVELS, RISES, FALLS = "stays level", "rises", "falls"
 PEAK, VALLEY, IRREGULAR = "rises, then falls", "falls, then rises", "goes up and down"
 
 
-ByField = Mapping[str, Mapping[str, pd.DataFrame]]  # ``changes`` by parameter and policy
+ByField = Mapping[str, Mapping[str, pd.DataFrame]]  # ``compare_values`` by parameter and policy
 
 
 class Shape(NamedTuple):
@@ -48,12 +53,12 @@ class Shape(NamedTuple):
     peaks: tuple[int, ...]
 
 
-def effects(results: Results) -> pd.DataFrame:
+def means_by_field(results: Results) -> pd.DataFrame:
     """Means with intervals of every policy at every value of every parameter.
 
     Returns:
         A row per parameter, value, policy and metric: ``field``, ``value`` in words, ``position``
-        (0, 1, ... in the order of the study), and the columns of ``summary.means``.
+        (0, 1, ... in the order of the study), and the columns of ``summary.means_of_points``.
 
     Raises:
         InputError: If a design point sets more or less than one field.
@@ -66,10 +71,10 @@ def effects(results: Results) -> pd.DataFrame:
     rows = [(field, value_text(value)) for values in design for field, value in values.items()]
     table = pd.DataFrame(rows, columns=["field", "value"]).rename_axis("point").reset_index()
     table["position"] = table.groupby("field").cumcount()
-    return table.merge(summary.means(results), on="point")
+    return table.merge(summary.means_of_points(results), on="point")
 
 
-def changes(
+def compare_values(
     results: Results,
     table: pd.DataFrame,
     policy: str,
@@ -81,7 +86,7 @@ def changes(
 
     Args:
         results: The study.
-        table: Its ``effects``.
+        table: Its ``means_by_field``.
         policy: The policy.
         field: The parameter.
         metric: The metric.
@@ -103,44 +108,48 @@ def changes(
     rows = []
     for first, second in couples:
         samples = values[second].to_numpy(), values[first].to_numpy()
-        pair, wide = (paired(*samples, level, metric) for level in (LEVEL, at_once))
+        pair, wide = (compare_pairs(*samples, level, metric) for level in (LEVEL, at_once))
         ends = pair.difference, pair.low, pair.high, wide.low, wide.high
         rows.append((first, second, *ends, pair.p, pair.n))
     columns = ["first", "second", *_ENDS, "wide_low", "wide_high", "p", "n"]
-    return with_adjusted(pd.DataFrame(rows, columns=columns), "holm")
+    return add_adjusted(pd.DataFrame(rows, columns=columns), "holm")
 
 
-def changes_by_field(results: Results, table: pd.DataFrame, metric: str = PRODUCT) -> ByField:
+def compare_values_by_field(
+    results: Results, table: pd.DataFrame, metric: str = PRODUCT
+) -> ByField:
     """The changes of a metric, by parameter and policy.
 
     Args:
         results: The study.
-        table: Its ``effects``, of some policies. A parameter with one value has no changes.
+        table: Its ``means_by_field``, of some policies. A parameter with one value has no changes.
     """
     policies = table["policy"].unique()
     fields = table.groupby("field", sort=False)["position"].nunique()
     return {
-        str(field): {p: changes(results, table, p, str(field), metric) for p in policies}
+        str(field): {p: compare_values(results, table, p, str(field), metric) for p in policies}
         for field in fields.index[fields > 1]
     }
 
 
-def shape(pairs: pd.DataFrame) -> Shape:
-    """The shape of a metric that follows from the differences of ``changes``."""
+def shape_of_changes(pairs: pd.DataFrame) -> Shape:
+    """The shape of a metric that follows from the differences of ``compare_values``."""
     sure = pairs[pairs["p_adjusted"] <= 1 - LEVEL]
     ups, downs = sure[sure["difference"] > 0], sure[sure["difference"] < 0]
     places = range(int(pairs["second"].max()) + 1)
-    peaks = tuple(place for place in places if _passes(place, ups, downs))
+    peaks = tuple(place for place in places if _rises_then_falls(place, ups, downs))
     if ups.empty or downs.empty:
         words = LEVELS if sure.empty else RISES if downs.empty else FALLS
     elif peaks:
         words = PEAK
     else:
-        words = VALLEY if any(_passes(place, downs, ups) for place in places) else IRREGULAR
+        words = (
+            VALLEY if any(_rises_then_falls(place, downs, ups) for place in places) else IRREGULAR
+        )
     return Shape(words, peaks)
 
 
-def _passes(peak: int, ups: pd.DataFrame, downs: pd.DataFrame) -> bool:
+def _rises_then_falls(peak: int, ups: pd.DataFrame, downs: pd.DataFrame) -> bool:
     """Whether there is no fall before the peak, and no rise after it."""
     return bool((downs["second"] > peak).all() and (ups["first"] < peak).all())
 
@@ -161,20 +170,24 @@ def leading_policies(
     for name in (learned, heuristic):
         if name is not None:
             results.check_policy(name)
-    trained = {policy for names in summary.learners(results).values() for policy in names}
-    ranked = summary.ranked_policies(results.missions)
+    trained = {
+        policy
+        for names in summary.trained_policies_by_learner(results).values()
+        for policy in names
+    }
+    ranked = summary.rank_policies(results.missions)
     learned = learned or next((policy for policy in ranked if policy in trained), None)
     heuristic = heuristic or next((policy for policy in ranked if policy not in trained), None)
     return [policy for policy in (learned, heuristic) if policy]
 
 
-def answer(table: pd.DataFrame, policies: Sequence[str]) -> str:
+def strongest_fields_sentence(table: pd.DataFrame, policies: Sequence[str]) -> str:
     """Which parameters change the product of every policy most, in a sentence for each.
 
     A parameter may help one policy and hurt another one, so none of them stands for the others.
 
     Args:
-        table: The ``effects``.
+        table: The ``means_by_field``.
         policies: The policies.
     """
     sentences = []
@@ -182,57 +195,123 @@ def answer(table: pd.DataFrame, policies: Sequence[str]) -> str:
         rows = table[(table["metric"] == PRODUCT) & (table["policy"] == policy)]
         by_field = rows.sort_values("position", kind="stable").groupby("field", sort=False)
         courses = []
-        for field in strongest(table, policy):
+        for field in strongest_fields(table, policy):
             values = by_field.get_group(field)
             extremes = [values["mean"].idxmin(), values["mean"].idxmax()]
             ends = values.loc[extremes].sort_values("position", kind="stable")
             first, last = [
-                f"{numbers.percent(row.mean)} at {row.value}" for row in ends.itertuples()
+                f"{numbers.format_percent(row.mean)} at {row.value}" for row in ends.itertuples()
             ]
-            courses.append(f"{parameter(str(field)).within} (from {first} to {last})")
+            courses.append(f"{field_named(str(field)).within} (from {first} to {last})")
         sentences.append(
             f"The product of {policy} depends most on the {' and on the '.join(courses)}."
         )
     counts = table.loc[table["policy"].isin(policies), "n"]
-    return f"{' '.join(sentences)} n = {numbers.span(counts)} missions per value."
+    return f"{' '.join(sentences)} n = {numbers.format_span(counts)} missions per value."
 
 
-def strongest(table: pd.DataFrame, policy: str, count: int = 2) -> list[str]:
-    """The parameters along whose values the product of a policy changes most; as ``answer``."""
+def strongest_fields(table: pd.DataFrame, policy: str, count: int = 2) -> list[str]:
+    """The parameters along whose values the product of a policy changes most."""
     rows = table[(table["metric"] == PRODUCT) & (table["policy"] == policy)]
     by_field = rows.groupby("field", sort=False)["mean"]
     return [*(by_field.max() - by_field.min()).nlargest(count).index]
 
 
-def listed(table: pd.DataFrame, changes: ByField, ratios: ByField) -> pd.DataFrame:
+def main_effects_table(table: pd.DataFrame, changes: ByField, ratios: ByField) -> pd.DataFrame:
     """How product goes along every parameter, as a table to print.
 
     Beside the change of the product from the first to the last value stands that of the collection
     ratio alone, which no failed mission moves: a few failures can make most of a small change.
 
     Args:
-        table: The ``effects``.
-        changes: ``changes_by_field``.
+        table: The ``means_by_field``.
+        changes: ``compare_values_by_field``.
         ratios: The same of the collection ratio.
     """
     rows = table[table["metric"] == PRODUCT].set_index(["policy", "field", "position"]).sort_index()
     lines = []
     for field, pairs_of_field in changes.items():
         for policy, pairs in pairs_of_field.items():
-            values, along = rows.loc[(policy, field)], shape(pairs)
+            values, along = rows.loc[(policy, field)], shape_of_changes(pairs)
             ends = values.iloc[[0, -1]]
             first, last = [
-                f"{numbers.percent(row.mean)} at {row.value}" for row in ends.itertuples()
+                f"{numbers.format_percent(row.mean)} at {row.value}" for row in ends.itertuples()
             ]
-            steps = [_points(of) for of in (pairs, ratios[field][policy])]
+            steps = [_format_total_change(of) for of in (pairs, ratios[field][policy])]
             peaks = values.loc[[*along.peaks], "value"] if along.words == PEAK else []
-            named = (parameter(field).name, policy, along.words, first, last)
+            named = (field_named(field).name, policy, along.words, first, last)
             lines.append((*named, *steps, " or ".join(peaks)))
     heads = ["Parameter", "Policy", "Along the values", "First", "Last", "Last − first"]
     return pd.DataFrame(lines, columns=[*heads, "Of the ratio alone", "Highest at"])
 
 
-def _points(pairs: pd.DataFrame) -> str:
+def _format_total_change(pairs: pd.DataFrame) -> str:
     """The change from the first to the last value, in points."""
     ends = pairs[pairs["first"] == 0].sort_values("second").iloc[-1]
-    return numbers.points(*ends[_ENDS])
+    return numbers.format_points(*ends[_ENDS])
+
+
+def plot_effect(
+    table: pd.DataFrame, field: str, changes: Mapping[str, pd.DataFrame], policies: list[str]
+) -> Figure:
+    """The metrics against a parameter: a part of Fig. 5.
+
+    There is a panel per metric, with the same axis for every parameter of the table, and a panel
+    with the differences from the first value, which has its own axis.
+
+    Args:
+        table: Rows of ``answers.main_effects.means_by_field``, of the policies to draw.
+        field: The parameter.
+        changes: For each policy to draw, its ``main_effects.compare_values`` in the last of
+        ``METRICS``. policies: All policies of the study, so that every policy has the same colour
+        on all pages.
+    """
+    rows, looks = table[table["field"] == field], style.policy_colours(policies, changes)
+    first = rows[rows["position"] == 0]
+    steps = pd.concat(
+        [pairs[pairs["first"] == 0].assign(policy=name) for name, pairs in changes.items()]
+    ).rename(columns={"difference": "mean", "second": "position"})
+    steps = pd.concat([first.assign(mean=0.0, low=0.0, high=0.0).drop_duplicates("policy"), steps])
+    steps["value"] = steps["position"].map(rows.set_index("position")["value"].to_dict())
+    ratios: dict = {"sharex": True, "height_ratios": (1, 1.6, 1.6, 1.2)}
+    with style.new_panels(7.6, 4, "y", **ratios) as (figure, axes):
+        for ax, (metric, name) in zip(axes, METRICS.items(), strict=False):
+            style.plot_along(rows[rows["metric"] == metric], looks, "%", ax)
+            ax.set(title=name, ylim=style.axis_ends(table[table["metric"] == metric], 0.1))
+        style.plot_along(steps, looks, "points", axes[-1])
+        axes[-1].axhline(0, **style.ZERO)
+        title = f"Paired difference from the value at {first['value'].iloc[0]}"
+        axes[-1].set(title=title, ylabel="points")
+        axes[-1].set_xlabel(field_named(field).label, parse_math=True)
+    return figure
+
+
+def draw_one_at_a_time(results: Results) -> Iterator[Drawing]:
+    """The paper's metrics against every field, with all other fields as in the scenario."""
+    table = means_by_field(results)
+    for field, pairs in compare_values_by_field(results, table).items():
+        data = table[table["field"] == field]
+        caption = (
+            f"n = {counted_missions(data)} missions per point; bars are {INTERVALS}. The lowest "
+            "panel shows the paired difference from the first value, with an axis of its own."
+        )
+        alt = f"The metrics against the {field_named(field).within}"
+        yield Drawing(plot_effect(table, field, pairs, results.policies), alt, caption, data)
+
+
+def plot_one_by_one(table: pd.DataFrame, policies: list[str]) -> Figure:
+    """The product against every parameter, in panels side by side with the same axis.
+
+    Args:
+        table: Rows of ``answers.main_effects.means_by_field``, of the policies to draw.
+        policies: All policies of the study, so that every policy has the same colour on all pages.
+    """
+    rows = table[table["metric"] == PRODUCT]
+    fields, looks = [*rows["field"].unique()], style.policy_colours(policies, rows["policy"])
+    with panel_grid(3.4, len(fields), len(fields)) as (figure, axes):
+        for ax, field in zip(axes, fields, strict=True):
+            style.plot_along(rows[rows["field"] == field], looks, "%", ax)
+            ax.set_xlabel(fill(field_named(field).label, 24), parse_math=True)
+            ax.tick_params(axis="x", labelsize=8)
+        figure.suptitle(metric_of(PRODUCT).label, fontsize=11, fontweight="bold", x=0.01, ha="left")
+    return figure

@@ -22,10 +22,10 @@ from dess.base.files.reading import paths_in
 FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
 
 
-def answer(missions: Sequence[Mission]) -> str:
+def shared_collection_sentence(missions: Sequence[Mission]) -> str:
     """What share of the data single missions of fleets collect, and how many UAVs run empty."""
     parts = [
-        f"{numbers.percent(m.record[RATIO])} with {m.fleet} in {m.record.slots} slots"
+        f"{numbers.format_percent(m.record[RATIO])} with {m.fleet} in {m.record.slots} slots"
         for m in missions
     ]
     empty = sum(int((mission.uavs["end"] == "battery").sum()) for mission in missions)
@@ -33,8 +33,9 @@ def answer(missions: Sequence[Mission]) -> str:
     if empty:
         run_empty = f"{empty} of {sum(len(mission.uavs) for mission in missions)} UAVs run"
     return (
-        f"Of the data, single missions of {missions[0].policy} collect {numbers.words(parts)}. "
-        f"{run_empty} out of battery in them.{_left_in_the_air(missions)}"
+        f"Of the data, single missions of {missions[0].policy} collect "
+        f"{numbers.join_words(parts)}. {run_empty} out of battery in them."
+        f"{_left_in_the_air(missions)}"
     )
 
 
@@ -44,7 +45,7 @@ def _left_in_the_air(missions: Sequence[Mission]) -> str:
     if not any(stranded_uavs(mission) for mission in missions):
         return ""
     return (
-        f" These missions end where the quotas are filled: {numbers.words(stranded)} UAVs end "
+        f" These missions end where the quotas are filled: {numbers.join_words(stranded)} UAVs end "
         "without the battery for the way home."
     )
 
@@ -74,7 +75,7 @@ def fate_in_words(mission: Mission) -> str:
         if end in ends
     ]
     if failures:
-        return f"{numbers.words(failures)}, so it counts 0"
+        return f"{numbers.join_words(failures)}, so it counts 0"
     text = f"all UAVs {scenario.aim}"
     if scenario.landing:
         return text
@@ -141,22 +142,24 @@ def _keep_log(results: Results, policy: str, replication: int, folder: str | Pat
         return
     # Arrow would read the nan of a pandas column as a missing value.
     table = pa.table({name: events[name].to_numpy() for name in events}, schema=parquet.EVENTS)
-    parquet.write(Path(folder, FOLDER), _name(results, policy, replication), table)
+    parquet.write(Path(folder, FOLDER), _log_name(results, policy, replication), table)
 
 
 def _kept_log(
     results: Results, policy: str, replication: int, folder: str | Path
 ) -> pd.DataFrame | None:
-    files = paths_in(Path(folder, FOLDER), f"{_name(results, policy, replication)}-*.parquet")
+    files = paths_in(Path(folder, FOLDER), f"{_log_name(results, policy, replication)}-*.parquet")
     tables = (parquet.read(path) for path in files)
     return next((table.to_pandas() for table in tables if table is not None), None)
 
 
-def _name(results: Results, policy: str, replication: int) -> str:
+def _log_name(results: Results, policy: str, replication: int) -> str:
     return f"{results.cell(policy, 0).key}-{replication:06}"
 
 
-def estimate(results: Results, policy: str, metric: str = PRODUCT, point: int | None = None) -> Any:
+def estimate_metric(
+    results: Results, policy: str, metric: str = PRODUCT, point: int | None = None
+) -> Any:
     """The mean of a metric over the missions of a policy, at one design point or at all.
 
     Returns:
@@ -168,7 +171,7 @@ def estimate(results: Results, policy: str, metric: str = PRODUCT, point: int | 
     return summary(missions, by=["policy"]).query("metric == @metric").iloc[0]
 
 
-def drawing(mission: Mission, alt: str, caption: str) -> Drawing:
+def draw_mission(mission: Mission, alt: str, caption: str) -> Drawing:
     """The map of a mission and its curves over time.
 
     Args:
@@ -189,22 +192,22 @@ def beside_paper(results: Results, mission: Mission, printed: float) -> Drawing:
         mission: The mission.
         printed: The collection ratio that the paper prints.
     """
-    mean = estimate(results, mission.policy, RATIO, mission.record.point)
+    mean = estimate_metric(results, mission.policy, RATIO, mission.record.point)
     caption = (
         f"n = 1 mission of {mission.record.slots} slots; {mission.collected}. The mean of this "
-        f"policy, n = {mean['n']:,}, is {numbers.estimate(mean)}, the paper's "
-        f"{numbers.percent(printed)}."
+        f"policy, n = {mean['n']:,}, is {numbers.format_estimate(mean)}, the paper's "
+        f"{numbers.format_percent(printed)}."
     )
     alt = f"Map of the mission with {mission.fleet}; battery, residual data and charging"
-    return drawing(mission, alt, caption)
+    return draw_mission(mission, alt, caption)
 
 
 def outcome_table(missions: Sequence[Mission]) -> pd.DataFrame:
     """A table to print with a row per mission; data are in data units."""
-    return pd.DataFrame([_outcome(mission) for mission in missions])
+    return pd.DataFrame([_mission_outcome(mission) for mission in missions])
 
 
-def _outcome(mission: Mission) -> dict[str, Any]:
+def _mission_outcome(mission: Mission) -> dict[str, Any]:
     row, log = mission.record, mission.events
     served = log.loc[log["event"] == "communication", "node"].nunique()
     left = log[(log["event"] == "mission_end") & (log["node"] >= 0)]
@@ -214,7 +217,7 @@ def _outcome(mission: Mission) -> dict[str, Any]:
         "UAVs": row["uavs"],
         "Success": "yes" if row["success"] else "no",
         "UAVs that can fly home": f"{len(mission.uavs) - stranded_uavs(mission)} of {row['uavs']}",
-        "Collected": numbers.percent(row[RATIO]),
+        "Collected": numbers.format_percent(row[RATIO]),
         "Mission slots": row["slots"],
         "Charging sessions": (log["event"] == "charge_start").sum(),
         "Nodes never served": f"{len(left) - served} of {len(left)}",
@@ -228,7 +231,7 @@ def _outcome(mission: Mission) -> dict[str, Any]:
 LEFT_BEHIND = 0.5
 
 
-def collected(events: Events, uavs: int, nodes: int) -> np.ndarray:
+def data_by_uav_and_node(events: Events, uavs: int, nodes: int) -> np.ndarray:
     """The (I, K) data that every UAV collected from every node [data units]."""
     log = pd.DataFrame(events)
     served = log[log["event"] == "communication"]
@@ -237,7 +240,7 @@ def collected(events: Events, uavs: int, nodes: int) -> np.ndarray:
     return data
 
 
-def held(events: Events, nodes: int) -> np.ndarray:
+def data_by_node(events: Events, nodes: int) -> np.ndarray:
     """The (K,) data of every node in the whole mission: initial and arrived [data units]."""
     return of_nodes(events, ["mission_start", "arrival"], nodes)
 
@@ -245,7 +248,7 @@ def held(events: Events, nodes: int) -> np.ndarray:
 def left_behind(events: Events, nodes: int) -> np.ndarray:
     """For each of the K nodes, whether less than ``LEFT_BEHIND`` of its data was collected."""
     return np.asarray(
-        of_nodes(events, ["communication"], nodes) < LEFT_BEHIND * held(events, nodes)
+        of_nodes(events, ["communication"], nodes) < LEFT_BEHIND * data_by_node(events, nodes)
     )
 
 
@@ -260,7 +263,7 @@ def far_edges(nodes: np.ndarray) -> np.ndarray:
     return np.asarray((nodes[:, 0] == nodes[:, 0].min()) | (nodes[:, 1] == nodes[:, 1].max()))
 
 
-def division(data: np.ndarray) -> float:
+def share_of_main_uav(data: np.ndarray) -> float:
     """The share of the data that was collected by the UAV which serves the node most.
 
     It is 1 if every node is served by only one UAV, and 1 / I if all UAVs collect the same amount
@@ -268,13 +271,13 @@ def division(data: np.ndarray) -> float:
     collected.
 
     Args:
-        data: (I, K) result of ``collected``.
+        data: (I, K) result of ``data_by_uav_and_node``.
     """
     total = data.sum()
     return float(data.max(axis=0).sum() / total) if total else np.nan
 
 
-def sectors(data: np.ndarray, nodes: np.ndarray) -> float:
+def share_in_own_sector(data: np.ndarray, nodes: np.ndarray) -> float:
     """The share of the data that two UAVs collected, each from its own sector.
 
     The sectors are the two sides of the straight line that gives the highest share. The share is 1
@@ -282,20 +285,22 @@ def sectors(data: np.ndarray, nodes: np.ndarray) -> float:
     collected.
 
     Args:
-        data: (2, K) result of ``collected``.
+        data: (2, K) result of ``data_by_uav_and_node``.
         nodes: (K, 2) cells x, y.
     """
     total = data.sum()
     if not total:
         return np.nan
-    orders = np.array([np.argsort(nodes @ way, kind="stable") for way in _directions(nodes)])
+    orders = np.array(
+        [np.argsort(nodes @ way, kind="stable") for way in _ordering_directions(nodes)]
+    )
     # What the first UAV collects before the line and the second behind it, for every line.
     lead = np.cumsum((data[0] - data[1])[orders], axis=1)
     own_side = data[1].sum() + np.concatenate([lead.ravel(), [0.0]])
     return float(max(own_side.max(), total - own_side.min()) / total)
 
 
-def _directions(nodes: np.ndarray) -> np.ndarray:
+def _ordering_directions(nodes: np.ndarray) -> np.ndarray:
     """The (D, 2) directions that order the nodes in all different ways.
 
     The order along a direction changes where two nodes have the same position on it; the returned

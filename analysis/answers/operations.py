@@ -1,7 +1,7 @@
 """Questions about the operation of a fleet: charging pads, the age of the data, failures.
 
-table = changes(results, "pads", 4, PRODUCT)  # of the study ``pads``
-pads(results, margin=0.01)  # the answer in words
+table = changes_from_reference(results, "pads", 4, PRODUCT)  # of the study ``pads``
+enough_pads_sentence(results, margin=0.01)  # the answer in words
 """
 
 from collections.abc import Iterable, Iterator
@@ -12,18 +12,19 @@ import pandas as pd
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.answers import settings
+from dess.analysis.answers.settings.effects import average_over_others
+from dess.analysis.answers.settings.figures import plot_curves
+from dess.analysis.answers.settings.points import check_metric, values_of_points, varied_values
 from dess.analysis.figures import Drawing
-from dess.analysis.figures.missions import courses
-from dess.analysis.figures.settings import lines
-from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, known_in, metric_of
+from dess.analysis.figures.missions import plot_courses
+from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, metric_in_missions, metric_of
 from dess.analysis.names import value_text
-from dess.analysis.results.event_log import duration
+from dess.analysis.results.event_log import mission_length
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import column_tests, relative_change
 from dess.analysis.stats.intervals import LEVEL, by_replication, check_share
-from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
-from dess.analysis.tables import WIDER, allowed_for
+from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_of
+from dess.analysis.tables import WIDER, allowance_sentence
 
 # The published changes of the average age of information, from one UAV to this number, in another
 # model of the same kind (Mathematics 13(21) 3564).
@@ -38,7 +39,7 @@ _WAITS = (
 _ENDS = ["mean", "low", "high"]
 
 
-def means(results: Results, metrics: Iterable[str]) -> pd.DataFrame:
+def means_of_metrics(results: Results, metrics: Iterable[str]) -> pd.DataFrame:
     """The means of metrics at every design point.
 
     Returns:
@@ -48,12 +49,12 @@ def means(results: Results, metrics: Iterable[str]) -> pd.DataFrame:
     Raises:
         InputError: If there is no such metric.
     """
-    fields = [*settings.varied(results)]
-    tables = [settings.averaged(results, fields, m).assign(metric=m) for m in metrics]
+    fields = [*varied_values(results)]
+    tables = [average_over_others(results, fields, m).assign(metric=m) for m in metrics]
     return pd.concat(tables, ignore_index=True)[["metric", "policy", *fields, *_ENDS, "n"]]
 
 
-def drawings(
+def draw_means(
     means: pd.DataFrame, x: str, line: str, panel: str, against: str, linked: bool = False
 ) -> dict[str, Drawing]:
     """The means of metrics against a field, by metric.
@@ -66,11 +67,11 @@ def drawings(
         against: The two fields in words.
         linked: Whether pages link to the data.
     """
-    counted = numbers.span(means["n"])
-    caption = f"n = {counted} missions per dot; bars are {numbers.level(LEVEL)} intervals."
+    counted = numbers.format_span(means["n"])
+    caption = f"n = {counted} missions per dot; bars are {numbers.format_level(LEVEL)} intervals."
     return {
         str(metric): Drawing(
-            lines(rows, x, line, str(metric), panel),
+            plot_curves(rows, x, line, str(metric), panel),
             f"{metric_of(str(metric)).name} against {against}",
             caption,
             rows if linked else None,
@@ -79,7 +80,7 @@ def drawings(
     }
 
 
-def changes(
+def changes_from_reference(
     results: Results, field: str, reference: Any, metric: str, relative: bool = False
 ) -> pd.DataFrame:
     """How a metric changes with a field, from a reference value and in the same replications.
@@ -100,16 +101,16 @@ def changes(
     Raises:
         InputError: If there is no such metric, or the field never has the reference value.
     """
-    settings.check_metric(results, metric)
-    table = settings.points(results)
+    check_metric(results, metric)
+    table = values_of_points(results)
     if field not in table or reference not in table[field].to_numpy():
         raise InputError(
             f"{field}: is never {reference!r} in the study; allowed: one of its values"
         )
-    rows, of = [], known_in(results.missions, metric)
+    rows, of = [], metric_in_missions(results.missions, metric)
     for policy, missions in results.missions.groupby("policy", sort=False):
         wide = by_replication(missions, metric, "point")
-        for point, partner in _pairs(table, field, reference):
+        for point, partner in _pairs_of_points(table, field, reference):
             both = wide[[point, partner]].dropna()
             if both.empty:
                 continue
@@ -140,7 +141,9 @@ def allowance_in_words(changes: pd.DataFrame, what: str) -> str:
         return ""
     row = wider.loc[wider["half"].idxmax()]
     plain, wide = (f"±{100 * row[half]:.2g} points" for half in ("student", "half"))
-    return allowed_for(f"the change of {what} with {row['policy']}", plain, wide, int(row["n"]))
+    return allowance_sentence(
+        f"the change of {what} with {row['policy']}", plain, wide, int(row["n"])
+    )
 
 
 def enough_pads(results: Results, margin: float) -> pd.DataFrame:
@@ -162,8 +165,8 @@ def enough_pads(results: Results, margin: float) -> pd.DataFrame:
         InputError: If the study does not vary these fields, or the margin is no share.
     """
     check_share("margin", margin)
-    pads = settings.varied(results).get("pads", [0])
-    lost = changes(results, "pads", max(pads), PRODUCT)
+    pads = varied_values(results).get("pads", [0])
+    lost = changes_from_reference(results, "pads", max(pads), PRODUCT)
     rows = []
     for (policy, uavs), part in lost.groupby(["policy", "uavs"], sort=False):
         short = part.loc[part["low"] < -margin, "pads"].max()
@@ -176,49 +179,51 @@ def enough_pads(results: Results, margin: float) -> pd.DataFrame:
 
 def short_of_pads(results: Results, margin: float) -> list[int]:
     """The design points with one pad, and with one pad less than is enough, for every fleet."""
-    table, found = settings.points(results), enough_pads(results, margin)
+    table, found = values_of_points(results), enough_pads(results, margin)
     enough = found[found["policy"] == results.policies[0]].set_index("uavs")["pads"]
     fewer = table[table["pads"] < table["uavs"].map(enough)]
     fewest = table[table["pads"] == table["pads"].min()]
     return sorted({*fewest.index, *fewer.groupby("uavs")["pads"].idxmax()})
 
 
-def pads(results: Results, margin: float) -> str:
+def enough_pads_sentence(results: Results, margin: float) -> str:
     """How many pads are enough for every fleet, by the first policy of the study."""
-    found, most = enough_pads(results, margin), max(settings.varied(results).get("pads", [0]))
+    found, most = enough_pads(results, margin), max(varied_values(results).get("pads", [0]))
     parts = []
     for row in found[found["policy"] == results.policies[0]].itertuples():
         part = f"{row.pads} {'are' if row.pads > 1 else 'is'} enough for {row.uavs} UAVs"
         if row.too_few:
             part += f", {row.too_few} {'are' if row.too_few > 1 else 'is'} too few"
-        parts.append(part + f", {numbers.words([*map(str, row.open)])} open" * bool(row.open))
+        parts.append(part + f", {numbers.join_words([*map(str, row.open)])} open" * bool(row.open))
+    counted = numbers.format_span(changes_from_reference(results, "pads", most, PRODUCT)["n"])
     return (
         f"Of charging pads, {'; '.join(parts)} (policy {results.policies[0]}, at most "
-        f"{numbers.margin(margin)} of the product lost, n = "
-        f"{numbers.span(changes(results, 'pads', most, PRODUCT)['n'])} missions)."
+        f"{numbers.format_margin(margin)} of the product lost, n = {counted} missions)."
     )
 
 
-def few_pads(results: Results) -> str:
+def few_pads_sentence(results: Results) -> str:
     """What the fewest pads cost every fleet against the most, in success and in collected data.
 
-    The policy is the first of the study. The means are those of ``means``, the differences those of
-    ``changes``.
+    The policy is the first of the study. The means are those of ``means_of_metrics``, the
+    differences those of ``changes_from_reference``.
     """
-    pads = settings.varied(results).get("pads", [0])
+    pads = varied_values(results).get("pads", [0])
     fewest, most, lines = min(pads), max(pads), []
     for metric in (SUCCESS, RATIO):
-        shares = means(results, [metric]).set_index(["policy", "uavs", "pads"])["mean"]
-        lost = changes(results, "pads", most, metric)
+        shares = means_of_metrics(results, [metric]).set_index(["policy", "uavs", "pads"])["mean"]
+        lost = changes_from_reference(results, "pads", most, metric)
         lost = lost[(lost["policy"] == results.policies[0]) & (lost["pads"] == fewest)]
         for row in lost.itertuples():
             with_fewest, with_most = (
-                numbers.percent(shares[row.policy, row.uavs, count]) for count in (fewest, most)
+                numbers.format_percent(shares[row.policy, row.uavs, count])
+                for count in (fewest, most)
             )
             lines.append(
-                f"- The {metric_of(metric).within} of {numbers.counted(row.uavs, 'UAV')} is "
-                f"{with_fewest} with {numbers.counted(fewest, 'pad')} and {with_most} with {most}: "
-                f"{numbers.points(row.mean, row.low, row.high)} points, n = {row.n:,}."
+                f"- The {metric_of(metric).within} of {numbers.format_count(row.uavs, 'UAV')} is "
+                f"{with_fewest} with {numbers.format_count(fewest, 'pad')} and {with_most} with "
+                f"{most}: {numbers.format_points(row.mean, row.low, row.high)} points, "
+                f"n = {row.n:,}."
             )
     return "\n".join(lines)
 
@@ -227,49 +232,50 @@ def age_changes(results: Results) -> pd.DataFrame:
     """The change of the average age from one UAV to more, as a share, by arrival rate.
 
     Returns:
-        The rows of ``changes``, with the column ``published`` (nan where nothing is).
+        The rows of ``changes_from_reference``, with the column ``published`` (nan where nothing
+        is).
     """
-    table = changes(results, "uavs", 1, AGE, relative=True)
+    table = changes_from_reference(results, "uavs", 1, AGE, relative=True)
     return table.assign(published=table["uavs"].map(PUBLISHED))
 
 
-def age(results: Results) -> str:
+def age_sentence(results: Results) -> str:
     """The mean age with the smallest and the third fleet, at the extreme arrival rates.
 
     Whether it falls is said by the interval of the change.
     """
-    table = means(results, [AGE])
+    table = means_of_metrics(results, [AGE])
     table = table[table["policy"] == results.policies[0]].sort_values("uavs")
     few, more = table["uavs"].unique()[:3][[0, -1]]
     ends = table[table["uavs"].isin([few, more])].set_index("arrival_rate")[_ENDS]
-    changed = changes(results, "uavs", few, AGE)
+    changed = changes_from_reference(results, "uavs", few, AGE)
     changed = changed[(changed["policy"] == results.policies[0]) & (changed["uavs"] == more)]
     verbs = {ABOVE: "rises", BELOW: "falls", INCONCLUSIVE: "does not surely change,"}
     parts = []
     for rate in dict.fromkeys([ends.index.min(), ends.index.max()]):
         (change,) = changed[changed["arrival_rate"] == rate].itertuples()
         rows = ends.loc[[rate]].to_numpy()
-        ages = [numbers.decimals(mean, low, high, digits=1) for mean, low, high in rows]
+        ages = [numbers.format_decimals(mean, low, high, digits=1) for mean, low, high in rows]
         parts.append(
-            f"{verbs[position(change)]} from {' to '.join(ages)} slots at an arrival rate of "
+            f"{verbs[position_of(change)]} from {' to '.join(ages)} slots at an arrival rate of "
             f"{value_text(rate)}"
         )
     return (
-        f"From {few} to {more} UAVs the mean age of the data {numbers.words(parts)} "
-        f"(policy {results.policies[0]}, n = {numbers.span(changed['n'])} missions)."
+        f"From {few} to {more} UAVs the mean age of the data {numbers.join_words(parts)} "
+        f"(policy {results.policies[0]}, n = {numbers.format_span(changed['n'])} missions)."
     )
 
 
-def published() -> str:
+def published_age_in_words() -> str:
     """The published changes of the age with the number of UAVs, in words."""
     parts = [
-        f"{numbers.minus(f'{100 * change:.0f}')} % from one to {uavs} UAVs"
+        f"{numbers.format_minus(f'{100 * change:.0f}')} % from one to {uavs} UAVs"
         for uavs, change in PUBLISHED.items()
     ]
-    return numbers.words(parts)
+    return numbers.join_words(parts)
 
 
-def lengths(results: Results) -> str:
+def mission_lengths_sentence(results: Results) -> str:
     """How many mission slots the missions last, in a sentence."""
     slots, longest = results.missions["slots"], results.scenario().max_slots
     whole = int((slots == longest).sum())
@@ -278,40 +284,40 @@ def lengths(results: Results) -> str:
     return f"{whole:,} of {len(slots):,} missions last to the last slot, {longest:,}."
 
 
-def failures(results: Results) -> str:
+def failures_sentence(results: Results) -> str:
     """What the lowest failure rate costs the smallest fleet, by the first policy."""
-    lost = changes(results, RATE, 0.0, PRODUCT)
+    lost = changes_from_reference(results, RATE, 0.0, PRODUCT)
     rows = lost[lost["policy"] == results.policies[0]]
     rows = rows[(rows["uavs"] == rows["uavs"].min()) & (rows[RATE] == rows[RATE].min())]
     parts = [
-        f"by {numbers.points(*row[_ENDS])} points if it is "
+        f"by {numbers.format_points(*row[_ENDS])} points if it is "
         + (f"repaired in {row[REPAIR]:g} slots" if row[REPAIR] else "lost")
         for _, row in rows.iterrows()
     ]
     return (
         f"If a UAV fails in each slot with probability {value_text(rows[RATE].iloc[0])}, the "
-        f"product of {rows['uavs'].iloc[0]} UAVs changes {numbers.words(parts)} "
-        f"(policy {results.policies[0]}, n = {numbers.span(rows['n'])} missions)."
+        f"product of {rows['uavs'].iloc[0]} UAVs changes {numbers.join_words(parts)} "
+        f"(policy {results.policies[0]}, n = {numbers.format_span(rows['n'])} missions)."
     )
 
 
-def relative(mean: float, low: float, high: float) -> str:
+def format_relative_change(mean: float, low: float, high: float) -> str:
     """A relative change with its interval, as ``−46.0 % [−47.1, −44.9]``."""
-    middle, *ends = [numbers.minus(f"{100 * value:+.1f}") for value in (mean, low, high)]
+    middle, *ends = [numbers.format_minus(f"{100 * value:+.1f}") for value in (mean, low, high)]
     return f"{middle} % [{ends[0]}, {ends[1]}]"
 
 
-def waiting(events: pd.DataFrame) -> np.ndarray:
+def count_waiting_uavs(events: pd.DataFrame) -> np.ndarray:
     """The number of UAVs that wait for a pad in every mission slot, (slots,)."""
     log = events[(events["uav"] >= 0) & events["event"].isin(_WAITS)]
     ends = log.groupby("uav")["time"].shift(-1)
     waits = log.assign(end=ends)[log["event"] == "charge_request"].dropna(subset="end")
     begin, end = waits[["time", "end"]].to_numpy(int).T[..., None]
-    slots = np.arange(duration(events))
+    slots = np.arange(mission_length(events))
     return np.asarray(((begin <= slots) & (slots < end)).sum(axis=0))
 
 
-def queues(results: Results, policy: str, points: Iterable[int]) -> pd.DataFrame:
+def queues_over_time(results: Results, policy: str, points: Iterable[int]) -> pd.DataFrame:
     """The queue for pads in every mission slot, over the missions whose event logs are kept.
 
     A mission that is over has no queue. The last slot is that of the longest mission.
@@ -333,24 +339,26 @@ def queues(results: Results, policy: str, points: Iterable[int]) -> pd.DataFrame
     for point in points:
         first = results.cell(policy, point).first
         logged = range(first, first + max(results.study.logged, 1))
-        of_missions = [pd.Series(waiting(results.events(policy, point, n))) for n in logged]
+        of_missions = [
+            pd.Series(count_waiting_uavs(results.events(policy, point, n))) for n in logged
+        ]
         counts = pd.concat(of_missions, axis=1).fillna(0)
         ends = dict(zip(("low", "high"), counts.quantile(BAND, axis=1).to_numpy(), strict=True))
         rows = pd.DataFrame({"slot": counts.index, "mean": counts.mean(axis=1), **ends})
-        fields = settings.points(results).loc[[point] * len(rows)].rename_axis("point")
+        fields = values_of_points(results).loc[[point] * len(rows)].rename_axis("point")
         rows = pd.concat([fields.reset_index(), rows], axis=1)
         tables.append(rows.assign(n=len(logged)))
     return pd.concat(tables, ignore_index=True)
 
 
-def waits(results: Results, margin: float) -> Drawing:
+def draw_queues(results: Results, margin: float) -> Drawing:
     """The queues with the fewest pads, and with one pad less than is enough, by fleet."""
-    rows = queues(results, results.policies[0], short_of_pads(results, margin))
+    rows = queues_over_time(results, results.policies[0], short_of_pads(results, margin))
     titles = {uavs: f"UAVs that wait for a pad: {uavs} UAVs" for uavs in rows["uavs"].unique()}
     panels = rows.assign(panel=rows["uavs"])
-    low, high = map(numbers.level, BAND)
+    low, high = map(numbers.format_level, BAND)
     return Drawing(
-        courses(panels, "pads", "", titles, "Number of charging pads"),
+        plot_courses(panels, "pads", "", titles, "Number of charging pads"),
         "The number of UAVs that wait for a pad over the slots of the mission",
         f"Mean of n = {rows['n'].min()} missions; the band is from the {low} to the {high} "
         "quantile.",
@@ -358,7 +366,7 @@ def waits(results: Results, margin: float) -> Drawing:
     )
 
 
-def _pairs(table: pd.DataFrame, field: str, reference: Any) -> Iterator[tuple[int, int]]:
+def _pairs_of_points(table: pd.DataFrame, field: str, reference: Any) -> Iterator[tuple[int, int]]:
     """Every design point, and the one that differs from it only by the reference value."""
     others = [name for name in table if name != field]
     for _, part in table.groupby(others, sort=False) if others else [((), table)]:

@@ -38,7 +38,7 @@ def by_fleet(results: Results) -> pd.DataFrame:
     if not results.bounds:
         return pd.DataFrame()
     overall = means_of(results.missions, by=["policy"]).assign(uavs=ALL)
-    fleets = summary.by_fleet(results.missions).sort_values("uavs", kind="stable")
+    fleets = summary.means_by_fleet(results.missions).sort_values("uavs", kind="stable")
     rows = pd.concat([fleets, overall] if fleets["uavs"].nunique() > 1 else [fleets])
     keys = ["uavs", "policy", "n"]
     table = rows.drop_duplicates(keys)[keys]
@@ -49,17 +49,17 @@ def by_fleet(results: Results) -> pd.DataFrame:
     return table.assign(**{f"{BOUND}_high": table[f"{BOUND}_high"].clip(upper=1.0)})
 
 
-def listed(table: pd.DataFrame) -> pd.DataFrame:
+def fleet_bound_table(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of ``by_fleet`` as a table of text."""
     columns = {"Policy": table["policy"], "UAVs": table["uavs"].astype(str)}
     columns["Missions"] = table["n"].map("{:,}".format)
     for metric, head in _SHOWN.items():
-        write = _points if metric == GAP else numbers.interval
-        columns[head] = numbers.estimates(table, metric, write)
+        write = _format_gap if metric == GAP else numbers.format_interval
+        columns[head] = numbers.format_estimates(table, metric, write)
     return pd.DataFrame(columns)
 
 
-def useful(table: pd.DataFrame) -> pd.DataFrame:
+def fleets_with_useful_bound(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of ``by_fleet`` of fleets whose bound says something.
 
     The bound is below 100 %, and is known of ``LEAST`` missions or more.
@@ -77,29 +77,33 @@ def in_words(results: Results, policy: str | None = None) -> str:
     """
     policy = policy or summary.best_policy(results.missions)
     table = by_fleet(results)
-    found = useful(table)
+    found = fleets_with_useful_bound(table)
     rows = found[found["policy"] == policy]
     parts = [
-        f"{100 * row[f'{GAP}_high']:.1f} points with {numbers.counted(row['uavs'], 'UAV')} "
-        f"(mean gap {_points(*row[[GAP, f'{GAP}_low', f'{GAP}_high']])}, n = {row['n']:,} missions)"
+        f"{100 * row[f'{GAP}_high']:.1f} points with {numbers.format_count(row['uavs'], 'UAV')} "
+        f"(mean gap {_format_gap(*row[[GAP, f'{GAP}_low', f'{GAP}_high']])}, "
+        f"n = {row['n']:,} missions)"
         for _, row in rows.iterrows()
     ]
     sentences = []
     if parts:
-        sentences.append(f"`{policy}` is at most {numbers.words(parts)} from the best possible.")
+        sentences.append(
+            f"`{policy}` is at most {numbers.join_words(parts)} from the best possible."
+        )
     of_policy = table[(table["policy"] == policy) & (table["uavs"] != ALL)]
     says = of_policy[BOUND] < _SAYS_NOTHING
     for row in of_policy[says & (of_policy["n"] < LEAST)].itertuples():
-        fleet = numbers.counted(row.uavs, "UAV")
+        fleet = numbers.format_count(row.uavs, "UAV")
         sentences.append(f"The bounds of n = {row.n} missions with {fleet} are too few to tell.")
     if not says.all():
-        fleets = [numbers.counted(int(uavs), "UAV") for uavs in of_policy.loc[~says, "uavs"]]
+        fleets = [numbers.format_count(int(uavs), "UAV") for uavs in of_policy.loc[~says, "uavs"]]
         sentences.append(
-            f"The upper bound is 100 % for {numbers.words(fleets)}, so there is no useful bound."
+            f"The upper bound is 100 % for {numbers.join_words(fleets)}, "
+            "so there is no useful bound."
         )
     return " ".join(sentences)
 
 
-def _points(mean: float, low: float, high: float) -> str:
+def _format_gap(mean: float, low: float, high: float) -> str:
     """A gap in points, as ``4.6 [4.1, 5.1]``."""
-    return numbers.points(mean, low, high).replace("+", "")
+    return numbers.format_points(mean, low, high).replace("+", "")

@@ -9,20 +9,19 @@ from matplotlib.figure import Figure
 
 from dess.analysis import numbers
 from dess.analysis.answers import comparison
-from dess.analysis.answers.comparison import Times
-from dess.analysis.answers.missions import collected, held
+from dess.analysis.answers.comparison import Times, plot_decision_times
+from dess.analysis.answers.missions import data_by_node, data_by_uav_and_node
 from dess.analysis.answers.optimality import ALL
 from dess.analysis.figures import Drawing, style
 from dess.analysis.figures import comparison as figures
 from dess.analysis.figures import missions as maps
-from dess.analysis.figures.settings import decision_times
 from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.results.event_log import uav_slots
 from dess.analysis.results.resimulate import Mission
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import summary
-from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
+from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_of
 from dess.policies.planner import Course, Planner, first_plan
 from dess.policies.registry import load
 from dess.scenario.scenario import ScenarioSpace
@@ -34,7 +33,7 @@ _CLAIMS = {
 }
 
 
-def differences(results: Results, planners: Sequence[str], learner: str) -> pd.DataFrame:
+def compare_with_learner(results: Results, planners: Sequence[str], learner: str) -> pd.DataFrame:
     """Planners compared with a learner on the same missions, by number of UAVs and over all.
 
     Returns:
@@ -54,44 +53,46 @@ def differences(results: Results, planners: Sequence[str], learner: str) -> pd.D
     return table.sort_values("policy", ignore_index=True, **order)
 
 
-def answer(table: pd.DataFrame, planner: str) -> tuple[str, str]:
+def planner_sentences(table: pd.DataFrame, planner: str) -> tuple[str, str]:
     """Whether the planner is better than the learner, and by how many points over all missions.
 
     The number for the index is empty if the missions do not tell which is better.
 
     Args:
-        table: Rows of ``differences``.
+        table: Rows of ``compare_with_learner``.
         planner: The planner.
     """
     rows = table[(table["policy"] == planner) & (table["metric"] == PRODUCT)]
     (overall,) = rows[rows["uavs"] == ALL].itertuples()
-    points = numbers.points(overall.difference, overall.low, overall.high)
+    points = numbers.format_points(overall.difference, overall.low, overall.high)
     sentence = (
-        f"{_CLAIMS[position(overall)]}: the product of {planner} minus that of {overall.baseline} "
-        f"is {points} points over {overall.n:,} missions."
+        f"{_CLAIMS[position_of(overall)]}: the product of {planner} minus that of "
+        f"{overall.baseline} is {points} points over {overall.n:,} missions."
     )
-    if position(overall) == INCONCLUSIVE:
+    if position_of(overall) == INCONCLUSIVE:
         return sentence, ""
-    return sentence, f"{numbers.difference(overall.difference, 0)} points"
+    return sentence, f"{numbers.format_difference(overall.difference, 0)} points"
 
 
 def by_fleet(table: pd.DataFrame) -> Drawing:
     """The differences of the product by number of UAVs.
 
     Args:
-        table: Rows of ``differences``.
+        table: Rows of ``compare_with_learner``.
     """
     rows = table[table["metric"] == PRODUCT]
-    names = rows["uavs"].map(lambda uavs: uavs if uavs == ALL else numbers.counted(uavs, "UAV"))
+    names = rows["uavs"].map(
+        lambda uavs: uavs if uavs == ALL else numbers.format_count(uavs, "UAV")
+    )
     baseline = rows["baseline"].iloc[0]
     return Drawing(
-        figures.differences(rows, names, f"Difference from {baseline}"),
+        figures.plot_differences(rows, names, f"Difference from {baseline}"),
         f"Paired differences from {baseline} in the product, by number of UAVs",
-        f"n = {numbers.span(rows['n'])} missions; bars are 95 % intervals.",
+        f"n = {numbers.format_span(rows['n'])} missions; bars are 95 % intervals.",
     )
 
 
-def front(results: Results, times: Times) -> Drawing:
+def draw_decision_time_front(results: Results, times: Times) -> Drawing:
     """The product against the decision time of every policy whose decisions were timed.
 
     Its data have a row per policy, the fastest first: ``policy``, ``mean``, ``low`` and ``high`` of
@@ -100,28 +101,31 @@ def front(results: Results, times: Times) -> Drawing:
     """
     means = summary(results.missions, by=["policy"]).query("metric == @PRODUCT")
     seconds = {cost.policy: cost.median for cost in times.costs}
-    points = comparison.front(means[["policy", "mean", "low", "high"]], seconds)
+    points = comparison.decision_time_front(means[["policy", "mean", "low", "high"]], seconds)
     return Drawing(
-        decision_times(points),
+        plot_decision_times(points),
         "Decision time against the product of all policies, and their Pareto front",
         "No policy is both faster and better than one on the line. Medians on one core.",
         points,
     )
 
 
-def coverage(results: Results, policy: str) -> np.ndarray:
+def collected_shares(results: Results, policy: str) -> np.ndarray:
     """The (K,) mean shares of their data that the nodes lose to a policy, over kept event logs."""
     nodes = len(results.scenario().nodes)
-    data = [(collected(log, _uavs(log), nodes), held(log, nodes)) for log in _logs(results, policy)]
+    data = [
+        (data_by_uav_and_node(log, _count_uavs(log), nodes), data_by_node(log, nodes))
+        for log in _event_logs(results, policy)
+    ]
     return np.mean([of_uavs.sum(axis=0) / of_nodes for of_uavs, of_nodes in data], axis=0)
 
 
-def coverages(results: Results, planner: str, learner: str) -> list[Drawing]:
+def draw_coverage(results: Results, planner: str, learner: str) -> list[Drawing]:
     """Maps of what two policies collect from every node, and of the difference."""
-    first, second = (coverage(results, policy) for policy in (planner, learner))
+    first, second = (collected_shares(results, policy) for policy in (planner, learner))
     single = {f"Collected by {planner}": first, f"Collected by {learner}": second}
     shown = single | {f"{planner} − {learner}": first - second}
-    counted = f"means over n = {len(_logged(results, planner))} missions"
+    counted = f"means over n = {len(_logged_replications(results, planner))} missions"
     return [
         Drawing(
             node_map(results.scenario(), title, values, signed=title not in single),
@@ -150,13 +154,13 @@ def node_map(
     """
     colours = ["white", style.BETTER] if not signed else [style.WORSE, "white", style.BETTER]
     most = max(float(np.abs(values).max()), 0.01) if signed else 1.0
-    with style.panels(5.4) as (figure, ax):
-        maps.chart(space, ax)
+    with style.new_panels(5.4) as (figure, ax):
+        maps.plot_chart(space, ax)
         ax.scatter(*np.transpose(space.nodes), c=values, s=420, zorder=3, edgecolors=style.MUTED,
                    cmap=sns.blend_palette(colours, as_cmap=True), linewidths=0.8,
                    vmin=-most if signed else 0.0, vmax=most)  # fmt: skip
         for cell, value in zip(space.nodes, values, strict=True):
-            text = numbers.difference(value, 0) if signed else write(value)
+            text = numbers.format_difference(value, 0) if signed else write(value)
             ax.annotate(text, cell, ha="center", va="center", fontsize=8.5, zorder=4,
                         **style.OUTLINED)  # fmt: skip
         ax.set_title(title)
@@ -171,22 +175,22 @@ def at_home(results: Results, policies: Sequence[str]) -> Drawing:
     """
     zones, tables = results.scenario().chart.zones, []
     for policy in policies:
-        slots = pd.concat([uav_slots(events) for events in _logs(results, policy)])
+        slots = pd.concat([uav_slots(events) for events in _event_logs(results, policy)])
         inside = pd.Series(zones[slots["y"], slots["x"]] >= 0, slots.index)
         rows = inside.groupby(slots["slot"]).agg(share="mean", n="size").reset_index()
         tables.append(rows[rows["n"] >= rows["n"].iloc[0] / 2].assign(policy=policy))
     table = pd.concat(tables, ignore_index=True)
     rows = table.assign(panel=0, **dict.fromkeys(("mean", "low", "high"), table["share"]))
-    logged = len(_logged(results, policies[0]))
+    logged = len(_logged_replications(results, policies[0]))
     return Drawing(
-        maps.courses(rows, "policy", "%", {0: "Share of the UAVs in the charging zone"}),
+        maps.plot_courses(rows, "policy", "%", {0: "Share of the UAVs in the charging zone"}),
         "The share of the UAVs in the charging zone over the slots",
         f"n = {logged} missions. A UAV that has filled its quota has left the mission.",
         table,
     )
 
 
-def returns(results: Results, policies: Sequence[str]) -> pd.DataFrame:
+def return_table(results: Results, policies: Sequence[str]) -> pd.DataFrame:
     """When and how UAVs go home: their charging sessions in kept event logs, as a table of text.
 
     Returns:
@@ -195,23 +199,23 @@ def returns(results: Results, policies: Sequence[str]) -> pd.DataFrame:
     """
     rows = []
     for policy in policies:
-        logs = _logs(results, policy)
+        logs = _event_logs(results, policy)
         begun = pd.concat([events[events["event"] == "charge_start"] for events in logs])
-        uavs, (slot, battery) = sum(map(_uavs, logs)), begun[["time", "battery"]].mean()
+        uavs, (slot, battery) = sum(map(_count_uavs, logs)), begun[["time", "battery"]].mean()
         sessions = f"{len(begun) / uavs:.2f}"
         rows.append((policy, sessions, f"{slot:.1f}", f"{battery:.1f} %", uavs))
     heads = ["Policy", "Sessions per UAV", "Begin in slot", "Battery then", "UAVs"]
     return pd.DataFrame(rows, columns=heads)
 
 
-def example(results: Results, policy: str) -> Mission:
+def first_logged_mission(results: Results, policy: str) -> Mission:
     """The first mission of the smallest fleet whose event log is kept."""
     missions = results.missions[results.missions["policy"] == policy].set_index("replication")
-    replication = int(missions.loc[[*_logged(results, policy)], "uavs"].idxmin())
+    replication = int(missions.loc[[*_logged_replications(results, policy)], "uavs"].idxmin())
     return Mission.of(results, policy, 0, replication)
 
 
-def plan(results: Results, mission: Mission) -> Drawing:
+def draw_plan(results: Results, mission: Mission) -> Drawing:
     """What a planner plans in the first slot of a mission, over the mission as simulated.
 
     Nothing is simulated. If the policy is no planner, no plan is drawn.
@@ -220,8 +224,8 @@ def plan(results: Results, mission: Mission) -> Drawing:
     if isinstance(planner, Planner):
         place = results.store.manifest.seed, mission.replication
         courses = first_plan(results.scenario(), *place, planner)
-    with style.panels(6.0) as (figure, ax):
-        maps.trajectories(mission.events, mission.scenario, ax)
+    with style.new_panels(6.0) as (figure, ax):
+        maps.plot_trajectories(mission.events, mission.scenario, ax)
         for uav, course in enumerate(courses):
             colour = style.uav_colours(len(courses))[uav]
             ax.plot(*course.path.T, color=colour, linestyle=(0, (3, 1.5)), linewidth=1.6, zorder=7,
@@ -244,7 +248,7 @@ def node_prices(results: Results, replication: int) -> np.ndarray:
     return results.bounds[0, replication].prices.sum(axis=0)
 
 
-def prices(results: Results, replication: int) -> Drawing:
+def draw_prices(results: Results, replication: int) -> Drawing:
     """A map of the prices of the nodes' data in the upper bound of a mission.
 
     Args:
@@ -261,15 +265,15 @@ def prices(results: Results, replication: int) -> Drawing:
     )
 
 
-def _logged(results: Results, policy: str) -> range:
+def _logged_replications(results: Results, policy: str) -> range:
     """The replications whose event logs are kept."""
     first = results.cell(policy, 0).first
     return range(first, first + results.study.logged)
 
 
-def _logs(results: Results, policy: str) -> list[pd.DataFrame]:
-    return [results.events(policy, 0, number) for number in _logged(results, policy)]
+def _event_logs(results: Results, policy: str) -> list[pd.DataFrame]:
+    return [results.events(policy, 0, number) for number in _logged_replications(results, policy)]
 
 
-def _uavs(events: pd.DataFrame) -> int:
+def _count_uavs(events: pd.DataFrame) -> int:
     return int(events["uav"].max()) + 1

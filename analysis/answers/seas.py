@@ -1,9 +1,9 @@
 """Every policy on many seas: all together, by family, by number of nodes and of UAVs.
 
-    results = load_results("results/seas")      # of a study whose design is a set of seas
-    quality(results, "family")                  # means, a row per policy and family
-    gains(results, "greedy", "family")          # paired differences
-    shares(results, "planner", "family")        # the product as a share of that of a policy
+    results = load_results("results/seas")  # of a study whose design is a set of seas
+    means_over_seas(results, "family")  # a row per policy and family
+    differences_from_baseline(results, "greedy", "family")  # paired differences
+    shares_of_reference(results, "planner", "family")  # products as shares of that of a policy
 
 The seas are the sampling units: what a policy reaches on a sea is its mean over the missions there.
 """
@@ -16,9 +16,8 @@ import pandas as pd
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers import comparison
-from dess.analysis.answers.comparison import Times
+from dess.analysis.answers.comparison import Times, plot_decision_times
 from dess.analysis.figures import Drawing, style
-from dess.analysis.figures.settings import decision_times
 from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import column_tests, relative_change
@@ -35,13 +34,13 @@ GROUPS = {"family": "Family", "nodes": "Nodes", "uavs": "UAVs"}
 _ENDS = ["mean", "low", "high"]
 
 
-def missions(results: Results) -> pd.DataFrame:
+def missions_by_sea(results: Results) -> pd.DataFrame:
     """The missions with the columns ``sea``, ``family``, ``nodes`` (a group in words) and ``all``.
 
     Raises:
         InputError: If the design of the study is not a set of seas.
     """
-    names = _names(results)
+    names = _sea_names(results)
     if not all(":" in name for name in names):
         raise InputError(f"{results.store.folder}: no study of seas; allowed: one whose design is")
     counts = np.array([len(space.nodes) for space in results.store.manifest.scenarios])
@@ -54,7 +53,7 @@ def missions(results: Results) -> pd.DataFrame:
     )  # fmt: skip
 
 
-def quality(results: Results, by: str = ALL, metric: str = PRODUCT) -> pd.DataFrame:
+def means_over_seas(results: Results, by: str = ALL, metric: str = PRODUCT) -> pd.DataFrame:
     """The means of every policy over seas.
 
     Args:
@@ -70,7 +69,7 @@ def quality(results: Results, by: str = ALL, metric: str = PRODUCT) -> pd.DataFr
     return table.assign(metric=metric)[[by, "policy", "metric", *_ENDS, "n"]]
 
 
-def gains(results: Results, baseline: str, by: str = ALL) -> pd.DataFrame:
+def differences_from_baseline(results: Results, baseline: str, by: str = ALL) -> pd.DataFrame:
     """Paired differences of the product between every other policy and a baseline.
 
     Returns:
@@ -89,7 +88,7 @@ def reference_of(results: Results) -> str:
     return next((name for name in REFERENCES if name in results.policies), REFERENCES[0])
 
 
-def shares(results: Results, reference: str, by: str = ALL) -> pd.DataFrame:
+def shares_of_reference(results: Results, reference: str, by: str = ALL) -> pd.DataFrame:
     """The product of every policy as a share of that of a reference.
 
     Returns:
@@ -111,11 +110,11 @@ def by_group(results: Results, reference: str) -> list[Drawing]:
     """What every policy reaches in groups of seas, as a share of what a reference does."""
     drawings = []
     for by, name in GROUPS.items():
-        table = shares(results, reference, by)
+        table = shares_of_reference(results, reference, by)
         table = table[table["policy"] != reference]
         looks = style.policy_colours(table["policy"])
-        with style.panels(4.2) as (figure, ax):
-            style.along(style.placed(table, by), looks, "%", ax, linestyle="")
+        with style.new_panels(4.2) as (figure, ax):
+            style.plot_along(style.place_values(table, by), looks, "%", ax, linestyle="")
             ax.set(ylabel=f"product, share of {reference}")
         alt = f"The product as a share of that of {reference}, by {name.lower()}"
         caption = (
@@ -126,15 +125,17 @@ def by_group(results: Results, reference: str) -> list[Drawing]:
     return drawings
 
 
-def front(results: Results, times: Times) -> Drawing:
+def draw_decision_time_front(results: Results, times: Times) -> Drawing:
     """The product over all seas against the time of a decision of every policy that was timed.
 
     Its data have a row per policy, the fastest first: ``policy``, ``mean``, ``low``, ``high``,
     ``n``, ``seconds`` (of a decision for a UAV, in batches), and ``on_front``.
     """
-    points = comparison.front(quality(results), {c.policy: c.batch for c in times.costs})
+    points = comparison.decision_time_front(
+        means_over_seas(results), {c.policy: c.batch for c in times.costs}
+    )
     return Drawing(
-        decision_times(points),
+        plot_decision_times(points),
         "Time of a decision against the product over all seas, and the Pareto front",
         f"n = {points['n'].max()} seas; bars are 95 % intervals over seas. Times are those of a "
         "decision for a UAV on one core, many missions side by side.",
@@ -142,66 +143,73 @@ def front(results: Results, times: Times) -> Drawing:
     )
 
 
-def summary(results: Results, times: Times) -> pd.DataFrame:
+def policies_table(results: Results, times: Times) -> pd.DataFrame:
     """Every policy over all seas, as a table of text: quality, as a share of others, and time.
 
     The bound counts in the missions in which it is below 100 %, if the study has bounds.
     """
-    means = {m: quality(results, metric=m).set_index("policy")["mean"] for m in (SUCCESS, PRODUCT)}
+    means = {
+        m: means_over_seas(results, metric=m).set_index("policy")["mean"]
+        for m in (SUCCESS, PRODUCT)
+    }
     columns = {"Success": means[SUCCESS], "Product": means[PRODUCT]}
     for reference in REFERENCES:
         if reference in results.policies:
-            share = shares(results, reference).set_index("policy")["mean"]
+            share = shares_of_reference(results, reference).set_index("policy")["mean"]
             columns[f"Of {reference}"] = share
     if BOUND in results.missions:
         says = results.missions[results.missions[BOUND] < 1.0].groupby("policy")
         columns["Of the bound"] = says[PRODUCT].sum() / says[BOUND].sum()
-    table = pd.DataFrame(columns).loc[results.policies].map(numbers.percent)
-    seconds = {cost.policy: numbers.seconds(cost.batch) for cost in times.costs if cost.batch}
+    table = pd.DataFrame(columns).loc[results.policies].map(numbers.format_percent)
+    seconds = {
+        cost.policy: numbers.format_seconds(cost.batch) for cost in times.costs if cost.batch
+    }
     return table.assign(Decision=table.index.map(seconds)).fillna("").reset_index(names="Policy")
 
 
-def counted(results: Results) -> str:
+def count_seas_in_words(results: Results) -> str:
     """The number of seas of a study and of the missions on each, as ``n = 28 seas, ...``."""
-    of_sea = numbers.span(results.missions.groupby(["policy", "point"]).size())
-    return f"n = {len(_names(results))} seas, missions on each: {of_sea}"
+    of_sea = numbers.format_span(results.missions.groupby(["policy", "point"]).size())
+    return f"n = {len(_sea_names(results))} seas, missions on each: {of_sea}"
 
 
-def worst(results: Results, policy: str, reference: str, count: int = 8) -> pd.DataFrame:
+def worst_seas_table(results: Results, policy: str, reference: str, count: int = 8) -> pd.DataFrame:
     """The seas on which a policy is the farthest behind another one, as a table of text."""
     ((_, values),) = _by_sea(results, ALL, PRODUCT)
     differences = values[policy] - values[reference]
     behind = differences[differences < 0].nsmallest(count)
-    spaces = dict(zip(_names(results), results.store.manifest.scenarios, strict=True))
+    spaces = dict(zip(_sea_names(results), results.store.manifest.scenarios, strict=True))
     return pd.DataFrame(
         {
             "Sea": sea,
             "Nodes": len(spaces[sea].nodes),
-            "UAVs": numbers.span(spaces[sea].uavs),
-            policy: numbers.percent(values.loc[sea, policy]),
-            reference: numbers.percent(values.loc[sea, reference]),
-            "Points": numbers.difference(points, 0),
+            "UAVs": numbers.format_span(spaces[sea].uavs),
+            policy: numbers.format_percent(values.loc[sea, policy]),
+            reference: numbers.format_percent(values.loc[sea, reference]),
+            "Points": numbers.format_difference(points, 0),
         }
         for sea, points in behind.items()
     ).reindex(columns=["Sea", "Nodes", "UAVs", policy, reference, "Points"])
 
 
-def answer(results: Results, times: Times, policy: str, reference: str, baseline: str) -> str:
+def unseen_seas_sentence(
+    results: Results, times: Times, policy: str, reference: str, baseline: str
+) -> str:
     """What a policy reaches on unseen seas, beside a slow reference and a fast baseline."""
-    share = shares(results, reference).set_index("policy").loc[policy]
-    gain = gains(results, baseline).set_index("policy").loc[policy]
+    share = shares_of_reference(results, reference).set_index("policy").loc[policy]
+    gain = differences_from_baseline(results, baseline).set_index("policy").loc[policy]
     seconds = {cost.policy: cost.batch for cost in times.costs}
     slow, fast = seconds.get(reference), seconds.get(policy)
     faster = f" in 1/{slow / fast:,.0f} of its time" if slow and fast else ""
-    reached = numbers.interval(*share[_ENDS])
-    more = numbers.points(*gain[["difference", "low", "high"]])
+    reached = numbers.format_interval(*share[_ENDS])
+    more = numbers.format_points(*gain[["difference", "low", "high"]])
     return (
         f"On {share['n']} unseen seas, {policy} reaches {reached} of the product of "
         f"{reference}{faster}; its product minus that of {baseline} is {more} points."
     )
 
 
-def _names(results: Results) -> list[str]:
+def _sea_names(results: Results) -> list[str]:
     return [str(values.get(SEA, "")) for values in results.store.manifest.values]
 
 
@@ -218,7 +226,7 @@ def _of_groups(
 
 def _by_sea(results: Results, by: str, metric: str) -> list[tuple[object, pd.DataFrame]]:
     """For each group: a row per sea and a column per policy, the means over its missions."""
-    table = missions(results)
+    table = missions_by_sea(results)
     means = table.groupby([by, "policy", "sea"], sort=False)[metric].mean().reset_index()
     groups = [*means[by].unique()]
     if by in ("uavs", "nodes"):  # by the first number

@@ -1,17 +1,18 @@
 """The means of a study's policies, what the numbers say in words, and Sobol indices."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.special import ndtri
+from matplotlib.figure import Figure
 
-from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers.fleet import cheapest
-from dess.analysis.answers.settings import edge, ends, in_words
+from dess.analysis.answers.settings.figures import counted_missions
+from dess.analysis.answers.settings.points import ends_of_point, ends_sentence, points_in_words
+from dess.analysis.figures import Drawing, style
 from dess.analysis.metrics import (
     ALWAYS,
     HOME,
@@ -19,25 +20,22 @@ from dess.analysis.metrics import (
     PRODUCT,
     RATIO,
     SUCCESS,
-    known_in,
+    metric_in_missions,
     metric_of,
 )
-from dess.analysis.names import parameter, value_text
 from dess.analysis.results.chunks import parts_of
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.distribution import distribution
 from dess.analysis.stats.intervals import (
-    LEVEL,
     by_replication,
     level_after,
     summary,
     values_within,
 )
 from dess.analysis.stats.learners import compare_learners
-from dess.analysis.stats.verdict import MARKS, may_be_best, position, within_reach
+from dess.analysis.stats.verdict import MARKS, may_be_best, position_of, within_reach
 from dess.analysis.study.cheapest import Cheapest
-from dess.analysis.study.design import NOISE, Saltelli
 from dess.analysis.tables import (
     INTERVALS,
     MARKED,
@@ -45,130 +43,20 @@ from dess.analysis.tables import (
     WIDER,
     YES,
     Table,
-    allowed_for,
-    compared,
-    counts,
+    allowance_sentence,
+    comparison_cells,
+    format_counts,
+    stack_by_policy,
 )
 
+PRINTED: dict = {"color": style.INK, "linestyle": "--", "linewidth": 1.3}
 UNGUARDED = "random-unguarded"  # the policy that acts without the return guard
-RESAMPLES = 1000  # bootstrap resamples of the blocks of the design; every metric has the same
-
-
-def sensitivity(
-    design: Saltelli, missions: pd.DataFrame, metrics: Sequence[str] = ALWAYS
-) -> pd.DataFrame:
-    """First-order and total Sobol indices of each metric to each parameter and to the noise.
-
-    A metric of a mission is a function of the parameters, each uniform on its range, and of the
-    replication; an index is a share of its variance over the design.
-
-    For a parameter, ``first`` is the share of the variance that disappears, on average, when the
-    parameter is fixed. It measures how strongly the parameter alone changes the mean, so parameters
-    with a large ``first`` should be set with care. ``total`` is the share that remains when all
-    other factors, the replication included, are fixed. If it is near 0, the parameter changes no
-    mission and can have any value in its range. A ``total`` above ``first`` means interaction with
-    other parameters or with the noise. A parameter with a high ``total`` and a ``first`` of 0
-    changes which missions go well, but not how many, unless other parameters are set with it.
-
-    For the noise, ``total`` is the share that remains when all parameters are fixed. On average
-    over the settings, no setting can remove it; only more missions reduce its effect on a mean. The
-    rest of the variance is what all parameters explain together. ``first`` is the noise that all
-    settings share, which common random numbers remove from comparisons. ``total`` above ``first``
-    is noise that depends on the setting. Parameters that the scenario draws from ranges, and that
-    are not in the design, belong to the noise.
-
-    Args:
-        design: The design of the missions.
-        missions: The missions of one policy, a row per design point in order, with the metrics.
-        metrics: Columns to analyse.
-
-    Returns:
-        A row per metric and parameter, the noise last: ``metric``, ``parameter``, ``first``,
-        ``first_low``, ``first_high``, ``total``, ``total_low``, ``total_high`` and ``n``, the
-        number of missions. Intervals are normal 95 % intervals with the standard error of the
-        bootstrap. Their coverage is right where the noise dominates. Where the parameters dominate
-        they are too wide, because the design covers the space more evenly than the resamples.
-        Estimates are not limited to [0, 1]; that of a small index may be negative. If a metric has
-        the same value in all missions of A and B, its indices are nan.
-
-    Raises:
-        InputError: If there is not one mission of every point of the design.
-    """
-    if len(missions) != design.count:
-        allowed = f"allowed: one for each of its {design.count} design points"
-        raise InputError(f"missions: {len(missions)} are not those of the design; {allowed}")
-    tables = {metric: _indices(design, missions[metric].to_numpy(float)) for metric in metrics}
-    return pd.concat(tables, names=["metric"]).reset_index("metric").reset_index(drop=True)
-
-
-def index_table(indices: pd.DataFrame) -> Table:
-    """Sobol indices with their intervals.
-
-    Args:
-        indices: Rows of ``sensitivities``.
-    """
-    names = indices["parameter"].map(lambda p: "noise" if p == NOISE else parameter(p).name)
-    cells = {
-        "Policy": indices["policy"],
-        "Metric": indices["metric"].map(METRICS),
-        "Parameter": names,
-        "Alone": numbers.estimates(indices, "first"),
-        "With all interactions": numbers.estimates(indices, "total"),
-    }
-    caption = f"Sobol indices as shares of the variance, with {INTERVALS}"
-    return Table(pd.DataFrame(cells), caption, indices)
-
-
-def of_variance(results: Results, metric: str) -> str:
-    """Which fields explain most of the variance of a metric for the first policy, in a sentence."""
-    rows, called = sensitivities(results), metric_of(metric).within
-    rows = rows[(rows["metric"] == metric) & (rows["policy"] == results.policies[0])].dropna()
-    parts = [
-        f"{parameter(row.parameter).within if row.parameter != NOISE else 'the replication'} "
-        f"{numbers.percent(row.total)}"
-        for row in rows.nlargest(3, "total").itertuples()
-    ]
-    if not parts:
-        return f"The {called} is the same in all missions: no variance."
-    return (
-        f"Of the variance of the {called} of {results.policies[0]}, with all interactions: "
-        f"{numbers.words(parts)}."
-    )
-
-
-def ranges_in_words(ranges: Mapping[str, Sequence[float]]) -> str:
-    """``number of UAVs 1–3 and initial data per node 5–20``."""
-    return numbers.words(
-        [f"{parameter(field).within} {value_text(ends)}" for field, ends in ranges.items()]
-    )
-
-
-def _indices(design: Saltelli, values: np.ndarray) -> pd.DataFrame:
-    """A row per parameter: first-order and total indices, each with the ends of its interval.
-
-    The estimators are those of SALib (Saltelli and others 2010), for all resamples at once.
-    """
-    rows = (values - values.mean()).reshape(design.base, -1)
-    a, b, mixed = rows[:, :1], rows[:, -1:], rows[:, 1:-1]  # A, B, and A with a column of B
-    drawn = np.random.default_rng(0).integers(design.base, size=(design.base, RESAMPLES))
-    counts = [np.bincount(blocks, minlength=design.base) for blocks in drawn.T]
-    weights = np.array([np.ones(design.base), *counts]) / design.base  # the design itself first
-    variance = weights @ (a**2 + b**2) / 2 - (weights @ (a + b) / 2) ** 2
-    varies = np.ptp([a, b]) > np.finfo(float).eps * np.ptp(values)
-    variance[variance <= 0] = np.inf  # of a resample in which nothing varies: its indices are 0
-    table = pd.DataFrame({"parameter": design.problem["names"]})
-    half = ndtri(0.5 + LEVEL / 2)
-    for name, share in (("first", b * (mixed - a)), ("total", (a - mixed) ** 2 / 2)):
-        indices = weights @ share / variance if varies else np.full((3, len(table)), np.nan)
-        table[name], error = indices[0], half * indices[1:].std(axis=0, ddof=1)
-        table[f"{name}_low"], table[f"{name}_high"] = table[name] - error, table[name] + error
-    return table.assign(n=len(values))
 
 
 BEST, TIED, WORSE, ONLY = "best", "tied", "worse", "only"  # verdicts on a policy at a design point
 
 
-def means(results: Results) -> pd.DataFrame:
+def means_of_points(results: Results) -> pd.DataFrame:
     """Means with intervals of every policy at every design point.
 
     Returns:
@@ -185,7 +73,7 @@ def means(results: Results) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def meeting(means: pd.DataFrame, targets: Mapping[str, float]) -> pd.DataFrame:
+def settings_meeting(means: pd.DataFrame, targets: Mapping[str, float]) -> pd.DataFrame:
     """The rows of ``means`` of the settings that meet all targets.
 
     A setting is a policy at a design point. It meets a target if the whole interval of the mean
@@ -202,7 +90,7 @@ def meeting(means: pd.DataFrame, targets: Mapping[str, float]) -> pd.DataFrame:
     return means
 
 
-def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
+def add_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
     """Rows of ``means`` with a column ``verdict``: how the policy compares with the others there.
 
     Compared are the policies of the table at the same design point, by each metric, on the
@@ -224,7 +112,7 @@ def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
             missions = results.missions[results.missions["point"] == point]
             wide = by_replication(missions, str(metric), "policy")
             looks = np.array([results.looks(policy)[point] for policy in rows["policy"]])
-            of = known_in(results.missions, str(metric))
+            of = metric_in_missions(results.missions, str(metric))
             may_be = may_be_best(wide[rows["policy"]].to_numpy(float), of, looks)
             may_be &= within_reach(rows["low"], rows["high"], str(metric)).to_numpy()
             best = TIED if may_be.sum() > 1 else BEST
@@ -242,12 +130,13 @@ def weights_in_words(results: Results) -> str:
     weighted = summary(missions, by=[]).set_index("metric").loc[PRODUCT, "mean"]
     return (
         "Every number of UAVs that may be drawn has the same weight in a mean, however often the "
-        f"missions drew it: the product of {policy} is {numbers.percent(weighted)}, and would be "
-        f"{numbers.percent(missions[PRODUCT].mean())} as a plain mean of all missions."
+        f"missions drew it: the product of {policy} is {numbers.format_percent(weighted)}, and "
+        f"would be {numbers.format_percent(missions[PRODUCT].mean())} "
+        "as a plain mean of all missions."
     )
 
 
-def by_fleet(missions: pd.DataFrame) -> pd.DataFrame:
+def means_by_fleet(missions: pd.DataFrame) -> pd.DataFrame:
     """Means with intervals of every policy by number of UAVs.
 
     Returns:
@@ -259,7 +148,7 @@ def by_fleet(missions: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def beside_paper(
+def compare_with_paper(
     estimates: pd.DataFrame, printed: Mapping[Any, Mapping[str, float]]
 ) -> pd.DataFrame:
     """The metrics of every policy, with marks relative to the numbers that the paper prints.
@@ -270,8 +159,8 @@ def beside_paper(
 
     Returns:
         A row of the printed numbers and a row per policy, with a column of text per metric and
-        number of UAVs, see ``with_mark``; of all missions, also the share with the battery for
-        the way home, which the paper does not have.
+        number of UAVs, see ``format_with_mark``; of all missions, also the share with the battery
+        for the way home, which the paper does not have.
     """
     policies, of_home = estimates["policy"].unique(), estimates[estimates["metric"] == HOME]
     columns = {("", "Policy"): ["paper", *policies]}
@@ -279,42 +168,42 @@ def beside_paper(
         of_metric = estimates[estimates["metric"] == metric]
         for uavs, figures in printed.items():
             rows = of_metric if uavs is None else of_metric[of_metric["uavs"] == uavs]
-            texts = [with_mark(row, figures[metric]) for row in rows.itertuples()]
+            texts = [format_with_mark(row, figures[metric]) for row in rows.itertuples()]
             head = "" if uavs is None else f"I = {uavs}"
-            columns[METRICS[metric], head] = [numbers.percent(figures[metric]), *texts]
+            columns[METRICS[metric], head] = [numbers.format_percent(figures[metric]), *texts]
     if None in printed and len(of_home):
-        texts = [numbers.estimate(row) for _, row in of_home.iterrows()]
+        texts = [numbers.format_estimate(row) for _, row in of_home.iterrows()]
         columns[metric_of(HOME).name, ""] = ["", *texts]
     return pd.DataFrame(columns)
 
 
-def home_in_words(means: pd.DataFrame) -> str:
+def way_home_in_words(means: pd.DataFrame) -> str:
     """What the paper's success is, and how often the UAVs of a success could fly home.
 
     Args:
         means: Rows of ``dess.analysis.summary`` by policy.
     """
     of_home = means[means["metric"] == HOME].itertuples()
-    shares = [f"{numbers.percent(row.mean)} with `{row.policy}`" for row in of_home]
+    shares = [f"{numbers.format_percent(row.mean)} with `{row.policy}`" for row in of_home]
     return (
         "Success is the paper's: the mission of a UAV ends where its quota is filled. The share of "
         "missions in which every UAV ends with the battery for its way home is "
-        f"{numbers.words(shares) or 'not known'}. With `landing = true`, missions end on the "
+        f"{numbers.join_words(shares) or 'not known'}. With `landing = true`, missions end on the "
         "ground."
     )
 
 
-def with_mark(estimate: Any, printed: float) -> str:
+def format_with_mark(estimate: Any, printed: float) -> str:
     """An estimate and its difference from a printed number: ``97.3 % [96.1, 98.1] +7.4 ▲``.
 
     The mark tells where the whole interval lies relative to the printed number.
     """
-    text = numbers.interval(estimate.mean, estimate.low, estimate.high)
-    mark = MARKS[position(estimate, printed)]
-    return f"{text} {numbers.difference(estimate.mean, printed)} {mark}"
+    text = numbers.format_interval(estimate.mean, estimate.low, estimate.high)
+    mark = MARKS[position_of(estimate, printed)]
+    return f"{text} {numbers.format_difference(estimate.mean, printed)} {mark}"
 
 
-def of_policy(means: pd.DataFrame, policy: str) -> pd.Series:
+def metrics_of_policy(means: pd.DataFrame, policy: str) -> pd.Series:
     """The means of a policy by metric, as text with their intervals.
 
     Args:
@@ -322,10 +211,10 @@ def of_policy(means: pd.DataFrame, policy: str) -> pd.Series:
         policy: The policy.
     """
     rows = means[means["policy"] == policy].set_index("metric")
-    return rows.loc[[*METRICS]].apply(numbers.estimate, axis=1)
+    return rows.loc[[*METRICS]].apply(numbers.format_estimate, axis=1)
 
 
-def against_paper(means: pd.DataFrame, policy: str, printed: Mapping[str, float]) -> str:
+def paper_sentence(means: pd.DataFrame, policy: str, printed: Mapping[str, float]) -> str:
     """The success and the product of a policy, beside the paper's product, in a sentence.
 
     Args:
@@ -333,15 +222,16 @@ def against_paper(means: pd.DataFrame, policy: str, printed: Mapping[str, float]
         policy: The policy.
         printed: The paper's numbers by metric.
     """
-    texts, n, count = of_policy(means, policy), means["n"].min(), means["policy"].nunique()
+    texts, n, count = metrics_of_policy(means, policy), means["n"].min(), means["policy"].nunique()
     return (
         f"The best of {count} policies, {policy}, succeeds in {texts[SUCCESS]} of {n:,} missions "
         f"with a product of {texts[PRODUCT]}; the paper prints "
-        f"{numbers.percent(printed[SUCCESS])} and {numbers.percent(printed[PRODUCT])}."
+        f"{numbers.format_percent(printed[SUCCESS])} and "
+        f"{numbers.format_percent(printed[PRODUCT])}."
     )
 
 
-def guard_in_words(means: pd.DataFrame) -> str:
+def guard_sentences(means: pd.DataFrame) -> str:
     """How often policies succeed under the return guard, and what success is without it.
 
     Args:
@@ -349,19 +239,19 @@ def guard_in_words(means: pd.DataFrame) -> str:
     """
     known = {*means["policy"]}
     guarded_means = means[(means["metric"] == SUCCESS) & (means["policy"] != UNGUARDED)]["mean"]
-    ends = dict.fromkeys(map(numbers.percent, (guarded_means.min(), guarded_means.max())))
+    ends = dict.fromkeys(map(numbers.format_percent, (guarded_means.min(), guarded_means.max())))
     text = (
         f"All policies but `{UNGUARDED}` act under the return guard: they succeed in "
         f"{' to '.join(ends)} of the missions."
     )
     for policy, guarded in (("random", "under"), (UNGUARDED, "without")):
         if policy in known:
-            share = of_policy(means, policy)[SUCCESS]
+            share = metrics_of_policy(means, policy)[SUCCESS]
             text += f" Random moves {guarded} the guard have a success of {share}."
     return text
 
 
-def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:
+def rank_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:
     """The policies by their mean product, the best one first.
 
     Every design point has the same weight. Of policies with equal means, the one that appears first
@@ -382,10 +272,10 @@ def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) 
 
 def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> str:
     """The policy with the highest mean product."""
-    return ranked_policies(missions, among)[0]
+    return rank_policies(missions, among)[0]
 
 
-def worst(
+def worst_missions(
     results: Results,
     policy: str,
     missions: int = 5,
@@ -416,37 +306,37 @@ def worst(
     return table.assign(command=[results.command(policy, *key, folder) for key in keys])
 
 
-def worst_table(results: Results, rows: pd.DataFrame) -> Table:
+def worst_missions_table(results: Results, rows: pd.DataFrame) -> Table:
     """The worst missions of a policy.
 
     Args:
         results: The study.
-        rows: The result of ``worst``.
+        rows: The result of ``worst_missions``.
     """
     cells = {
         "Replication": rows["replication"],
         "Success": rows["success"].astype(bool).map(YES),
-        "Collection ratio": rows["collection_ratio"].map(numbers.percent),
-        "Reward": rows["reward"].map(numbers.quantity),
+        "Collection ratio": rows["collection_ratio"].map(numbers.format_percent),
+        "Reward": rows["reward"].map(numbers.format_quantity),
     }
     policy, point = rows["policy"].iloc[0], {*rows["point"]}
-    words = in_words(results)[point.pop()] if len(point) == 1 else ""
+    words = points_in_words(results)[point.pop()] if len(point) == 1 else ""
     caption = f"The worst missions of {policy}{', ' * bool(words)}{words}"
     return Table(pd.DataFrame(cells), caption, rows)
 
 
-def tests_of(results: Results) -> int:
+def count_tests(results: Results) -> int:
     """The number of comparisons that a study allows, by all of the paper's metrics.
 
     Compared are every two policies, and every learner of several trainings with every heuristic.
     """
-    trained, policies = learners(results), len(results.policies)
+    trained, policies = trained_policies_by_learner(results), len(results.policies)
     several = sum(len(trainings) > 1 for trainings in trained.values())
     heuristics = policies - sum(map(len, trained.values()))
     return len(METRICS) * (policies * (policies - 1) // 2 + several * heuristics)
 
 
-def corrected(results: Results, table: pd.DataFrame) -> pd.DataFrame:
+def correct_for_all_tests(results: Results, table: pd.DataFrame) -> pd.DataFrame:
     """A table of comparisons, corrected for all comparisons that the study allows (Bonferroni).
 
     So it does not matter which of them were chosen by these data, and a comparison has the same
@@ -456,30 +346,33 @@ def corrected(results: Results, table: pd.DataFrame) -> pd.DataFrame:
         results: The study.
         table: The comparisons, with ``p``.
     """
-    return table.assign(p_adjusted=(table["p"] * tests_of(results)).clip(upper=1))
+    return table.assign(p_adjusted=(table["p"] * count_tests(results)).clip(upper=1))
 
 
-def comparisons(results: Results) -> pd.DataFrame:
+def compare_with_best(results: Results) -> pd.DataFrame:
     """Every policy compared with the best one on the same missions, over all design points.
 
     Returns:
-        A row per policy and metric, as ``dess.analysis.compare`` returns it, ``corrected``. Empty
-        if there is only one policy, or if a stopping rule gave the policies different missions.
+        A row per policy and metric, as ``dess.analysis.compare`` returns it,
+        ``correct_for_all_tests``. Empty if there is only one policy, or if a stopping rule gave the
+        policies different missions.
     """
     if len(results.policies) < 2 or not _same_missions(results):
         return pd.DataFrame()
     best = best_policy(results.missions)
-    return corrected(results, compare(results.missions, best, [*METRICS], correction=None))
+    return correct_for_all_tests(
+        results, compare(results.missions, best, [*METRICS], correction=None)
+    )
 
 
 def comparison_table(results: Results) -> Table:
-    """The ``comparisons``."""
-    data = comparisons(results)
+    """The ``compare_with_best``."""
+    data = compare_with_best(results)
     caption = f"Differences from {data['baseline'].iloc[0]}"
-    return _compared(results, data, "policy", caption)
+    return _difference_table(results, data, "policy", caption)
 
 
-def learners(results: Results) -> dict[str, list[str]]:
+def trained_policies_by_learner(results: Results) -> dict[str, list[str]]:
     """The trained policies by learner; those of one learner differ in the seed of their training.
 
     Returns:
@@ -494,41 +387,41 @@ def learners(results: Results) -> dict[str, list[str]]:
     return dict(zip(names, policies.values(), strict=True)) if unique else policies
 
 
-def learned_against_heuristic(results: Results) -> pd.DataFrame:
+def compare_learned_with_heuristic(results: Results) -> pd.DataFrame:
     """Every learner compared with the best policy that is not learned, on the same missions.
 
     Returns:
         A row per learner and metric, as ``dess.analysis.compare_learners`` returns it: about the
-        learner if it has several trainings, otherwise about this one checkpoint, ``corrected``.
-        Empty if there is nothing to compare, or if a stopping rule gave the policies different
-        missions.
+        learner if it has several trainings, otherwise about this one checkpoint,
+        ``correct_for_all_tests``. Empty if there is nothing to compare, or if a stopping rule gave
+        the policies different missions.
     """
-    trained = learners(results)
+    trained = trained_policies_by_learner(results)
     learned = {policy for checkpoints in trained.values() for policy in checkpoints}
     heuristics = [policy for policy in results.policies if policy not in learned]
     if not trained or not heuristics or not _same_missions(results):
         return pd.DataFrame()
     baseline = best_policy(results.missions, heuristics)
     table = compare_learners(results.missions, trained, baseline, [*METRICS], correction=None)
-    return corrected(results, table)
+    return correct_for_all_tests(results, table)
 
 
 def learner_table(results: Results) -> Table:
-    """What ``learned_against_heuristic`` finds."""
-    data = learned_against_heuristic(results)
+    """What ``compare_learned_with_heuristic`` finds."""
+    data = compare_learned_with_heuristic(results)
     caption = f"Learned policies: differences from {data['baseline'].iloc[0]}, the best heuristic"
-    return _compared(results, data, "learner", caption)
+    return _difference_table(results, data, "learner", caption)
 
 
-def _compared(results: Results, rows: pd.DataFrame, of: str, caption: str) -> Table:
+def _difference_table(results: Results, rows: pd.DataFrame, of: str, caption: str) -> Table:
     caption = (
         f"{caption} [percentage points], with {INTERVALS}, each by itself; {MARKED}, by p. "
         f"{correction_in_words(results)}"
     )
-    return Table(compared(rows, of), caption, rows)
+    return Table(comparison_cells(rows, of), caption, rows)
 
 
-def allowance_in_words(rows: pd.DataFrame, of: str, metric: str = PRODUCT) -> str:
+def allowance_for_difference(rows: pd.DataFrame, of: str, metric: str = PRODUCT) -> str:
     """Why the intervals of differences are wider than the missions alone would make them.
 
     Args:
@@ -549,15 +442,15 @@ def allowance_in_words(rows: pd.DataFrame, of: str, metric: str = PRODUCT) -> st
     scale, words = (100, " points") if unit.in_percent else (1, f" {unit.unit}".rstrip())
     plain, wide = (f"±{scale * row[half]:.2g}{words}" for half in ("student", "half"))
     what = f"the difference of {row[of]} in {unit.within}"
-    return allowed_for(what, plain, wide, int(row["n"]))
+    return allowance_sentence(what, plain, wide, int(row["n"]))
 
 
 def correction_in_words(results: Results) -> str:
     """For what p-values are corrected, and why a mark may differ from its interval."""
     return (
-        f"P-values are corrected for the {tests_of(results):,} comparisons that the policies and "
-        f"metrics allow (Bonferroni). So ≈ may stand beside an interval without 0, which is not "
-        "corrected."
+        f"P-values are corrected for the {count_tests(results):,} comparisons that the policies "
+        "and metrics allow (Bonferroni). So ≈ may stand beside an interval without 0, which is "
+        "not corrected."
     )
 
 
@@ -566,7 +459,7 @@ def _same_missions(results: Results) -> bool:
     return len({n for of_team in counts for n in of_team}) == 1
 
 
-def distributions(results: Results) -> pd.DataFrame:
+def product_distributions(results: Results) -> pd.DataFrame:
     """The distribution of product over the missions of every policy.
 
     Returns:
@@ -579,7 +472,7 @@ def distributions(results: Results) -> pd.DataFrame:
     return distribution(results.missions, PRODUCT, generator)
 
 
-def spread(rows: pd.DataFrame, metric: str) -> Table:
+def quantile_table(rows: pd.DataFrame, metric: str) -> Table:
     """Quantiles of a metric over the missions, and means of the worst ones.
 
     Args:
@@ -588,16 +481,18 @@ def spread(rows: pd.DataFrame, metric: str) -> Table:
     """
     of, heads = metric_of(metric), []
     for row in rows.itertuples():
-        share = numbers.level(row.share)
+        share = numbers.format_level(row.share)
         heads.append(
             f"{share} quantile" if row.view == "quantile" else f"Mean of the worst {share}"
         )
     long = rows.assign(head=heads).rename(columns={"value": "mean"})
-    cells = numbers.wide(long, "policy", "head", of.written).reset_index(names="Policy")
+    cells = numbers.estimates_as_text(long, "policy", "head", of.written).reset_index(
+        names="Policy"
+    )
     return Table(cells, f"Quantiles of {of.within} over missions, with {INTERVALS}", rows)
 
 
-def precisions(results: Results) -> pd.DataFrame:
+def reached_precisions(results: Results) -> pd.DataFrame:
     """How narrow the intervals are, for a study with targets.
 
     Returns:
@@ -611,14 +506,14 @@ def precisions(results: Results) -> pd.DataFrame:
         policy: pd.DataFrame(rule.reached(results.store.samples(parts_of(manifest, team))))
         for team, policy in enumerate(results.policies)
     }
-    return _by_policy(tables)
+    return stack_by_policy(tables)
 
 
 def precision_table(rows: pd.DataFrame, most: int | None = MOST_ROWS) -> Table:
     """The precision of each estimate beside its target.
 
     Args:
-        rows: The ``precisions``.
+        rows: The ``reached_precisions``.
         most: The largest number of rows that it has; None: all.
     """
     top = rows[:most]
@@ -626,8 +521,8 @@ def precision_table(rows: pd.DataFrame, most: int | None = MOST_ROWS) -> Table:
         "Policy": top["policy"],
         "Point": top["point"],
         "Metric": top["metric"].map(lambda metric: metric_of(metric).name),
-        "Missions": counts(top["missions"]),
-        "Mean": top["mean"].map(numbers.quantity),
+        "Missions": format_counts(top["missions"]),
+        "Mean": top["mean"].map(numbers.format_quantity),
         "Half-width": top["half_width"].map("{:.2g}".format),
         "Target": top["target"].map("{:.2g}".format),
         "Reached": top["met"].map({True: "yes", False: "no: the budget ended"}),
@@ -635,41 +530,22 @@ def precision_table(rows: pd.DataFrame, most: int | None = MOST_ROWS) -> Table:
     return Table(pd.DataFrame(cells), f"Half-widths of {INTERVALS}, and their targets", rows)
 
 
-def sensitivities(results: Results) -> pd.DataFrame:
-    """The Sobol indices of each metric of each policy for each parameter and for the noise.
-
-    Returns:
-        A row per policy, metric and parameter: ``policy``, and the columns of
-        ``sensitivity``. Empty if the design is not of the kind ``saltelli``.
-    """
-    design = results.study.design
-    if not isinstance(design, Saltelli):
-        return pd.DataFrame()
-    missions = results.missions.groupby("policy", sort=False)
-    return _by_policy({name: sensitivity(design, rows, [*METRICS]) for name, rows in missions})
-
-
-def _by_policy(tables: Mapping[Any, pd.DataFrame]) -> pd.DataFrame:
-    """The rows of all policies, with the column ``policy``."""
-    return pd.concat(tables, names=["policy"]).reset_index("policy").reset_index(drop=True)
-
-
-def selections(results: Results) -> pd.DataFrame:
+def selected_settings(results: Results) -> pd.DataFrame:
     """The design point that was selected for every policy, and its guarantee.
 
     Returns:
         A row per policy: ``policy``, ``point``, ``setting`` in words, number of ``missions``,
         ``left`` (number of points not ruled out), ``guaranteed``, and ``guarantee`` in words, with
         the ends of the values at which the point lies. Empty if the study selects nothing. For a
-        study that selects the cheapest setting, the rows of ``cheapest.selections``.
+        study that selects the cheapest setting, the rows of ``cheapest.selected_fleets``.
     """
     if isinstance(results.study.selection, Cheapest):
-        return cheapest.selections(results)
-    words, rows = in_words(results), []
+        return cheapest.selected_fleets(results)
+    words, rows = points_in_words(results), []
     for policy in results.policies:
         if (c := results.choice(policy)) is not None:
             found = (policy, c.best, words[c.best], c.missions, len(c.survivors))
-            lies = edge(results, c.best, ends(results, c.best))
+            lies = ends_sentence(results, c.best, ends_of_point(results, c.best))
             rows.append((*found, c.guaranteed, f"{c.guarantee}.{lies}" if lies else c.guarantee))
     columns = ["policy", "point", "setting", "missions", "left", "guaranteed", "guarantee"]
     return pd.DataFrame(rows, columns=columns)
@@ -677,16 +553,64 @@ def selections(results: Results) -> pd.DataFrame:
 
 def selection_table(results: Results) -> Table:
     """The setting that was selected for every policy."""
-    data = selections(results)
+    data = selected_settings(results)
     cells = {
         "Policy": data["policy"],
         "Selected setting": data["setting"],
-        "Missions of the selection": counts(data["missions"]),
+        "Missions of the selection": format_counts(data["missions"]),
         "Settings not ruled out": data["left"],
     }
     return Table(pd.DataFrame(cells), "The setting that was selected for every policy", data)
 
 
-def checks(results: Results) -> pd.DataFrame:
+def means_of_check(results: Results) -> pd.DataFrame:
     """Means with intervals of the selected points, over missions not used for the selection."""
     return summary(results.checks, by=["policy", "point"])
+
+
+def plot_performance(summary: pd.DataFrame, metric: str, printed: float | None = None) -> Figure:
+    """A metric of every policy: means with intervals, and the paper's number as a line.
+
+    Args:
+        summary: Rows of ``dess.analysis.summary`` by ``policy``.
+        metric: The metric.
+        printed: The paper's number.
+    """
+    rows, of = summary[summary["metric"] == metric], metric_of(metric)
+    with style.new_panels(1.3 + 0.42 * len(rows), values="x") as (figure, ax):
+        style.plot_in_rows(rows, ax)
+        for y, mean in enumerate(rows["mean"]):
+            style.note_at_right(of.write(mean), y, ax)
+        if printed is not None:
+            ax.axvline(printed, **PRINTED, label=f"paper {of.write(printed)}", zorder=1)
+        ax.set(title=of.name, xlim=(-0.02, 1.02) if of.is_bounded else None)
+        style.set_axis_unit(ax.xaxis, of.axis, 5)
+    return figure
+
+
+def plot_by_fleet(
+    summary: pd.DataFrame, metric: str, printed: Mapping[int, float] | None = None
+) -> Figure:
+    """A metric of every policy against the number of UAVs, with intervals.
+
+    Args:
+        summary: Rows of ``dess.analysis.summary`` by ``policy`` and ``uavs``.
+        metric: One of ``METRICS``.
+        printed: The paper's numbers by number of UAVs.
+    """
+    rows = style.place_values(summary[summary["metric"] == metric], "uavs")
+    with style.new_panels(3.9, values="y", legend=5) as (figure, ax):
+        style.plot_along(rows, style.policy_colours(rows["policy"]), "%", ax)
+        if printed:
+            ax.plot(*zip(*sorted(printed.items()), strict=True), "D", label="paper", **PRINTED)
+        ax.set(title=METRICS[metric], xlabel="UAVs", ylim=(-0.03, 1.04))
+    return figure
+
+
+def draw_performance(results: Results, metric: str) -> Drawing:
+    """A metric of every policy at the only design point."""
+    table = means_of_points(results)
+    data = table[table["metric"] == metric]
+    caption = f"n = {counted_missions(data)} missions per policy; bars are {INTERVALS}."
+    alt = f"{metric_of(metric).name} of every policy"
+    return Drawing(plot_performance(table, metric), alt, caption, data)

@@ -1,8 +1,8 @@
 """What-ifs around a cheapest fleet: one more UAV or pad, and what breaks its requirements first.
 
-question = around(results, "my-sea.toml")  # of a search for the cheapest setting, with a data sheet
+question = question_around(results, "my-sea.toml")  # results of a search for the cheapest setting
 question.ask()
-table(results)
+table_around(results)
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,17 +13,27 @@ import numpy as np
 import pandas as pd
 
 from dess import InputError
-from dess.analysis.answers import costs
 from dess.analysis.answers.fleet import cheapest
-from dess.analysis.answers.fleet.requirements import Requirement, Verdict, least_spare, required
+from dess.analysis.answers.fleet.costs import (
+    currency_of,
+    fleets_in_words,
+    priced_settings,
+    setting_cells,
+)
+from dess.analysis.answers.fleet.requirements import (
+    Requirement,
+    Verdict,
+    least_spare,
+    requirements_of,
+)
 from dess.analysis.ask.question import LONGEST, Question
 from dess.analysis.metrics import metric_of
-from dess.analysis.names import parameter
+from dess.analysis.names import field_named
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.tables import Results, load_results
 from dess.analysis.stats.differences import compare
 from dess.analysis.study.study import study_from
-from dess.analysis.tables import INTERVALS, Table, counts
+from dess.analysis.tables import INTERVALS, Table, format_counts
 from dess.policies.registry import is_path
 from dess.scenario.quantities import times
 from dess.scenario.scenario import ScenarioSpace, load_scenario
@@ -32,7 +42,7 @@ FACTOR = 2  # harder conditions have twice the wind, the failures and the data
 WIND, HOURS = 0.5, 100  # without any: the wind as a share of the cruising speed; between failures
 
 
-def around(results: Results, scenario: str, missions: int = 100) -> Question | None:
+def question_around(results: Results, scenario: str, missions: int = 100) -> Question | None:
     """The question of what changes if the cheapest fleet or its conditions change a little.
 
     A fleet for several conditions is asked about under the last of them.
@@ -47,12 +57,12 @@ def around(results: Results, scenario: str, missions: int = 100) -> Question | N
         data sheet, or if no fleet is known to meet the requirements, or its policy is a file.
     """
     policy, manifest = cheapest.best_policy(results), results.store.manifest
-    points = cheapest.the_answer(results).points
+    points = cheapest.cheapest_answer(results).points
     if not points or not results.scenario(points[-1]).units or is_path(policy):
         return None
     fixed, values = manifest.study.set, manifest.points[points[-1]].values
     changes = []
-    for change in _changes(results.scenario(points[-1])):
+    for change in _changed_fields(results.scenario(points[-1])):
         try:
             load_scenario(scenario, **fixed | values | change)
         except InputError:  # such as a wind that UAVs cannot fly against
@@ -62,7 +72,7 @@ def around(results: Results, scenario: str, missions: int = 100) -> Question | N
     start = {field: value for field, value in (fixed | values).items() if field in varied}
     data = manifest.study.model_dump(mode="json", exclude_none=True, exclude={"selection"})
     data |= {
-        "name": _place(results).name,
+        "name": _place_of_question(results).name,
         "scenario": scenario,
         "description": "a fleet, and what changes if it or its conditions change a little",
         "set": {field: value for field, value in fixed.items() if field not in varied},
@@ -70,22 +80,22 @@ def around(results: Results, scenario: str, missions: int = 100) -> Question | N
         "policies": [policy],
         "missions": missions,
     }
-    return Question(study_from(data, "question"), _place(results))
+    return Question(study_from(data, "question"), _place_of_question(results))
 
 
 def is_known(results: Results) -> bool:
-    """Whether ``around`` was asked."""
-    return (_place(results) / MANIFEST).exists()
+    """Whether ``question_around`` was asked."""
+    return (_place_of_question(results) / MANIFEST).exists()
 
 
-def _place(results: Results) -> Path:
+def _place_of_question(results: Results) -> Path:
     """The results folder of the question, beside that of the study."""
     about = f"{results.store.manifest.key} {cheapest.best_policy(results)}"
     name = f"{results.store.manifest.study.name[:LONGEST]}-around-{short_hash(about.encode())}"
     return results.store.folder.parent / name
 
 
-def _changes(space: ScenarioSpace) -> Iterator[dict[str, Any]]:
+def _changed_fields(space: ScenarioSpace) -> Iterator[dict[str, Any]]:
     """What is changed, one after the other: the fleet, then its conditions."""
     sheet, rate = space.data_sheet, space.data_sheet.data_rate or ""
     yield {"uavs": space.uavs[1] + 1}
@@ -97,28 +107,28 @@ def _changes(space: ScenarioSpace) -> Iterator[dict[str, Any]]:
     yield {"data_sheet.data_rate": doubled[0] if isinstance(rate, str) else doubled}
 
 
-def table(results: Results) -> Table:
+def table_around(results: Results) -> Table:
     """The fleet, then every change with its means, that with the least lead first.
 
     Args:
-        results: The study that ``around`` was asked about.
+        results: The study that ``question_around`` was asked about.
     """
-    found, requirements = load_results(_place(results)), required(results)
+    found, requirements = load_results(_place_of_question(results)), requirements_of(results)
     start, *rows = [point.values for point in found.store.manifest.points]
     changes = [{f: v for f, v in row.items() if v != start.get(f)} for row in rows]
-    words = ["the fleet: " + costs.fleets(found)[0], *map(_in_words, changes)]
-    refused = [change for change in _changes(found.scenario(0)) if change not in changes]
-    data = costs.priced(found)
+    words = ["the fleet: " + fleets_in_words(found)[0], *map(_in_words, changes)]
+    refused = [change for change in _changed_fields(found.scenario(0)) if change not in changes]
+    data = priced_settings(found)
     data = data.assign(
         change=[words[point] for point in data["point"]],
         lead=least_spare(data, requirements),
-        verdict=[_verdict(row, requirements) for _, row in data.iterrows()],
+        verdict=[_verdict_on_row(row, requirements) for _, row in data.iterrows()],
     )
     data = data.iloc[np.lexsort((data["lead"], data["point"] > 0))].reset_index(drop=True)
     columns = [requirement.column for requirement in requirements]
-    cells = costs.cells(data.assign(condition="", fleet=data["change"]), columns)
+    cells = setting_cells(data.assign(condition="", fleet=data["change"]), columns)
     cells = cells.drop(columns="Policy").rename(columns={"Fleet": "What if"})
-    cells = cells.rename(columns={"Cost": f"Cost [{costs.currency(results)}]"})
+    cells = cells.rename(columns={"Cost": f"Cost [{currency_of(results)}]"})
     differences = compare(found.missions, 0, columns, correction=None, of="point")
     differences = differences.set_index(["metric", "point"])[["difference", "low", "high"]]
     for metric in map(metric_of, columns):
@@ -127,7 +137,7 @@ def table(results: Results) -> Table:
         place = cells.columns.get_loc(metric.name) + 1
         cells.insert(place, f"Change of {metric.within}", ["", *changes_in_words])
     cells.insert(1, "Requirements", data["verdict"].astype(str))
-    cells["Missions"] = counts(data["n"])
+    cells["Missions"] = format_counts(data["n"])
     caption = (
         "The fleet, one more of it, and harder conditions: means, and changes on the same "
         f"missions, with {INTERVALS}; requirements are met or missed if whole intervals say so, "
@@ -138,7 +148,7 @@ def table(results: Results) -> Table:
     return Table(cells, caption, data)
 
 
-def _verdict(row: pd.Series, requirements: Sequence[Requirement]) -> Verdict:
+def _verdict_on_row(row: pd.Series, requirements: Sequence[Requirement]) -> Verdict:
     """Whether the intervals of a row keep all requirements."""
     verdicts = [
         requirement.verdict(row[f"{requirement.column}_low"], row[f"{requirement.column}_high"])
@@ -149,5 +159,5 @@ def _verdict(row: pd.Series, requirements: Sequence[Requirement]) -> Verdict:
 
 def _in_words(change: dict[str, Any]) -> str:
     ((field, value),) = change.items()
-    name, is_list = parameter(field), isinstance(value, list | tuple)
+    name, is_list = field_named(field), isinstance(value, list | tuple)
     return f"{name.within} doubled" if is_list else name.words(value)

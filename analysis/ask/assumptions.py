@@ -1,16 +1,16 @@
 """What an answer assumes, in ten lines for the one who pays."""
 
 from dess.analysis import numbers
-from dess.analysis.answers import settings
 from dess.analysis.answers.fleet import cheapest
-from dess.analysis.answers.fleet.requirements import required
+from dess.analysis.answers.fleet.requirements import requirements_of
+from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
 from dess.scenario.quantities import printed
 
 
-def assumptions(results: Results, metric: str = PRODUCT) -> list[str]:
+def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
     """What a success, a slot and a cell are, who flies, and the data, radio, wind and failures.
 
     Args:
@@ -20,7 +20,7 @@ def assumptions(results: Results, metric: str = PRODUCT) -> list[str]:
     """
     space, units = results.scenario(), results.scenario().units
     assert units
-    sheet, nodes = space.data_sheet, numbers.counted(len(space.nodes), "node")
+    sheet, nodes = space.data_sheet, numbers.format_count(len(space.nodes), "node")
     varied = {f.removeprefix("data_sheet.") for f in results.store.manifest.values[0]}
     wide, high = (printed(cells * units.cell, "m") for cells in space.size)
     quota = "" if space.quota == 0 else " with its quota filled"
@@ -58,6 +58,6 @@ def assumptions(results: Results, metric: str = PRODUCT) -> list[str]:
 
 def _policy_of(results: Results, metric: str) -> str:
     """The policy of the answer: of the cheapest fleet, or of the best setting."""
-    if required(results):
+    if requirements_of(results):
         return cheapest.best_policy(results)
-    return str(settings.ranked(results, metric)["policy"].iloc[0])
+    return str(rank_settings(results, metric)["policy"].iloc[0])

@@ -123,12 +123,14 @@ class Question:
             sides = {"set": after, "baseline": study.set | before}
             words = [WHAT_IF]
             for option, values in sides.items():
-                words += _options(option, _listed({f: [value] for f, value in values.items()}))
+                words += _option_per_value(
+                    option, _values_as_options({f: [value] for f, value in values.items()})
+                )
             teams = list(study.policies)
         else:
             assert isinstance(design, Grid)
             fixed = {field: (value,) for field, value in study.set.items()}
-            words = ["sweep", *_options("set", _listed(fixed | design.values))]
+            words = ["sweep", *_option_per_value("set", _values_as_options(fixed | design.values))]
             teams = [",".join(study.policies)]
         words += [word for team in teams for word in ("--policy", team)]
         missions = rule.check if isinstance(rule, Cheapest) else study.missions
@@ -136,23 +138,23 @@ class Question:
         if study.scenario != "paper":
             words += ["--scenario", Path(study.scenario).name]
         if study.costs:
-            words += _options("price", study.costs.model_dump(exclude_unset=True))
+            words += _option_per_value("price", study.costs.model_dump(exclude_unset=True))
         if isinstance(rule, Cheapest):
-            words += _options("require", rule.requirements)
+            words += _option_per_value("require", rule.requirements)
         return shlex.join(["dess", *words])
 
 
-def _options(name: str, values: Mapping[Any, Any]) -> list[str]:
+def _option_per_value(name: str, values: Mapping[Any, Any]) -> list[str]:
     """``--NAME KEY=VALUE`` for every value."""
     return [word for key, value in values.items() for word in (f"--{name}", f"{key}={value}")]
 
 
-def _listed(values: Mapping[str, Iterable[Any]]) -> dict[str, str]:
+def _values_as_options(values: Mapping[str, Iterable[Any]]) -> dict[str, str]:
     """The values of every field in the syntax of ``--set``."""
     return {f: ",".join(map(toml_value, of_field)) for f, of_field in values.items()}
 
 
-def _key(study: Study) -> str:
+def _question_key(study: Study) -> str:
     """A hash of all that the records of a question depend on, without their number.
 
     So the same question with more missions adds to the same results folder.
@@ -209,18 +211,20 @@ def sweep_question(
     # What is decided by the design points, so once the study is known to be valid.
     decided: dict[str, Any] = {}
     if requirements:
-        decided["selection"] = _cheapest(requirements, missions, study)
+        decided["selection"] = _cheapest_rule(requirements, missions, study)
     if policies is None:
         each = max(ROOM, missions) if requirements else missions
         decided["policies"] = policies_for(study.scenarios, each)
     study = study.model_copy(update=decided)
     if name is None:
-        name = f"{'-'.join(swept)[:LONGEST] or 'sweep'}-{_key(study)}"
+        name = f"{'-'.join(swept)[:LONGEST] or 'sweep'}-{_question_key(study)}"
         study = study.model_copy(update={"name": name})
     return Question(study, Path(folder) / SWEEPS / name)
 
 
-def _cheapest(requirements: Mapping[str, float | str], missions: int, study: Study) -> Cheapest:
+def _cheapest_rule(
+    requirements: Mapping[str, float | str], missions: int, study: Study
+) -> Cheapest:
     """The rule that searches for the cheapest setting that meets the requirements."""
     prices = study.costs
     if not prices:
@@ -279,7 +283,7 @@ def what_if_question(
     measuring = {field for field in changed if field.endswith(".measured")}
     if changed.keys() - measuring:  # what changes is something else, which both sides measure
         fixed |= {field: changed.pop(field) for field in sorted(measuring)}
-    fixed = _measured(fixed | changed) | fixed
+    fixed = _fields_to_measure(fixed | changed) | fixed
     sides = load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed)
     _check_changes(*sides, changed)
     if isinstance(missions, int) and missions < 2:
@@ -296,15 +300,15 @@ def what_if_question(
         "seed": seed,
     }
     study = study_from(data, "question")
-    return Question(study, Path(folder) / WHAT_IF / _key(study))
+    return Question(study, Path(folder) / WHAT_IF / _question_key(study))
 
 
 def _check_changes(before: ScenarioSpace, after: ScenarioSpace, changed: Iterable[str]) -> None:
     """Refuse a variation that changes nothing, or sets a field to its value in the baseline."""
     for field in changed:
-        if _value(before, field) == _value(after, field):
+        if _value_of_field(before, field) == _value_of_field(after, field):
             raise InputError(
-                f"settings: {field} is {in_words(before, field)} in the baseline already; "
+                f"settings: {field} is {value_in_words(before, field)} in the baseline already; "
                 "allowed: another value"
             )
     if not changed:
@@ -312,18 +316,18 @@ def _check_changes(before: ScenarioSpace, after: ScenarioSpace, changed: Iterabl
         raise InputError(f"settings: none is given; allowed: one or more of {allowed}")
 
 
-def _measured(values: Iterable[str]) -> dict[str, bool]:
+def _fields_to_measure(values: Iterable[str]) -> dict[str, bool]:
     """The fields that measure what belongs to the sections of these fields, without those given."""
     sections = {section for section, dot, _ in (field.partition(".") for field in values) if dot}
     measuring = fields_of(ScenarioSpace).keys() & {f"{section}.measured" for section in sections}
     return dict.fromkeys(sorted(measuring - {*values}), True)
 
 
-def in_words(space: ScenarioSpace, field: str) -> str:
+def value_in_words(space: ScenarioSpace, field: str) -> str:
     """The value of a field in words: ``3``, ``10 to 50`` for a range, ``25 cells`` for nodes."""
-    value = _value(space, field)
+    value = _value_of_field(space, field)
     if field in RANGES:
-        return numbers.span(value, "{:g}")
+        return numbers.format_span(value, "{:g}")
     if field == "nodes":
         return f"{len(value)} cells"
     if isinstance(value, bool):
@@ -331,7 +335,7 @@ def in_words(space: ScenarioSpace, field: str) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value).strip("()")
 
 
-def _value(space: ScenarioSpace, field: str) -> Any:
+def _value_of_field(space: ScenarioSpace, field: str) -> Any:
     """The value of a field; for ``pads``, the number of pads also if it follows from the zone."""
     value = space.value(field)
     return space.zone_pads[0] if field == "pads" else value
@@ -347,10 +351,10 @@ def values_of(field: str, given: Any) -> tuple[Any, ...]:
     Raises:
         InputError: If there is none, or there are too many.
     """
-    return (_plain(given),) if _is_value(field, given) else listed(field, given)
+    return (_as_toml_value(given),) if _is_value(field, given) else list_values(field, given)
 
 
-def listed(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
+def list_values(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
     """One or several values of a field, in the types of TOML.
 
     Raises:
@@ -363,7 +367,7 @@ def listed(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
     if not 0 < count <= MAX_SIZE:
         counted = f"{count:,}" if count else "no"
         raise InputError(f"{field}: has {counted} values; allowed: 1 to {MAX_SIZE:,}")
-    return tuple(map(_plain, given))
+    return tuple(map(_as_toml_value, given))
 
 
 def _is_value(field: str, given: Any) -> bool:
@@ -385,13 +389,13 @@ def _are_numbers(given: Any, length: int | None) -> bool:
     return is_list and all(isinstance(item, int | float | np.number) for item in given)
 
 
-def _plain(value: Any) -> Any:
+def _as_toml_value(value: Any) -> Any:
     """A value in the types of TOML, without numpy types and tuples."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
-    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
+    return [_as_toml_value(item) for item in value] if isinstance(value, list | tuple) else value
 
 
-def plain(text: str) -> str:
+def strip_markdown(text: str) -> str:
     """A sentence of Markdown as plain text."""
     return text.replace("**", "").replace("`", "")

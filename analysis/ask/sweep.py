@@ -9,9 +9,15 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from dess import InputError
-from dess.analysis.answers import costs, settings
 from dess.analysis.answers.fleet import cheapest
-from dess.analysis.ask.question import Question, plain, sweep_question, values_of
+from dess.analysis.answers.fleet.costs import priced_settings, prices_in_words
+from dess.analysis.answers.settings.points import varied_values
+from dess.analysis.answers.settings.ranking import (
+    best_setting_sentence,
+    other_policies_sentences,
+    rank_settings,
+)
+from dess.analysis.ask.question import Question, strip_markdown, sweep_question, values_of
 from dess.analysis.execution.jobs import Progress
 from dess.analysis.execution.runner import Round
 from dess.analysis.metrics import PRODUCT
@@ -47,11 +53,15 @@ class Sweep:
             (``met``, ``missed`` or ``open``), and ``selected``: whether the setting is the selected
             one of its policy under its condition.
         """
-        table = settings.ranked(self.results, metric)
+        table = rank_settings(self.results, metric)
         study = self.question.study
         if study.costs is None:
             return table
-        priced = cheapest.judged(self.results) if study.selection else costs.priced(self.results)
+        priced = (
+            cheapest.judge_settings(self.results)
+            if study.selection
+            else priced_settings(self.results)
+        )
         key = ["policy", "point"]
         more = [name for name in priced if name in key or name not in table]
         return table.merge(priced[more], on=key, how="left")
@@ -86,18 +96,18 @@ class Sweep:
             metric: The metric that ranks the settings, where there are no requirements.
         """
         if self.question.study.selection:
-            return [*map(plain, cheapest.sentences(self.results))]
-        ranked = settings.ranked(self.results, metric)
-        best = settings.best_sentence(self.results, ranked, metric)
-        lines = [best, *settings.dependence(self.results, ranked, metric)]
+            return [*map(strip_markdown, cheapest.cheapest_sentences(self.results))]
+        ranked = rank_settings(self.results, metric)
+        best = best_setting_sentence(self.results, ranked, metric)
+        lines = [best, *other_policies_sentences(self.results, ranked, metric)]
         if self.question.study.costs:
-            lines.append(costs.prices_in_words(self.results))
+            lines.append(prices_in_words(self.results))
         return lines
 
     @property
     def guarantee(self) -> str:
         """With requirements: what is guaranteed about the selected settings, in words."""
-        return "; ".join(cheapest.guarantees(self.results))
+        return "; ".join(cheapest.guarantee_sentences(self.results))
 
     def plot(self, x: str | None = None, hue: str | None = None, metric: str = PRODUCT) -> "Figure":
         """Curves of a metric over a swept field, with 95 % intervals, for every policy.
@@ -111,13 +121,13 @@ class Sweep:
         Raises:
             InputError: If a field is not swept, or there is no such metric.
         """
-        from dess.analysis.figures import settings as figures
+        from dess.analysis.answers.settings.figures import draw_curves
 
         if x is None:
-            if not (fields := [*settings.varied(self.results)]):
+            if not (fields := [*varied_values(self.results)]):
                 raise InputError("x: no field is swept; allowed: a sweep of one field or more")
             x, hue = fields[0], hue or next(iter(fields[1:]), None)
-        return figures.plot(self.results, x, hue, metric).figure
+        return draw_curves(self.results, x, hue, metric).figure
 
 
 def sweep(
@@ -170,13 +180,13 @@ def sweep(
     about = scenario, policies, missions, seed, prices, requirements, name, folder
     question = sweep_question(values, *about)
     if progress is True:
-        with _bar() as (bar, announce):
+        with _progress_bar() as (bar, announce):
             return Sweep(question, question.ask(workers, bar, announce, yes))
     return Sweep(question, question.ask(workers, progress or None, yes=yes))
 
 
 @contextmanager
-def _bar() -> Iterator[tuple[Progress, Callable[[Round], None]]]:
+def _progress_bar() -> Iterator[tuple[Progress, Callable[[Round], None]]]:
     """A progress bar in missions, shown if they take a second; its total may grow by a rule."""
     from tqdm.auto import tqdm
 

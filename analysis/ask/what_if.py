@@ -13,27 +13,33 @@ from scipy.special import ndtri
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers import summary
-from dess.analysis.answers.fleet import home
-from dess.analysis.answers.missions import estimate, fate_in_words
-from dess.analysis.ask.question import RANGES, Question, in_words, plain, what_if_question
+from dess.analysis.answers.missions import estimate_metric, fate_in_words
+from dess.analysis.answers.settings.home import with_way_home
+from dess.analysis.ask.question import (
+    RANGES,
+    Question,
+    strip_markdown,
+    value_in_words,
+    what_if_question,
+)
 from dess.analysis.execution.jobs import Progress
 from dess.analysis.metrics import (
     METRICS,
     PRODUCT,
     RATIO,
     SUCCESS,
-    in_units,
-    lasting,
+    column_as_told,
+    columns_in_units,
+    format_length,
     measured_in,
     metric_of,
-    told,
 )
-from dess.analysis.names import parameter
+from dess.analysis.names import field_named
 from dess.analysis.results.resimulate import resimulate
-from dess.analysis.results.tables import Results, once
+from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import LEVEL, by_replication
-from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position
+from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position_of
 from dess.base.errors import one_of
 from dess.scenario.fields import fields_of
 from dess.scenario.scenario import ScenarioSpace
@@ -66,7 +72,7 @@ _SHORT = {SUCCESS: "Success", RATIO: "Collection ratio", PRODUCT: "Their product
 _MISSION = ["policy", "point", "replication"]
 
 
-@once
+@compute_once
 def missions_of(results: Results) -> pd.DataFrame:
     """``results.missions`` with all of ``MEASURES``; nothing failed where nothing can fail."""
     uavs = results.uavs.assign(depleted=100 * (results.uavs["end"] == "battery"))
@@ -79,35 +85,41 @@ def missions_of(results: Results) -> pd.DataFrame:
         charging_per_uav=missions["slots_charging"] / missions["uavs"],
         waiting_per_uav=missions["slots_waiting"] / missions["uavs"],
     )
-    return found.assign(**in_units(found, units)) if units else found
+    return found.assign(**columns_in_units(found, units)) if units else found
 
 
-def measured(results: Results) -> list[str]:
+def measured_columns(results: Results) -> list[str]:
     """What scenarios beyond the paper measure, on at least one of both sides."""
     missions = results.missions
     return [name for name in measured_in(missions) if missions[name].notna().any()]
 
 
-def means(results: Results) -> pd.DataFrame:
+def means_of_sides(results: Results) -> pd.DataFrame:
     """Means with intervals: rows of ``dess.analysis.summary`` by ``policy`` and ``point``."""
-    table = summary.means(replace(results, missions=missions_of(results)))
-    return table[table["metric"].isin([*METRICS, *measured(results)])].reset_index(drop=True)
+    table = summary.means_of_points(replace(results, missions=missions_of(results)))
+    return table[table["metric"].isin([*METRICS, *measured_columns(results)])].reset_index(
+        drop=True
+    )
 
 
-@once
-def answers(results: Results) -> pd.DataFrame:
+@compute_once
+def compare_sides(results: Results) -> pd.DataFrame:
     """The variation compared with the baseline, mission by mission.
 
     Returns:
         A row per policy and metric (those of ``METRICS``, the way home where missions may end in
-        the air, what is ``measured``, then those of ``MEASURES``): ``policy``, the means ``before``
-        and ``after``, and the columns of ``dess.analysis.compare``. Every interval has its own
-        level of 95 %; see ``stats.differences.paired``. Of what only one side measures, ``n`` is 0
-        and all else nan but the mean of this side.
+        the air, what is ``measured_columns``, then those of ``MEASURES``): ``policy``, the means
+        ``before`` and ``after``, and the columns of ``dess.analysis.compare``. Every interval has
+        its own level of 95 %; see ``stats.differences.compare_pairs``. Of what only one side
+        measures, ``n`` is 0 and all else nan but the mean of this side.
     """
     missions = missions_of(results)
-    of_paper = home.beside_success(results, METRICS)
-    metrics = [*of_paper, *measured(results), *(told(name, missions) for name in MEASURES)]
+    of_paper = with_way_home(results, METRICS)
+    metrics = [
+        *of_paper,
+        *measured_columns(results),
+        *(column_as_told(name, missions) for name in MEASURES),
+    ]
     tables = []
     for policy, rows in missions.groupby("policy", sort=False):
         table = compare(rows, BASELINE, metrics, correction=None, of="point")
@@ -121,17 +133,17 @@ def answers(results: Results) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def verdict(answer: Any) -> str:
+def verdict_on_change(answer: Any) -> str:
     """Whether the variation is significantly ``ABOVE`` or ``BELOW`` the baseline.
 
     The complete interval has to be above or below 0. If it has no length, it tells nothing about
     the variance, so the sign test must be significant as well.
 
     Args:
-        answer: A row of ``answers``.
+        answer: A row of ``compare_sides``.
     """
     known = answer.low < answer.high or answer.p <= 1 - LEVEL
-    return position(answer) if known else INCONCLUSIVE
+    return position_of(answer) if known else INCONCLUSIVE
 
 
 def missions_needed(answer: Any) -> float:
@@ -151,14 +163,14 @@ def missions_needed(answer: Any) -> float:
     return float(np.ceil(answer.n * (half * (1 + ndtri(POWER) / quantile)) ** 2))
 
 
-def differences(results: Results, policy: str) -> pd.Series:
+def product_differences(results: Results, policy: str) -> pd.Series:
     """Variation - baseline in product of a policy, by replication."""
     missions = results.missions[results.missions["policy"] == policy]
     sides = missions.pivot(index="replication", columns="point", values=PRODUCT)
     return sides[VARIATION] - sides[BASELINE]
 
 
-def _meaning(field: str) -> str:
+def _meaning_of_field(field: str) -> str:
     """The first part of a field's description, without details."""
     description = fields_of(ScenarioSpace)[field].description or ""
     return description.partition(";")[0].partition(":")[0]
@@ -170,22 +182,22 @@ def best_policy(results: Results, point: int) -> str:
     return summary.best_policy(missions[missions["point"] == point])
 
 
-def conclusion(answer: Any) -> str:
-    """What a row of ``answers`` says about the product, in Markdown."""
+def conclusion_in_words(answer: Any) -> str:
+    """What a row of ``compare_sides`` says about the product, in Markdown."""
     words = {
         ABOVE: "is **higher** in the variation",
         BELOW: "is **lower** in the variation",
         INCONCLUSIVE: "is **inconclusive**",
     }
-    found = verdict(answer)
+    found = verdict_on_change(answer)
     return (
-        f"**{answer.policy}**: product {words[found]}, by {change(answer)} points: from "
-        f"{numbers.percent(answer.before)} to {numbers.percent(answer.after)}."
-        f"{_missing(answer) if found == INCONCLUSIVE else ''}"
+        f"**{answer.policy}**: product {words[found]}, by {format_change(answer)} points: from "
+        f"{numbers.format_percent(answer.before)} to {numbers.format_percent(answer.after)}."
+        f"{_missing_in_words(answer) if found == INCONCLUSIVE else ''}"
     )
 
 
-def _missing(answer: Any) -> str:
+def _missing_in_words(answer: Any) -> str:
     """How many missions would be needed for a conclusive answer, in words."""
     needed = missions_needed(answer)
     if needed == np.inf:
@@ -197,24 +209,26 @@ def _missing(answer: Any) -> str:
     )
 
 
-def change(answer: Any) -> str:
-    """The paired difference of a row of ``answers`` with its interval, as text.
+def format_change(answer: Any) -> str:
+    """The paired difference of a row of ``compare_sides`` with its interval, as text.
 
     It is in percentage points for the paper's metrics; small numbers have more digits.
     """
     ends = (answer.difference, answer.low, answer.high)
     if not metric_of(answer.metric).in_percent:
-        return _amount(*ends, sign="+")
+        return _format_amount(*ends, sign="+")
     if 0 < answer.high - answer.low < 0.01:
-        return _amount(*(100 * end for end in ends), sign="+")
-    return numbers.points(*ends)
+        return _format_amount(*(100 * end for end in ends), sign="+")
+    return numbers.format_points(*ends)
 
 
-def _amount(value: float, *ends: float, sign: str = "") -> str:
+def _format_amount(value: float, *ends: float, sign: str = "") -> str:
     """A number with two decimals, or more if it is small, and its interval if it has a length."""
     digits = 2 if abs(value) >= 0.1 or not value else 4
     rounded = [round(number, digits) or 0.0 for number in (value, *ends)]  # no -0.00
-    texts = [numbers.minus(f"{number:{sign if number else ''}.{digits}f}") for number in rounded]
+    texts = [
+        numbers.format_minus(f"{number:{sign if number else ''}.{digits}f}") for number in rounded
+    ]
     return f"{texts[0]} [{', '.join(texts[1:])}]" if len({*ends}) > 1 else texts[0]
 
 
@@ -233,8 +247,8 @@ class WhatIf:
     shown: str
 
     def table(self) -> pd.DataFrame:
-        """The paired differences, with a row per policy and metric, as ``answers``."""
-        return answers(self.results)
+        """The paired differences, with a row per policy and metric, as ``compare_sides``."""
+        return compare_sides(self.results)
 
     def _of_product(self) -> Iterable[Any]:
         """The rows of the table on the product, one per policy."""
@@ -244,7 +258,7 @@ class WhatIf:
     def answer(self) -> str:
         """The paired differences in product, in words (Markdown)."""
         before, after = map(self._best, (BASELINE, VARIATION))
-        lines = "\n".join(f"- {conclusion(row)}" for row in self._of_product())
+        lines = "\n".join(f"- {conclusion_in_words(row)}" for row in self._of_product())
         return f"{lines}\n\nThe highest mean: in the baseline {before}; in the variation {after}."
 
     def _repr_markdown_(self) -> str:
@@ -253,32 +267,39 @@ class WhatIf:
     def sentence(self) -> str:
         """What the variation changes, in a sentence."""
         new = [
-            f"{parameter(side.Field).words(side.Variation)} instead of {side.Baseline}"
+            f"{field_named(side.Field).words(side.Variation)} instead of {side.Baseline}"
             for side in self._fields(self._changed).itertuples()
         ]
         parts = [
-            f"that of {row.policy} by {change(row)} points"
-            + " (inconclusive)" * (verdict(row) == INCONCLUSIVE)
+            f"that of {row.policy} by {format_change(row)} points"
+            + " (inconclusive)" * (verdict_on_change(row) == INCONCLUSIVE)
             for row in self._of_product()
         ]
-        n = f"n = {numbers.span(row.n for row in self._of_product())} pairs"
-        return f"With {numbers.words(new)}, the product changes: {numbers.words(parts)}; {n}."
+        n = f"n = {numbers.format_span(row.n for row in self._of_product())} pairs"
+        with_new = numbers.join_words(new)
+        return f"With {with_new}, the product changes: {numbers.join_words(parts)}; {n}."
 
     def answers(self) -> list[str]:
         """What the variation changes, and then the conclusion on every policy, in sentences."""
-        return [self.sentence(), *(plain(conclusion(row)) for row in self._of_product())]
+        return [
+            self.sentence(),
+            *(strip_markdown(conclusion_in_words(row)) for row in self._of_product()),
+        ]
 
     def _best(self, point: int) -> str:
         """The best policy of one side with its mean, as ``greedy, 95.3 % [94.5, 96.1]``."""
         policy = best_policy(self.results, point)
-        return f"{policy}, {numbers.estimate(estimate(self.results, policy, point=point))}"
+        mean = estimate_metric(self.results, policy, point=point)
+        return f"{policy}, {numbers.format_estimate(mean)}"
 
     def winners(self) -> str:
         """In words: the shares of the missions in which each policy is better or worse."""
-        gaps = {policy: differences(self.results, policy) for policy in self.results.policies}
+        gaps = {
+            policy: product_differences(self.results, policy) for policy in self.results.policies
+        }
         return "; ".join(
-            f"{policy} is better in {numbers.percent((of_policy > 0).mean())} and worse in "
-            f"{numbers.percent((of_policy < 0).mean())}"
+            f"{policy} is better in {numbers.format_percent((of_policy > 0).mean())} and worse in "
+            f"{numbers.format_percent((of_policy < 0).mean())}"
             for policy, of_policy in gaps.items()
         )
 
@@ -292,7 +313,7 @@ class WhatIf:
         failures = (successes.size() - successes.sum()).astype(int)
         sentences = []
         for policy in self.results.missions["policy"].unique():
-            gaps = differences(self.results, policy)
+            gaps = product_differences(self.results, policy)
             mostly = np.sign((gaps > 0).sum() - (gaps < 0).sum())
             if mostly * gaps.mean() >= 0:
                 continue
@@ -312,7 +333,7 @@ class WhatIf:
         """How the intervals and marks that occur in the answer are read, in sentences."""
         table = self.table()
         table = table[table["metric"].isin([*METRICS])]
-        verdicts = [verdict(row) for row in table.itertuples()]
+        verdicts = [verdict_on_change(row) for row in table.itertuples()]
         sentences = []
         if INCONCLUSIVE in verdicts:
             sentences.append("A difference is inconclusive (≈) if its interval contains 0.")
@@ -320,7 +341,7 @@ class WhatIf:
             sentences.append(
                 "Intervals of the means may overlap although the paired difference is clear."
             )
-        if summary.learners(self.results):
+        if summary.trained_policies_by_learner(self.results):
             sentences.append(
                 "A learned policy is used as it was trained; in a setting far from its training, "
                 "a new training may do better."
@@ -335,7 +356,7 @@ class WhatIf:
 
     def _overlap(self, policy: str, metric: str) -> bool:
         """Whether the intervals of the means of both sides overlap."""
-        rows = means(self.results)
+        rows = means_of_sides(self.results)
         rows = rows[(rows["policy"] == policy) & (rows["metric"] == metric)]
         return bool(rows["low"].max() <= rows["high"].min())
 
@@ -347,7 +368,10 @@ class WhatIf:
     def _fields(self, names: Iterable[str]) -> pd.DataFrame:
         """Fields of the scenario in the baseline and in the variation, as a table to print."""
         sides = [self.results.scenario(point) for point in (BASELINE, VARIATION)]
-        rows = [(name, _meaning(name), *(in_words(side, name) for side in sides)) for name in names]
+        rows = [
+            (name, _meaning_of_field(name), *(value_in_words(side, name) for side in sides))
+            for name in names
+        ]
         return pd.DataFrame(rows, columns=["Field", "Meaning", "Baseline", "Variation"])
 
     def field_table(self) -> pd.DataFrame:
@@ -370,10 +394,14 @@ class WhatIf:
         table, lines = self.table(), []
         for row in table[table["policy"] == policy].itertuples():
             in_percent = metric_of(row.metric).in_percent
-            write, unit = (numbers.percent, " points") if in_percent else (_amount, "")
+            write, unit = (
+                (numbers.format_percent, " points") if in_percent else (_format_amount, "")
+            )
             sides = ["–" if np.isnan(mean) else write(mean) for mean in (row.before, row.after)]
             name = (_SHORT | MEASURES).get(row.metric) or metric_of(row.metric).label
-            difference = f"{MARKS[verdict(row)]} {change(row)}{unit}" if row.n else ""
+            difference = (
+                f"{MARKS[verdict_on_change(row)]} {format_change(row)}{unit}" if row.n else ""
+            )
             lines.append([name, *sides, difference])
         heads = ["Mean per mission", "Baseline", "Variation", "Paired difference"]
         return pd.DataFrame(lines, columns=heads)
@@ -386,9 +414,13 @@ class WhatIf:
                 lines.append((row.policy, _SHORT[row.metric], "no variance", *"–––"))
                 continue
             left = 1 - row.variance_reduction
-            narrower = numbers.percent(1 - left**0.5) if left < 1 else "none"
+            narrower = numbers.format_percent(1 - left**0.5) if left < 1 else "none"
             worth = f"{row.n / left:,.0f}" if left else "any number"
-            amounts = (numbers.minus(f"{row.correlation:.2f}"), numbers.percent(left), narrower)
+            amounts = (
+                numbers.format_minus(f"{row.correlation:.2f}"),
+                numbers.format_percent(left),
+                narrower,
+            )
             lines.append((row.policy, _SHORT[row.metric], *amounts, worth))
         heads = ["Policy", "Metric", "Correlation", "Variance left", "Narrower by", "Worth"]
         return pd.DataFrame(lines, columns=heads)
@@ -397,7 +429,7 @@ class WhatIf:
         """The paired differences of the metrics, with intervals."""
         from dess.analysis.figures import comparison
 
-        return comparison.gains(self.table())
+        return comparison.plot_gains(self.table())
 
     def plot_means(self, metric: str = PRODUCT) -> "Figure":
         """A metric of every policy in the baseline and in the variation, with intervals.
@@ -408,14 +440,16 @@ class WhatIf:
         from dess.analysis.figures import comparison
 
         sides = ["\n".join((side, *words)) for side, words in zip(SIDES, self.sides, strict=True)]
-        return comparison.means(means(self.results), metric, sides)
+        return comparison.plot_sides(means_of_sides(self.results), metric, sides)
 
     def plot_spread(self) -> "Figure":
         """The distribution of the paired differences in product."""
         from dess.analysis.figures import comparison
 
         policies = self.results.policies
-        return comparison.spread({policy: differences(self.results, policy) for policy in policies})
+        return comparison.plot_difference_spread(
+            {policy: product_differences(self.results, policy) for policy in policies}
+        )
 
     def typical(self) -> "Example":
         """The replication that has the median of the differences.
@@ -423,7 +457,7 @@ class WhatIf:
         With an even number it is the lower one of the two in the middle; among equal ones, the
         first.
         """
-        ordered = differences(self.results, self.shown).sort_values(kind="stable")
+        ordered = product_differences(self.results, self.shown).sort_values(kind="stable")
         middle = ordered.iloc[(len(ordered) - 1) // 2]
         return Example(self, int(ordered.index[ordered == middle][0]))
 
@@ -459,7 +493,9 @@ class Example:
     def effect(self) -> str:
         """By how much the variation changes the mission, in a sentence of Markdown."""
         policy = self.answer.shown
-        gap = numbers.difference(differences(self.answer.results, policy)[self.replication], 0)
+        gap = numbers.format_difference(
+            product_differences(self.answer.results, policy)[self.replication], 0
+        )
         return (
             f"Replication {self.replication} with **{policy}**: the variation changes the product "
             f"by {gap} points."
@@ -484,8 +520,9 @@ class Example:
         figure = mission_figure(mission.events, mission.scenario)
         caption = (
             f"{SIDES[point].capitalize()} ({', '.join(self.answer.sides[point])}): collection "
-            f"ratio {numbers.percent(mission.record.collection_ratio)}; {fate_in_words(mission)}. "
-            f"{lasting(mission.record.slots, mission.scenario.units)}. n = 1."
+            f"ratio {numbers.format_percent(mission.record.collection_ratio)}; "
+            f"{fate_in_words(mission)}. "
+            f"{format_length(mission.record.slots, mission.scenario.units)}. n = 1."
         )
         return figure, "Map of the mission; battery, residual data and charging", caption
 

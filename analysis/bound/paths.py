@@ -194,7 +194,7 @@ def memory_of(blocks, home, node, level):
 
 
 @inlined
-def remembered(blocks, home, memory):
+def decode_memory(blocks, home, memory):
     """The node and the level of a memory; -1 and 0 for none."""
     if memory == 0:
         return -1, 0
@@ -203,7 +203,7 @@ def remembered(blocks, home, memory):
 
 
 @inlined
-def beginning(blocks, local, now, ahead, had, then_had, home, there, level, later, start):
+def bound_of_beginning(blocks, local, now, ahead, had, then_had, home, there, level, later, start):
     """The least bound of a step into another block: its value and the local price there.
 
     Args:
@@ -266,11 +266,13 @@ def _bound_slot(f, to_zone, phases, data, period, blocks, local, values, waiting
         had, then_had = data_had(data, phases, phase, f), data_had(data, phases, phase, f + 1)
         if f < phases.deadline[phase]:
             gain, then = values[period[phases.clock[phase, f]]], ceilings[f + 1, phase]
-            _begin(to_zone, phases, f, phase, blocks, local, gain, then, had, then_had, begins)
+            _bound_beginnings(
+                to_zone, phases, f, phase, blocks, local, gain, then, had, then_had, begins
+            )
             for x in range(width):
                 for y in range(height):
                     if is_reached(to_zone, phases, phase, f, x, y):
-                        _act(
+                        _raise_by_acting(
                             to_zone, phases, f, phase, blocks, local, gain, then, had, then_had,
                             begins, x, y, scratch, here[x, y],
                         )  # fmt: skip
@@ -279,15 +281,17 @@ def _bound_slot(f, to_zone, phases, data, period, blocks, local, values, waiting
             for y in range(height):
                 if may_charge(to_zone, phases, phase, f, x, y):
                     new = data_had(data, phases, target, f) - had
-                    _charge(blocks, local, new, ceilings[f, target, x, y], x, y, here[x, y])
+                    _raise_by_charging(
+                        blocks, local, new, ceilings[f, target, x, y], x, y, here[x, y]
+                    )
 
 
 @inlined
-def _charge(blocks, local, new, charged, x, y, here):
+def _raise_by_charging(blocks, local, new, charged, x, y, here):
     """Raise the ceilings of a state to what it is worth after a charge."""
     home = blocks.home[x, y]
     for memory in range(len(here)):
-        node, level = remembered(blocks, home, memory)
+        node, level = decode_memory(blocks, home, memory)
         more = local[node, blocks.levels[level]] * new[node] if memory > 0 else 0.0
         for q in range(local.shape[1]):
             value = charged[memory, q] + local[home, q] * new[home] + more
@@ -295,7 +299,7 @@ def _charge(blocks, local, new, charged, x, y, here):
 
 
 @inlined
-def _begin(to_zone, phases, f, phase, blocks, local, gain, then, had, then_had, begins):
+def _bound_beginnings(to_zone, phases, f, phase, blocks, local, gain, then, had, then_had, begins):
     """The least bounds of all steps into another block, per level of memory before and after."""
     levels, (width, height) = len(blocks.levels), to_zone.shape
     for action in range(4):
@@ -309,14 +313,14 @@ def _begin(to_zone, phases, f, phase, blocks, local, gain, then, had, then_had, 
                     continue
                 for level in range(levels):
                     for later in range(levels):
-                        begins[action, x2, y2, level, later], _ = beginning(
+                        begins[action, x2, y2, level, later], _ = bound_of_beginning(
                             blocks, local, gain[action, x2, y2], then[x2, y2], had, then_had,
                             home, there, level, later, np.inf,
                         )  # fmt: skip
 
 
 @inlined
-def _act(
+def _raise_by_acting(
     to_zone, phases, f, phase, blocks, local, gain, then, had, then_had, begins, x, y, scratch, here
 ):  # fmt: skip
     """Raise the ceilings of a state to what its actions can earn."""
@@ -328,7 +332,7 @@ def _act(
             continue
         there = blocks.home[x2, y2]
         for memory in range(len(here)):
-            node, level = remembered(blocks, home, memory)
+            node, level = decode_memory(blocks, home, memory)
             if node < 0 and memory > 0:  # this block has fewer neighbours
                 break
             if there != home:

@@ -21,7 +21,7 @@ import numpy as np
 
 from dess import InputError
 from dess.analysis.bound import paths
-from dess.analysis.bound.service import POINTS, add_slopes, rates_of, spread, step_values
+from dess.analysis.bound.service import POINTS, add_slopes, rates_of, spread_normal, step_values
 from dess.base.kernels import kernel
 from dess.model import rules
 from dess.model.channel import empty_scratch, world_of
@@ -152,7 +152,7 @@ def upper_bound(
     """
     (space,) = spaces_of([scenario])
     check_scenario(space)
-    return improve(known_of(space, seed, replication), iterations, Detail())
+    return improve_prices(known_of(space, seed, replication), iterations, Detail())
 
 
 def check_scenario(scenario: ScenarioSpace) -> None:
@@ -177,10 +177,13 @@ def ceilings_memory(scenario: ScenarioSpace, detail: Detail) -> int:
     slots, near = paths.most_flying(scenario), min(detail.near, max(len(scenario.nodes) - 1, 1))
     battery = scenario.flying_time[0], scenario.charge_start[1], scenario.charge_complete[0]
     phases = 2 + len(paths.early_charges(slots, *battery)) if scenario.flight_cost else 1
-    return math.prod(_shape(slots, phases, scenario.size, near, detail)) * np.dtype(float).itemsize
+    return (
+        math.prod(_shape_of_ceilings(slots, phases, scenario.size, near, detail))
+        * np.dtype(float).itemsize
+    )
 
 
-def _shape(
+def _shape_of_ceilings(
     slots: int, phases: int, size: tuple[int, int], near: int, detail: Detail
 ) -> tuple[int, ...]:
     """The shape of ``Bounds.ceilings``, with ``near`` blocks that can be remembered."""
@@ -202,7 +205,7 @@ def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
     )
     world = world_of(scenario)
     points = POINTS if scenario.shadowing_variance > 0 else np.zeros(1)
-    below = spread(points) if scenario.shadowing_variance > 0 else np.array([0.0, 1.0])
+    below = spread_normal(points) if scenario.shadowing_variance > 0 else np.array([0.0, 1.0])
     rates = rates_of(record, world.mean_snr, points)
     zones, cells = np.array(scenario.rectangles), world.chart.zones
     ways = chart.spread(cells, world.chart.parking)[0].reshape(cells.shape)
@@ -238,7 +241,9 @@ class Bounds:
         times = np.arange(len(known.data))
         self.period = np.searchsorted(inner, times)
         self.values = np.empty((len(self.cuts), 5, *size, len(self.parts)))
-        self.ceilings = np.empty(_shape(slots, phases, size, self.blocks.near.shape[1], detail))
+        self.ceilings = np.empty(
+            _shape_of_ceilings(slots, phases, size, self.blocks.near.shape[1], detail)
+        )
 
     def at(self, prices: np.ndarray) -> tuple[float, np.ndarray]:
         """The bound at prices (S, K), as a share of all data, and its derivatives (S, K)."""
@@ -265,7 +270,7 @@ class Bounds:
         return bound / total, (slope - takings.cumsum(axis=0)) / total
 
 
-def improve(known: Known, iterations: int, detail: Detail) -> Bound:
+def improve_prices(known: Known, iterations: int, detail: Detail) -> Bound:
     """Search for prices with a low bound; the lowest bound found is kept."""
     bounds = Bounds(known, detail)
     shape = len(bounds.cuts), len(known.nodes)
@@ -273,7 +278,7 @@ def improve(known: Known, iterations: int, detail: Detail) -> Bound:
     most[-1] = 1.0
     kept, lowest = most, 1.0  # with prices of 1 at the end
     if known.data[-1].sum() > 0 and iterations > 0:
-        kept, lowest = _descend(bounds, _first_prices(known, shape), most, iterations)
+        kept, lowest = _descend_to_minimum(bounds, _first_prices(known, shape), most, iterations)
     if lowest * (1.0 + _ROUNDING) >= 1.0:
         kept, lowest = np.where(np.isinf(most), 0.0, most), 1.0
     return Bound(min(lowest * (1.0 + _ROUNDING), 1.0), kept, bounds.cuts, iterations)
@@ -288,7 +293,7 @@ def _first_prices(known: Known, shape: tuple[int, int]) -> np.ndarray:
     return prices
 
 
-def _descend(
+def _descend_to_minimum(
     bounds: Bounds, prices: np.ndarray, most: np.ndarray, iterations: int
 ) -> tuple[np.ndarray, float]:
     """The prices with the lowest bound of those that the bundle method tries, and the bound."""

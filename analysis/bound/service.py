@@ -25,7 +25,7 @@ _UNLIKELY = 1e-5
 POINTS = np.array([*(-z for z in _HALF[::-1]), 0.0, *_HALF])  # standard normal deviates
 
 
-def spread(points: np.ndarray) -> np.ndarray:
+def spread_normal(points: np.ndarray) -> np.ndarray:
     """(J + 1,) distribution on J points, a mean-preserving spread of the standard normal one.
 
     Entry j is the probability of the points before j.
@@ -149,7 +149,7 @@ def step_values(worth, local, nodes, block, rates, below, values):
         nodes: (K, 2) cells of the nodes.
         block: (W, H) home node of each cell ``x, y``.
         rates: From ``rates_of``.
-        below: (J + 1,) From ``spread``.
+        below: (J + 1,) From ``spread_normal``.
         values: (S, 5, W, H, Q) worth of the step with an action to a cell ``x, y``, overwritten.
     """
     values[:] = 0.0
@@ -210,7 +210,7 @@ def step_takings(x, y, action, worth, nodes, rates, below, takings):
 
 
 @inlined
-def _stay(local, now, ahead, had, then_had, home, q):
+def _ceiling_of_staying(local, now, ahead, had, then_had, home, q):
     """The ceiling of local price ``q`` by a step within the block, and the local price after."""
     least, best = np.inf, q
     for line in range(local.shape[1]):
@@ -222,11 +222,11 @@ def _stay(local, now, ahead, had, then_had, home, q):
 
 
 @inlined
-def _leave(blocks, local, now, ahead, had, then_had, home, there, level, q):
+def _ceiling_of_leaving(blocks, local, now, ahead, had, then_had, home, there, level, q):
     """The same by a step into another block, and the level at which ``home`` is remembered."""
     least, best, chosen = np.inf, 0, 0
     for later in range(len(blocks.levels)):
-        value, line = paths.beginning(
+        value, line = paths.bound_of_beginning(
             blocks, local, now, ahead, had, then_had, home, there, level, later, local[home, q]
         )
         if value < least:
@@ -235,13 +235,13 @@ def _leave(blocks, local, now, ahead, had, then_had, home, there, level, q):
 
 
 @kernel
-def _choose(
+def _choose_service(
     to_zone, phases, data, period, blocks, local, values, waiting, ceilings,
     f, phase, x, y, memory, q,
 ):  # fmt: skip
     """What determines the ceiling of a state: the choice, its local price, the level kept."""
     home = blocks.home[x, y]
-    node, level = paths.remembered(blocks, home, memory)
+    node, level = paths.decode_memory(blocks, home, memory)
     had = paths.data_had(data, phases, phase, f)
     then_had = paths.data_had(data, phases, phase, f + 1)
     most = -waiting[paths.last_slot(phases, phase, f, len(waiting) - 1)]
@@ -262,13 +262,15 @@ def _choose(
             continue
         there, now, ahead = blocks.home[x2, y2], values[s, action, x2, y2], ceilings[f + 1, phase]
         if there == home:
-            value, best = _stay(local, now, ahead[x2, y2, memory], had, then_had, home, q)
+            value, best = _ceiling_of_staying(
+                local, now, ahead[x2, y2, memory], had, then_had, home, q
+            )
             if memory > 0:
                 value += local[node, blocks.levels[level]] * (then_had[node] - had[node])
             kept = 0
         else:
             known = level if node == there else 0
-            value, best, kept = _leave(
+            value, best, kept = _ceiling_of_leaving(
                 blocks, local, now, ahead[x2, y2], had, then_had, home, there, known, q
             )
         if value > most:
@@ -302,13 +304,13 @@ def add_slopes(
     last[home] += parts[q] * had[home]
     takings = np.empty(len(nodes))
     while f < len(ceilings) - 1:
-        choice, line, later = _choose(
+        choice, line, later = _choose_service(
             to_zone, phases, data, period, blocks, local, values, waiting, ceilings,
             f, phase, x, y, memory, q,
         )  # fmt: skip
         if choice == paths.STOP:
             break
-        node, level = paths.remembered(blocks, home, memory)
+        node, level = paths.decode_memory(blocks, home, memory)
         price = parts[blocks.levels[level]]
         had = paths.data_had(data, phases, phase, f)
         then_had = paths.data_had(data, phases, phase, f + 1)

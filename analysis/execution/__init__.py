@@ -29,7 +29,7 @@ def live_and_die_with(parent: int) -> None:
 
 
 @contextmanager
-def variable(name: str, value: str) -> Iterator[None]:
+def set_variable(name: str, value: str) -> Iterator[None]:
     """Set an environment variable for the processes that start here."""
     before = os.environ.get(name)
     os.environ[name] = value

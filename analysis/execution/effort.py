@@ -13,7 +13,7 @@ from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.execution.jobs import simulate_missions
 from dess.analysis.results.chunks import bound_parts, check_parts, missions_in, parts_of
-from dess.analysis.results.store import Store, sources
+from dess.analysis.results.store import Store, source_folders
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.study import Study
 from dess.base.files.memory import check_memory
@@ -39,14 +39,14 @@ def policies_for(spaces: Iterable[ScenarioSpace], missions: int) -> tuple[str, .
         missions: Number of missions of every design point.
     """
     spaces = [*spaces]
-    made = missions * sum(map(decisions, spaces))
+    made = missions * sum(map(estimate_decisions, spaces))
     is_small = mean(mean(space.uavs) for space in spaces) <= SMALL
     ranked = OF_SMALL_FLEETS if is_small else OF_LARGE_FLEETS
     best = next((name for name in ranked if made * SECONDS[name] <= BUDGET), BASELINE)
     return tuple(dict.fromkeys((best, BASELINE)))
 
 
-def decisions(space: ScenarioSpace) -> float:
+def estimate_decisions(space: ScenarioSpace) -> float:
     """About the decisions of a mission: every UAV flies until its quota is filled."""
     needed = ceil(space.quota / space.communication_slots) or space.max_slots
     slots = min(needed, space.max_slots)
@@ -90,7 +90,7 @@ class Range(NamedTuple):
 
     def __str__(self) -> str:
         """The ends in words, such as ``5 seconds to 2 minutes``."""
-        low, high = (numbers.duration(max(end, 2.0)) for end in self)
+        low, high = (numbers.format_duration(max(end, 2.0)) for end in self)
         if self.low < 2.0:
             return f"up to {high}"
         return f"{low.removesuffix(high[high.index(' ') :])} to {high}"
@@ -122,14 +122,14 @@ def seconds_of(
         engine: ``batch`` or ``events``.
         workers: Number of processes or threads.
     """
-    each = [_decision(name) for name in team.split(",")]
+    each = [_decision_time(name) for name in team.split(",")]
     more = EVENTS if engine == "events" else 0.0
-    made = sum(map(decisions, spaces)) / len(spaces) / workers
+    made = sum(map(estimate_decisions, spaces)) / len(spaces) / workers
     low, high = (sum(of) / len(each) + more for of in zip(*each, strict=True))
     return Range(missions[0] * made * low / SPREAD, missions[1] * made * high * SPREAD)
 
 
-def _decision(policy: str) -> tuple[float, float]:
+def _decision_time(policy: str) -> tuple[float, float]:
     """The least and the largest time of a decision of a policy [s]."""
     if policy in _SECONDS:
         return _SECONDS[policy], _SECONDS[policy]
@@ -149,7 +149,7 @@ def check_time(what: str, seconds: float | Range) -> None:
         InputError: If it takes more than ``LONG_RUN``.
     """
     if (seconds.low if isinstance(seconds, Range) else seconds) > LONG_RUN:
-        text = seconds if isinstance(seconds, Range) else numbers.duration(seconds)
+        text = seconds if isinstance(seconds, Range) else numbers.format_duration(seconds)
         raise InputError(f"{what}, about {text}; allowed: {CONFIRMED}")
 
 
@@ -167,14 +167,14 @@ def check_missions(what: str, spaces: Sequence[ScenarioSpace], earlier: float = 
     Raises:
         InputError: If they may take more than ``LONG_RUN``, or one more memory than is available.
     """
-    seconds = earlier + sum(map(_longest, spaces))
+    seconds = earlier + sum(map(_longest_mission_time, spaces))
     check_time(f"{what}: {len(spaces)} missions to simulate", seconds)
     for space in spaces:
         check_memory(f"{what}: a mission", mission_memory(space), CONFIRMED)
     return seconds
 
 
-def _longest(space: ScenarioSpace) -> float:
+def _longest_mission_time(space: ScenarioSpace) -> float:
     """The longest time that the SimPy engine takes for a mission [s]."""
     arrivals = len(space.nodes) * space.arrival_rate * space.max_slots
     in_slots = space.max_slots * space.uavs[1] * space.communication_slots
@@ -265,12 +265,14 @@ def plan_study(
     """
     check_workers(workers)
     store = Store.peek(study, out, accept_code)
-    for source in sources(reuse, store.manifest):
+    for source in source_folders(reuse, store.manifest):
         store.count(source)
-    return [replace(p, seconds=_seconds(study, p)) for p in _counted(study, store)]
+    return [
+        replace(p, seconds=_seconds_of_missing(study, p)) for p in _count_missions(study, store)
+    ]
 
 
-def total(plan: Sequence[Planned], workers: int) -> Range:
+def total_time(plan: Sequence[Planned], workers: int) -> Range:
     """The time of a plan with so many workers."""
     low, high = reduce(Range.plus, (planned.seconds for planned in plan), Range())
     return Range(low / workers, high / workers + (START if high else 0.0))
@@ -301,7 +303,7 @@ def check_run(
             a learned policy on a layout that differs from that of its training.
     """
     plan, teams = plan_study(study, out, workers, accept_code), len(study.policies)
-    if reuse and total(plan, workers).low > LONG_RUN:
+    if reuse and total_time(plan, workers).low > LONG_RUN:
         plan = plan_study(study, out, workers, accept_code, reuse)
     missing = sum(planned.missing for planned in plan[:teams])
     what = (
@@ -309,7 +311,7 @@ def check_run(
         f"simulate (policies: {teams}, design points: {study.size:,}, workers: {workers:,})"
     )
     if not yes and any(planned.missing + planned.logs for planned in plan):
-        check_time(what, total(plan, workers))
+        check_time(what, total_time(plan, workers))
         held = study.size * (POINT_MEMORY + study.first * teams * MISSION_MEMORY)
         check_workers_memory(what, workers, [study.scenarios[0], study.scenarios[-1]], held)
     if missing:
@@ -341,7 +343,7 @@ def _check_policies(study: Study) -> None:
                 continue
 
 
-def _counted(study: Study, store: Store) -> list[Planned]:
+def _count_missions(study: Study, store: Store) -> list[Planned]:
     """What is needed for now, and what of it is present: of every policy, then of the bounds."""
     manifest, logged = store.manifest, [study.logged] * study.size
     plan = []
@@ -349,7 +351,7 @@ def _counted(study: Study, store: Store) -> list[Planned]:
         parts = parts_of(manifest, team) + check_parts(manifest, team)
         needed, missing = missions_in(parts), missions_in(store.missing("missions", parts))
         logs = missions_in(store.missing("events", parts_of(manifest, team, logged)))
-        most = _most(study) if study.rule and missing else needed
+        most = _most_missions(study) if study.rule and missing else needed
         plan.append(Planned(policy, needed, needed - missing, logs, max(most, needed)))
     if study.bounds:
         parts = bound_parts(manifest)
@@ -358,12 +360,12 @@ def _counted(study: Study, store: Store) -> list[Planned]:
     return plan
 
 
-def budget(study: Study) -> int:
+def largest_budget(study: Study) -> int:
     """Largest number of missions that a study may need, which a rule decides if it has one."""
-    return len(study.policies) * _most(study)
+    return len(study.policies) * _most_missions(study)
 
 
-def _most(study: Study) -> int:
+def _most_missions(study: Study) -> int:
     """The largest number of missions of a policy."""
     if not study.selection:
         return study.most * study.size
@@ -371,11 +373,11 @@ def _most(study: Study) -> int:
     return study.selection.budget + study.selection.check * checked
 
 
-def _seconds(study: Study, planned: Planned) -> Range:
+def _seconds_of_missing(study: Study, planned: Planned) -> Range:
     """Estimated time on one core of the missing missions and event logs, or of the bounds."""
     spaces = study.scenarios
     if planned.policy not in study.policies:
-        made = planned.missing * sum(map(decisions, spaces)) / len(spaces)
+        made = planned.missing * sum(map(estimate_decisions, spaces)) / len(spaces)
         return Range(*(made * each for each in BOUND))
     logs = seconds_of(spaces, planned.policy, (planned.logs, planned.logs), "events")
     missions = planned.missing, planned.most - planned.present

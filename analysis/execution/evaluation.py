@@ -19,8 +19,8 @@ from dess.analysis.execution.jobs import (
     simulate_missions,
 )
 from dess.analysis.execution.workers import Here, Pool
-from dess.analysis.metrics import ALWAYS, HOME, SUCCESS, in_units, measured_in
-from dess.analysis.results.chunks import Part, split
+from dess.analysis.metrics import ALWAYS, HOME, SUCCESS, columns_in_units, measured_in
+from dess.analysis.results.chunks import Part, split_into_chunks
 from dess.analysis.results.manifest import Cell
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.intervals import Moments
@@ -98,7 +98,8 @@ def evaluate(
 ) -> Evaluation:
     """Simulate replications 0, 1, ... of a team, and measure the time.
 
-    The records of all missions are kept, some 300 bytes for each of them; ``means`` need not.
+    The records of all missions are kept, some 300 bytes for each of them; ``estimate_means`` need
+    not.
 
     Args:
         scenario: The scenario space from which the missions are drawn, or what ``load_scenario``
@@ -117,10 +118,10 @@ def evaluate(
     check_type("policy", team, str, "a name such as greedy, or names such as greedy,tour")
     (space,) = spaces_of([scenario])
     asked = Asked(space, TypedByUser(team), missions, seed, engine, workers)
-    return _evaluated(asked, missions, progress)
+    return _evaluate_in_parts(asked, missions, progress)
 
 
-def means(asked: Asked, progress: Progress | None = None) -> Evaluation:
+def estimate_means(asked: Asked, progress: Progress | None = None) -> Evaluation:
     """The metrics of replications 0, 1, ... of a team, in a memory that does not grow with them.
 
     The number of workers does not change the result.
@@ -132,18 +133,18 @@ def means(asked: Asked, progress: Progress | None = None) -> Evaluation:
     Raises:
         InputError: As for ``evaluate``.
     """
-    return _evaluated(asked, _together(asked.scenario), progress)
+    return _evaluate_in_parts(asked, _missions_at_once(asked.scenario), progress)
 
 
-def _evaluated(asked: Asked, size: int, progress: Progress | None) -> Evaluation:
+def _evaluate_in_parts(asked: Asked, size: int, progress: Progress | None) -> Evaluation:
     """The evaluation, by ``size`` missions at a time; their records are kept if these are all."""
     asked.check()
     moments: ByFleet = {}
     uav_slots, seconds = 0, 0.0
     records: Records | None = None
     pieces = (range(n, min(n + size, asked.missions)) for n in range(0, asked.missions, size))
-    for records, took in _simulated(asked, pieces, progress):
-        _add(moments, _metrics(records, asked.scenario), records.missions["uavs"])
+    for records, took in _simulate_pieces(asked, pieces, progress):
+        _add_to_moments(moments, _metric_values(records, asked.scenario), records.missions["uavs"])
         uav_slots += int(records.missions["uav_slots"].sum())
         seconds += took
     kept = records if size >= asked.missions else None
@@ -160,13 +161,15 @@ def of_results(results: Results) -> list[Evaluation]:
         for name in (*measured, *measured_in(rows)):  # as they are measured, then in units
             metrics[name] = rows[name].to_numpy(float)
         moments: ByFleet = {}
-        _add(moments, metrics, rows["uavs"].to_numpy())
+        _add_to_moments(moments, metrics, rows["uavs"].to_numpy())
         over_space = _over_space(moments, results.scenario(), len(rows))
         evaluations.append(Evaluation(str(team), over_space, int(rows["uav_slots"].sum()), nan))
     return evaluations
 
 
-def _add(moments: ByFleet, metrics: Mapping[str, np.ndarray], fleets: np.ndarray) -> None:
+def _add_to_moments(
+    moments: ByFleet, metrics: Mapping[str, np.ndarray], fleets: np.ndarray
+) -> None:
     """Add the metrics of missions, by the number of UAVs of each; those without a value are not."""
     for metric, values in metrics.items():
         for fleet in np.unique(fleets[~np.isnan(values)]):
@@ -180,17 +183,17 @@ def _over_space(moments: ByFleet, space: ScenarioSpace, missions: int) -> dict[s
     return {m: Moments.of_space([of.get(n) for n in fleets], missions) for m, of in moments.items()}
 
 
-def _metrics(records: Records, space: ScenarioSpace) -> dict[str, np.ndarray]:
+def _metric_values(records: Records, space: ScenarioSpace) -> dict[str, np.ndarray]:
     """The values of every metric that some of the missions have measured, in units as well."""
     values = {metric: records.missions[metric] for metric in (SUCCESS, HOME, *ALWAYS)}
     if len(records.operations):
         values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
-    values |= in_units(values, space.units) if space.units else {}
+    values |= columns_in_units(values, space.units) if space.units else {}
     return {metric: of.astype(float) for metric, of in values.items()}
 
 
 def check_evaluation(asked: Sequence[Asked], yes: bool = False) -> None:
-    """Refuse ``means`` of several teams that could not come to their end, before the first mission.
+    """Refuse means of several teams that could not come to their end, before the first mission.
 
     Args:
         asked: For each team its missions, which differ in nothing else.
@@ -216,14 +219,14 @@ def check_evaluation(asked: Sequence[Asked], yes: bool = False) -> None:
         simulate_missions(engine, [scenario], load_team(one.team), one.seed, [0])
 
 
-def _together(scenario: ScenarioSpace) -> int:
+def _missions_at_once(scenario: ScenarioSpace) -> int:
     """Number of missions to simulate together: a power of two whose records fit in ``MEMORY``."""
     each = MISSION_RECORD.itemsize + scenario.uavs[1] * UAV_RECORD.itemsize
     each += OPERATIONS.itemsize if scenario.is_extended else 0
     return 2 ** ((MEMORY // each).bit_length() - 1)
 
 
-def _simulated(
+def _simulate_pieces(
     asked: Asked, pieces: Iterable[range], progress: Progress | None
 ) -> Iterator[tuple[Records, float]]:
     """The records of each piece of the replications, and the time of the simulation alone [s]."""
@@ -232,25 +235,27 @@ def _simulated(
     if asked.engine == "batch":
         simulate_batch(*about, 1)  # compiles
     else:
-        first = _jobs(asked, range(1))
-        _results(pool, first * (1 if asked.workers == 1 else 2 * asked.workers))  # starts processes
+        first = _event_jobs(asked, range(1))
+        _results_in_order(
+            pool, first * (1 if asked.workers == 1 else 2 * asked.workers)
+        )  # starts processes
     for piece in pieces:
         begin = perf_counter()
         if asked.engine == "batch":
             records = simulate_batch(*about, piece, workers=asked.workers, progress=progress)
         else:
-            records = _results(pool, _jobs(asked, piece), progress)
+            records = _results_in_order(pool, _event_jobs(asked, piece), progress)
         yield records, perf_counter() - begin
 
 
-def _jobs(asked: Asked, replications: range) -> list[Job]:
+def _event_jobs(asked: Asked, replications: range) -> list[Job]:
     """Jobs of the event engine."""
-    chunks = split([Part(Cell(0, 0, "", 0), replications)], CHUNK["events"])
+    chunks = split_into_chunks([Part(Cell(0, 0, "", 0), replications)], CHUNK["events"])
     spaces = (asked.scenario,)
     return [MissionsJob(chunk, spaces, asked.team, asked.seed, "events") for chunk in chunks]
 
 
-def _results(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) -> Records:
+def _results_in_order(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) -> Records:
     """The records of all jobs, in the order of the jobs.
 
     Raises:

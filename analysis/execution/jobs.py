@@ -213,7 +213,7 @@ class Problem:
         return cls(line, "".join(traceback.format_exception(error)), mission)
 
 
-def attempt(job: Job, progress: Progress | None = None) -> Any:
+def attempt_job(job: Job, progress: Progress | None = None) -> Any:
     """Run a job and return its result, or a ``Problem``.
 
     Raises:
@@ -231,7 +231,7 @@ def attempt(job: Job, progress: Progress | None = None) -> Any:
         if isinstance(error, OSError) and error.errno in _FULL:
             line = f"{job.policy}: {error.strerror}; allowed: a disk with room for compiled code"
             raise InputError(line) from None
-        return Problem.of(error, first_failing(job, _fails))
+        return Problem.of(error, first_failing(job, _must_fail))
 
 
 def first_failing(job: Job, fails: Callable[[Job], bool]) -> Part | None:
@@ -239,7 +239,7 @@ def first_failing(job: Job, fails: Callable[[Job], bool]) -> Part | None:
     return next((single.chunk.parts[0] for single in job.alone() if fails(single)), None)
 
 
-def _fails(job: Job) -> bool:
+def _must_fail(job: Job) -> bool:
     try:
         job.run()
     except Exception:

@@ -28,7 +28,7 @@ from dess.analysis.execution.jobs import (
 from dess.analysis.execution.workers import Cluster, Here, Pool
 from dess.analysis.results import chunks, tables
 from dess.analysis.results.manifest import Selected
-from dess.analysis.results.store import Failure, Store, sources
+from dess.analysis.results.store import Failure, Store, source_folders
 from dess.analysis.results.tables import Results, results_of
 from dess.analysis.study.cheapest import Setting
 from dess.analysis.study.stopping import Samples
@@ -148,7 +148,7 @@ class _Run:
             for team in teams:
                 all_of_team = chunks.parts_of(manifest, team, wanted[team]), checks[team]
                 parts = new_parts(all_of_team, defaultdict(list))
-                self.store.merge([*chunks.split(parts, CHUNK[self.study.engine])])
+                self.store.merge([*chunks.split_into_chunks(parts, CHUNK[self.study.engine])])
         self._make((BoundsJob, new_parts([chunks.bound_parts(manifest, wanted)], asked)))
         self.store.finish(wanted, selected)
 
@@ -176,7 +176,7 @@ class _Run:
 
     @cached_property
     def _sources(self) -> list[Store]:
-        return sources(self.reuse, self.store.manifest)
+        return source_folders(self.reuse, self.store.manifest)
 
     def _make(self, *works: tuple[type[Job], Sequence[chunks.Part]]) -> None:
         """One kind of work after the other: find what is missing of its parts, run and store it.
@@ -200,7 +200,7 @@ class _Run:
         study = self.study
         for team, of_team in groupby(parts, lambda part: part.cell.team):
             policy = "the upper bound" if kind is BoundsJob else study.policies[team]
-            for chunk in chunks.split(of_team, self._size(kind, policy)):
+            for chunk in chunks.split_into_chunks(of_team, self._size(kind, policy)):
                 if missing := tuple(self.store.missing(kind.kind, chunk.parts)):
                     spaces = tuple(study.scenarios[part.cell.point] for part in missing)
                     kept = chunks.Chunk(team, missing)
@@ -254,7 +254,7 @@ def new_parts(wanted: Iterable[Iterable[chunks.Part]], asked: chunks.Present) ->
     parts = []
     for part in (part for of_team in wanted for part in of_team):
         earlier = asked[part.cell.key]
-        new = chunks.gaps(part.replications, earlier)
+        new = chunks.gaps_between(part.replications, earlier)
         parts += [chunks.Part(part.cell, gap) for gap in new]
         earlier += new
     return parts

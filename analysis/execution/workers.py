@@ -19,8 +19,8 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from dess import InputError
-from dess.analysis.execution import live_and_die_with, variable
-from dess.analysis.execution.jobs import Job, Problem, Progress, attempt, first_failing
+from dess.analysis.execution import live_and_die_with, set_variable
+from dess.analysis.execution.jobs import Job, Problem, Progress, attempt_job, first_failing
 from dess.analysis.results.provenance import Member, engine_code
 from dess.base.libraries import needs
 
@@ -44,10 +44,13 @@ class Pool(AbstractContextManager["Pool"]):
         while waiting:
             suspects: set[int] = set()
             for number, result in self._finished(waiting, suspects):
-                yield number, reported(waiting.pop(number), result, progress)
+                yield number, report_job(waiting.pop(number), result, progress)
             # Workers died, and one of these jobs caused it.
             for number in sorted(suspects & waiting.keys()):
-                yield number, reported(waiting[number], self._alone(waiting.pop(number)), progress)
+                yield (
+                    number,
+                    report_job(waiting[number], self._alone(waiting.pop(number)), progress),
+                )
 
     @abstractmethod
     def _finished(self, jobs: Mapping[int, Job], suspects: set[int]) -> Iterator[tuple[int, Any]]:
@@ -106,10 +109,10 @@ class Here(Pool):
         def tasks() -> Iterator[Any]:
             for number, job in [*jobs.items()]:
                 suspects.add(number)  # from now on it may be running
-                yield delayed(_numbered)(number, job)
+                yield delayed(_numbered_result)(number, job)
 
         try:
-            with _results(parallel, tasks()) as results:
+            with _results_of_tasks(parallel, tasks()) as results:
                 # An expression in between, since "yield from" would close the results themselves.
                 yield from (result for result in results)
         except BrokenProcessPool:
@@ -117,7 +120,7 @@ class Here(Pool):
 
 
 @contextmanager
-def _results(parallel: Any, tasks: Iterator[Any]) -> Iterator[Iterator[Any]]:
+def _results_of_tasks(parallel: Any, tasks: Iterator[Any]) -> Iterator[Iterator[Any]]:
     """The results of tasks as joblib workers finish them; no task is left at the end.
 
     Workers inherit that the signals are blocked. So if one is sent to all processes, this process
@@ -125,7 +128,7 @@ def _results(parallel: Any, tasks: Iterator[Any]) -> Iterator[Iterator[Any]]:
     """
     results: Generator[Any, None, None] = (_ for _ in [])
     try:
-        with _blocked(), _quiet():
+        with _blocked_signals(), _quiet_joblib():
             results = parallel(tasks)
         yield results
     finally:
@@ -135,7 +138,7 @@ def _results(parallel: Any, tasks: Iterator[Any]) -> Iterator[Iterator[Any]]:
 
 
 @contextmanager
-def _blocked() -> Iterator[None]:
+def _blocked_signals() -> Iterator[None]:
     """Let the signals wait that end a command, where the system can do so."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -147,13 +150,13 @@ def _blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
-def _quiet() -> AbstractContextManager[None]:
+def _quiet_joblib() -> AbstractContextManager[None]:
     """A process of joblib that starts here does not warn of what a killed run left and it removed.
 
     The warnings would follow the last line of a command, and a user need not do anything.
     """
     ignored = os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker:UserWarning"
-    return variable("PYTHONWARNINGS", ",".join(filter(None, ignored)))
+    return set_variable("PYTHONWARNINGS", ",".join(filter(None, ignored)))
 
 
 def _in_turn(job: Job, progress: Progress | None) -> Any:
@@ -166,21 +169,21 @@ def _in_turn(job: Job, progress: Progress | None) -> Any:
         if progress:
             progress(missions)
 
-    result = attempt(job, report)
+    result = attempt_job(job, report)
     if done < job.missions:
         report(job.missions - done)
     return result
 
 
-def reported(job: Job, result: Any, progress: Progress | None) -> Any:
+def report_job(job: Job, result: Any, progress: Progress | None) -> Any:
     """Report the missions of a finished job to ``progress``, and return its result."""
     if progress:
         progress(job.missions)
     return result
 
 
-def _numbered(number: int, job: Job) -> tuple[int, Any]:
-    return number, attempt(job)
+def _numbered_result(number: int, job: Job) -> tuple[int, Any]:
+    return number, attempt_job(job)
 
 
 log = logging.getLogger(__name__)
@@ -225,7 +228,7 @@ class Cluster(Pool):
         from distributed import Client
 
         with ExitStack() as stack:
-            stack.enter_context(_silence())
+            stack.enter_context(_silence_libraries())
             try:
                 self._greet()
                 self.client = Client(self.address, timeout=ANSWER, set_as_default=False)
@@ -255,7 +258,7 @@ class Cluster(Pool):
         try:
             for job in jobs.values():
                 own = codes[job.policy]
-                futures.append(self.client.submit(_checked, job, code, own, pure=False))
+                futures.append(self.client.submit(_check_and_run, job, code, own, pure=False))
                 futures[-1].add_done_callback(done.put)
             numbers = {future.key: number for future, number in zip(futures, jobs, strict=True)}
             for _ in futures:
@@ -332,7 +335,7 @@ async def _kind(address: str) -> str:
 
 
 @contextmanager
-def _silence() -> Iterator[None]:
+def _silence_libraries() -> Iterator[None]:
     """Let the libraries of the cluster log and warn of nothing."""
     names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in NOISY]
     loggers = [logging.getLogger(name) for name in {*names, *NOISY}]
@@ -348,10 +351,10 @@ def _silence() -> Iterator[None]:
                 logger.setLevel(level)
 
 
-def _checked(job: Job, code: str, own: list[Member] | str) -> Any:
+def _check_and_run(job: Job, code: str, own: list[Member] | str) -> Any:
     other = "code of dess" if engine_code() != code else ""
     if job.code != own:
         other = f"code or weights of {job.policy}"
     if other:
         raise InputError(f"scheduler: a worker has other {other}; allowed: the same as here")
-    return attempt(job)
+    return attempt_job(job)

@@ -8,12 +8,12 @@ from matplotlib.figure import Figure
 
 from dess.analysis.figures import style
 from dess.analysis.metrics import BOUND, METRICS, PRODUCT, metric_of
-from dess.analysis.numbers import counted
+from dess.analysis.numbers import format_count
 
-TAIL = 0.05  # share of the missions that is beyond each end of the second panel of ``spread``
+TAIL = 0.05  # share of the missions beyond each end of the second panel of a difference
 
 
-def claims(table: pd.DataFrame, width: int = 60) -> Figure:
+def plot_claims(table: pd.DataFrame, width: int = 60) -> Figure:
     """Results minus the numbers that the paper prints: a row per number, a colour per policy.
 
     Args:
@@ -24,89 +24,92 @@ def claims(table: pd.DataFrame, width: int = 60) -> Figure:
     looks = style.policy_colours(table["policy"])
     lines = [fill(name, width) for name in names]
     height = 0.3 * len(names) if width > max(map(len, names)) else 0.52 * len(names)
-    with style.panels(height, values="x", legend=5) as (figure, ax):
+    with style.new_panels(height, values="x", legend=5) as (figure, ax):
         for shift, (policy, rows) in zip(
-            style.shifts(len(looks), 0.3), table.groupby("policy", sort=False), strict=True
+            style.side_by_side_shifts(len(looks), 0.3),
+            table.groupby("policy", sort=False),
+            strict=True,
         ):
             places = rows["claim"].map(names.index) + shift
-            ax.errorbar(rows["mean"], places, xerr=style.arms(rows), linestyle="", label=policy,
-                        **style.dot(looks[str(policy)]))  # fmt: skip
+            arms = style.error_bar_arms(rows)
+            ax.errorbar(rows["mean"], places, xerr=arms, linestyle="", label=policy,
+                        **style.dot_style(looks[str(policy)]))  # fmt: skip
         ax.axvline(0, **style.ZERO)
         ax.set_yticks(range(len(names)), lines)
         ax.set(ylim=(len(names) - 0.5, -0.5), xlabel="ours minus the paper's [points]")
-        style.in_units(ax.xaxis, "points")
+        style.set_axis_unit(ax.xaxis, "points")
     return figure
 
 
-def means(table: pd.DataFrame, metric: str, sides: Sequence[str]) -> Figure:
+def plot_sides(table: pd.DataFrame, metric: str, sides: Sequence[str]) -> Figure:
     """A metric of every policy in the baseline and in the variation, with intervals.
 
     Args:
-        table: Rows of ``ask.what_if.means``.
+        table: Rows of ``ask.what_if.means_of_sides``.
         metric: One of their metrics.
         sides: The texts below the baseline and the variation.
     """
     rows = table[table["metric"] == metric].dropna(subset="mean")
     rows = rows.assign(position=rows["point"], value=rows["point"].map(dict(enumerate(sides))))
-    with style.panels(4.1, values="y") as (figure, ax):
-        style.along(rows, style.policy_colours(rows["policy"]), metric_of(metric).axis, ax)
+    with style.new_panels(4.1, values="y") as (figure, ax):
+        style.plot_along(rows, style.policy_colours(rows["policy"]), metric_of(metric).axis, ax)
         ax.set(title=metric_of(metric).label, xlim=(-0.45, 1.45))
         ax.set_xticks((0, 1), sides)
         if metric in METRICS:
-            ax.set_ylim(style.ends(rows, 0.05))
+            ax.set_ylim(style.axis_ends(rows, 0.05))
     return figure
 
 
-def gains(answers: pd.DataFrame) -> Figure:
+def plot_gains(answers: pd.DataFrame) -> Figure:
     """The paired differences of the metrics of every policy, with intervals.
 
     Args:
-        answers: Rows of ``ask.what_if.answers``.
+        answers: Rows of ``ask.what_if.compare_sides``.
     """
     names = {metric: name.replace(" and ", "\nand ") for metric, name in METRICS.items()}
     rows = answers[answers["metric"].isin([*names])]
-    return differences(rows, rows["metric"].map(names), "Variation − baseline")
+    return plot_differences(rows, rows["metric"].map(names), "Variation − baseline")
 
 
-def spread(differences: Mapping[str, pd.Series]) -> Figure:
+def plot_difference_spread(differences: Mapping[str, pd.Series]) -> Figure:
     """The distribution of the paired differences of every policy: all, and the central part.
 
     Args:
-        differences: For each policy the result of ``ask.what_if.differences``.
+        differences: For each policy the result of ``ask.what_if.product_differences``.
     """
-    with style.panels(5.6, 2, sharey=True) as (figure, axes):
+    with style.new_panels(5.6, 2, sharey=True) as (figure, axes):
         titles = ("Share of missions with that difference or less", "The central part of it")
         for ax, title in zip(axes, titles, strict=True):
-            style.distributions(differences, ax)
+            style.plot_distributions(differences, ax)
             ax.axvline(0, **style.ZERO)
             ax.axhline(0.5, color=style.MUTED, linewidth=0.9, linestyle=":", zorder=1)
             ax.set_title(title)
-            style.in_units(ax.xaxis, "points", 7)
-        axes[1].set(xlim=middle([*differences.values()], TAIL), xlabel="percentage points")
+            style.set_axis_unit(ax.xaxis, "points", 7)
+        axes[1].set(xlim=central_range([*differences.values()], TAIL), xlabel="percentage points")
     return figure
 
 
-def gaps(table: pd.DataFrame) -> Figure:
+def plot_gaps(table: pd.DataFrame) -> Figure:
     """The product of every policy and the upper bound, in a panel per number of UAVs.
 
     Args:
-        table: Rows of ``answers.optimality.useful``.
+        table: Rows of ``answers.optimality.fleets_with_useful_bound``.
     """
     fleets = [*table.groupby("uavs", sort=False)]
     height = (0.75 + 0.22 * table["policy"].nunique()) * len(fleets) + 0.6
-    with style.panels(height, len(fleets), "x", sharex=True, squeeze=False) as (figure, axes):
+    with style.new_panels(height, len(fleets), "x", sharex=True, squeeze=False) as (figure, axes):
         for ax, (uavs, rows) in zip(axes.flat, fleets, strict=True):
             bound, low, high = rows[[BOUND, f"{BOUND}_low", f"{BOUND}_high"]].iloc[0]
             ax.axvspan(low, high, color=style.MUTED, alpha=0.3, linewidth=0)
             ax.axvline(bound, color=style.INK, linewidth=1.3, label="upper bound")
-            style.in_rows(rows, ax, PRODUCT, f"{PRODUCT}_low", f"{PRODUCT}_high")
-            ax.set(title=f"{counted(uavs, 'UAV')}: bound {bound:.1%}", xlim=(-0.02, 1.02))
-            style.in_units(ax.xaxis, "%")
+            style.plot_in_rows(rows, ax, PRODUCT, f"{PRODUCT}_low", f"{PRODUCT}_high")
+            ax.set(title=f"{format_count(uavs, 'UAV')}: bound {bound:.1%}", xlim=(-0.02, 1.02))
+            style.set_axis_unit(ax.xaxis, "%")
         ax.set_xlabel(METRICS[PRODUCT])
     return figure
 
 
-def differences(rows: pd.DataFrame, names: pd.Series, title: str) -> Figure:
+def plot_differences(rows: pd.DataFrame, names: pd.Series, title: str) -> Figure:
     """Paired differences of every policy by what has these names, in their order.
 
     Args:
@@ -114,17 +117,17 @@ def differences(rows: pd.DataFrame, names: pd.Series, title: str) -> Figure:
         names: The name of what each row is about.
         title: The title of the figure.
     """
-    rows = style.placed(rows.assign(mean=rows["difference"], name=names), "name")
-    with style.panels(3.6, values="y") as (figure, ax):
+    rows = style.place_values(rows.assign(mean=rows["difference"], name=names), "name")
+    with style.new_panels(3.6, values="y") as (figure, ax):
         ax.axhline(0, **style.ZERO)
         looks = style.policy_colours(rows["policy"])
-        style.along(rows, looks, "points", ax, linestyle="")
+        style.plot_along(rows, looks, "points", ax, linestyle="")
         ax.set(title=f"{title} (paired)", ylabel="percentage points")
         ax.margins(x=0.2)
     return figure
 
 
-def middle(values: Sequence[pd.Series], tail: float) -> tuple[float, float]:
+def central_range(values: Sequence[pd.Series], tail: float) -> tuple[float, float]:
     """The ends of an axis with 0 that leaves out a share ``tail`` of the values at each side."""
     low = min(0.0, *(of.quantile(tail) for of in values))
     high = max(0.0, *(of.quantile(1 - tail) for of in values))

@@ -33,7 +33,7 @@ _ARROW: dict = {
 }
 
 
-def trajectories(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
+def plot_trajectories(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     """The map of a mission, with the legend of the paper's Table I.
 
     An arrow is a move and a cross a slot in which the UAV hovers; both have the colour of the node
@@ -43,8 +43,8 @@ def trajectories(events: event_log.Events, scenario: Scenario, ax: Axes) -> None
     """
     # The last is that of node -1, which is none.
     colours = np.array([*style.node_colours(len(scenario.nodes)), style.MUTED])
-    offsets = style.shifts(scenario.uavs, SPREAD / 2)
-    _grid(scenario, ax)
+    offsets = style.side_by_side_shifts(scenario.uavs, SPREAD / 2)
+    _plot_grid(scenario, ax)
     for uav, slots in event_log.uav_slots(events).groupby("uav"):
         colour = style.uav_colours(scenario.uavs)[uav]
         ways = slots[["from_x", "from_y", "x", "y"]] + offsets[uav]
@@ -71,7 +71,7 @@ def trajectories(events: event_log.Events, scenario: Scenario, ax: Axes) -> None
                         color=text, fontweight="bold", zorder=9)  # fmt: skip
 
 
-def chart(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
+def plot_chart(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
     """The grid with its zones and no-fly cells, without nodes; y grows south."""
     columns, rows = scenario.size
     ax.set_facecolor(style.SEA)
@@ -85,12 +85,12 @@ def chart(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
     ax.set(aspect="equal", xlim=(-0.5, columns - 0.5), ylim=(rows - 0.5, -0.5))
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(MaxNLocator(integer=True, nbins=8))
-    ax.set_ylabel(f"y, south [{_unit(ax.yaxis, 'km', 'cells', scenario)}]")
+    ax.set_ylabel(f"y, south [{_unit_of_axis(ax.yaxis, 'km', 'cells', scenario)}]")
     cells = f"cells of {scenario.cell_size:g} m"
-    ax.set_xlabel(f"x, east [{_unit(ax.xaxis, 'km', cells, scenario)}]")
+    ax.set_xlabel(f"x, east [{_unit_of_axis(ax.xaxis, 'km', cells, scenario)}]")
 
 
-def battery(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
+def plot_battery(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     """Battery [%] of every UAV over time, with the thresholds C_S and C_C of charging."""
     levels = event_log.battery_levels(events)
     for uav, curve in levels.groupby("uav"):
@@ -108,7 +108,7 @@ def battery(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     _time_axis(events, scenario, ax)
 
 
-def residual(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
+def plot_residual(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     """Residual data [data units] over time: one band per node, in its colour, and their sum."""
     data = event_log.residual_data(events)
     colours = style.node_colours(len(scenario.nodes))
@@ -118,22 +118,22 @@ def residual(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     size = size_of("MB", scenario.units) if scenario.units else 1
     _margin_note(f"{total.iloc[-1] * size:.0f} left", total.iloc[-1], ax)
     ax.set(title="Residual data, a band per node", ylim=(0, None))
-    ax.set_ylabel(_unit(ax.yaxis, "MB", "data units", scenario, 5))
+    ax.set_ylabel(_unit_of_axis(ax.yaxis, "MB", "data units", scenario, 5))
     _time_axis(events, scenario, ax)
 
 
-def age(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
+def plot_age(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     """The mean age of information of all nodes [slots] over time."""
     curve = event_log.mean_age(events)
     ax.plot(curve["time"], curve["age"], color=style.INK, linewidth=1.2, gid="age")
     ax.set(title="Mean age of the nodes", ylim=(0, None))
-    ax.set_ylabel(_unit(ax.yaxis, "h", "slots", scenario, 5))
+    ax.set_ylabel(_unit_of_axis(ax.yaxis, "h", "slots", scenario, 5))
     _time_axis(events, scenario, ax)
 
 
-def occupancy(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
+def plot_occupancy(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     """The UAVs that charge (stacked, in their colours) and that wait for a pad, over time."""
-    slots, edges = event_log.uav_slots(events), np.arange(event_log.duration(events) + 1)
+    slots, edges = event_log.uav_slots(events), np.arange(event_log.mission_length(events) + 1)
     base, colours = np.zeros(len(edges)), style.uav_colours(scenario.uavs)
     for state, hatch in (("charging", None), ("waiting", "/////")):
         for uav, busy in slots[slots[state]].groupby("uav"):
@@ -153,21 +153,23 @@ def occupancy(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     _time_axis(events, scenario, ax)
 
 
-def curves(scenario: Scenario) -> dict[Callable[[event_log.Events, Scenario, Axes], None], float]:
+def curves_of_mission(
+    scenario: Scenario,
+) -> dict[Callable[[event_log.Events, Scenario, Axes], None], float]:
     """The figures over the time of a mission, from top to bottom, and their heights [inches]."""
-    ages = {age: 1.6} if scenario.age.measured else {}
-    return {battery: 1.6, residual: 1.6, **ages, occupancy: 1.1}
+    ages = {plot_age: 1.6} if scenario.age.measured else {}
+    return {plot_battery: 1.6, plot_residual: 1.6, **ages, plot_occupancy: 1.1}
 
 
 def mission_figure(events: event_log.Events, scenario: Scenario) -> Figure:
     """A mission: its map, and below it its curves over time."""
-    panels = curves(scenario)
-    with style.look():
+    panels = curves_of_mission(scenario)
+    with style.figure_look():
         figure = style.Picture(figsize=(5.6, 6.7 + sum(panels.values())), dpi=style.DPI)
         figure.set_layout_engine("constrained", rect=(0, 0, 0.94, 1))
         axes = figure.subplots(1 + len(panels), height_ratios=(5.6, *panels.values()))
-        trajectories(events, scenario, axes[0])
-        axes[0].set_title(_outcome(events, scenario))
+        plot_trajectories(events, scenario, axes[0])
+        axes[0].set_title(_outcome_in_words(events, scenario))
         _map_legend(axes[0])
         for panel, ax in zip(panels, axes[1:], strict=True):
             panel(events, scenario, ax)
@@ -178,13 +180,13 @@ def mission_figure(events: event_log.Events, scenario: Scenario) -> Figure:
 
 def sea_figure(space: ScenarioSpace) -> Figure:
     """The map of a scenario: its sensor nodes, each in its colour, and its zone."""
-    with style.look():
+    with style.figure_look():
         figure = style.Picture(figsize=(5.6, 5.6), dpi=style.DPI, layout="constrained")
-        _grid(space, figure.subplots())
+        _plot_grid(space, figure.subplots())
     return figure
 
 
-def courses(
+def plot_courses(
     rows: pd.DataFrame, line: str, unit: str, titles: Mapping[object, str], heading: str = ""
 ) -> Figure:
     """Means over the slots of the mission: a curve for each value of a column, with its band.
@@ -192,14 +194,14 @@ def courses(
     Args:
         rows: Rows with ``panel``, ``slot``, ``mean``, ``low`` and ``high``.
         line: The column.
-        unit: The unit of the means, as for ``style.in_units``.
+        unit: The unit of the means, as for ``style.set_axis_unit``.
         titles: The titles of the panels, by ``panel``.
         heading: The title of the legend.
     """
     values = sorted(rows[line].unique()) if line != "policy" else rows[line].unique()
-    looks = style.policy_colours(values) if line == "policy" else style.graded(values)
+    looks = style.policy_colours(values) if line == "policy" else style.graded_colours(values)
     height, shape = 1.9 * len(titles) + 1.3, {"sharex": True, "squeeze": False}
-    with style.panels(height, len(titles), "y", 4, heading, **shape) as (figure, axes):
+    with style.new_panels(height, len(titles), "y", 4, heading, **shape) as (figure, axes):
         for ax, (panel, title) in zip(axes.flat, titles.items(), strict=True):
             for value, course in rows[rows["panel"] == panel].groupby(line, sort=False):
                 colour = looks[value_text(value)][0]
@@ -207,12 +209,12 @@ def courses(
                                 color=colour, alpha=0.25, linewidth=0)  # fmt: skip
                 ax.plot(course["slot"], course["mean"], color=colour, label=value_text(value))
             ax.set(title=title, ylim=(0, None), xlim=(0, rows["slot"].max()))
-            style.in_units(ax.yaxis, unit, 4)
+            style.set_axis_unit(ax.yaxis, unit, 4)
         axes.flat[-1].set_xlabel("mission slot")
     return figure
 
 
-def _outcome(events: event_log.Events, scenario: Scenario) -> str:
+def _outcome_in_words(events: event_log.Events, scenario: Scenario) -> str:
     log = pd.DataFrame(events)
     data = log[log["node"] >= 0].groupby("event")["value"].sum()
     total = data["mission_start"] + data.get("arrival", 0.0)
@@ -222,9 +224,9 @@ def _outcome(events: event_log.Events, scenario: Scenario) -> str:
     return f"I = {scenario.uavs}: {share:.1%} collected, {count} of {scenario.uavs} {what}"
 
 
-def _grid(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
+def _plot_grid(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
     """The grid, its zone and its nodes, with their names if they have some."""
-    chart(scenario, ax)
+    plot_chart(scenario, ax)
     nodes = np.array(scenario.nodes)
     ax.scatter(nodes[:, 0], nodes[:, 1], c=style.node_colours(len(nodes)), s=95,
                edgecolors="white", linewidths=1.2, zorder=3, gid="nodes")  # fmt: skip
@@ -250,7 +252,7 @@ def name_places(
     """
     scale = MAP_WIDTH / max(size)
     centres = np.array(nodes) * (scale, -scale)
-    discs = [_box(x - NODE_RADIUS, y, 2 * NODE_RADIUS, 2 * NODE_RADIUS) for x, y in centres]
+    discs = [_box_ends(x - NODE_RADIUS, y, 2 * NODE_RADIUS, 2 * NODE_RADIUS) for x, y in centres]
     map_box = np.array([-scale / 2, (0.5 - size[1]) * scale, (size[0] - 0.5) * scale, scale / 2])
     taken, places = [*discs], []
     for (x, y), name in zip(centres, names, strict=False):
@@ -266,27 +268,27 @@ def name_places(
             (-beside - width, above - 4),
             (-beside - width, 4 - above),
         ]
-        boxes = [_box(x + dx, y + dy, width, 1.1 * NAME_SIZE) for dx, dy in choices]
-        covered = [sum(_overlap(box, other) for other in taken) for box in boxes]
-        outside = [_area(box) - _overlap(box, map_box) for box in boxes]
+        boxes = [_box_ends(x + dx, y + dy, width, 1.1 * NAME_SIZE) for dx, dy in choices]
+        covered = [sum(_overlapping_area(box, other) for other in taken) for box in boxes]
+        outside = [_area_of_box(box) - _overlapping_area(box, map_box) for box in boxes]
         best = int(np.argmin(np.add(covered, outside).round(6)))
         taken.append(boxes[best])
         places.append(choices[best])
     return places
 
 
-def _box(left: float, middle: float, width: float, height: float) -> np.ndarray:
+def _box_ends(left: float, middle: float, width: float, height: float) -> np.ndarray:
     """The ends of a box: left, lower, right, upper."""
     return np.array([left, middle - height / 2, left + width, middle + height / 2])
 
 
-def _area(box: np.ndarray) -> float:
+def _area_of_box(box: np.ndarray) -> float:
     return float(np.prod(np.clip(box[2:] - box[:2], 0, None)))
 
 
-def _overlap(box: np.ndarray, other: np.ndarray) -> float:
+def _overlapping_area(box: np.ndarray, other: np.ndarray) -> float:
     """The area that two boxes have in common."""
-    return _area(np.r_[np.maximum(box[:2], other[:2]), np.minimum(box[2:], other[2:])])
+    return _area_of_box(np.r_[np.maximum(box[:2], other[:2]), np.minimum(box[2:], other[2:])])
 
 
 @mpl.rc_context({"text.parse_math": True})  # an arrow is a symbol in TeX
@@ -320,17 +322,17 @@ def _margin_note(text: str, level: float, ax: Axes) -> None:
 
 
 def _time_axis(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
-    ax.set(xlim=(0, event_log.duration(events)))
+    ax.set(xlim=(0, event_log.mission_length(events)))
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=8))
-    ax.set_xlabel(f"time [{_unit(ax.xaxis, 'h', 'mission slots', scenario)}]")
+    ax.set_xlabel(f"time [{_unit_of_axis(ax.xaxis, 'h', 'mission slots', scenario)}]")
     style.grid_of("y", ax)
 
 
-def _unit(
+def _unit_of_axis(
     axis: Axis, unit: str, of_model: str, scenario: Scenario | ScenarioSpace, nbins: int = 8
 ) -> str:
     """The unit of an axis; with a data sheet, its ticks are in that unit."""
     if not scenario.units:
         return of_model
-    style.in_size(axis, size_of(unit, scenario.units), nbins)
+    style.set_axis_size(axis, size_of(unit, scenario.units), nbins)
     return unit

@@ -1,13 +1,14 @@
 """The look that all figures share, and what they are drawn of.
 
-A figure is made inside ``look`` and touches no state of pyplot::
+A figure is made inside ``figure_look`` and touches no state of pyplot::
 
-    with style.panels(height=3.5, values="x") as (figure, ax):
-        ax.errorbar(row["mean"], 0, xerr=style.arms(row), **style.dot(looks["greedy"]))
+    with style.new_panels(height=3.5, values="x") as (figure, ax):
+        arms = style.error_bar_arms(row)
+        ax.errorbar(row["mean"], 0, xerr=arms, **style.dot_style(looks["greedy"]))
 
 Functions that draw rows of a tidy table on axes take estimates with ``mean``, ``low`` and
 ``high``, the ends of the interval; rows along a field also have ``position``, the place on the
-axis, and ``value``, the text at this place, see ``placed``.
+axis, and ``value``, the text at this place, see ``place_values``.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -29,7 +30,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 from pandas.api.types import is_numeric_dtype
 
 from dess.analysis.names import value_text
-from dess.analysis.numbers import minus
+from dess.analysis.numbers import format_minus
 
 Look: TypeAlias = tuple[str, str]  # a colour and a marker
 Values: TypeAlias = Literal["x", "y", "xy"]
@@ -99,7 +100,7 @@ class Picture(Figure):
             return
         for legend in [*self.legends]:
             legend.remove()
-        with look():
+        with figure_look():
             self.place_legend(*self._legend_options)
 
     def _repr_png_(self) -> bytes:
@@ -110,7 +111,7 @@ class Picture(Figure):
 
 
 @contextmanager
-def look() -> Iterator[None]:
+def figure_look() -> Iterator[None]:
     """The look of all figures, for the figures and axes that are made inside."""
     with mpl.rc_context():
         mpl.rcdefaults()  # whatever the user's matplotlibrc says
@@ -120,7 +121,7 @@ def look() -> Iterator[None]:
 
 
 @contextmanager
-def panels(
+def new_panels(
     height: float,
     rows: int = 1,
     values: Values = "xy",
@@ -140,7 +141,7 @@ def panels(
         heading: The title of the legend.
         options: Further arguments of ``Figure.subplots``.
     """
-    with look():
+    with figure_look():
         figure = Picture(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
         axes = figure.subplots(rows, **options)
         for ax in np.ravel(axes):
@@ -171,17 +172,17 @@ def uav_colours(count: int) -> list[str]:
     return [UAVS[uav % len(UAVS)] for uav in range(count)]
 
 
-def palette() -> list[str]:
+def readable_palette() -> list[str]:
     """Ten colour-blind safe colours, as dark as readers need on white paper."""
-    return [to_hex(_readable(colour)) for colour in sns.color_palette("colorblind")]
+    return [to_hex(_darken_until_readable(colour)) for colour in sns.color_palette("colorblind")]
 
 
-def _readable(colour: tuple[float, ...]) -> tuple[float, ...]:
+def _darken_until_readable(colour: tuple[float, ...]) -> tuple[float, ...]:
     """The colour, darkened until its contrast with white is 3 to 1 (WCAG 2.1, 1.4.11)."""
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
     luminance = np.dot([0.2126, 0.7152, 0.0722], linear)
     darker = tuple(0.97 * c for c in colour)
-    return colour if 1.05 / (luminance + 0.05) >= 3 else _readable(darker)
+    return colour if 1.05 / (luminance + 0.05) >= 3 else _darken_until_readable(darker)
 
 
 def policy_colours(policies: Iterable[str], drawn: Iterable[str] | None = None) -> dict[str, Look]:
@@ -196,34 +197,38 @@ def policy_colours(policies: Iterable[str], drawn: Iterable[str] | None = None) 
     free = [n for n in range(len(names)) if n not in numbers.values()]
     numbers |= dict(zip((name for name in names if name not in numbers), free, strict=False))
     shown = names if drawn is None else dict.fromkeys(drawn)
-    return {name: (palette()[numbers[name] % 10], MARKERS[numbers[name] % 7]) for name in shown}
+    return {
+        name: (readable_palette()[numbers[name] % 10], MARKERS[numbers[name] % 7]) for name in shown
+    }
 
 
-def graded(values: Sequence[Any]) -> dict[str, Look]:
+def graded_colours(values: Sequence[Any]) -> dict[str, Look]:
     """Colours from light to dark, and markers, for values in their order."""
-    shades = [to_hex(_readable(colour)) for colour in sns.color_palette("flare", len(values))]
+    shades = [
+        to_hex(_darken_until_readable(colour)) for colour in sns.color_palette("flare", len(values))
+    ]
     return {value_text(v): (shades[k], MARKERS[k % 7]) for k, v in enumerate(values)}
 
 
-def dot(look: Look) -> dict:
+def dot_style(look: Look) -> dict:
     """The style of means with that colour and marker, as arguments of ``Axes.errorbar``."""
     colour, marker = look
     return {"color": colour, "marker": marker, "markersize": 4.5, "capsize": 4, "elinewidth": 1.8}
 
 
-def arms(
+def error_bar_arms(
     rows: pd.DataFrame | pd.Series, mean: str = "mean", low: str = "low", high: str = "high"
 ) -> np.ndarray:
     """Lengths of the arms of error bars, (2, N), from the columns of estimate and interval."""
     return np.array([rows[mean] - rows[low], rows[high] - rows[mean]]).reshape(2, -1)
 
 
-def shifts(count: int, half_width: float) -> np.ndarray:
+def side_by_side_shifts(count: int, half_width: float) -> np.ndarray:
     """The (count,) offsets from ``-half_width`` to ``half_width`` that keep marks apart."""
     return np.linspace(-half_width, half_width, count) if count > 1 else np.zeros(count)
 
 
-def ends(rows: pd.DataFrame, length: float = 0.0, zero: bool = False) -> tuple[float, float]:
+def axis_ends(rows: pd.DataFrame, length: float = 0.0, zero: bool = False) -> tuple[float, float]:
     """The ends of an axis for all intervals, at least ``length`` long, and with 0 if asked."""
     low, high = rows["low"].min(), rows["high"].max()
     if zero:
@@ -234,17 +239,17 @@ def ends(rows: pd.DataFrame, length: float = 0.0, zero: bool = False) -> tuple[f
 
 def signed_points(share: float, _: float = 0) -> str:
     """A difference of shares in percentage points, as ``+2.5`` for ``0.025``: a tick label."""
-    return minus(f"{100 * share:+.3g}") if round(share, 9) else "0"
+    return format_minus(f"{100 * share:+.3g}") if round(share, 9) else "0"
 
 
-def in_units(axis: Axis, unit: str, nbins: int = 6) -> None:
+def set_axis_unit(axis: Axis, unit: str, nbins: int = 6) -> None:
     """Ticks at round values: in percent ("%"), in signed percentage points, or as numbers ("")."""
     axis.set_major_locator(MaxNLocator(nbins=nbins, steps=[1, 2, 5, 10]))
     numbers = {"points": signed_points, "": lambda value, _: f"{value:,.6g}"}
     axis.set_major_formatter(PercentFormatter(1) if unit == "%" else numbers[unit])
 
 
-def in_size(axis: Axis, size: float, nbins: int = 8) -> None:
+def set_axis_size(axis: Axis, size: float, nbins: int = 8) -> None:
     """Ticks at round values of a unit of which the axis, with its limits, has ``size`` in 1."""
     low, high = sorted(axis.get_view_interval())
     values = MaxNLocator(nbins, steps=[1, 2, 5, 10]).tick_values(low * size, high * size)
@@ -261,19 +266,19 @@ def note_at_right(text: str, level: float, ax: Axes, size: float = 9) -> Any:
 MOST_TICKS = 12
 
 
-def ordered(column: pd.Series) -> list[Any]:
+def ordered_values(column: pd.Series) -> list[Any]:
     """The values of a column: numbers in ascending order, others in order of appearance."""
     return sorted(column.unique()) if is_numeric_dtype(column) else [*column.unique()]
 
 
-def placed(rows: pd.DataFrame, field: str) -> pd.DataFrame:
+def place_values(rows: pd.DataFrame, field: str) -> pd.DataFrame:
     """Rows with the places of a field: numbers where they are, other values evenly spaced."""
     column = rows[field]
     places = column if is_numeric_dtype(column) else pd.factorize(column)[0]
     return rows.assign(position=places, value=column.map(value_text))
 
 
-def along(
+def plot_along(
     rows: pd.DataFrame,
     looks: Mapping[str, Look],
     unit: str,
@@ -284,9 +289,9 @@ def along(
     """Means with intervals along a field: a curve for each value of a column, side by side.
 
     Args:
-        rows: The rows; see ``placed``.
+        rows: The rows; see ``place_values``.
         looks: The curves to draw, by the value of the column as text.
-        unit: The unit of the means, as for ``style.in_units``.
+        unit: The unit of the means, as for ``style.set_axis_unit``.
         ax: The axes to draw on.
         line: The column.
         options: Further arguments of ``Axes.errorbar``.
@@ -295,15 +300,16 @@ def along(
     span, gap = float(np.ptp(ticks["position"])), ticks["position"].diff().min()
     half_width = min(0.12 * gap, 0.02 * span) if span else 0.02
     curves = rows[line].map(value_text)
-    for name, shift in zip(looks, shifts(len(looks), half_width), strict=True):
+    for name, shift in zip(looks, side_by_side_shifts(len(looks), half_width), strict=True):
         means = rows[curves == name].sort_values("position")
-        ax.errorbar(means["position"] + shift, means["mean"], yerr=arms(means), label=name,
-                    linewidth=1, **dot(looks[name]) | options)  # fmt: skip
+        arms = error_bar_arms(means)
+        ax.errorbar(means["position"] + shift, means["mean"], yerr=arms, label=name,
+                    linewidth=1, **dot_style(looks[name]) | options)  # fmt: skip
     name_ticks(ax.xaxis, [*ticks["value"]], [*ticks["position"]])
-    in_units(ax.yaxis, unit)
+    set_axis_unit(ax.yaxis, unit)
 
 
-def in_rows(rows: pd.DataFrame, ax: Axes, *columns: str) -> None:
+def plot_in_rows(rows: pd.DataFrame, ax: Axes, *columns: str) -> None:
     """A row per policy, the first on top: its mean as a dot with its interval.
 
     Args:
@@ -314,12 +320,12 @@ def in_rows(rows: pd.DataFrame, ax: Axes, *columns: str) -> None:
     looks = policy_colours(rows["policy"])
     for y, (_, row) in enumerate(rows.iterrows()):
         mean = row[columns[0] if columns else "mean"]
-        ax.errorbar(mean, y, xerr=arms(row, *columns), **dot(looks[row["policy"]]))
+        ax.errorbar(mean, y, xerr=error_bar_arms(row, *columns), **dot_style(looks[row["policy"]]))
     ax.set_yticks(range(len(rows)), rows["policy"])
     ax.set_ylim(len(rows) - 0.4, -0.6)
 
 
-def cells(rows: pd.DataFrame, names: Sequence[Sequence[Any]], ax: Axes, **colours: Any) -> Any:
+def plot_cells(rows: pd.DataFrame, names: Sequence[Sequence[Any]], ax: Axes, **colours: Any) -> Any:
     """Cells in the colours of means, with texts.
 
     Args:
@@ -342,14 +348,14 @@ def cells(rows: pd.DataFrame, names: Sequence[Sequence[Any]], ax: Axes, **colour
     return ax.pcolormesh(means, edgecolors="white", rasterized=means.size > 400, **colours)
 
 
-def distributions(values: Mapping[str, pd.Series], ax: Axes) -> None:
+def plot_distributions(values: Mapping[str, pd.Series], ax: Axes) -> None:
     """The share of the missions with at most a value: a curve per policy."""
     colours = policy_colours(values)
     for number, (policy, of_policy) in enumerate(values.items()):
         ax.ecdf(of_policy, label=policy, color=colours[policy][0], linewidth=1.7,
                 linestyle=LINES[number % 4])  # fmt: skip
     ax.set(ylim=(-0.02, 1.02), ylabel="share of the missions")
-    in_units(ax.yaxis, "%")
+    set_axis_unit(ax.yaxis, "%")
 
 
 def name_ticks(axis: Axis, values: Sequence[Any], places: Sequence[float] | np.ndarray) -> None:
@@ -363,3 +369,8 @@ def name_ticks(axis: Axis, values: Sequence[Any], places: Sequence[float] | np.n
     longest = max(map(len, "\n".join(names).split("\n")))
     if isinstance(axis, XAxis) and longest * np.ptp(places) / gap > 44 / columns:
         axis.set_tick_params(rotation=30)
+
+
+def plot_front(paid: pd.Series, reached: pd.Series, label: str, ax: Axes) -> None:
+    """A front as steps: what is reached by paying so much."""
+    ax.step(paid, reached, where="post", color=INK, linewidth=1.1, zorder=1, label=label)

@@ -10,9 +10,9 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers import learning, main_effects, missions
-from dess.analysis.answers.learning import Transfer, last_phase, settled
+from dess.analysis.answers.learning import Transfer, last_phase, settling_position
 from dess.analysis.metrics import RATIO
-from dess.analysis.names import parameter, value_text
+from dess.analysis.names import field_named, value_text
 from dess.analysis.paper import values
 from dess.analysis.paper.rules import MARGIN
 from dess.analysis.results.tables import Results
@@ -21,7 +21,7 @@ from dess.analysis.stats.intervals import (
     Interval,
     bounded_interval,
     mean_interval,
-    wilson,
+    wilson_interval,
 )
 from dess.analysis.stats.intervals import summary as means_of
 from dess.analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
@@ -36,7 +36,7 @@ class Pairs(NamedTuple):
 
     Attributes:
         field: The parameter.
-        changes: The result of ``main_effects.changes``.
+        changes: The result of ``main_effects.compare_values``.
         positions: The position of every value, by its text.
     """
 
@@ -47,7 +47,7 @@ class Pairs(NamedTuple):
     @property
     def shape(self) -> main_effects.Shape:
         """How the metric changes along the values."""
-        return main_effects.shape(self.changes)
+        return main_effects.shape_of_changes(self.changes)
 
     @property
     def course(self) -> str:
@@ -71,7 +71,7 @@ class Pairs(NamedTuple):
         chosen = [self.position(value) for value in values]
         first, second = (self.changes[end].isin(chosen) for end in ("first", "second"))
         up, down = self.changes[second & ~first], self.changes[first & ~second]
-        down = negated(down).assign(other=down["second"])
+        down = negate_changes(down).assign(other=down["second"])
         return pd.concat([up.assign(other=up["first"]), down])
 
     def change(self, first: str, second: str) -> pd.Series:
@@ -79,7 +79,7 @@ class Pairs(NamedTuple):
         return self.leads(second).set_index("other").loc[self.position(first)]
 
 
-def negated(changes: pd.DataFrame) -> pd.DataFrame:
+def negate_changes(changes: pd.DataFrame) -> pd.DataFrame:
     """The differences with the opposite sign."""
     turned = {"difference": "difference", "low": "high", "high": "low"}
     turned |= {"wide_low": "wide_high", "wide_high": "wide_low"}
@@ -100,8 +100,8 @@ class EvidenceOfPolicy:
 
     @cached_property
     def effects(self) -> pd.DataFrame:
-        """The result of ``main_effects.effects``."""
-        return main_effects.effects(self.results)
+        """The result of ``main_effects.means_by_field``."""
+        return main_effects.means_by_field(self.results)
 
     def missions(self, uavs: int | None = None) -> pd.DataFrame:
         """The missions of the policy, or only those with a number of UAVs.
@@ -123,7 +123,7 @@ class EvidenceOfPolicy:
         values = self.effects[self.effects["field"] == field].drop_duplicates("position")
         if len(values) < 2:
             raise MissingError(f"the study {self.study} does not vary {field}")
-        changes = main_effects.changes(
+        changes = main_effects.compare_values(
             self.results, self.effects, self.policy, field, metric, fewest_uavs
         )
         return Pairs(field, changes, dict(zip(values["value"], values["position"], strict=True)))
@@ -151,12 +151,12 @@ class EvidenceOfTrainings(NamedTuple):
 
     def curves(self, metric: str) -> pd.DataFrame:
         """Smoothed curves of a metric."""
-        return learning.smoothed(self.trainings, metric)
+        return learning.smooth_curves(self.trainings, metric)
 
     def transfer(self, metric: str) -> learning.Transfer:
         """The trainings with transfer learning, compared with those without."""
         curves = self.curves(metric)
-        return learning.transfer(curves, self.using, self.without, shortest=values.CROSSING)
+        return learning.compare_transfer(curves, self.using, self.without, shortest=values.CROSSING)
 
 
 NO_RESULTS = "no results"
@@ -204,20 +204,32 @@ class Quantity(NamedTuple):
         spread = low < high
         match self.unit:
             case "share":
-                return numbers.interval(value, low, high) if spread else numbers.percent(value)
+                return (
+                    numbers.format_interval(value, low, high)
+                    if spread
+                    else numbers.format_percent(value)
+                )
             case "points":
-                text = numbers.points(value, low, high) if spread else numbers.difference(value, 0)
+                text = (
+                    numbers.format_points(value, low, high)
+                    if spread
+                    else numbers.format_difference(value, 0)
+                )
                 return f"{text} points"
             case "reward":
-                return numbers.with_ends(_reward, value, low, high) if spread else _reward(value)
+                return (
+                    numbers.with_ends(_format_reward, value, low, high)
+                    if spread
+                    else _format_reward(value)
+                )
             case "steps":
                 return f"{value:,.0f} steps"
             case "p":
-                return numbers.p_value(value)
+                return numbers.format_p_value(value)
         return f"{value:g}"
 
 
-def _reward(value: float) -> str:
+def _format_reward(value: float) -> str:
     return f"{value:+,.0f}".replace("-", "−")
 
 
@@ -232,7 +244,7 @@ class Finding:
         note: A remark in words, or the reason why there are no results.
         policy: The policy; empty for a claim about trainings.
         against: Where the interval of the difference from the paper's number lies relative to 0
-            (``stats.verdict.position``); empty if they cannot be compared.
+            (``stats.verdict.position_of``); empty if they cannot be compared.
         weakness: Whether the claim is that something is lost.
     """
 
@@ -270,7 +282,7 @@ class Finding:
 Judge = Callable[..., str]
 
 
-def _found(judge: Judge, *quantities: Quantity) -> Finding:
+def _finding_of(judge: Judge, *quantities: Quantity) -> Finding:
     """What the intervals of quantities say to a judge."""
     return Finding(judge(*(quantity.interval for quantity in quantities)), quantities)
 
@@ -280,7 +292,7 @@ def _found(judge: Judge, *quantities: Quantity) -> Finding:
 
 def mean(judge: Judge, evidence: EvidenceOfPolicy, metric: str, uavs: int | None = None) -> Finding:
     """The mean of a metric over all missions, or over those with a number of UAVs."""
-    return _found(judge, _mean_of(evidence.missions(uavs), metric))
+    return _finding_of(judge, _mean_of(evidence.missions(uavs), metric))
 
 
 def missed_data(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
@@ -288,7 +300,7 @@ def missed_data(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     missions = evidence.missions()
     everything = missions[RATIO].to_numpy() >= 1
     name = "missions that collected everything"
-    return _found(judge, _mean_of(missions, RATIO), _share_of(everything, name))
+    return _finding_of(judge, _mean_of(missions, RATIO), _share_of(everything, name))
 
 
 # Event logs.
@@ -297,7 +309,7 @@ def missed_data(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
 def single_charges(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     """The share of missions in which a lone UAV charges once."""
     charges = [(events["event"] == "charge_start").sum() for events, _ in evidence.logs(uavs=1)]
-    return _found(judge, _share_of(np.array(charges) == 1, "missions with one charge"))
+    return _finding_of(judge, _share_of(np.array(charges) == 1, "missions with one charge"))
 
 
 def ignored_nodes(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
@@ -305,7 +317,7 @@ def ignored_nodes(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     far, others = np.transpose([_left_behind(*log) for log in evidence.logs(uavs=1)])
     ignored = _mean_share(far, "ignored of these nodes")
     more = Quantity(mean_interval(far - others), len(far), "points", "more than of the others")
-    return _found(judge, ignored, more)
+    return _finding_of(judge, ignored, more)
 
 
 def reached_nodes(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
@@ -321,7 +333,7 @@ def reached_nodes(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
 def sectors(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     """The share of data that two UAVs collect on their own sides, and the share by chance."""
     generator = np.random.default_rng(evidence.results.store.manifest.seed)
-    rows = [row for log in evidence.logs(uavs=2) if (row := _division(*log, generator))]
+    rows = [row for log in evidence.logs(uavs=2) if (row := _collection_shares(*log, generator))]
     if not rows:
         raise MissingError("no data was collected")
     sides, chance, most = np.transpose(rows)
@@ -341,16 +353,20 @@ def _left_behind(events: pd.DataFrame, nodes: np.ndarray) -> tuple[float, float]
     return float(left[far].mean()), float(left[~far].mean())
 
 
-def _division(
+def _collection_shares(
     events: pd.DataFrame, nodes: np.ndarray, generator: np.random.Generator
 ) -> tuple[float, ...]:
     """The share on the own side, the share by chance, and that of the UAV that serves most."""
-    data = missions.collected(events, 2, len(nodes))
+    data = missions.data_by_uav_and_node(events, 2, len(nodes))
     if not data.any():
         return ()
     shuffled = (generator.permutation(data, axis=1) for _ in range(SHUFFLES))
-    chance = np.mean([missions.sectors(by_chance, nodes) for by_chance in shuffled])
-    return missions.sectors(data, nodes), float(chance), missions.division(data)
+    chance = np.mean([missions.share_in_own_sector(by_chance, nodes) for by_chance in shuffled])
+    return (
+        missions.share_in_own_sector(data, nodes),
+        float(chance),
+        missions.share_of_main_uav(data),
+    )
 
 
 # The values of a parameter, compared mission by mission.
@@ -358,34 +374,36 @@ def _division(
 
 def change(judge: Judge, pairs: Pairs, first: str, second: str) -> Finding:
     """How much the metric changes from one value to another."""
-    return _found(judge, _points(pairs.change(first, second)))
+    return _finding_of(judge, _points_of_row(pairs.change(first, second)))
 
 
 def lead(judge: Judge, pairs: Pairs, value: str) -> Finding:
     """How much higher the metric is at a value than at all others."""
-    return _tested(judge, pairs.leads(value), f"{setting(pairs.field, value)} above the next best")
+    return _decisive_lead(
+        judge, pairs.leads(value), f"{setting_in_symbols(pairs.field, value)} above the next best"
+    )
 
 
 def lag(judge: Judge, pairs: Pairs, value: str) -> Finding:
     """How much lower the metric is at a value than at all others."""
-    return _tested(judge, negated(pairs.leads(value)), "the next lowest is higher by")
+    return _decisive_lead(judge, negate_changes(pairs.leads(value)), "the next lowest is higher by")
 
 
-def _tested(judge: Judge, leads: pd.DataFrame, name: str) -> Finding:
+def _decisive_lead(judge: Judge, leads: pd.DataFrame, name: str) -> Finding:
     """The lead that decides: the surest one below 0, or else the least sure one."""
     below = leads[leads["difference"] < 0]
     order = (leads if below.empty else below).sort_values("p_adjusted", kind="stable")
     row = order.iloc[-1 if below.empty else 0]
     p = Quantity.exact(float(row["p_adjusted"]), unit="p", name="its p (Holm)")
-    return Finding(judge(leads), (_points(row, name), p))
+    return Finding(judge(leads), (_points_of_row(row, name), p))
 
 
 def least_lead(judge: Judge, pairs: Pairs, values: Sequence[str]) -> Finding:
     """How much higher the metric is at some values than at all others: the lowest intervals."""
     leads = pairs.leads(*values)
     lowest = leads.loc[leads["low"].idxmin()]
-    widened = _widened(leads.loc[leads["wide_high"].idxmin()])
-    return Finding(judge(leads), (_points(lowest, "lowest interval"), widened))
+    widened = _widened_interval(leads.loc[leads["wide_high"].idxmin()])
+    return Finding(judge(leads), (_points_of_row(lowest, "lowest interval"), widened))
 
 
 def spread(judge: Judge, pairs: Pairs) -> Finding:
@@ -393,22 +411,22 @@ def spread(judge: Judge, pairs: Pairs) -> Finding:
     changes = pairs.changes.reset_index(drop=True)
     farthest = changes[["low", "high"]].abs().max(axis="columns").idxmax()
     nearest = np.maximum(changes["wide_low"], -changes["wide_high"]).idxmax()
-    quantity = _points(changes.loc[farthest], "farthest interval")
-    return Finding(judge(pairs.changes), (quantity, _widened(changes.loc[nearest])))
+    quantity = _points_of_row(changes.loc[farthest], "farthest interval")
+    return Finding(judge(pairs.changes), (quantity, _widened_interval(changes.loc[nearest])))
 
 
 def course(judge: Judge, pairs: Pairs) -> Finding:
     """How the metric changes along the values, from the first to the last."""
     first, *_, last = pairs.positions
-    quantity = _points(pairs.change(first, last), f"from {first} to {last}")
+    quantity = _points_of_row(pairs.change(first, last), f"from {first} to {last}")
     return Finding(judge(pairs.shape), (quantity,), pairs.course)
 
 
 def peak(judge: Judge, pairs: Pairs, value: str) -> Finding:
     """How the metric changes along the values, with the lead of a value over all others."""
     leads = pairs.leads(value)
-    name = f"{setting(pairs.field, value)} above the best other"
-    ahead = _points(leads.loc[leads["difference"].idxmin()], name)
+    name = f"{setting_in_symbols(pairs.field, value)} above the best other"
+    ahead = _points_of_row(leads.loc[leads["difference"].idxmin()], name)
     return Finding(judge(pairs.shape, pairs.position(value)), (ahead,), pairs.course)
 
 
@@ -421,16 +439,16 @@ def selected_uavs(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     wanted = [n for n, point in enumerate(points) if point.values.get("uavs") == values.BEST_UAVS]
     best = points[choice.best].values
     uavs = Quantity.exact(best["uavs"], choice.missions, "number", "UAVs")
-    note = ", ".join(setting(field, value_text(value)) for field, value in best.items())
+    note = ", ".join(setting_in_symbols(field, value_text(value)) for field, value in best.items())
     left = {choice.best, *choice.survivors}
     fleets = sorted({points[n].values["uavs"] for n in left})
-    note += f"; settings not ruled out: {len(left)}, UAVs {numbers.words([*map(str, fleets)])}"
+    note += f"; settings not ruled out: {len(left)}, UAVs {numbers.join_words([*map(str, fleets)])}"
     return Finding(judge(choice, wanted), (uavs,), note)
 
 
-def setting(field: str, value: str) -> str:
+def setting_in_symbols(field: str, value: str) -> str:
     """``C_S 30``."""
-    return f"{parameter(field).short} {value}"
+    return f"{field_named(field).short} {value}"
 
 
 # Learning curves.
@@ -448,7 +466,7 @@ def level_from(judge: Judge, evidence: EvidenceOfTrainings, metric: str) -> Find
     """The step from which on the mean curve without transfer learning stays near its end."""
     transfer, curves = evidence.transfer(metric), evidence.curves(metric)
     means = last_phase(curves, evidence.without).mean(axis="columns")
-    since = int(means.index[settled(means, MARGIN)])
+    since = int(means.index[settling_position(means, MARGIN)])
     level = Quantity.exact(since, unit="steps", name="level from")
     note = f"trainings {evidence.without}{_if_short(transfer)}"
     verdict = judge(since / means.index[-1], transfer)
@@ -475,7 +493,7 @@ def _mean_of(missions: pd.DataFrame, metric: str) -> Quantity:
 
 def _share_of(occurs: np.ndarray, name: str) -> Quantity:
     """The share of missions in which something occurs."""
-    return Quantity(wilson(int(occurs.sum()), len(occurs)), len(occurs), name=name)
+    return Quantity(wilson_interval(int(occurs.sum()), len(occurs)), len(occurs), name=name)
 
 
 def _mean_share(values: np.ndarray, name: str) -> Quantity:
@@ -483,13 +501,13 @@ def _mean_share(values: np.ndarray, name: str) -> Quantity:
     return Quantity(bounded_interval(values), len(values), name=name)
 
 
-def _points(row: pd.Series, name: str = "") -> Quantity:
-    """A row of ``main_effects.changes``."""
+def _points_of_row(row: pd.Series, name: str = "") -> Quantity:
+    """A row of ``main_effects.compare_values``."""
     interval = Interval(*map(float, row[["difference", "low", "high"]]))
     return Quantity(interval, int(row["n"]), "points", name)
 
 
-def _widened(row: pd.Series) -> Quantity:
-    """The interval of a row of ``main_effects.changes`` that holds for all rows at once."""
+def _widened_interval(row: pd.Series) -> Quantity:
+    """The interval of a row of ``main_effects.compare_values`` that holds for all rows at once."""
     interval = Interval(*map(float, row[["difference", "wide_low", "wide_high"]]))
     return Quantity(interval, int(row["n"]), "points", "widened for their number")

@@ -29,7 +29,7 @@ MARGIN = 0.01
 
 def all_above(limits: Sequence[float], *intervals: Interval) -> str:
     """Whether all of some means, shares or differences are above their limits."""
-    return verdict.judged(*map(verdict.above, intervals, limits))
+    return verdict.judge_parts(*map(verdict.verdict_above, intervals, limits))
 
 
 def reached(mean: Interval, printed: Interval) -> str:
@@ -56,21 +56,21 @@ def gap(mean: Interval, printed: Interval) -> Interval:
 def gained(difference: Interval, printed: Interval) -> str:
     """Whether a metric rises, and by as much as the paper prints."""
     near = difference.low > printed.mean - NEAR or None
-    return verdict.judged(
-        verdict.above(difference), near if difference.high >= printed.mean else False
+    return verdict.judge_parts(
+        verdict.verdict_above(difference), near if difference.high >= printed.mean else False
     )
 
 
 def lower(difference: Interval) -> str:
     """Whether a metric is lower."""
     return {verdict.BELOW: verdict.HOLDS, verdict.ABOVE: verdict.REFUTED}.get(
-        verdict.position(difference), verdict.INCONCLUSIVE
+        verdict.position_of(difference), verdict.INCONCLUSIVE
     )
 
 
 def kept(difference: Interval, margin: float) -> str:
     """Whether a metric does not fall by more than the margin."""
-    return verdict.judged(verdict.above(difference, -margin))
+    return verdict.judge_parts(verdict.verdict_above(difference, -margin))
 
 
 def slightly_lower(difference: Interval) -> str:
@@ -87,11 +87,11 @@ def never_all(ratio: Interval, whole: Interval) -> str:
     if whole.mean == 1:
         return verdict.REFUTED
     never = whole.mean == 0 and whole.high < NEAR
-    return verdict.judged(never or None, ratio.high < 1 or None)
+    return verdict.judge_parts(never or None, ratio.high < 1 or None)
 
 
-# The values of a parameter. ``leads`` are rows of ``main_effects.changes``, with signs such that a
-# difference is the value in question minus another value.
+# The values of a parameter. ``leads`` are rows of ``main_effects.compare_values``, with signs such
+# that a difference is the value in question minus another value.
 
 
 def best(leads: pd.DataFrame) -> str:
@@ -134,7 +134,7 @@ def peaks(shape: Shape, wanted: int) -> str:
 def chosen(choice: Choice, wanted: Collection[int]) -> str:
     """Whether a selection has chosen one of the design points with these numbers."""
     left = {choice.best, *choice.survivors}
-    return verdict.judged(left <= {*wanted} or (None if left & {*wanted} else False))
+    return verdict.judge_parts(left <= {*wanted} or (None if left & {*wanted} else False))
 
 
 # Learning curves, with transfer learning and without.
@@ -155,4 +155,4 @@ def levels_off(settled: float, transfer: Transfer) -> str:
     """Whether training without transfer learning levels off early, and at a low value."""
     if transfer.length < CROSSING:
         return verdict.INCONCLUSIVE
-    return verdict.judged(settled <= 0.5 or None, verdict.above(transfer.last))
+    return verdict.judge_parts(settled <= 0.5 or None, verdict.verdict_above(transfer.last))

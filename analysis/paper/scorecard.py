@@ -17,7 +17,7 @@ from dess.analysis.answers.learning import BAND
 from dess.analysis.paper import measures, rules, values
 from dess.analysis.paper.rules import MARGIN, NEAR
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.verdict import INCONCLUSIVE, position
+from dess.analysis.stats.verdict import INCONCLUSIVE, position_of
 from dess.base.files.reading import parse_toml, read_text
 from dess.policies.learner.config import TrainingConfig
 
@@ -25,10 +25,10 @@ TRAININGS = "trainings"  # in place of the name of a study, for claims about lea
 
 _FILE = Path(__file__).with_name("claims.toml")
 _NAMED = {
-    "near": numbers.margin(NEAR),
+    "near": numbers.format_margin(NEAR),
     "near_share": f"{100 * NEAR:g} %",
     "band": f"{100 * BAND:g} %",
-    "level": numbers.margin(MARGIN),
+    "level": numbers.format_margin(MARGIN),
     "crossing": f"{values.CROSSING:,}",
 }
 
@@ -82,7 +82,7 @@ class Claim(NamedTuple):
     weakness: bool = False
 
 
-def _claim(
+def _read_claim(
     section: Mapping[str, Any],
     rule: str,
     measure: str,
@@ -92,12 +92,12 @@ def _claim(
 ) -> Claim:
     """A claim of a section of the file."""
     measured = partial(getattr(measures, measure), **arguments or {})
-    number = _printed(**printed) if printed else None
+    number = _printed_quantity(**printed) if printed else None
     place = {name: section[name] for name in ("page", "study")}
     return Claim(rule=RULES[rule], measure=measured, printed=number, **place, **others)
 
 
-def _printed(
+def _printed_quantity(
     figure: str,
     less: str = "",
     missions: str = "",
@@ -106,13 +106,15 @@ def _printed(
     name: str = "",
 ) -> measures.Quantity:
     """A number of the paper, with an interval if it is a share of a known number of missions."""
-    n = _figure(missions) if missions else 0
+    n = _printed_number(missions) if missions else 0
     if is_share:
-        return measures.Quantity(values.spread(_figure(figure), n), n)
-    return measures.Quantity.exact(_figure(figure) - (_figure(less) if less else 0), n, unit, name)
+        return measures.Quantity(values.interval_of_share(_printed_number(figure), n), n)
+    return measures.Quantity.exact(
+        _printed_number(figure) - (_printed_number(less) if less else 0), n, unit, name
+    )
 
 
-def _figure(path: str) -> Any:
+def _printed_number(path: str) -> Any:
     """A number by its name: ``FIG_4.2.success`` is that of two UAVs in the table of Fig. 4."""
     name, *keys = path.split(".")
     return reduce(
@@ -123,7 +125,7 @@ def _figure(path: str) -> Any:
 _CONTENT = parse_toml(read_text(_FILE), str(_FILE))
 RULES = {name: Rule.of(name, **texts) for name, texts in _CONTENT["rules"].items()}
 CLAIMS = [
-    _claim(section, **claim)
+    _read_claim(section, **claim)
     for section in _CONTENT["sections"].values()
     for claim in section["claims"]
 ]
@@ -196,25 +198,27 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
         is_own = column == PAPERS_NETWORK and own in studies
         return _evidence_of_policy(studies, own if is_own else study, column)
 
-    known = {"margin": margin(studies)}
-    words = {"margin": numbers.margin(known["margin"]), **_NAMED}
+    known = {"margin": indifference_margin(studies)}
+    words = {"margin": numbers.format_margin(known["margin"]), **_NAMED}
     return [
         Row(
             claim,
             f"{claim.basis} {claim.rule.words.format(**words)}".strip(),
-            tuple(_finding(claim, known, partial(evidence, claim.study, c)) for c in COLUMNS),
+            tuple(
+                _find_for_claim(claim, known, partial(evidence, claim.study, c)) for c in COLUMNS
+            ),
         )
         for claim in CLAIMS
     ]
 
 
-def margin(studies: Mapping[str, Results]) -> float:
+def indifference_margin(studies: Mapping[str, Results]) -> float:
     """The difference that does not matter: the indifference of the sweet spot's selection."""
     rule = studies["sweet-spot"].manifest["study"]["selection"] if "sweet-spot" in studies else None
     return (rule or {}).get("indifference") or MARGIN
 
 
-def departures(training: TrainingConfig) -> list[str]:
+def departures_in_words(training: TrainingConfig) -> list[str]:
     """In what a training departs from the paper, in words."""
     n_step, num_envs = training.n_step, training.num_envs
     greedy = all(phase.temperature == 0 for phase in training.phases)
@@ -238,7 +242,7 @@ def _evidence_of_policy(
     if study not in studies:
         raise measures.MissingError(f"the study {study} has not been run")
     results, which = studies[study], f"policy {column}"
-    learners = summary.learners(results)
+    learners = summary.trained_policies_by_learner(results)
     if column in NULLS:
         among = [name for name in results.policies if name == column]
     elif column == COLUMNS[0]:
@@ -262,7 +266,7 @@ def _evidence_of_trainings(trainings: pd.DataFrame, column: str) -> measures.Evi
     return measures.EvidenceOfTrainings(trainings, *VARIANTS)
 
 
-def _finding(
+def _find_for_claim(
     claim: Claim, known: Mapping[str, Any], evidence: Callable[[], Any]
 ) -> measures.Finding:
     """What a policy's results say about a claim or, without results, why there are none."""
@@ -289,7 +293,7 @@ def _finding(
         return found
     beyond = rules.gap(first.interval, printed.interval)
     shown = first, measures.Quantity(beyond, 0, "points", "minus the paper's"), *others
-    return replace(found, quantities=shown, against=position(beyond))
+    return replace(found, quantities=shown, against=position_of(beyond))
 
 
 def of_kind(rows: Iterable[Row], kind: str) -> list[Row]:
@@ -297,13 +301,13 @@ def of_kind(rows: Iterable[Row], kind: str) -> list[Row]:
     return [row for row in rows if row.kind == kind]
 
 
-def answer(rows: Sequence[Row]) -> str:
+def scorecard_sentence(rows: Sequence[Row]) -> str:
     """How many claims hold for the best learned policy, by kinds of claims, in words.
 
     A weakness that the policy shares with the paper's is no claim that it passes.
     """
     telling, passed, undecided, weaknesses = (of_kind(rows, kind) for kind in KINDS)
-    policy = names(rows)[0]
+    policy = policy_names(rows)[0]
     held = sum(row.findings[0].passes for row in telling)
     short = [f"“{row.claim.text}”" for row in telling if row.findings[0].fails]
     without, undecided_held = (
@@ -311,12 +315,12 @@ def answer(rows: Sequence[Row]) -> str:
     )
     shared = sum(row.findings[0].outcome == measures.SHARED for row in weaknesses)
     sentences = [
-        f"Of {len(rows)} claims, {len(telling)} are diagnostic: {numbers.words(NULLS)}, as far as "
-        f"they were simulated, are shown to fail them. {policy} passes {held} of these "
+        f"Of {len(rows)} claims, {len(telling)} are diagnostic: {numbers.join_words(NULLS)}, as "
+        f"far as they were simulated, are shown to fail them. {policy} passes {held} of these "
         f"{len(telling)}."
     ]
     if short:
-        sentences.append(f"It falls short of {numbers.words(short)}.")
+        sentences.append(f"It falls short of {numbers.join_words(short)}.")
     sentences.append(
         f"Of the others, it passes {without} of {len(passed)} that a policy without learning "
         f"passes too, and {undecided_held} of {len(undecided)} on which such policies decide "
@@ -325,7 +329,7 @@ def answer(rows: Sequence[Row]) -> str:
     return " ".join(sentences)
 
 
-def names(rows: Sequence[Row]) -> list[str]:
+def policy_names(rows: Sequence[Row]) -> list[str]:
     """For each of ``COLUMNS`` the policy of most of its findings, or its own name."""
     found = []
     for number, name in enumerate(COLUMNS):
@@ -335,11 +339,11 @@ def names(rows: Sequence[Row]) -> list[str]:
     return found
 
 
-def counts(rows: Sequence[Row]) -> pd.DataFrame:
+def count_verdicts(rows: Sequence[Row]) -> pd.DataFrame:
     """The number of verdicts, for every policy and kind of claims; without those never given."""
     table = []
     for kind in KINDS:
-        for number, name in enumerate(names(rows)):
+        for number, name in enumerate(policy_names(rows)):
             given = Counter(row.findings[number].outcome for row in of_kind(rows, kind))
             counted = {outcome.capitalize(): given[outcome] for outcome in measures.OUTCOMES}
             table.append({"Claims": kind, "Policy": name, **counted})

@@ -5,9 +5,9 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
-from dess.analysis.names import parameter, value_text
+from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.intervals import Interval, wilson
+from dess.analysis.stats.intervals import Interval, wilson_interval
 
 # Table IV: means over TABLE_IV_MISSIONS random missions of the scenario space of Table II.
 TABLE_IV_MISSIONS = 1000
@@ -36,29 +36,31 @@ BEST_UAVS = 3
 CROSSING, LEVEL_FROM = 800_000, 500_000
 
 
-def spread(share: float, missions: int) -> Interval:
+def interval_of_share(share: float, missions: int) -> Interval:
     """A printed share of missions with its Wilson interval, which the paper does not print."""
-    return Interval(share, *wilson(round(share * missions), missions)[1:])
+    return Interval(share, *wilson_interval(round(share * missions), missions)[1:])
 
 
-def setting(results: Results, point: int) -> dict[str, str]:
+def setting_in_symbols(results: Results, point: int) -> dict[str, str]:
     """The values of a design point in words, by the short names of its parameters."""
     values = results.store.manifest.points[point].values
-    return {parameter(field).short: value_text(value) for field, value in values.items()}
+    return {field_named(field).short: value_text(value) for field, value in values.items()}
 
 
-def table(results: Results) -> pd.DataFrame:
+def best_settings_table(results: Results) -> pd.DataFrame:
     """A table with a row for the paper and a row per policy: its best setting and its check."""
-    checks = {(row.policy, row.metric): row for row in summary.checks(results).itertuples()}
-    printed = {name: numbers.percent(SWEET_SPOT[metric]) for metric, name in METRICS.items()}
-    rows = [{"Policy": "paper", **dict.fromkeys(setting(results, 0), ""), **printed}]
-    for row in summary.selections(results).itertuples():
+    checks = {(row.policy, row.metric): row for row in summary.means_of_check(results).itertuples()}
+    printed = {name: numbers.format_percent(SWEET_SPOT[metric]) for metric, name in METRICS.items()}
+    rows = [{"Policy": "paper", **dict.fromkeys(setting_in_symbols(results, 0), ""), **printed}]
+    for row in summary.selected_settings(results).itertuples():
         means = {
-            name: summary.with_mark(checks[row.policy, metric], SWEET_SPOT[metric])
+            name: summary.format_with_mark(checks[row.policy, metric], SWEET_SPOT[metric])
             for metric, name in METRICS.items()
             if checks
         }
         effort = {"Missions": f"{row.missions:,}", "Settings left": str(row.left)}
         effort["Guarantee"] = row.guarantee
-        rows.append({"Policy": row.policy, **setting(results, row.point), **means, **effort})
+        rows.append(
+            {"Policy": row.policy, **setting_in_symbols(results, row.point), **means, **effort}
+        )
     return pd.DataFrame(rows)

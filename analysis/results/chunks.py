@@ -59,7 +59,7 @@ def missions_in(parts: Iterable[Part]) -> int:
 
 def parts_of(manifest: Manifest, team: int, counts: Sequence[int] | None = None) -> list[Part]:
     """The first missions of every cell of a team: ``counts`` of them, or as the manifest says."""
-    return _first(manifest.cells[team], counts or manifest.missions[team])
+    return _first_parts(manifest.cells[team], counts or manifest.missions[team])
 
 
 def bound_parts(manifest: Manifest, counts: Sequence[Sequence[int]] | None = None) -> list[Part]:
@@ -71,10 +71,10 @@ def bound_parts(manifest: Manifest, counts: Sequence[Sequence[int]] | None = Non
     """
     if not manifest.bound_cells:
         return []
-    return _first(manifest.bound_cells, np.max(counts or manifest.missions, axis=0).tolist())
+    return _first_parts(manifest.bound_cells, np.max(counts or manifest.missions, axis=0).tolist())
 
 
-def _first(cells: Sequence[Cell], counts: Sequence[int]) -> list[Part]:
+def _first_parts(cells: Sequence[Cell], counts: Sequence[int]) -> list[Part]:
     return [Part(c, range(c.first, c.first + n)) for c, n in zip(cells, counts, strict=True)]
 
 
@@ -88,7 +88,7 @@ def check_parts(manifest: Manifest, team: int) -> list[Part]:
     return [Part(cells[point], replications) for point in manifest.selected_points(team)]
 
 
-def split(parts: Iterable[Part], size: int) -> Iterator[Chunk]:
+def split_into_chunks(parts: Iterable[Part], size: int) -> Iterator[Chunk]:
     """Split the parts of one team, in their order, into chunks of ``size`` missions."""
     waiting: list[Part] = []
     room = size
@@ -104,7 +104,7 @@ def split(parts: Iterable[Part], size: int) -> Iterator[Chunk]:
         yield Chunk(waiting[0].cell.team, tuple(waiting))
 
 
-def gaps(wanted: range, present: list[range]) -> list[range]:
+def gaps_between(wanted: range, present: list[range]) -> list[range]:
     """The parts of a range that are in none of the present ranges."""
     missing, begin = [], wanted.start
     for there in sorted(present, key=lambda r: r.start):
@@ -116,9 +116,13 @@ def gaps(wanted: range, present: list[range]) -> list[range]:
     return [gap for gap in [*missing, range(begin, wanted.stop)] if len(gap)]
 
 
-def absent(parts: Iterable[Part], present: Present) -> list[Part]:
+def absent_parts(parts: Iterable[Part], present: Present) -> list[Part]:
     """What of some parts is not present."""
-    return [Part(p.cell, gap) for p in parts for gap in gaps(p.replications, present[p.cell.key])]
+    return [
+        Part(p.cell, gap)
+        for p in parts
+        for gap in gaps_between(p.replications, present[p.cell.key])
+    ]
 
 
 def name_of(rows: Sequence[Sequence[Any]]) -> str:
@@ -150,7 +154,7 @@ def rows_of(parts: Sequence[Part], stacked: pd.DataFrame) -> pd.DataFrame:
     return rows[["point", *stacked]]
 
 
-def stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
+def stack_tables(tables: Sequence[pa.Table]) -> pd.DataFrame:
     """The rows of all tables; nan in columns that only others of them have.
 
     Args:
@@ -177,7 +181,7 @@ BOUNDS = "bounds"  # the folder of the bounds of missions, which are the same fo
 FOLDERS = ("missions", "uavs", "events", BOUNDS, "failures")
 
 
-def partition(policy: str) -> str:
+def partition_name(policy: str) -> str:
     """The name of the folder with the files of a team."""
     name = quote(policy, safe="", errors="surrogatepass")
     if len(name) > LONG:

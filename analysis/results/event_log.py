@@ -37,11 +37,11 @@ def uav_slots(events: Events) -> pd.DataFrame:
         first = table["uav"].map(start[axis])
         before = table.groupby("uav")[axis].shift().fillna(first).astype(int)
         table.insert(2, f"from_{axis}", before)
-    table["node"] = _served(log, table)
+    table["node"] = _is_served(log, table)
     table["moved"] = (table["x"] != table["from_x"]) | (table["y"] != table["from_y"])
-    table["charging"] = _between(log, table, "charge_start", "charge_end")
-    table["waiting"] = _waiting(log, table)
-    table["grounded"] = _between(log, table, "uav_failure", "uav_repair")
+    table["charging"] = _is_between(log, table, "charge_start", "charge_end")
+    table["waiting"] = _is_waiting(log, table)
+    table["grounded"] = _is_between(log, table, "uav_failure", "uav_repair")
     return table
 
 
@@ -62,8 +62,8 @@ def residual_data(events: Events) -> pd.DataFrame:
     """
     log = pd.DataFrame(events)
     flows = _node_flows(log)
-    times = range(duration(log) + 1)
-    held = _held(flows).groupby([np.ceil(flows["time"]).astype(int), flows["node"]]).last()
+    times = range(mission_length(log) + 1)
+    held = _data_held(flows).groupby([np.ceil(flows["time"]).astype(int), flows["node"]]).last()
     table = held.unstack().reindex(index=times).ffill()
     table = table.where(table > _ROUNDING, 0.0)
     return table.rename_axis(index="time", columns="node")
@@ -84,19 +84,19 @@ def age_falls(events: Events) -> pd.DataFrame:
         falls, newest = falls[newest > before], newest[newest > before]
     else:
         flows = _node_flows(log)
-        falls = flows[(flows["event"] == "communication") & (_held(flows) == 0.0)]
+        falls = flows[(flows["event"] == "communication") & (_data_held(flows) == 0.0)]
         newest = falls["time"]
     return falls[["time", "node"]].assign(newest=newest).reset_index(drop=True)
 
 
-def ages(events: Events) -> pd.DataFrame:
+def ages_of_nodes(events: Events) -> pd.DataFrame:
     """Age of information [slots] at every mission slot's start (rows) and node (columns).
 
     The last row is the end of the mission.
     """
     log, falls = pd.DataFrame(events), age_falls(events)
     nodes = log.loc[(log["event"] == "mission_start") & (log["node"] >= 0), "node"].to_numpy()
-    times = np.arange(duration(log) + 1)
+    times = np.arange(mission_length(log) + 1)
     newest = falls["newest"].groupby([np.ceil(falls["time"]).astype(int), falls["node"]]).max()
     table = newest.unstack().reindex(index=times, columns=nodes).ffill().fillna(0.0)
     return table.rsub(times, axis=0).rename_axis(index="time", columns="node")
@@ -112,11 +112,13 @@ def mean_age(events: Events) -> pd.DataFrame:
     before = falls.groupby("node")["newest"].shift(fill_value=0.0)
     gains = (falls["newest"] - before).groupby(falls["time"]).sum().cumsum() / nodes
     newest = np.concatenate([[0.0, 0.0], np.repeat(gains.to_numpy(), 2)])
-    times = np.concatenate([[0.0], np.repeat(gains.index.to_numpy(float), 2), [duration(log)]])
+    times = np.concatenate(
+        [[0.0], np.repeat(gains.index.to_numpy(float), 2), [mission_length(log)]]
+    )
     return pd.DataFrame({"time": times, "age": times - newest})
 
 
-def duration(events: Events) -> int:
+def mission_length(events: Events) -> int:
     """The length of the mission [mission slots]."""
     log = pd.DataFrame(events)
     return int(log.loc[log["event"] == "mission_end", "time"].max())
@@ -129,7 +131,7 @@ def _node_flows(log: pd.DataFrame) -> pd.DataFrame:
     return flows.assign(change=flows["value"].where(flows["event"].isin(gains), -flows["value"]))
 
 
-def _held(flows: pd.DataFrame) -> pd.Series:
+def _data_held(flows: pd.DataFrame) -> pd.Series:
     """What each node holds after every row of ``_node_flows`` [data units].
 
     Summed in the order of the simulation, which finds a node empty where exactly 0 is left.
@@ -141,7 +143,7 @@ def _of_uavs(log: pd.DataFrame, event: str) -> pd.DataFrame:
     return log[(log["event"] == event) & (log["uav"] >= 0)]
 
 
-def _served(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
+def _is_served(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
     served = log[log["event"] == "communication"]
     slot = (np.ceil(served["time"]).astype(int) - 1).rename("slot")
     count = served.groupby(["uav", slot, "node"])["time"].agg(["size", "max"]).reset_index()
@@ -150,7 +152,7 @@ def _served(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
     return node.fillna(-1).astype(int).to_numpy()
 
 
-def _between(log: pd.DataFrame, table: pd.DataFrame, start: str, end: str) -> np.ndarray:
+def _is_between(log: pd.DataFrame, table: pd.DataFrame, start: str, end: str) -> np.ndarray:
     """Whether a slot of a UAV is one from an event ``start`` on to before the next ``end``."""
     steps = {start: 1, end: -1}
     edges = log[log["event"].isin(steps)]
@@ -160,7 +162,7 @@ def _between(log: pd.DataFrame, table: pd.DataFrame, start: str, end: str) -> np
     return between > 0
 
 
-def _waiting(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
+def _is_waiting(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
     """A UAV waits from its ``charge_request`` on until it charges, moves off or tries to."""
     overruled, requested = _slots_of(log, "collision"), _slots_of(log, "charge_request")
     waiting, queued = np.zeros(len(table), bool), False
@@ -178,7 +180,7 @@ def _slots_of(log: pd.DataFrame, event: str) -> set[tuple[int, int]]:
     return set(zip(rows["uav"], rows["time"].astype(int), strict=True))
 
 
-def causes(events: Events, scenario: Scenario, first: int = 1) -> list[str]:
+def causes_of_failure(events: Events, scenario: Scenario, first: int = 1) -> list[str]:
     """A sentence per UAV that did not fill its quota, or did not land, without a full stop.
 
     Args:
@@ -194,10 +196,12 @@ def causes(events: Events, scenario: Scenario, first: int = 1) -> list[str]:
     starts = levels.rename(columns={"time": "slot", "battery": "before"})
     slots = slots.merge(starts, on=["uav", "slot"])
     failed = (uav for uav in range(scenario.uavs) if uav not in ended)
-    return [_cause(log, slots, scenario, uav, first) for uav in failed]
+    return [_cause_of_uav(log, slots, scenario, uav, first) for uav in failed]
 
 
-def _cause(log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int, first: int) -> str:
+def _cause_of_uav(
+    log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int, first: int
+) -> str:
     own, flown = log[log["uav"] == uav], slots[slots["uav"] == uav]
     kind, last = type_of(scenario.fleet, uav), flown.iloc[-1]
     quota, after = kind.quota or scenario.quota, int(last["slot"]) + 1
@@ -212,14 +216,14 @@ def _cause(log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int,
     zones, parking, *_ = scenario.chart
     home = spread(zones, parking)[0].reshape(zones.shape)
     away = home[last["y"], last["x"]]
-    where = f"{numbers.counted(away, 'cell')} from the nearest zone" if away else "in a zone"
+    where = f"{numbers.format_count(away, 'cell')} from the nearest zone" if away else "in a zone"
     facts = [f"{name} ran empty {cell}, {where}, {to_go}"]
     if flown["charging"].any():
         flown = flown[flown["slot"] > flown["slot"][flown["charging"]].max()]
     cells = home[flown["from_y"], flown["from_x"]]
     covers = flown["before"] > cells * kind.slots_per_cell * scenario.flight_cost
     if away and covers.any():
-        row, way = flown[covers].iloc[-1], numbers.counted(cells[covers][-1], "cell")
+        row, way = flown[covers].iloc[-1], numbers.format_count(cells[covers][-1], "cell")
         facts.append(
             f"its battery last covered the way to a zone after {row['slot']} slots, with "
             f"{row['before']} % for {way}"
@@ -230,24 +234,24 @@ def _cause(log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int,
     waited, charging = flown[flown["waiting"]], slots[slots["charging"]]
     for zone, rows in waited.groupby(zones[waited["y"], waited["x"]]):
         there = charging["slot"].isin(rows["slot"]) & (zones[charging["y"], charging["x"]] == zone)
-        busy = f", while {_names(charging['uav'][there], first)} charged there"
+        busy = f", while {_uavs_in_words(charging['uav'][there], first)} charged there"
         x, y, *_ = scenario.rectangles[zone]
         facts.append(
-            f"it waited {numbers.counted(len(rows), 'slot')} for a pad of the zone at ({x}, {y}), "
-            f"which has {scenario.zone_pads[zone]}{busy if there.any() else ''}"
+            f"it waited {numbers.format_count(len(rows), 'slot')} for a pad of the zone at ({x}, "
+            f"{y}), which has {scenario.zone_pads[zone]}{busy if there.any() else ''}"
         )
     overruled = own[(own["event"] == "collision") & (own["other"] >= 0)]
     overruled = overruled["other"][overruled["time"] >= flown["slot"].min()]
     if len(overruled):
-        times = numbers.counted(len(overruled), "time")
-        facts.append(f"it was overruled {times}, by {_names(overruled, first)}")
+        times = numbers.format_count(len(overruled), "time")
+        facts.append(f"it was overruled {times}, by {_uavs_in_words(overruled, first)}")
     return "; ".join(facts)
 
 
-def _names(uavs: pd.Series, first: int) -> str:
+def _uavs_in_words(uavs: pd.Series, first: int) -> str:
     """Several UAVs as ``UAVs 1 and 3``."""
     shown = [str(first + uav) for uav in sorted(set(uavs))]
-    return f"UAV{'s' * (len(shown) > 1)} {numbers.words(shown)}"
+    return f"UAV{'s' * (len(shown) > 1)} {numbers.join_words(shown)}"
 
 
 _KML = """<?xml version='1.0' encoding='UTF-8'?>
@@ -296,10 +300,10 @@ def path_text(events: Events, scenario: Scenario, kind: str) -> str:
     axes = ["lon", "lat"] if scenario.centre else ["x", "y"]
     others = table.columns.intersection(["time", "seconds", "battery"])
     paths = {uav: of[[*axes, "altitude", *others]] for uav, of in table.groupby("uav")}
-    return (_kml if kind == "kml" else _geojson)(paths)
+    return (_paths_as_kml if kind == "kml" else _paths_as_geojson)(paths)
 
 
-def _geojson(paths: dict[int, pd.DataFrame]) -> str:
+def _paths_as_geojson(paths: dict[int, pd.DataFrame]) -> str:
     """A line for each UAV, with the times and the battery at each of its places."""
     names = {"time": "times", "seconds": "seconds", "battery": "battery"}
     features = [
@@ -313,7 +317,7 @@ def _geojson(paths: dict[int, pd.DataFrame]) -> str:
     return json.dumps({"type": "FeatureCollection", "features": features})
 
 
-def _kml(paths: dict[int, pd.DataFrame]) -> str:
+def _paths_as_kml(paths: dict[int, pd.DataFrame]) -> str:
     """A track for each UAV, with times from 1970 on, as KML has no others.
 
     Without a data sheet, a mission slot is a second.

@@ -149,7 +149,7 @@ class Manifest(provenance.Origin):
             InputError: If the results would not belong together.
         """
         self._check_extended_by(new, path)
-        changes = provenance.differing(self.code, new.code)
+        changes = provenance.differing_modules(self.code, new.code)
         if changes and accepting is None:
             modules = ", ".join(changes)
             raise InputError(
@@ -196,7 +196,7 @@ class Manifest(provenance.Origin):
         keys = [cell.key for cells in self.cells for cell in cells]
         accepted = [change.data for change in self.accepted]
         bounds = [[cell.key for cell in self.bound_cells]] if self.bound_code else []
-        content = _canonical([keys, self.missions, self.selected, accepted, *bounds])
+        content = _canonical_json([keys, self.missions, self.selected, accepted, *bounds])
         return sha256(content.encode()).hexdigest()[:16]
 
     def units_at(self, points: np.ndarray) -> Units | None:
@@ -249,7 +249,7 @@ class Manifest(provenance.Origin):
 
     def _cells(self, team: int, run: dict[str, Any]) -> tuple[Cell, ...]:
         """The cells of what is made with the same code and seed at every design point."""
-        texts = (_canonical(run) + text for text in self._scenario_texts)
+        texts = (_canonical_json(run) + text for text in self._scenario_texts)
         keys = (sha256(text.encode()).hexdigest()[:16] for text in texts)
         points = enumerate(zip(keys, self.points, strict=True))
         return tuple(Cell(team, p, key, point.replication) for p, (key, point) in points)
@@ -273,8 +273,8 @@ _ALLOWED = f"{ELSEWHERE}, another name, or remove the folder"
 @lru_cache(maxsize=2**15)
 def _text_of(space: ScenarioSpace) -> str:
     """A scenario as text; the manifests of a run have the same ones."""
-    return _canonical(space.model_dump(mode="json"))
+    return _canonical_json(space.model_dump(mode="json"))
 
 
-def _canonical(data: Any) -> str:
+def _canonical_json(data: Any) -> str:
     return json.dumps(data, sort_keys=True)

@@ -49,17 +49,17 @@ MEASURED = OPERATIONS.names or ()  # nan where a mission lacks it
 WORDS = {"end": END_NAMES, "event": EVENT_NAMES}
 
 
-def _columns(record: np.dtype) -> list[tuple[str, pa.DataType]]:
+def _record_columns(record: np.dtype) -> list[tuple[str, pa.DataType]]:
     assert record.fields is not None
     return [(name, pa.from_numpy_dtype(kind[0])) for name, kind in record.fields.items()]
 
 
 # The columns of the tables; ``cell`` is the key of the team and the scenario.
-MISSIONS = pa.schema([("cell", KEY), *_columns(MISSION_RECORD)])
+MISSIONS = pa.schema([("cell", KEY), *_record_columns(MISSION_RECORD)])
 # With what extended scenarios measure; nan where a mission lacks it.
-EXTENDED_MISSIONS = pa.schema([*MISSIONS, *_columns(OPERATIONS)])
+EXTENDED_MISSIONS = pa.schema([*MISSIONS, *_record_columns(OPERATIONS)])
 UAVS = pa.schema(
-    [("cell", KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_columns(UAV_RECORD)]
+    [("cell", KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_record_columns(UAV_RECORD)]
 )
 UAVS = UAVS.set(UAVS.get_field_index("end"), pa.field("end", pa.string()))
 # ``prices`` has a value for every cut and node, the nodes of the first cut first.
@@ -79,7 +79,7 @@ EVENTS = pa.schema(
 )
 
 
-def _without(schema: pa.Schema, *names: str) -> pa.Schema:
+def _without_cell(schema: pa.Schema, *names: str) -> pa.Schema:
     return pa.schema([field for field in schema if field.name not in names])
 
 
@@ -87,11 +87,11 @@ def _without(schema: pa.Schema, *names: str) -> pa.Schema:
 # event log, and earlier ones of version 0.3 do not say what was charged and which UAVs are down.
 SCHEMAS = {
     "missions": [MISSIONS, EXTENDED_MISSIONS]
-    + [_without(schema, "home") for schema in (MISSIONS, EXTENDED_MISSIONS)],
+    + [_without_cell(schema, "home") for schema in (MISSIONS, EXTENDED_MISSIONS)],
     "uavs": [
         UAVS,
-        _without(UAVS, "charged", "down"),
-        _without(UAVS, "way_home", "charged", "down"),
+        _without_cell(UAVS, "charged", "down"),
+        _without_cell(UAVS, "way_home", "charged", "down"),
     ],
     "bounds": [BOUNDS],
     "events": [EVENTS, pa.schema([EVENTS.field(name) for name in EVENTS.names[:7]])],
@@ -113,7 +113,7 @@ MAYBE = {*MEASURED, "snr", "generated"}
 
 def tables_of(chunk: Chunk, records: Records) -> list[pa.Table]:
     """The records of the missions of a chunk, and of their UAVs, with their parts as metadata."""
-    cells = _cells(chunk)
+    cells = _cell_columns(chunk)
     missions = {"cell": cells} | {n: records.missions[n] for n in MISSION_RECORD.names or ()}
     if len(records.operations):
         missions |= {n: records.operations[n] for n in OPERATIONS.names or ()}
@@ -135,29 +135,29 @@ def tables_with(
     """The tables of a chunk from their columns, such as those of ``rows_of``."""
     is_extended = any(name in missions and not np.isnan(missions[name]).all() for name in MEASURED)
     schema = EXTENDED_MISSIONS if is_extended else MISSIONS
-    return [_table(missions, schema, chunk), _table(uavs, UAVS, chunk)]
+    return [_arrow_table(missions, schema, chunk), _arrow_table(uavs, UAVS, chunk)]
 
 
 def table_of_bounds(chunk: Chunk, bounds: Sequence[Bound]) -> pa.Table:
     """The bounds of the missions of a chunk as a table, with their parts as metadata."""
     columns = {
-        "cell": _cells(chunk),
+        "cell": _cell_columns(chunk),
         "replication": np.concatenate([part.replications for part in chunk.parts]),
         "ratio": [bound.ratio for bound in bounds],
         "iterations": [bound.iterations for bound in bounds],
         "cuts": [bound.cuts.tolist() for bound in bounds],
         "prices": [bound.prices.ravel().tolist() for bound in bounds],
     }
-    return _table(columns, BOUNDS, chunk)
+    return _arrow_table(columns, BOUNDS, chunk)
 
 
-def _cells(chunk: Chunk) -> np.ndarray:
+def _cell_columns(chunk: Chunk) -> np.ndarray:
     """The key of the cell of every mission."""
     keys, lengths = zip(*((p.cell.key, len(p.replications)) for p in chunk.parts), strict=True)
     return np.repeat(keys, lengths)
 
 
-def _table(columns: Columns, schema: pa.Schema, chunk: Chunk) -> pa.Table:
+def _arrow_table(columns: Columns, schema: pa.Schema, chunk: Chunk) -> pa.Table:
     arrays = {name: pa.array(columns[name]) for name in schema.names}
     arrays["cell"] = arrays["cell"].dictionary_encode()
     return pa.table(arrays, schema=schema.with_metadata({PARTS: json.dumps(chunk.rows)}))
@@ -213,7 +213,7 @@ def parts_in(table: pa.Table) -> list[Row]:
 
 def is_log(path: Path) -> bool:
     """Whether a file is an event log without damage."""
-    return _is_log(*_state(path))
+    return _is_log(*_file_state(path))
 
 
 @lru_cache(2**16)
@@ -224,7 +224,7 @@ def _is_log(path: Path, *_: int) -> bool:
 File = tuple[Path, int, int, int]
 
 
-def _state(path: Path) -> File:
+def _file_state(path: Path) -> File:
     """A file with its number, size and time; if they stay the same, it is not read again."""
     found = path.stat()
     return path, found.st_ino, found.st_size, found.st_mtime_ns
@@ -288,7 +288,7 @@ def _are_valid(table: pa.Table) -> bool:
     for name, column in zip(table.column_names, table.columns, strict=True):
         if column.null_count:
             return False
-        if limits := _limits(name, column.type):
+        if limits := _column_limits(name, column.type):
             (low, high), values = limits, column.to_numpy()
             if not ((values >= low) & (values <= high)).all():
                 return False
@@ -298,7 +298,7 @@ def _are_valid(table: pa.Table) -> bool:
     return "event" not in table.column_names or "mission_end" in table["event"].to_pylist()
 
 
-def _limits(name: str, kind: pa.DataType) -> tuple[float, float] | None:
+def _column_limits(name: str, kind: pa.DataType) -> tuple[float, float] | None:
     """The least and the largest value of a column, if it has any."""
     if name in INDICES:
         return INDICES[name]
@@ -320,7 +320,7 @@ def tables_in(folder: Path, kind: str) -> Found:
     A file is damaged if its content is not what its name says. Two files with different records of
     the same missions both count as damaged, since it is unknown which one is right.
     """
-    return _tables_of(tuple(map(_state, files_in(folder))), kind)
+    return _tables_of(tuple(map(_file_state, files_in(folder))), kind)
 
 
 @lru_cache(64)

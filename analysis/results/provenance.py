@@ -26,7 +26,7 @@ from pydantic import (
 import dess
 from dess import InputError
 from dess.analysis.study.stopping import Text
-from dess.analysis.study.study import StudyData, changed
+from dess.analysis.study.study import StudyData, change_scenario
 from dess.base.errors import validation_line
 from dess.base.files.documents import Document, Sha256
 from dess.base.sources import OURS, code_of, combined
@@ -143,7 +143,7 @@ class Origin(Document):
         """
         if SEA in values:
             return scenario_at(self.study.scenario, values, **self.study.set)
-        return changed(self._fields, json.dumps(values))
+        return change_scenario(self._fields, json.dumps(values))
 
     @cached_property
     def _fields(self) -> str:
@@ -167,7 +167,7 @@ class Origin(Document):
         code = {name: code for name, code in self.code.items() if name in here or not closed}
         if self.version != dess.__version__:
             changes.append(f"made by dess {self.version}, not {dess.__version__}")
-        elif modules := differing(code, here):
+        elif modules := differing_modules(code, here):
             changes.append(f"made by other code of {', '.join(modules)}")
         if weights := [name for name in teams if teams[name].weights != team_of(name).weights]:
             changes.append(f"made by other weights of {', '.join(weights)}")
@@ -189,14 +189,14 @@ def team_of(policy: str) -> Team:
 
 def members_of(team: str) -> list[Member]:
     """The identities of a team's policies, as this process has them."""
-    return [_member(policy) for policy in load_team(team)]
+    return [_member_identity(policy) for policy in load_team(team)]
 
 
-def _member(policy: Policy) -> Member:
+def _member_identity(policy: Policy) -> Member:
     fields = {
         "name": policy.name,
         "class": f"{type(policy).__module__}:{type(policy).__qualname__}",
-        "code": combined(_code(_modules_of(policy))),
+        "code": combined(_code_hashes(_modules_of(policy))),
         "weights": getattr(policy, "weights", ""),
         "learner": getattr(policy, "learner", ""),
     }
@@ -208,23 +208,23 @@ def _member(policy: Policy) -> Member:
 
 def engine_code() -> str:
     """A hash of the code of the engines."""
-    return combined(_code(ENGINES))
+    return combined(_code_hashes(ENGINES))
 
 
 def bound_code() -> str:
     """A hash of the code of the bound."""
-    return combined(_code(BOUND))
+    return combined(_code_hashes(BOUND))
 
 
 def code_behind(teams: Iterable[str], bounds: bool = False) -> dict[str, str]:
     """Hashes of the modules that the records of teams, and bounds, depend on, by name."""
-    hashes = _code(ENGINES) | (_code(BOUND) if bounds else {})
+    hashes = _code_hashes(ENGINES) | (_code_hashes(BOUND) if bounds else {})
     for policy in (policy for team in teams for policy in load_team(team)):
-        hashes |= _code(_modules_of(policy))
+        hashes |= _code_hashes(_modules_of(policy))
     return dict(sorted(hashes.items()))
 
 
-def differing(old: Mapping[str, str], new: Mapping[str, str]) -> dict[str, tuple[str, str]]:
+def differing_modules(old: Mapping[str, str], new: Mapping[str, str]) -> dict[str, tuple[str, str]]:
     """The old and the new hash of each old module that has changed or is gone.
 
     A new module need not be listed: it matters only if an old module has changed to import it.
@@ -258,5 +258,5 @@ def _modules_of(policy: Policy) -> tuple[str, ...]:
 
 
 @lru_cache
-def _code(modules: tuple[str, ...]) -> dict[str, str]:
+def _code_hashes(modules: tuple[str, ...]) -> dict[str, str]:
     return code_of(*modules)

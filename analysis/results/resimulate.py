@@ -13,8 +13,8 @@ from pydantic import Field, model_validator
 
 from dess import InputError, simulate
 from dess.analysis import numbers
-from dess.analysis.metrics import HOME, MEASURES, lasting
-from dess.analysis.results.event_log import causes
+from dess.analysis.metrics import HOME, MEASURES, format_length
+from dess.analysis.results.event_log import causes_of_failure
 from dess.analysis.results.provenance import Origin
 from dess.analysis.results.tables import Results
 from dess.analysis.study.stopping import Text
@@ -63,10 +63,10 @@ class Mission:
         """
         events = results.events(policy, point, replication) if events is None else events
         mission = {"policy": policy, "point": point, "replication": replication}
-        record = _rows(results.missions, mission).iloc[0]
+        record = _rows_of_mission(results.missions, mission).iloc[0]
         sampled = {name: int(record[name]) for name in SAMPLED}
         scenario = results.scenario(point).scenario_at(**sampled)
-        return cls(policy, scenario, record, _rows(results.uavs, mission), events)
+        return cls(policy, scenario, record, _rows_of_mission(results.uavs, mission), events)
 
     @property
     def replication(self) -> int:
@@ -82,12 +82,12 @@ class Mission:
     @property
     def fleet(self) -> str:
         """The fleet of the mission, as ``3 UAVs``."""
-        return numbers.counted(self.scenario.uavs, "UAV")
+        return numbers.format_count(self.scenario.uavs, "UAV")
 
     @property
     def causes(self) -> str:
         """What ended the mission of each UAV that did not fill its quota, as sentences."""
-        return " ".join(f"{cause}." for cause in causes(self.events, self.scenario))
+        return " ".join(f"{cause}." for cause in causes_of_failure(self.events, self.scenario))
 
     @property
     def caption(self) -> str:
@@ -95,7 +95,7 @@ class Mission:
         return (
             f"{self.policy} in mission {self.replication}, a single one (n = 1): "
             f"{self.causes or f'All UAVs {self.scenario.aim}.'} "
-            f"{self.collected} in {lasting(self.record.slots, self.scenario.units)}."
+            f"{self.collected} in {format_length(self.record.slots, self.scenario.units)}."
         )
 
 
@@ -123,7 +123,9 @@ def resimulate(results: Results, policy: str, point: int, replication: int) -> M
     """
     space, seed = results.scenario(point), results.store.manifest.seed
     mission = mission_of(space, load_team(policy, space.uavs[1]), seed, replication)
-    if changed := difference(mission.record, recorded(results, policy, point, replication)):
+    if changed := difference_in_words(
+        mission.record, stored_record(results, policy, point, replication)
+    ):
         raise InputError(
             f"{results.store.folder}: {policy}, point {point}, replication {replication}: "
             f"{changed}; allowed: results that were made by this code"
@@ -131,7 +133,7 @@ def resimulate(results: Results, policy: str, point: int, replication: int) -> M
     return mission
 
 
-def recorded(results: Results, policy: str, point: int, replication: int) -> dict[str, Any]:
+def stored_record(results: Results, policy: str, point: int, replication: int) -> dict[str, Any]:
     """The stored record of a mission, by field; fields of its UAVs are named like ``uav 1 quota``.
 
     For missions that check a selection, no records of UAVs are stored.
@@ -141,7 +143,9 @@ def recorded(results: Results, policy: str, point: int, replication: int) -> dic
     """
     mission = {"policy": policy, "point": point, "replication": replication}
     tables = (results.missions, results.checks, results.uavs)
-    missions, checks, uavs = (_rows(table, mission).to_dict("records") for table in tables)
+    missions, checks, uavs = (
+        _rows_of_mission(table, mission).to_dict("records") for table in tables
+    )
     if missions or checks:
         row = (missions or checks)[0]
         measured = (name for name in MEASURES if name in row and not isnan(row[name]))
@@ -152,7 +156,7 @@ def recorded(results: Results, policy: str, point: int, replication: int) -> dic
     )
 
 
-def difference(record: MissionRecord, fields: Mapping[str, Any]) -> str:
+def difference_in_words(record: MissionRecord, fields: Mapping[str, Any]) -> str:
     """The stored fields that differ, in any bit, from a record, in words; empty if none does."""
     uavs = _uavs_of(record).to_dict("records")
     metrics = {name: record.metrics[name] for name in MISSION_RECORD.names or ()}
@@ -178,7 +182,7 @@ def _uavs_of(record: MissionRecord) -> pd.DataFrame:
     return pd.DataFrame(record.uavs).assign(end=[END_NAMES[end] for end in record.uavs["end"]])
 
 
-def _rows(table: pd.DataFrame, mission: Mapping[str, Any]) -> pd.DataFrame:
+def _rows_of_mission(table: pd.DataFrame, mission: Mapping[str, Any]) -> pd.DataFrame:
     """The rows of a table that belong to a mission."""
     for name in ("replication", "point", "policy"):  # texts last: they are slow to compare
         table = table[table[name].to_numpy() == mission[name]]
@@ -236,7 +240,9 @@ class Evidence(Origin):
         manifest = results.store.manifest
         counts = [n for of_team in manifest.missions for n in of_team]
         missions = pd.concat([results.missions, results.checks], ignore_index=True)
-        drawn = chosen(len(missions), sample, _hash(results) if seed is None else seed)
+        drawn = draw_numbers(
+            len(missions), sample, _hash_of_records(results) if seed is None else seed
+        )
         identities = missions.loc[drawn, ["policy", "point", "replication"]]
         return cls(
             **{name: getattr(manifest, name) for name in Origin.model_fields},
@@ -248,7 +254,7 @@ class Evidence(Origin):
                     policy=policy,
                     values=manifest.points[point].values,
                     replication=replication,
-                    record=recorded(results, policy, point, replication),
+                    record=stored_record(results, policy, point, replication),
                 )
                 for policy, point, replication in identities.itertuples(index=False)
             ],
@@ -263,13 +269,13 @@ def learned_files(folder: Path = TRAINED) -> dict[str, str]:
     return {p.relative_to(folder).as_posix(): h for p, h in zip(paths, hashes, strict=True)}
 
 
-def chosen(count: int, most: int, seed: int) -> Sequence[int]:
+def draw_numbers(count: int, most: int, seed: int) -> Sequence[int]:
     """Draw at most ``most`` of the numbers 0..count - 1 at random; the result is sorted."""
     numbers = np.random.default_rng(seed).choice(count, min(count, most), replace=False)
     return sorted(numbers.tolist())
 
 
-def _hash(results: Results) -> int:
+def _hash_of_records(results: Results) -> int:
     """A number that depends on every record."""
     tables = (results.missions, results.checks, results.uavs)
     hashes = [pd.util.hash_pandas_object(table, index=False).to_numpy() for table in tables]

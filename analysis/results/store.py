@@ -24,7 +24,7 @@ import pyarrow as pa
 
 from dess import InputError
 from dess.analysis.bound import Bound
-from dess.analysis.metrics import MOST_LOST, MOST_SLOTS, in_units
+from dess.analysis.metrics import MOST_LOST, MOST_SLOTS, columns_in_units
 from dess.analysis.results import chunks, parquet
 from dess.analysis.results.manifest import ELSEWHERE, NO_TEAM, Cell, Manifest, Selected
 from dess.analysis.study.study import Study
@@ -98,12 +98,12 @@ class Store:
         """
         folder = Path(out)
         manifest = Manifest.of(study)
-        store = cls(folder, _extended(folder, manifest, accept_code))
+        store = cls(folder, _extended_manifest(folder, manifest, accept_code))
         chunks.check_places(folder)
         with ExitStack() as lock:
             lock.enter_context(locked(folder / chunks.LOCK, _BUSY))
             # Read again under the lock, because another run may have ended in the meantime.
-            store.manifest = _extended(folder, manifest, accept_code)
+            store.manifest = _extended_manifest(folder, manifest, accept_code)
             store._prepare()
             store._lock = lock.pop_all()
         return store
@@ -126,7 +126,7 @@ class Store:
         Raises:
             InputError: If the folder holds something else, or cannot be written.
         """
-        store = cls(Path(out), _extended(Path(out), Manifest.of(study), accept_code))
+        store = cls(Path(out), _extended_manifest(Path(out), Manifest.of(study), accept_code))
         store._scan()
         return store
 
@@ -170,7 +170,7 @@ class Store:
         """The folders of a team's tables of a kind of work, with their names in ``SCHEMAS``."""
         if team == NO_TEAM:
             return [(self.folder / chunks.BOUNDS, chunks.BOUNDS)]
-        of_team = chunks.partition(self.manifest.policies[team].policy)
+        of_team = chunks.partition_name(self.manifest.policies[team].policy)
         return [(self.folder / name / of_team, name) for name in TABLES[kind]]
 
     def _examine(self, kind: str, team: int, name: str, tables: Sequence[pa.Table]) -> None:
@@ -205,7 +205,7 @@ class Store:
             kind: ``missions``, ``bounds`` or ``events``.
             parts: The parts.
         """
-        return chunks.absent(parts, self._present[kind])
+        return chunks.absent_parts(parts, self._present[kind])
 
     def keep(self, kind: str, chunk: chunks.Chunk, tables: Sequence[pa.Table]) -> None:
         """Store the tables of a chunk."""
@@ -258,7 +258,9 @@ class Store:
         gone = {
             name
             for name, of_file in held.items()
-            if not any(chunks.gaps(range(start, stop), merged[key]) for key, start, stop in of_file)
+            if not any(
+                chunks.gaps_between(range(start, stop), merged[key]) for key, start, stop in of_file
+            )
         }
         for folder, _ in self._places("missions", large[0].team):
             for path in parquet.files_in(folder):
@@ -268,14 +270,14 @@ class Store:
 
     def _frames(self, parts: Iterable[chunks.Part]) -> list[pd.DataFrame]:
         """The rows of the files with missions of some parts, and those of the files with UAVs."""
-        return [*map(chunks.stacked, zip(*self._tables_with("missions", parts), strict=True))]
+        return [*map(chunks.stack_tables, zip(*self._tables_with("missions", parts), strict=True))]
 
     def _held(self, parts: Sequence[chunks.Part]) -> list[chunks.Part]:
         """What of the missions of some parts is present."""
         missing: chunks.Present = defaultdict(list)
         for part in self.missing("missions", parts):
             missing[part.cell.key].append(part.replications)
-        return chunks.absent(parts, missing)
+        return chunks.absent_parts(parts, missing)
 
     def count(self, other: "Store") -> None:
         """Count the missions of another folder as if they were here, to plan a run."""
@@ -307,7 +309,7 @@ class Store:
 
         ``most_slots`` is the longest that each may last. If the study has prices, the missions have
         a ``cost``, and ``most_lost``, what a loss of all UAVs costs; with a data sheet, what they
-        measure is there in units as well (``metrics.in_units``).
+        measure is there in units as well (``metrics.columns_in_units``).
 
         Raises:
             InputError: If some are missing or damaged.
@@ -320,7 +322,7 @@ class Store:
             missions["cost"] = sum(cost.values())
             missions[MOST_LOST] = costs.of_lost(missions["uavs"].to_numpy())
         if units := self.manifest.units_at(missions["point"].to_numpy()):
-            missions = missions.assign(**in_units(missions, units))
+            missions = missions.assign(**columns_in_units(missions, units))
         return missions
 
     def uavs(self, parts: Sequence[chunks.Part]) -> pd.DataFrame:
@@ -368,7 +370,7 @@ class Store:
         found = [tables[table] for tables in self._tables_with(kind, parts)]
         key = kind, table, *map(id, found)
         if key not in self._stacked:
-            self._stacked[key] = chunks.stacked(found)
+            self._stacked[key] = chunks.stack_tables(found)
         rows = chunks.rows_of(parts, self._stacked[key])
         return rows.drop(columns="cell")
 
@@ -410,7 +412,7 @@ def _tables_of(chunk: chunks.Chunk, frames: Iterable[pd.DataFrame]) -> list[pa.T
     return parquet.tables_with(chunk, *columns)
 
 
-def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
+def _extended_manifest(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
     """The manifest for a folder into which this study will be written.
 
     Raises:
@@ -429,25 +431,25 @@ def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
     return held.extended_to(manifest, path, parquet.missions_in(folder) if accept_code else None)
 
 
-def sources(folders: Iterable[Path], manifest: Manifest) -> list[Store]:
+def source_folders(folders: Iterable[Path], manifest: Manifest) -> list[Store]:
     """The folders that contain cells of a manifest: same code, scenario, policy and seed.
 
     A folder that is not a results folder is left out. So is a folder whose missions were simulated
     by several versions of the code, because the keys of its cells identify only the first version.
     """
-    keys = _keys(manifest)
-    return [store for folder in folders if (store := _source(folder, keys))]
+    keys = _cell_keys(manifest)
+    return [store for folder in folders if (store := _source_folder(folder, keys))]
 
 
-def _source(folder: Path, keys: set[str]) -> Store | None:
+def _source_folder(folder: Path, keys: set[str]) -> Store | None:
     try:
         manifest = Manifest.read(folder / chunks.MANIFEST)
-        if manifest.accepted or not keys & _keys(manifest):
+        if manifest.accepted or not keys & _cell_keys(manifest):
             return None
         return Store.read(folder)
     except (InputError, FileNotFoundError):  # another run may merge its files
         return None
 
 
-def _keys(manifest: Manifest) -> set[str]:
+def _cell_keys(manifest: Manifest) -> set[str]:
     return {cell.key for cells in manifest.cells for cell in cells}

@@ -72,7 +72,7 @@ Given = ParamSpec("Given")
 Found = TypeVar("Found")
 
 
-def once(
+def compute_once(
     ask: Callable[Concatenate["Results", Given], Found],
 ) -> Callable[Concatenate["Results", Given], Found]:
     """Let a function of results compute its answer once for the same results and arguments.
@@ -111,7 +111,7 @@ class Results:
             selection was not based on them. Empty if the study selects nothing.
         bounds: The upper bound of every mission by design point and replication, the same for all
             policies. Empty if the study has no bounds.
-        answers: What functions of these results have computed, see ``once``.
+        answers: What functions of these results have computed, see ``compute_once``.
     """
 
     store: Store
@@ -195,7 +195,7 @@ class Results:
         """The cheapest settings of a policy that meet the requirements of the study."""
         return self._chosen(policy, Cheapest)
 
-    @once
+    @compute_once
     def _chosen(self, policy: str, kind: type) -> Any:
         """What a rule of this kind has selected for a policy; None if the study has another."""
         self.check_policy(policy)
@@ -254,7 +254,7 @@ def load_results(out: str | Path) -> Results:
     return _KEPT.get(Path(out).absolute()) or results_of(Store.read(out))
 
 
-def keep(out: str | Path) -> None:
+def keep_results(out: str | Path) -> None:
     """Load results once: ``load_results`` returns them here, and in processes forked from here.
 
     Raises:
@@ -278,8 +278,8 @@ def results_of(store: Store) -> Results:
             checks[team.policy] = store.missions(checked)
     if not manifest.complete:
         raise InputError(f"{store.folder}: incomplete; allowed: run the study again to complete it")
-    all_missions = _labelled(manifest, missions)
-    all_checks = _labelled(manifest, checks) if checks else all_missions[:0]
+    all_missions = _label_missions(manifest, missions)
+    all_checks = _label_missions(manifest, checks) if checks else all_missions[:0]
     bounds = store.bounds_of(bound_parts(manifest))
     if bounds:
         all_missions = _with_gaps(all_missions, bounds)
@@ -300,16 +300,16 @@ def _of_policies(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return table
 
 
-def _labelled(manifest: Manifest, missions: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def _label_missions(manifest: Manifest, missions: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """The missions of all policies, with the fields that the design sets and no record has."""
     table = _of_policies(missions)
     table = table.drop(columns=[m for m in EITHER if m in table and table[m].isna().all()])
-    for position, (name, values) in enumerate(_swept(manifest).items(), 2):
+    for position, (name, values) in enumerate(_swept_fields(manifest).items(), 2):
         table.insert(position, name, table["point"].map(dict(enumerate(values))))
     return table
 
 
-def _swept(manifest: Manifest) -> dict[str, list[Any]]:
+def _swept_fields(manifest: Manifest) -> dict[str, list[Any]]:
     """The fields that the design sets and no record has, by design point.
 
     Values are JSON text where some of them are lists, and None where a point does not set a field.

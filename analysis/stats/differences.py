@@ -10,7 +10,7 @@ import scipy
 from scipy.special import stdtr, stdtrit
 
 from dess import InputError
-from dess.analysis.metrics import ALWAYS, EITHER, REWARD, Metric, known_in, metric_of
+from dess.analysis.metrics import ALWAYS, EITHER, REWARD, Metric, metric_in_missions, metric_of
 from dess.analysis.stats import intervals
 
 Treatment = Literal["policy", "point"]
@@ -45,11 +45,11 @@ def metrics_by_treatment(
     values = {metric: intervals.values_within(missions, metric, spaces) for metric in metrics}
     table = missions[[of, *keys]].assign(**values)
     return {
-        name: part.set_index(keys)[[*values]] for (name,), part in intervals.groups(table, [of])
+        name: part.set_index(keys)[[*values]] for (name,), part in intervals.group_rows(table, [of])
     }
 
 
-def select(tables: Mapping[Any, pd.DataFrame], of: str, name: str | int) -> pd.DataFrame:
+def select_table(tables: Mapping[Any, pd.DataFrame], of: str, name: str | int) -> pd.DataFrame:
     """The table of a policy or point.
 
     Raises:
@@ -71,7 +71,7 @@ def check_same_missions(tables: Mapping[Any, pd.DataFrame], name: Any, baseline:
             )
 
 
-def matched(
+def match_groups(
     tables: Sequence[pd.DataFrame], by: Sequence[str]
 ) -> Iterator[tuple[tuple, list[dict[str, np.ndarray]]]]:
     """Groups of independent units: missions, or means over the missions of a replication.
@@ -82,7 +82,7 @@ def matched(
     names = tables[0].index.names
     unit = [name for name in names if name in (*by, "seed", "replication")]
     means = [table.groupby(level=unit, dropna=False).mean() for table in tables]
-    for group, part in intervals.groups(means[0].reset_index(), by):
+    for group, part in intervals.group_rows(means[0].reset_index(), by):
         yield group, [{metric: m[metric].to_numpy()[part.index] for metric in m} for m in means]
 
 
@@ -93,7 +93,7 @@ def _first_row(keys: pd.DataFrame) -> str:
 Correction = Literal["holm", "fdr"]
 
 
-def adjust(p: np.ndarray, correction: Correction | None) -> np.ndarray:
+def adjust_p_values(p: np.ndarray, correction: Correction | None) -> np.ndarray:
     """Adjust p-values for multiple tests; adjusted values up to alpha are significant at alpha.
 
     Args:
@@ -122,9 +122,9 @@ def adjust(p: np.ndarray, correction: Correction | None) -> np.ndarray:
     return adjusted
 
 
-def with_adjusted(table: pd.DataFrame, correction: Correction | None) -> pd.DataFrame:
+def add_adjusted(table: pd.DataFrame, correction: Correction | None) -> pd.DataFrame:
     """Add ``p_adjusted`` after ``p`` to a table of comparisons, adjusted over all its rows."""
-    adjusted = adjust(table["p"].to_numpy(float), correction)
+    adjusted = adjust_p_values(table["p"].to_numpy(float), correction)
     table.insert(table.columns.get_loc("p") + 1, "p_adjusted", adjusted)
     return table
 
@@ -178,16 +178,16 @@ def difference_test(
     rare, of = intervals.rare_differences(metric, a.mean(), b.mean()), metric_of(metric)
     if rare is None or (differences.size == 1 and not of.is_bounded):
         return t_test(differences, level)
-    smooth, p = t_test(smoothed(differences, rare), level)
+    smooth, p = t_test(add_rare_pairs(differences, rare), level)
     if of.is_outcome and np.isin(differences, (-1, 0, 1)).all():
-        p = mcnemar(int(np.sum(differences > 0)), int(np.sum(differences < 0)))
+        p = mcnemar_p_value(int(np.sum(differences > 0)), int(np.sum(differences < 0)))
     limit = of.range[1] - of.range[0]
     mean = float(differences.mean())
     return intervals.Interval(mean, max(smooth.low, -limit), min(smooth.high, limit)), p
 
 
 @cache
-def mcnemar(gains: int, losses: int) -> float:
+def mcnemar_p_value(gains: int, losses: int) -> float:
     """The p-value of McNemar's exact test."""
     return float(scipy.stats.binomtest(gains, gains + losses).pvalue) if gains + losses else 1.0
 
@@ -198,7 +198,7 @@ def column_tests(
     metric: str | Metric = "",
     levels: float | np.ndarray = intervals.LEVEL,
 ) -> pd.DataFrame:
-    """Paired comparisons of many columns with a baseline, as ``paired`` makes them.
+    """Paired comparisons of many columns with a baseline, as ``compare_pairs`` makes them.
 
     Args:
         values: (R, K) a row per replication; nan where a column lacks one.
@@ -244,7 +244,7 @@ def column_tests(
     if of.is_outcome:
         gains, losses = (differences > 0).sum(), (differences < 0).sum()
         exact = (differences.isin((-1, 0, 1)) | ~present).all() & (n > 0)
-        table.loc[exact, "p"] = [*map(mcnemar, gains[exact], losses[exact])]
+        table.loc[exact, "p"] = [*map(mcnemar_p_value, gains[exact], losses[exact])]
     return table
 
 
@@ -253,7 +253,7 @@ def sign_test(equal: np.ndarray) -> float:
     return min(1.0, 2 * 0.5 ** len(equal)) if equal[0] else 1.0
 
 
-def smoothed(differences: np.ndarray, rare: Sequence[float] = (1.0, -1.0)) -> np.ndarray:
+def add_rare_pairs(differences: np.ndarray, rare: Sequence[float] = (1.0, -1.0)) -> np.ndarray:
     """The differences with rare ones added, along the last axis: one gain and one loss."""
     more = np.broadcast_to(np.asarray(rare, float), (*differences.shape[:-1], 2))
     return np.concatenate([differences, more], axis=-1)
@@ -278,7 +278,7 @@ class Paired(NamedTuple):
     student: float = np.nan
 
 
-def paired(
+def compare_pairs(
     a: np.ndarray, b: np.ndarray, level: float = intervals.LEVEL, metric: str | Metric = ""
 ) -> Paired:
     """Compare two samples pair by pair; differences are A - B.
@@ -302,7 +302,7 @@ def paired(
     """
     mean, p = difference_test(a, b, metric, level)
     differences = differences_of(a, b)
-    of_a, of_b, of_differences = map(_variance, (a, b, differences))
+    of_a, of_b, of_differences = map(_sample_variance, (a, b, differences))
     correlation = float(np.corrcoef(a, b)[0, 1]) if of_a and of_b else 0.0
     reduction = 1 - of_differences / (of_a + of_b) if of_a + of_b else 0.0
     plain = intervals.mean_interval(differences, level)
@@ -310,7 +310,7 @@ def paired(
     return Paired(*mean, p, correlation, reduction, a.size, half)
 
 
-def unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Paired:
+def compare_unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Paired:
     """Compare two samples of different missions by Welch's t test; differences are A - B.
 
     To both samples of a share, a 0 and a 1 are added for the test (A. Agresti and B. Caffo, The
@@ -349,7 +349,7 @@ def relative_change(
     if of.has_range:
         more = max(most - mean, mean - ratio * least)
         less = min(least - mean, mean - ratio * most)
-        residuals = smoothed(residuals, (more, less))
+        residuals = add_rare_pairs(residuals, (more, less))
     _, low, high = (ratio - 1 + end for end in intervals.mean_interval(residuals / abs(base)))
     return intervals.Interval(ratio - 1, max(low, -1.0) if least >= 0 else low, high)
 
@@ -372,7 +372,7 @@ def compare(
         metrics: Columns of numbers.
         by: Columns whose values form groups of missions, compared one by one.
         level: Confidence level of each interval.
-        correction: Correction of the p-values over all rows, as for ``adjust``.
+        correction: Correction of the p-values over all rows, as for ``adjust_p_values``.
         of: What is compared: ``policy`` or ``point``.
 
     Returns:
@@ -392,23 +392,23 @@ def compare(
     """
     intervals.check_share("level", level)
     tables = metrics_by_treatment(missions, of, metrics, by)
-    reference = select(tables, of, baseline)
+    reference = select_table(tables, of, baseline)
     others = [name for name in tables if name != baseline]
     if not others:
         raise InputError(f"{of}: nothing to compare with {baseline}; allowed: two or more")
-    rows, known = [], {metric: known_in(missions, metric) for metric in metrics}
+    rows, known = [], {metric: metric_in_missions(missions, metric) for metric in metrics}
     for name in others:
         check_same_missions(tables, name, baseline)
-        for group, (a, b) in matched([tables[name], reference], by):
+        for group, (a, b) in match_groups([tables[name], reference], by):
             for metric in metrics:
                 measured = ~np.isnan(a[metric]) & ~np.isnan(b[metric])
                 if measured.any():
                     pairs = a[metric][measured], b[metric][measured]
-                    result = paired(*pairs, level, known[metric])
+                    result = compare_pairs(*pairs, level, known[metric])
                     rows.append((name, baseline, *group, metric, *result))
     columns = [of, "baseline", *by, "metric", *Paired._fields]
-    return with_adjusted(pd.DataFrame(rows, columns=columns), correction)
+    return add_adjusted(pd.DataFrame(rows, columns=columns), correction)
 
 
-def _variance(values: np.ndarray) -> float:
+def _sample_variance(values: np.ndarray) -> float:
     return float(values.var()) if np.ptp(values) else 0.0

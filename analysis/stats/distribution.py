@@ -66,7 +66,7 @@ def distribution(
         return sign * tail_mean(sign * values, tail, axis)
 
     rows = []
-    for group, part in intervals.groups(missions, by):
+    for group, part in intervals.group_rows(missions, by):
         values = part[metric].to_numpy(float)
         views = [("quantile", q, quantile_interval(values, q, level)) for q in quantiles]
         expanded = intervals.expanded_level(level, tail * len(values))

@@ -15,7 +15,7 @@ import scipy
 from scipy.special import ndtr, ndtri, stdtrit
 
 from dess import InputError
-from dess.analysis.metrics import Metric, known_in, metric_of, metrics_in
+from dess.analysis.metrics import Metric, metric_in_missions, metric_of, metrics_in
 from dess.base.errors import one_of
 
 LEVEL = 0.95
@@ -88,10 +88,12 @@ def skewed_ends(mean: Any, error: Any, skewness: Any, n: Any, level: Any = LEVEL
 def ends_by_quantile(mean: Any, error: Any, skewness: Any, n: Any, quantile: Any) -> Any:
     """The ends of ``skewed_ends``, with the (...) quantiles of Student's t."""
     slope = skewness / np.sqrt(n) / 3
-    return mean - error * _skewed(quantile, slope), mean - error * _skewed(-quantile, slope)
+    return mean - error * _skewed_quantile(quantile, slope), mean - error * _skewed_quantile(
+        -quantile, slope
+    )
 
 
-def _skewed(quantile: Any, slope: Any) -> Any:
+def _skewed_quantile(quantile: Any, slope: Any) -> Any:
     """The t with a slope of skewness that belongs to a quantile without: Hall's inverse."""
     cube = 3 * slope * (quantile - slope / 2)
     near = np.expm1(np.log1p(np.maximum(cube, -0.5)) / 3)  # exact for a small slope
@@ -124,7 +126,7 @@ def rare_differences(metric: str | Metric, a: Any, b: Any) -> tuple[Any, Any] | 
     a cost by the price of the fleet.
 
     Args:
-        metric: The metric; that of missions (``known_in``) has the range of a time.
+        metric: The metric; that of missions (``metric_in_missions``) has the range of a time.
         a: (...) means of A.
         b: (...) means of B.
 
@@ -231,7 +233,7 @@ class Moments(NamedTuple):
         """The mean of a metric with the interval of ``interval_of``."""
         of = metric_of(metric)
         if of.is_outcome and self._are_outcomes:
-            return wilson(int(self.total), self.n, level)
+            return wilson_interval(int(self.total), self.n, level)
         if of.is_bounded:
             return self.bounded(level)
         mean, *ends = self.skewed(level)
@@ -268,7 +270,7 @@ class Moments(NamedTuple):
         return Interval(self.mean, *map(float, ends))
 
 
-def wilson(successes: int, n: int, level: float = LEVEL) -> Interval:
+def wilson_interval(successes: int, n: int, level: float = LEVEL) -> Interval:
     """Share of successes with its Wilson score interval, which holds near 0 and 1 as well."""
     share, z = successes / n, ndtri(0.5 + 0.5 * level)
     width = 2 * (n + z**2)
@@ -304,7 +306,7 @@ def interval_of(
     return Moments.of(values).interval(metric, level)
 
 
-def stratified(values: np.ndarray, metric: str | Metric, level: float = LEVEL) -> Interval:
+def stratified_interval(values: np.ndarray, metric: str | Metric, level: float = LEVEL) -> Interval:
     """Mean of the means of fixed design points with its interval: the points are strata.
 
     What differs from point to point is no chance, so the interval rests on the variance within the
@@ -352,8 +354,8 @@ def summary(
     """Means with intervals of groups of missions.
 
     A group with missions at several design points (column ``point``), each of which has two or
-    more, has the mean of the points' means and the interval of ``stratified``. Points with a
-    single mission each are taken for a sample of the design.
+    more, has the mean of the points' means and the interval of ``stratified_interval``. Points with
+    a single mission each are taken for a sample of the design.
 
     Args:
         missions: A row per mission, with the fields of ``MISSION_RECORD`` and those of ``by``.
@@ -369,10 +371,10 @@ def summary(
     """
     strata = "point" in missions and "point" not in by
     rows = []
-    for group, part in groups(missions, by):
+    for group, part in group_rows(missions, by):
         for metric in metrics_in(missions):
             if n := int(part[metric].count()):
-                ends = _interval(part, known_in(missions, metric), level, strata)
+                ends = _interval_of_group(part, metric_in_missions(missions, metric), level, strata)
                 rows.append((*group, metric, *ends, n))
     return pd.DataFrame(rows, columns=[*by, "metric", "mean", "low", "high", "n"])
 
@@ -406,7 +408,9 @@ def column_intervals(
         rows = ((values.isin((0, 1)) | values.isna()).all() & (n > 0)).to_numpy()
         successes = (mean * n)[rows].round().astype(int)
         samples = [*zip(successes, n[rows], level[rows], strict=True)]
-        known = {sample: wilson(*sample)[1:] for sample in {*samples}}  # each takes its time
+        known = {
+            sample: wilson_interval(*sample)[1:] for sample in {*samples}
+        }  # each takes its time
         table.loc[rows, ["low", "high"]] = np.array([known[s] for s in samples]).reshape(-1, 2)
     return table
 
@@ -424,18 +428,20 @@ def check_share(name: str, share: float) -> None:
         raise InputError(f"{name}: {share!r}; allowed: between 0 and 1")
 
 
-def groups(missions: pd.DataFrame, by: Sequence[str]) -> Iterator[tuple[tuple, pd.DataFrame]]:
+def group_rows(missions: pd.DataFrame, by: Sequence[str]) -> Iterator[tuple[tuple, pd.DataFrame]]:
     """Groups of rows by the values of columns, in order of first appearance; all without any."""
     yield from missions.groupby(list(by), sort=False, dropna=False) if by else [((), missions)]
 
 
-def _interval(missions: pd.DataFrame, metric: Metric, level: float, strata: bool) -> Interval:
+def _interval_of_group(
+    missions: pd.DataFrame, metric: Metric, level: float, strata: bool
+) -> Interval:
     """The mean of a group: over its missions, or over the points that these are at."""
     if strata and missions["point"].nunique() > 1:
         wide = by_replication(missions, metric.column, "point").dropna(axis="columns", how="all")
         if (wide.count() > 1).all():
             # In this order, so that the last bits of sums are the same with every pandas.
-            return stratified(np.ascontiguousarray(wide, float), metric, level)
+            return stratified_interval(np.ascontiguousarray(wide, float), metric, level)
     values = values_within(missions, metric.column, ())
     return interval_of(metric, values[~np.isnan(values)], level)
 
@@ -499,7 +505,7 @@ def values_within(missions: pd.DataFrame, metric: str, spaces: Sequence[str]) ->
     if "uavs" in missions:
         fleets = missions["uavs"].to_numpy()
         table = missions[[*spaces]].reset_index(drop=True)
-        for _, part in groups(table, spaces):
+        for _, part in group_rows(table, spaces):
             rows = part.index.to_numpy()
             values[rows] = post_stratified(values[rows], fleets[rows])
     return values

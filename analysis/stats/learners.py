@@ -13,19 +13,19 @@ import pandas as pd
 import scipy
 
 from dess import InputError
-from dess.analysis.metrics import ALWAYS, Metric, known_in
+from dess.analysis.metrics import ALWAYS, Metric, metric_in_missions
 from dess.analysis.stats.differences import (
     Correction,
+    add_adjusted,
+    add_rare_pairs,
     check_same_missions,
     difference_test,
     differences_of,
-    matched,
+    match_groups,
     metrics_by_treatment,
-    select,
+    select_table,
     sign_test,
-    smoothed,
     t_test,
-    with_adjusted,
 )
 from dess.analysis.stats.intervals import LEVEL, check_share, rare_differences
 
@@ -54,7 +54,7 @@ class Crossed(NamedTuple):
     rest_sd: float
 
 
-def crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
+def compare_crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
     """The mean difference of a learner, with training and mission as crossed random factors.
 
     The model d = mu + training + mission + rest has one observation per cell. The mean squares give
@@ -125,7 +125,8 @@ def compare_learners(
         metrics: Columns of numbers.
         by: Columns whose values form groups of missions, compared one by one.
         level: Confidence level of each interval.
-        correction: Correction of the p-values over all rows, as for ``differences.adjust``.
+        correction: Correction of the p-values over all rows, as for
+        ``differences.adjust_p_values``.
 
     Returns:
         A row per learner, group and metric: ``learner``, ``baseline``, the columns ``by``,
@@ -141,41 +142,41 @@ def compare_learners(
     """
     check_share("level", level)
     tables = metrics_by_treatment(missions, "policy", metrics, by)
-    reference = select(tables, "policy", baseline)
-    rows, known = [], {metric: known_in(missions, metric) for metric in metrics}
+    reference = select_table(tables, "policy", baseline)
+    rows, known = [], {metric: metric_in_missions(missions, metric) for metric in metrics}
     for learner, checkpoints in learners.items():
         if not checkpoints or len(set(checkpoints)) < len(checkpoints) or baseline in checkpoints:
             raise InputError(
                 f"learner {learner}: checkpoints {', '.join(checkpoints) or 'none'}; "
                 f"allowed: one or more, all distinct, without the baseline {baseline}"
             )
-        trained = [select(tables, "policy", checkpoint) for checkpoint in checkpoints]
+        trained = [select_table(tables, "policy", checkpoint) for checkpoint in checkpoints]
         for checkpoint in checkpoints:
             check_same_missions(tables, checkpoint, baseline)
-        for group, (b, *parts) in matched([reference, *trained], by):
+        for group, (b, *parts) in match_groups([reference, *trained], by):
             for metric in metrics:
                 of_learner = np.stack([a[metric] for a in parts])
-                result, differences = _compared(of_learner, b[metric], known[metric], level)
+                result, differences = _compare_learner(of_learner, b[metric], known[metric], level)
                 about = LEARNER if len(parts) > 1 else CHECKPOINT
                 labels = (learner, baseline, *group, metric, about)
                 rows.append((*labels, *result, *differences.shape))
     columns = ["learner", "baseline", *by, "metric", "about", *Crossed._fields, "trainings", "n"]
-    return with_adjusted(pd.DataFrame(rows, columns=columns), correction)
+    return add_adjusted(pd.DataFrame(rows, columns=columns), correction)
 
 
-def _compared(
+def _compare_learner(
     a: np.ndarray, b: np.ndarray, metric: Metric, level: float
 ) -> tuple[Crossed, np.ndarray]:
     """A learner (S, R) compared with a baseline (R,) by a metric, and the differences."""
     differences = differences_of(a, b)
-    result = crossed(differences, level)
+    result = compare_crossed(differences, level)
     if len(a) == 1:
         mean, p = difference_test(a[0], b, metric, level)
         return result._replace(low=mean.low, high=mean.high, p=p), differences
     rare = rare_differences(metric, a.mean(), b.mean())
     if rare is None or (b.size == 1 and not metric.is_bounded):
         return result, differences
-    smooth = crossed(smoothed(differences, rare), level)
+    smooth = compare_crossed(add_rare_pairs(differences, rare), level)
     limit = metric.range[1] - metric.range[0]
     ends = {name: float(np.clip(getattr(smooth, name), -limit, limit)) for name in _ENDS}
     return result._replace(**ends, p=smooth.p), differences

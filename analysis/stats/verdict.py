@@ -2,7 +2,7 @@
 
 An estimate is ``ABOVE`` or ``BELOW`` a reference if its whole interval is, else ``INCONCLUSIVE``:
 
-    >>> position(Interval(0.2, 0.1, 0.3))
+    >>> position_of(Interval(0.2, 0.1, 0.3))
     'above'
 
 A part of a claim is shown (True), refuted (False) or open (None), by a complete interval. Of
@@ -23,7 +23,7 @@ HOLDS, IN_PART, REFUTED = "holds", "holds in part", "does not hold"
 Part = bool | None
 
 
-def position(interval: Interval, reference: float = 0.0) -> str:
+def position_of(interval: Interval, reference: float = 0.0) -> str:
     """Whether a complete interval is above a reference, below it, or contains it.
 
     Args:
@@ -50,12 +50,12 @@ def position_by_test(difference: float, p: float, level: float = LEVEL) -> str:
     return BELOW if significant and difference < 0 else INCONCLUSIVE
 
 
-def above(interval: Interval, bound: float = 0.0) -> Part:
+def verdict_above(interval: Interval, bound: float = 0.0) -> Part:
     """Whether something is above a bound."""
-    return {ABOVE: True, BELOW: False}.get(position(interval, bound))
+    return {ABOVE: True, BELOW: False}.get(position_of(interval, bound))
 
 
-def judged(*parts: Part) -> str:
+def judge_parts(*parts: Part) -> str:
     """The verdict on a claim of several parts.
 
     The claim holds if all parts are shown, and holds in part if some are. It does not hold if none
@@ -93,7 +93,7 @@ def on_front(costs: np.ndarray, values: np.ndarray) -> np.ndarray:
     return members
 
 
-def membership(
+def front_membership(
     costs: np.ndarray,
     values: np.ndarray,
     share: bool,
@@ -203,7 +203,7 @@ def may_be_best(
     shared = [np.minimum(looks[block, None], looks) for block in blocks]
     alphas = [1 - level_after(of_pairs, 1 - each) for of_pairs in shared]
     parts = [
-        _unbeaten(block, added, centred, mask, alpha)
+        _unbeaten_settings(block, added, centred, mask, alpha)
         for block, added, alpha in zip(blocks, rare, alphas, strict=True)
     ]
     return np.concatenate(parts) if parts else np.zeros(0, bool)
@@ -219,7 +219,7 @@ def _rare_leads(
     return -rare[1], -rare[0]
 
 
-def _unbeaten(
+def _unbeaten_settings(
     block: slice,
     rare: tuple[np.ndarray, np.ndarray] | None,
     values: np.ndarray,

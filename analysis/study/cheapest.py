@@ -12,10 +12,10 @@ from scipy.special import stdtrit
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.metrics import AGE, size_of, told
+from dess.analysis.metrics import AGE, column_as_told, size_of
 from dess.analysis.names import DECISIONS
 from dess.analysis.study.costs import Costs
-from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, needed
+from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, missions_needed
 from dess.analysis.study.stopping import MOST, Line, Samples, StrictTable, of_its_kind
 from dess.base.errors import shown
 from dess.physics.section import Integer, Number
@@ -50,8 +50,8 @@ class MeanTest:
         """Take more values into account, in the order of their replications."""
         if self.verdict != "open" or not len(values):
             return
-        met = _first(self._at_most.after(values) >= self._target)
-        missed = _first(self._at_least.after(1 - values) >= self._target)
+        met = _first_true(self._at_most.after(values) >= self._target)
+        missed = _first_true(self._at_least.after(1 - values) >= self._target)
         if min(met, missed) < len(values):
             self.verdict = "met" if met < missed else "missed"
         self.missions += min(met + 1, missed + 1, len(values))
@@ -74,7 +74,7 @@ class _Wealth:
         return np.logaddexp.reduce(paths, axis=0)
 
 
-def _first(holds: np.ndarray) -> int:
+def _first_true(holds: np.ndarray) -> int:
     """The index of the first true value, or the number of values if none is true."""
     return int(np.argmax(holds)) if holds.any() else len(holds)
 
@@ -167,19 +167,19 @@ class Question:
 
 def questions_about(values: Sequence[Mapping[str, Any]]) -> list[Question]:
     """A question for each condition and, if there are several, one for all of them together."""
-    conditions = grouped(values, decisions=False)
+    conditions = group_points(values, decisions=False)
     questions = [
         Question(json.loads(text), [[point] for point in points])
         for text, points in conditions.items()
     ]
     if len(conditions) > 1:
-        everywhere = grouped(values, decisions=True).values()
+        everywhere = group_points(values, decisions=True).values()
         fleets = [points for points in everywhere if len(points) == len(conditions)]
         questions.append(Question(None, fleets))
     return questions
 
 
-def grouped(values: Iterable[Mapping[str, Any]], decisions: bool) -> dict[str, list[int]]:
+def group_points(values: Iterable[Mapping[str, Any]], decisions: bool) -> dict[str, list[int]]:
     """Group design points that share either their decisions or their conditions.
 
     Args:
@@ -361,7 +361,7 @@ class Cheapest(StrictTable):
         Returns:
             For each design point at least the n missions given; exactly n if no more are needed.
         """
-        return needed(_Search(self, samples, settings).points.counts, samples)
+        return missions_needed(_Search(self, samples, settings).points.counts, samples)
 
     def choice(self, samples: Samples, settings: Sequence[Setting]) -> CheapestChoice:
         """The selected settings, and what is guaranteed about them.
@@ -398,7 +398,10 @@ class Cheapest(StrictTable):
         if not search.done or all(question.settled for question in search.questions):
             return None
         endless = self.model_copy(update={"budget": MOST})
-        names = ["cost", *(told(metric, search.samples[0]) for metric in self.requirements)]
+        names = [
+            "cost",
+            *(column_as_told(metric, search.samples[0]) for metric in self.requirements),
+        ]
         points = [*zip(search.samples, search.points.counts, strict=True)]
         times = 2
         while times <= FURTHER and times * search.points.counts.sum() <= MOST_FURTHER:
@@ -413,7 +416,7 @@ class Cheapest(StrictTable):
         if not search.done:
             return "none yet: the procedure needs more missions"
         low, high = (self._in_words(shift) for shift in (-self.tolerance, self.tolerance))
-        saving = numbers.money(self.indifference, search.settings[0].currency)
+        saving = numbers.format_money(self.indifference, search.settings[0].currency)
         words = (
             f"for each policy by itself, with probability at least {self.confidence:g}, all of "
             f"this holds: a setting that was found to meet the requirements has {low}; one that "
@@ -541,7 +544,7 @@ class _Search:
         points.costs[point] = np.mean(sample["cost"][:count])
         points.promising[point] = True
         for metric, test in self._tests[point].items():
-            values = np.asarray(sample[told(metric, sample)][:count], float)
+            values = np.asarray(sample[column_as_told(metric, sample)][:count], float)
             shares = as_share(metric, values, horizon)
             test.observe(shares[test.missions :])
             points.promising[point] &= shares.mean() >= test.required

@@ -110,7 +110,7 @@ class Costs(StrictTable):
         return np.bincount(mission, np.asarray(uavs[field]), missions)
 
 
-def stranded(uavs: Mapping[str, Any]) -> np.ndarray:
+def stranded_uavs(uavs: Mapping[str, Any]) -> np.ndarray:
     """(u,) whether UAVs that are not lost have no battery for their way home, by ``UAV_RECORD``.
 
     Where missions do not end on the ground, this is not paid for.

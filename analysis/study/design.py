@@ -201,7 +201,9 @@ class Sampled(_Design):
     def _points(self) -> Iterator[DesignPoint]:
         for unit in self._sample:
             places = zip(self.ranges.items(), unit, strict=False)  # the noise is last
-            values = {field: _scaled(u, ends, field in INTEGERS) for (field, ends), u in places}
+            values = {
+                field: _scale_to_range(u, ends, field in INTEGERS) for (field, ends), u in places
+            }
             yield DesignPoint(values, self._replication(unit))
 
     def _replication(self, unit: np.ndarray) -> int:
@@ -235,7 +237,7 @@ class Saltelli(Sampled):
     is one mission. With D factors (the fields and the replication), the points come in ``base``
     blocks of D + 2: a point of the sample A, then D points that differ from it in one factor each,
     whose value is taken from the sample B, then the point of B.
-    ``dess.analysis.answers.summary.sensitivity`` computes Sobol indices from the missions.
+    ``dess.analysis.answers.settings.sobol.sobol_indices`` computes Sobol indices from the missions.
 
     Source: A. Saltelli et al., Variance based sensitivity analysis of model output, Comput. Phys.
     Commun. 181 (2010) 259-270.
@@ -279,10 +281,10 @@ class Saltelli(Sampled):
         return sobol.sample(self.problem, self.base, calc_second_order=False, seed=self.seed)
 
     def _replication(self, unit: np.ndarray) -> int:
-        return _scaled(unit[-1], (0, self.replications - 1), True)
+        return _scale_to_range(unit[-1], (0, self.replications - 1), True)
 
 
-def _scaled(u: float, ends: tuple[Any, Any], is_integer: bool) -> Any:
+def _scale_to_range(u: float, ends: tuple[Any, Any], is_integer: bool) -> Any:
     """Map a number of [0, 1] to a value of a range."""
     low, high = ends
     if is_integer:

@@ -96,7 +96,7 @@ class Choice(Chosen):
         return self.best
 
 
-def needed(counts: np.ndarray, samples: Samples) -> list[int]:
+def missions_needed(counts: np.ndarray, samples: Samples) -> list[int]:
     """How many missions design points need, if those that they have are kept."""
     return [max(missions_of(s), int(n)) for s, n in zip(samples, counts, strict=True)]
 
@@ -173,7 +173,7 @@ class Selection(StrictTable):
         Returns:
             For each design point at least the n missions given; exactly n if no more are needed.
         """
-        return needed(_Race(self, self._values(samples)).counts, samples)
+        return missions_needed(_Race(self, self._values(samples)).counts, samples)
 
     def choice(self, samples: Samples, settings: Sequence[Any] = ()) -> Choice:
         """The selected design point, and what is guaranteed about it.
@@ -230,7 +230,7 @@ class Selection(StrictTable):
         )
 
 
-def _grown(count: int) -> int:
+def _grow_count(count: int) -> int:
     return count + max(count // 2, 1)
 
 
@@ -294,7 +294,7 @@ class _Race:
                     self._renew_margins(self.stage)
             last_stage = int(self.reach.max()) + 1  # by the variances known
             step = min(
-                _grown(target) - target,
+                _grow_count(target) - target,
                 max(last_stage - target, 1),
                 (self.rule.budget - int(self.counts.sum())) // len(self.alive),
             )
@@ -311,7 +311,7 @@ class _Race:
         ``reach`` has the stages from which the margins of all pairs are zero, h2 S2_il / delta^2:
         (s, s), of no meaning on the diagonal.
         """
-        self.renewal = _grown(stage) if self.is_bounded else np.inf
+        self.renewal = _grow_count(stage) if self.is_bounded else np.inf
         points, first, delta = len(self.values), self.rule.first, self.rule.indifference
         if points == 1:
             self.reach = np.zeros((1, 1))

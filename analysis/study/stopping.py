@@ -33,22 +33,22 @@ MOST = 1_000_000_000
 _GROWTH = 2.0
 
 
-def _printable(text: str) -> str:
+def _check_printable(text: str) -> str:
     if not text.isprintable():  # also half a character, which no encoding can write
         raise ValueError(f"{shown(text)} has characters that cannot be printed; allowed: a line")
     return text
 
 
-def _known(metric: str) -> str:
+def _check_metric(metric: str) -> str:
     if metric not in _METRICS:
         raise ValueError(f"{shown(metric)} is unknown{one_of(metric, _METRICS)}")
     return metric
 
 
 # A metric of missions; those of ``MEASURES`` only where the scenario measures them.
-Metric = Annotated[str, AfterValidator(_known)]
+Metric = Annotated[str, AfterValidator(_check_metric)]
 # A line of text, such as a name.
-Line = Annotated[str, AfterValidator(_printable)]
+Line = Annotated[str, AfterValidator(_check_printable)]
 Text = Annotated[Line, Field(max_length=4000)]
 
 
@@ -295,7 +295,7 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
     sums = np.cumsum(shifted**3) - 3 * means * np.cumsum(shifted**2)
     skewness = skewness_of(squares, sums + 2 * counts * means**3, counts)
     errors = np.sqrt(squares / np.maximum(counts - 1, 1) / counts)
-    quantiles = _student(1 << len(sample).bit_length())[: len(sample)]
+    quantiles = _student_quantiles(1 << len(sample).bit_length())[: len(sample)]
     low, high = ends_by_quantile(means, errors, skewness, counts, quantiles)
     widths = (high - low) / 2
     widths[:1] = np.inf
@@ -303,7 +303,7 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 @cache
-def _student(n: int) -> np.ndarray:
+def _student_quantiles(n: int) -> np.ndarray:
     """The (n,) quantiles of Student's t for samples of 1..n values."""
     freedom = np.maximum(np.arange(n), 1)
     return stdtrit(freedom, (1 + LEVEL) / 2)

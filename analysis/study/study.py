@@ -308,7 +308,7 @@ class Study(StudyData):
             # As the scenario has the values, which is the same for 1 and 1.0.
             key = frozenset((f, v if f == SEA else space.value(f)) for f, v in point.values.items())
             if key in found and not isinstance(self.design, Sampled):  # equal integers by chance
-                shown = _shown(point.values)
+                shown = _values_in_words(point.values)
                 raise InputError(f"design: {shown} is listed twice; allowed: once")
             found.add(key)
 
@@ -316,7 +316,7 @@ class Study(StudyData):
         if not values.keys() & {SEA, "grid", "rows", "cell_size"}:  # these move nodes of a file
             # An error is raised below, in the words of the scenario's file.
             with suppress(InputError, TypeError, ValueError):
-                return changed(self._fields, json.dumps(values))
+                return change_scenario(self._fields, json.dumps(values))
         try:
             space = scenario_at(self.scenario, values, **self.set)
             for field, cells in product(("grid", "rows", "cell_size"), ("nodes", "no_fly")):
@@ -325,11 +325,13 @@ class Study(StudyData):
                     raise InputError(f"{field} moves the {cells} of a file; allowed: cells")
             return space
         except InputError as error:
-            raise InputError(f"at {_shown(values)}: {error}" if values else str(error)) from None
+            raise InputError(
+                f"at {_values_in_words(values)}: {error}" if values else str(error)
+            ) from None
 
 
 @lru_cache(maxsize=2**15)
-def changed(scenario: str, values: str) -> ScenarioSpace:
+def change_scenario(scenario: str, values: str) -> ScenarioSpace:
     """A scenario with other values, both as JSON: a study and its manifests ask for it many times.
 
     Raises:
@@ -417,6 +419,6 @@ def budget_of(study: StudyData) -> str:
     return ", ".join([*words, *(f"another {key}" for key in changed)]) or "full"
 
 
-def _shown(values: dict[str, Any]) -> str:
+def _values_in_words(values: dict[str, Any]) -> str:
     text = ", ".join(f"{key}={value}" for key, value in values.items())
     return cut(text, MOST_CHARACTERS) or "the scenario as it is"

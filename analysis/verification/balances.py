@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from dess import InputError
-from dess.analysis.numbers import words
+from dess.analysis.numbers import join_words
 from dess.analysis.results import event_log
 from dess.analysis.results.chunks import MANIFEST
 from dess.analysis.results.tables import Results, load_results
@@ -19,7 +19,7 @@ from dess.analysis.verification.checks import (
     RECORDS,
     Check,
 )
-from dess.analysis.verification.measurements import CrossCheck, Log, longest
+from dess.analysis.verification.measurements import CrossCheck, Log, longest_logs
 from dess.base.files.reading import paths_in
 from dess.model.state import EAST, NORTH, SOUTH, WEST
 from dess.physics.fleet import type_of
@@ -60,7 +60,7 @@ def conservation_check(studies: Mapping[str, Results]) -> Check:
     Args:
         studies: Results by the name of their study.
     """
-    tables = [_imbalances(results) for results in studies.values()]
+    tables = [_imbalance_of_missions(results) for results in studies.values()]
     table = pd.concat(tables, ignore_index=True)
     error, bound = table.loc[(table["error"] / table["bound"]).idxmax()]
     seen = f"off by {error:.1e} of the data at most, {error / EPSILON:.0f} units of rounding"
@@ -69,7 +69,7 @@ def conservation_check(studies: Mapping[str, Results]) -> Check:
     return Check.exact(CONSERVATION, test, _KEPT, seen, len(table), error, float(bound))
 
 
-def _imbalances(results: Results) -> pd.DataFrame:
+def _imbalance_of_missions(results: Results) -> pd.DataFrame:
     """A row per mission: ``error``, as a share of its data, and the ``bound`` of rounding."""
     missions = pd.concat([results.missions, results.checks])
     spaces = [results.scenario(point) for point in range(len(results.manifest["points"]))]
@@ -117,7 +117,7 @@ def battery_errors(log: Log) -> np.ndarray:
     s, table = log.scenario, log.uav_slots
     uavs, charging = table.groupby("uav"), table["charging"]
     before = uavs["battery"].shift().fillna(table["uav"].map(_first_battery(s)))
-    flown = (before - s.flight_cost * (1 + _surcharges(s, table))).clip(lower=0)
+    flown = (before - s.flight_cost * (1 + _wind_surcharges(s, table))).clip(lower=0)
     flown = flown.where(~table["grounded"], before)
     right = (table["battery"] == flown).where(~charging, _charges_rightly(log, before))
     right &= ~charging | ((_zone_of(s, table) >= 0) & ~table["moved"])
@@ -143,7 +143,7 @@ def _first_battery(scenario: Scenario) -> dict[int, int]:
     return {i: kind.flying_time or scenario.flying_time for i, kind in enumerate(types)}
 
 
-def _surcharges(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
+def _wind_surcharges(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
     """(N,) the battery [%] that the wind costs in each UAV slot; a move pays in its first."""
     wind = scenario.wind
     field = surcharges(scenario.size, *wind.pushes(), wind.gusts, wind.seed)
@@ -187,7 +187,7 @@ def _adds_up(log: Log) -> bool:
     served = events[events["event"] == "communication"].groupby("uav")["value"]
     ends = events[(events["event"] == "mission_end") & (events["uav"] >= 0)].set_index("uav")
     of_mission = {
-        "slots": event_log.duration(events),
+        "slots": event_log.mission_length(events),
         "uav_slots": len(log.uav_slots),
         "arrived": value.get("arrival", 0.0),
         "success": filled == {*uavs.index},
@@ -214,7 +214,7 @@ def realisation_checks(results: Results, logs: Sequence[Log]) -> list[Check]:
     if len(results.policies) < 2:
         return []
     drawn = results.missions.groupby(["point", "replication"])[[*SAMPLED, "initial"]].nunique()
-    reference = {log.replication: log for log in longest(logs)}
+    reference = {log.replication: log for log in longest_logs(logs)}
     others = sum(not _same_realisation(log, reference[log.replication]) for log in logs)
     known, of_replication = "the same for all policies", "of a replication"
     return [
@@ -246,5 +246,5 @@ def engine_check(results: Results, again: CrossCheck) -> Check:
     test = f"Record of the {results.manifest['study']['engine']} engine, simulated again with SimPy"
     simulated = {mission.policy for mission in again.missions}
     if left_out := [policy for policy in results.policies if policy not in simulated]:
-        test += f"; not simulated again: {words(left_out)}"
+        test += f"; not simulated again: {join_words(left_out)}"
     return Check.exact(ENGINES, test, "equal, bit for bit", seen, n, differing)

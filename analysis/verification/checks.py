@@ -3,8 +3,8 @@
 A statistical check has a p-value; an exact check has an error and an upper bound of it::
 
     checks = [z_check(CHANNEL, "Mean", known=0, estimate=0.1, error=0.2, n=50), ...]
-    table = judge(checks)
-    overall(table)  # "**2 of 2 checks hold**. 1 is exact ..."
+    table = judge_checks(checks)
+    checks_summary(table)  # "**2 of 2 checks hold**. 1 is exact ..."
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ import pandas as pd
 from scipy import stats
 
 from dess.analysis import numbers
-from dess.analysis.stats.differences import adjust
+from dess.analysis.stats.differences import adjust_p_values
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 
@@ -87,12 +87,12 @@ class Check(NamedTuple):
             digits: Decimals of the estimate as text.
         """
         ends = (estimate - _NORMAL * error, estimate + _NORMAL * error)
-        seen = numbers.decimals(estimate, *ends, digits=digits)
+        seen = numbers.format_decimals(estimate, *ends, digits=digits)
         p = float(2 * stats.norm.sf(abs(estimate - known) / error))
         return cls(topic, test, f"{known:g}", seen, n, p)
 
 
-def judge(checks: Sequence[Check], alpha: float = ALPHA) -> pd.DataFrame:
+def judge_checks(checks: Sequence[Check], alpha: float = ALPHA) -> pd.DataFrame:
     """The verdicts on checks: by p-values corrected by Holm, and by the bounds of exact checks.
 
     Args:
@@ -105,7 +105,7 @@ def judge(checks: Sequence[Check], alpha: float = ALPHA) -> pd.DataFrame:
     """
     table = pd.DataFrame(checks, columns=Check._fields).astype({"p": float, "error": float})
     chance = table["p"].notna()
-    table.loc[chance, "p_adjusted"] = adjust(table.loc[chance, "p"].to_numpy(), "holm")
+    table.loc[chance, "p_adjusted"] = adjust_p_values(table.loc[chance, "p"].to_numpy(), "holm")
     fails = (table["p_adjusted"] <= alpha) | (table["error"] > table["bound"])
     decided = chance | table["error"].notna()
     verdicts = np.select([fails, decided], [REFUTED, HOLDS], INCONCLUSIVE)
@@ -116,7 +116,7 @@ def as_text(judged: pd.DataFrame) -> pd.DataFrame:
     """The table on the page: a row of text per check.
 
     Args:
-        judged: The result of ``judge``.
+        judged: The result of ``judge_checks``.
     """
     return pd.DataFrame(
         {
@@ -124,16 +124,17 @@ def as_text(judged: pd.DataFrame) -> pd.DataFrame:
             "Verdict": judged["verdict"],
             "Known": judged["known"],
             "Seen": judged["seen"],
-            "p-value or error": [_reason(row) for _, row in judged.iterrows()],
+            "p-value or error": [_reason_in_words(row) for _, row in judged.iterrows()],
             "n": judged["n"].map("{:,}".format),
         }
     )
 
 
-def _reason(row: pd.Series) -> str:
+def _reason_in_words(row: pd.Series) -> str:
     """The p-value and its correction, or the error and its bound."""
     if not np.isnan(row["p"]):
-        return f"p {numbers.p_value(row['p'])}, Holm {numbers.p_value(row['p_adjusted'])}"
+        adjusted = numbers.format_p_value(row["p_adjusted"])
+        return f"p {numbers.format_p_value(row['p'])}, Holm {adjusted}"
     if np.isnan(row["error"]):
         return ""
     if not row["bound"]:
@@ -141,9 +142,9 @@ def _reason(row: pd.Series) -> str:
     return f"error {row['error']:.2g}, allowed {row['bound']:.2g}"
 
 
-def answer(judged: pd.DataFrame) -> str:
+def checks_sentence(judged: pd.DataFrame) -> str:
     """How many checks hold, in a sentence."""
-    held, refuted = (len(_tests(judged, verdict)) for verdict in (HOLDS, REFUTED))
+    held, refuted = (len(_tests_with_verdict(judged, verdict)) for verdict in (HOLDS, REFUTED))
     exact, chance = judged["error"].count(), judged["p"].count()
     return (
         f"{held} of {len(judged)} comparisons with theory hold and {refuted} do not; {exact} are "
@@ -151,24 +152,26 @@ def answer(judged: pd.DataFrame) -> str:
     )
 
 
-def overall(judged: pd.DataFrame) -> str:
+def checks_summary(judged: pd.DataFrame) -> str:
     """A summary of all checks, as Markdown.
 
     Args:
-        judged: The result of ``judge``.
+        judged: The result of ``judge_checks``.
     """
-    refuted, open_tests = (_tests(judged, verdict) for verdict in (REFUTED, INCONCLUSIVE))
+    refuted, open_tests = (
+        _tests_with_verdict(judged, verdict) for verdict in (REFUTED, INCONCLUSIVE)
+    )
     n, exact, chance = len(judged), judged["error"].count(), judged["p"].count()
     if refuted:
-        verdict = f"**{len(refuted)} of {n} checks do not hold**: {numbers.words(refuted)}."
+        verdict = f"**{len(refuted)} of {n} checks do not hold**: {numbers.join_words(refuted)}."
     else:
         others = "; the others are inconclusive." if open_tests else "."
-        verdict = f"**{len(_tests(judged, HOLDS))} of {n} checks hold**{others}"
-    few = f" Too few observations for: {numbers.words(open_tests)}." if open_tests else ""
+        verdict = f"**{len(_tests_with_verdict(judged, HOLDS))} of {n} checks hold**{others}"
+    few = f" Too few observations for: {numbers.join_words(open_tests)}." if open_tests else ""
     alarm = f"any of them fails for at most one seed in {1 / ALPHA:.0f}"
     return (
         f"{verdict}{few} {exact} are exact. {chance} are statistical, judged at a level of "
-        f"{numbers.level(ALPHA)}: if the simulator is correct, {alarm}."
+        f"{numbers.format_level(ALPHA)}: if the simulator is correct, {alarm}."
     )
 
 
@@ -176,19 +179,19 @@ def on_topics(judged: pd.DataFrame, *topics: str) -> str:
     """How many checks of some topics hold, and which do not, as Markdown.
 
     Args:
-        judged: The result of ``judge``.
+        judged: The result of ``judge_checks``.
         topics: Constants of this module.
     """
     rows = judged[judged["topic"].isin(topics)]
     others = "".join(
-        f"; {verdict}: {numbers.words(tests)}"
+        f"; {verdict}: {numbers.join_words(tests)}"
         for verdict in (REFUTED, INCONCLUSIVE)
-        if (tests := _tests(rows, verdict))
+        if (tests := _tests_with_verdict(rows, verdict))
     )
-    return f"**{len(_tests(rows, HOLDS))} of {len(rows)} checks hold**{others}."
+    return f"**{len(_tests_with_verdict(rows, HOLDS))} of {len(rows)} checks hold**{others}."
 
 
-def _tests(judged: pd.DataFrame, verdict: str) -> list[str]:
+def _tests_with_verdict(judged: pd.DataFrame, verdict: str) -> list[str]:
     """The names of the tests with a verdict."""
     return judged.loc[judged["verdict"] == verdict, "test"].tolist()
 
@@ -240,7 +243,7 @@ def poisson_fit(counts: np.ndarray, mean: float) -> Fit:
     numbers = np.arange(int(law.ppf(1 - 1e-12)) + 1)
     frequent = numbers[n * law.pmf(numbers) >= LEAST]
     if not len(frequent):
-        return _fit(["0 or more"], np.array([n]), np.array([float(n)]))
+        return _fit_of_counts(["0 or more"], np.array([n]), np.array([float(n)]))
     low, high = int(frequent[0]), int(frequent[-1])
     low -= n * law.cdf(low - 1) >= LEAST
     high += n * law.sf(high) >= LEAST
@@ -251,7 +254,7 @@ def poisson_fit(counts: np.ndarray, mean: float) -> Fit:
     labels = [*map(str, classes)]
     labels[0] += " or less" if low > 0 else ""
     labels[-1] += " or more"
-    return _fit(labels, observed, n * np.diff(below, prepend=0.0))
+    return _fit_of_counts(labels, observed, n * np.diff(below, prepend=0.0))
 
 
 def uniform_fit(values: np.ndarray, low: int, high: int) -> Fit:
@@ -261,7 +264,9 @@ def uniform_fit(values: np.ndarray, low: int, high: int) -> Fit:
     """
     classes = np.arange(low, high + 1)
     observed = (np.asarray(values)[:, None] == classes).sum(0)
-    fit = _fit([*map(str, classes)], observed, np.full(len(classes), len(values) / len(classes)))
+    fit = _fit_of_counts(
+        [*map(str, classes)], observed, np.full(len(classes), len(values) / len(classes))
+    )
     return fit if fit.n == len(values) else fit._replace(p=0.0)
 
 
@@ -270,7 +275,7 @@ def chi_square(observed: np.ndarray, expected: np.ndarray, freedom: int) -> floa
     return float(stats.chi2.sf(((observed - expected) ** 2 / expected).sum(), freedom))
 
 
-def _fit(labels: Sequence[str], observed: np.ndarray, expected: np.ndarray) -> Fit:
+def _fit_of_counts(labels: Sequence[str], observed: np.ndarray, expected: np.ndarray) -> Fit:
     table = pd.DataFrame({"label": labels, "observed": observed, "expected": expected})
     if len(table) < 2 or expected.min() < LEAST:
         return Fit(table, None)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import integrate, stats
 
-from dess.analysis.stats.intervals import LEVEL, wilson
+from dess.analysis.stats.intervals import LEVEL, wilson_interval
 from dess.scenario.scenario import Scenario, ScenarioSpace
 
 World = Scenario | ScenarioSpace
@@ -25,7 +25,7 @@ class Moments(NamedTuple):
     deviation: float
 
 
-def distance(scenario: World, dx: Any, dy: Any) -> Any:
+def distance_to_node(scenario: World, dx: Any, dy: Any) -> Any:
     """Distance [m] between a node and a UAV that is ``dx, dy`` cells from above it."""
     across = scenario.cell_size * np.hypot(dx, dy)
     return np.hypot(across, scenario.altitude)
@@ -37,7 +37,7 @@ def mean_snr(scenario: World, distance: Any) -> Any:
     return scenario.edge_snr - 10 * scenario.path_loss_exponent * np.log10(distance / edge)
 
 
-def rate(scenario: World, snr: Any) -> Any:
+def rate_at_snr(scenario: World, snr: Any) -> Any:
     """Data units per communication slot at an SNR [dB] (eq. 9)."""
     length = scenario.slot_length / scenario.communication_slots
     efficiency = np.log1p(10 ** (np.asarray(snr) / 10)) / np.log(2)
@@ -60,7 +60,7 @@ def rate_moments(scenario: World, distance: float) -> Moments:
     def expectation(function: Any) -> float:
         def weighed(z: float) -> float:
             density = np.exp(-z * z / 2) / np.sqrt(2 * np.pi)
-            return float(function(rate(scenario, mean_db + spread * z)) * density)
+            return float(function(rate_at_snr(scenario, mean_db + spread * z)) * density)
 
         return float(integrate.quad(weighed, -_FAR, _FAR, limit=200, epsabs=0)[0])
 
@@ -89,7 +89,7 @@ def wilson_coverage(successes: int, missions: int, block: int, level: float = LE
         level: Confidence level of the interval.
     """
     numbers = np.arange(block + 1)
-    ends = [wilson(x, block, level) for x in range(block + 1)]
+    ends = [wilson_interval(x, block, level) for x in range(block + 1)]
     holds = np.array([e.low <= successes / missions <= e.high for e in ends])
     return float(stats.hypergeom(missions, successes, block).pmf(numbers)[holds].sum())
 

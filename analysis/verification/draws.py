@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from scipy import special, stats
 
-from dess.analysis.names import parameter
-from dess.analysis.numbers import decimals, interval, minus
-from dess.analysis.stats.intervals import Interval, mean_interval, wilson
+from dess.analysis.names import field_named
+from dess.analysis.numbers import format_decimals, format_interval, format_minus
+from dess.analysis.stats.intervals import Interval, mean_interval, wilson_interval
 from dess.analysis.verification import closed_forms
 from dess.analysis.verification.checks import (
     ARRIVALS,
@@ -138,7 +138,7 @@ def parameter_checks(missions: pd.DataFrame, space: ScenarioSpace) -> list[Check
     checks = []
     for field, fit in fits.items():
         low, high = getattr(space, field)
-        test = f"{parameter(field).name}: chi-square"
+        test = f"{field_named(field).name}: chi-square"
         checks.append(Check(DRAWS, test, f"uniform on {low}..{high}", fit.range, n, fit.p))
     return [*checks, *_independence_checks(missions[[*fits]])]
 
@@ -151,7 +151,7 @@ def _independence_checks(values: pd.DataFrame) -> list[Check]:
     table = np.corrcoef(values.rank(), rowvar=False)
     off = table[np.triu_indices(len(table), 1)]
     p = float(stats.chi2.sf(n * (off**2).sum(), len(pairs)))
-    seen = " to ".join(minus(f"{end:+.3f}") for end in (off.min(), off.max()))
+    seen = " to ".join(format_minus(f"{end:+.3f}") for end in (off.min(), off.max()))
     return [Check(DRAWS, "Correlations of all pairs: chi-square", "0", seen, n, p)]
 
 
@@ -180,7 +180,7 @@ def _distribution_check(per: str, values: np.ndarray, law: Any, known: str) -> C
     test = f"Initial data per {per}: Kolmogorov-Smirnov"
     if not values.size:
         return Check(DRAWS, test, known, "", 0)
-    seen = f"mean {decimals(*mean_interval(values))}; known {law.mean():.3f}"
+    seen = f"mean {format_decimals(*mean_interval(values))}; known {law.mean():.3f}"
     return Check(DRAWS, test, known, seen, values.size, float(stats.kstest(values, law.cdf).pvalue))
 
 
@@ -207,7 +207,7 @@ _COMMUNICATIONS = ["node", "value", "best", "known", "residual"]
 
 
 def rate_check(rates: pd.DataFrame) -> Check:
-    """Compare the mean rates of ``measurements.rates`` with the integral over all shadowing."""
+    """Compare the rates of ``measurements.compare_rates`` with the integral over all shadowing."""
     test = "Mean rate of a lone UAV at each distance: chi-square"
     known, n = "E[δ log₂(1 + SNR)] by integration", int(rates["n"].sum())
     off = float((rates["mean"] / rates["known"] - 1).abs().max())
@@ -219,9 +219,9 @@ def rate_check(rates: pd.DataFrame) -> Check:
 
 
 def shadowing_checks(deviates: np.ndarray) -> list[Check]:
-    """Compare the shadowing of ``measurements.deviates`` with independent normal variables."""
+    """Compare ``measurements.shadowing_deviates`` with independent normal variables."""
     n, test = deviates.size, "Correlation of a communication slot and the next"
-    mean, deviation = (minus(f"{value:.3f}") for value in (deviates.mean(), deviates.std()))
+    mean, deviation = (format_minus(f"{value:.3f}") for value in (deviates.mean(), deviates.std()))
     seen = f"mean {mean}, deviation {deviation}"
     p = float(stats.kstest(deviates, stats.norm.cdf).pvalue)
     correlation = float((deviates[1:] * deviates[:-1]).mean())
@@ -237,7 +237,7 @@ def communication_checks(logs: Sequence[Log], seed: int) -> list[Check]:
     Both are computed again from the formula, with the shadowing of that communication slot: the
     node with the highest SNR of those with data, and the smaller of its rate and its data.
     """
-    tables = [communications(log, seed) for log in logs]
+    tables = [recompute_communications(log, seed) for log in logs]
     table = pd.concat(tables) if tables else pd.DataFrame(columns=_COMMUNICATIONS, dtype=float)
     same = table[table["node"] == table["best"]]
     off = float((same["value"] / same["known"] - 1).abs().max()) if len(same) else 0.0
@@ -250,7 +250,7 @@ def communication_checks(logs: Sequence[Log], seed: int) -> list[Check]:
     return [choice, Check.exact(CHANNEL, test, known, seen, len(same), off, bound)]
 
 
-def communications(log: Log, seed: int) -> pd.DataFrame:
+def recompute_communications(log: Log, seed: int) -> pd.DataFrame:
     """Compute every communication of a log again.
 
     Returns:
@@ -264,20 +264,22 @@ def communications(log: Log, seed: int) -> pd.DataFrame:
     slot = np.ceil(rows["time"]).to_numpy(np.int64) - 1
     number = np.rint((rows["time"] - slot) * m).to_numpy(np.int64) - 1
     offset = rows[["x", "y"]].to_numpy()[:, None] - np.array(scenario.nodes)
-    distance = closed_forms.distance(scenario, offset[..., 0], offset[..., 1])
-    eta = _shadowing(seed, log, rows["uav"].to_numpy(np.int64), slot, number)
+    distance = closed_forms.distance_to_node(scenario, offset[..., 0], offset[..., 1])
+    eta = _shadowing_of_slots(seed, log, rows["uav"].to_numpy(np.int64), slot, number)
     snr = closed_forms.mean_snr(scenario, distance) + eta
     residual = log.residuals[served.to_numpy()]
     best = np.where(residual > 0, snr, -np.inf).argmax(1)
     row = np.arange(len(rows))
     factor = rows["uav"].map(lambda i: type_of(scenario.fleet, int(i)).rate).to_numpy()
-    rate = factor * closed_forms.rate(scenario, snr[row, best])
+    rate = factor * closed_forms.rate_at_snr(scenario, snr[row, best])
     left = residual[row, best]
     columns = (rows["node"].array, rows["value"].array, best, np.minimum(rate, left), left)
     return pd.DataFrame(dict(zip(_COMMUNICATIONS, columns, strict=True)))
 
 
-def _shadowing(seed: int, log: Log, uav: np.ndarray, slot: np.ndarray, n: np.ndarray) -> np.ndarray:
+def _shadowing_of_slots(
+    seed: int, log: Log, uav: np.ndarray, slot: np.ndarray, n: np.ndarray
+) -> np.ndarray:
     """The (E, K) shadowing [dB] of communication slots ``n`` = 0..m-1, for all nodes.
 
     Four communication slots share a block of four random words. One counter word of the generator
@@ -299,7 +301,7 @@ def _shadowing(seed: int, log: Log, uav: np.ndarray, slot: np.ndarray, n: np.nda
     return np.sqrt(log.scenario.shadowing_variance) * deviates
 
 
-def blocks(values: np.ndarray, size: int, share: bool) -> pd.DataFrame:
+def intervals_of_blocks(values: np.ndarray, size: int, share: bool) -> pd.DataFrame:
     """Intervals of blocks of missions, and whether each contains the mean of all missions.
 
     Args:
@@ -314,7 +316,7 @@ def blocks(values: np.ndarray, size: int, share: bool) -> pd.DataFrame:
         ``holds``.
     """
     whole = values[: len(values) // size * size].reshape(-1, size)
-    rows = [wilson(int(b.sum()), size) if share else mean_interval(b) for b in whole]
+    rows = [wilson_interval(int(b.sum()), size) if share else mean_interval(b) for b in whole]
     table = pd.DataFrame(rows, columns=Interval._fields)
     reference = whole.mean() if whole.size else np.nan
     holds = (table["low"] <= reference) & (reference <= table["high"])
@@ -326,9 +328,9 @@ def coverage_check(metric: str, values: np.ndarray, size: int, share: bool) -> C
 
     Args:
         metric: The name of the metric on the page.
-        values, size, share: As for ``blocks``.
+        values, size, share: As for ``intervals_of_blocks``.
     """
-    table = blocks(values, size, share)
+    table = intervals_of_blocks(values, size, share)
     n = len(table)
     test = f"{metric}: intervals of blocks of {size:,} missions"
     if n < 2 or np.ptp(values) == 0:  # coverage cannot be tested
@@ -338,6 +340,6 @@ def coverage_check(metric: str, values: np.ndarray, size: int, share: bool) -> C
         known = closed_forms.wilson_coverage(round(values[:missions].sum()), missions, size)
     else:
         known = closed_forms.t_coverage(missions, size)
-    seen = f"{hits:,} of {n:,}: {interval(*wilson(hits, n))}"
+    seen = f"{hits:,} of {n:,}: {format_interval(*wilson_interval(hits, n))}"
     p = float(stats.binomtest(hits, n, min(known, 1.0)).pvalue)
     return Check(COVERAGE, test, f"{100 * known:.1f} %", seen, n, p)

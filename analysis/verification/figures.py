@@ -19,7 +19,7 @@ SEEN, MISS, KNOWN = "#0072b2", "#d55e00", "#c9d3da"
 _ABOVE: dict = {"rows": 2, "values": "y", "sharex": True, "height_ratios": (2, 1), "legend": 2}
 
 
-def fit(observed: Fit, title: str, label: str) -> Figure:
+def plot_fit(observed: Fit, title: str, label: str) -> Figure:
     """Observed and expected numbers of observations, and their difference in standard errors.
 
     If the expected numbers differ by more than a factor of 100, their axis is logarithmic.
@@ -32,7 +32,7 @@ def fit(observed: Fit, title: str, label: str) -> Figure:
     table, spots = observed.table, np.arange(len(observed.table))
     expected = table["expected"]
     error = np.sqrt(expected * (1 - expected / expected.sum()).clip(lower=1e-12))
-    with style.panels(4.6, **_ABOVE) as (figure, (ax, below)):
+    with style.new_panels(4.6, **_ABOVE) as (figure, (ax, below)):
         ax.bar(spots, expected, 0.8, color=KNOWN, label="expected")
         ax.scatter(spots, table["observed"], s=26, color=SEEN, zorder=3, label="observed")
         ax.set_title(title, parse_math=True)
@@ -42,7 +42,7 @@ def fit(observed: Fit, title: str, label: str) -> Figure:
                 yscale="log", ylim=(max(table[["expected", "observed"]].min().min(), 1) / 3, None)
             )
         ax.yaxis.set_major_formatter("{x:,.0f}")
-        _deviations(below, spots, (table["observed"] - expected) / error)
+        _plot_deviations(below, spots, (table["observed"] - expected) / error)
         step = -(-len(table) // 12)  # as many labels as there is room for
         labels = [name.replace(" or ", "\nor ") for name in table["label"]]
         below.set_xticks(spots[::step], labels[::step])
@@ -50,29 +50,29 @@ def fit(observed: Fit, title: str, label: str) -> Figure:
     return figure
 
 
-def rates(table: pd.DataFrame, space: ScenarioSpace) -> Figure:
+def plot_rates(table: pd.DataFrame, space: ScenarioSpace) -> Figure:
     """The mean rate against the distance: closed form, simulation and their difference.
 
     Args:
-        table: The result of ``measurements.rates``.
+        table: The result of ``measurements.compare_rates``.
         space: The scenario.
     """
     away = np.geomspace(table["distance"].min(), table["distance"].max(), 60)
     known = [closed_forms.rate_moments(space, d).mean for d in away]
-    with style.panels(4.6, **_ABOVE) as (figure, (ax, below)):
+    with style.new_panels(4.6, **_ABOVE) as (figure, (ax, below)):
         ax.plot(away, known, color=style.INK, linewidth=1.3, zorder=1, label="by integration")
         ax.scatter(table["distance"], table["mean"], s=30, color=SEEN, zorder=3, label="simulated")
         ax.set(title="Mean rate of a lone UAV", ylabel="data units per\ncommunication slot")
         ax.set(xscale="log", yscale="log")
         ax.yaxis.set_major_formatter("{x:g}")
         error = table["error"].where(table["error"] > 0)
-        _deviations(below, table["distance"], (table["mean"] - table["known"]) / error)
+        _plot_deviations(below, table["distance"], (table["mean"] - table["known"]) / error)
         below.xaxis.set_major_formatter("{x:,.0f}")
         below.set_xlabel("distance [m]")
     return figure
 
 
-def slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
+def plot_slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
     """The order of events in a mission slot: a column of boxes, and an arrow back to the first.
 
     Args:
@@ -83,7 +83,7 @@ def slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
     """
     last, arrow = len(steps), {"arrowstyle": "-|>", "color": style.INK}
     box = {"boxstyle": "round", "edgecolor": style.MUTED}
-    with style.panels(0.8 * (last + 1)) as (figure, ax):
+    with style.new_panels(0.8 * (last + 1)) as (figure, ax):
         for number, (name, text) in enumerate([*steps, (end, "")]):
             fill = style.ZONE if number in (0, last) else style.SEA
             ax.text(0, -number, f"{name}\n{text}".strip(), va="center", fontsize=9.5,
@@ -97,7 +97,7 @@ def slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
     return figure
 
 
-def _deviations(ax: Axes, spots: "np.ndarray | pd.Series", deviations: pd.Series) -> None:
+def _plot_deviations(ax: Axes, spots: "np.ndarray | pd.Series", deviations: pd.Series) -> None:
     """Deviations in standard errors, and a band that contains all in 95 % of such figures."""
     band = stats.norm.ppf(1 - (1 - LEVEL) / 2 / max(len(deviations), 1))
     ax.axhspan(-band, band, color=KNOWN, alpha=0.45, linewidth=0)

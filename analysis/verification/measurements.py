@@ -4,8 +4,8 @@
 missions of a single UAV near a single node with both engines. The page reads them and simulates
 nothing::
 
-    make("results", results)
-    missions = read("results", results)
+    ensure_cross_check("results", results)
+    missions = read_cross_check("results", results)
     balances.engine_check(results, missions)
 
 In a mission, UAVs serve the node with the highest SNR, so the data that they collect are not a
@@ -24,7 +24,7 @@ import pandas as pd
 from dess import InputError, simulate, simulate_batch
 from dess.analysis.answers.missions import FOLDER, of_nodes
 from dess.analysis.results import event_log
-from dess.analysis.results.resimulate import Mission, difference, recorded
+from dess.analysis.results.resimulate import Mission, difference_in_words, stored_record
 from dess.analysis.results.tables import Results
 from dess.analysis.study.stopping import Text
 from dess.analysis.verification import closed_forms
@@ -65,7 +65,7 @@ class Log(Mission):
     def arrivals(self) -> np.ndarray:
         """(T, K) data units that arrived, by mission slot and node."""
         rows = self.events[self.events["event"] == "arrival"]
-        counts = np.zeros((event_log.duration(self.events), len(self.scenario.nodes)), int)
+        counts = np.zeros((event_log.mission_length(self.events), len(self.scenario.nodes)), int)
         slot = rows["time"].astype(int) - 1
         np.add.at(counts, (slot, rows["node"]), rows["value"].astype(int))
         return counts
@@ -88,7 +88,7 @@ def logs_of(results: Results) -> list[Log]:
     return [Log.of(results, policy, 0, n) for policy in results.policies for n in logged]
 
 
-def longest(logs: Sequence[Log]) -> list[Log]:
+def longest_logs(logs: Sequence[Log]) -> list[Log]:
     """The longest log of every replication; all policies meet the same arrivals in it."""
     by_replication: dict[int, Log] = {}
     for log in logs:
@@ -98,7 +98,7 @@ def longest(logs: Sequence[Log]) -> list[Log]:
     return [by_replication[replication] for replication in sorted(by_replication)]
 
 
-def arrivals(logs: Sequence[Log], space: ScenarioSpace) -> np.ndarray:
+def arrivals_by_slot(logs: Sequence[Log], space: ScenarioSpace) -> np.ndarray:
     """(T, K) data units that arrived, by slot and node; missions follow one after another."""
     none = np.zeros((0, len(space.nodes)), int)
     return np.concatenate([none, *(log.arrivals for log in logs)])
@@ -120,7 +120,7 @@ class Hovering:
         return np.full(len(view.uav), HOVER)
 
 
-def alone(space: ScenarioSpace, dx: int, dy: int, slots: int) -> ScenarioSpace:
+def scenario_of_one_uav(space: ScenarioSpace, dx: int, dy: int, slots: int) -> ScenarioSpace:
     """A scenario with the same channel, one UAV and one node ``dx, dy`` cells away.
 
     The mission lasts ``slots`` slots. The battery does not decrease, and the node is never empty.
@@ -132,7 +132,7 @@ def alone(space: ScenarioSpace, dx: int, dy: int, slots: int) -> ScenarioSpace:
     return ScenarioSpace.of(space, **still, **place, **data, quota=quota, max_slots=slots)
 
 
-def offsets(space: ScenarioSpace) -> list[tuple[int, int]]:
+def offsets_of_node(space: ScenarioSpace) -> list[tuple[int, int]]:
     """Offsets of the node from the UAV [cells], from none up to the whole grid."""
     along = [0, *(2**k for k in range(8) if 2**k < space.grid)]
     return [*((d, 0) for d in along), (space.grid - 1, space.grid - 1)]
@@ -144,26 +144,26 @@ def simulate_rates(space: ScenarioSpace, seed: int) -> list[float]:
     Every offset has its own replications, because the same replications have the same shadowing.
     """
     means = []
-    for number, (dx, dy) in enumerate(offsets(space)):
+    for number, (dx, dy) in enumerate(offsets_of_node(space)):
         replications = range(number * PER_DISTANCE, (number + 1) * PER_DISTANCE)
-        scenario = alone(space, dx, dy, SLOTS)
+        scenario = scenario_of_one_uav(space, dx, dy, SLOTS)
         missions = simulate_batch(scenario, Hovering(), seed, replications).missions
-        means.append(float(missions["collected"].sum() / _draws(space)))
+        means.append(float(missions["collected"].sum() / _draws_per_distance(space)))
     return means
 
 
 def simulate_slots(space: ScenarioSpace, seed: int, slots: int = LONG) -> list[float]:
     """Data of every communication slot of a mission with the SimPy engine [data units]."""
-    scenario = alone(space, space.grid // 2, 0, slots)
+    scenario = scenario_of_one_uav(space, space.grid // 2, 0, slots)
     log = simulate(
-        scenario, Hovering(), seed, len(offsets(space)) * PER_DISTANCE, events=True
+        scenario, Hovering(), seed, len(offsets_of_node(space)) * PER_DISTANCE, events=True
     ).events
     assert log is not None
     columns = log.columns()
     return columns["value"][columns["event"] == "communication"].tolist()
 
 
-def rates(space: ScenarioSpace, means: Sequence[float]) -> pd.DataFrame:
+def compare_rates(space: ScenarioSpace, means: Sequence[float]) -> pd.DataFrame:
     """The rates of ``simulate_rates`` together with those of the closed form.
 
     Returns:
@@ -171,26 +171,26 @@ def rates(space: ScenarioSpace, means: Sequence[float]) -> pd.DataFrame:
         communication slot], ``known`` and ``error``, the closed form's mean and the standard error
         of a mean of n draws.
     """
-    rows, n = [], _draws(space)
-    for (dx, dy), mean in zip(offsets(space), means, strict=True):
-        distance = float(closed_forms.distance(space, dx, dy))
+    rows, n = [], _draws_per_distance(space)
+    for (dx, dy), mean in zip(offsets_of_node(space), means, strict=True):
+        distance = float(closed_forms.distance_to_node(space, dx, dy))
         known, deviation = closed_forms.rate_moments(space, distance)
         rows.append((distance, n, mean, known, deviation / np.sqrt(n)))
     return pd.DataFrame(rows, columns=["distance", "n", "mean", "known", "error"])
 
 
-def deviates(space: ScenarioSpace, collected: Sequence[float]) -> np.ndarray:
+def shadowing_deviates(space: ScenarioSpace, collected: Sequence[float]) -> np.ndarray:
     """The shadowing in the data of ``simulate_slots``, in standard deviations.
 
     The SNR follows from the data of a communication slot (eq. 9), the shadowing from the SNR
     (eq. 10).
     """
-    distance = closed_forms.distance(space, space.grid // 2, 0)
+    distance = closed_forms.distance_to_node(space, space.grid // 2, 0)
     snr = closed_forms.snr_of(space, np.array(collected))
     return (snr - closed_forms.mean_snr(space, distance)) / np.sqrt(space.shadowing_variance)
 
 
-def _draws(space: ScenarioSpace) -> int:
+def _draws_per_distance(space: ScenarioSpace) -> int:
     """The number of communication slots per distance."""
     return PER_DISTANCE * SLOTS * space.communication_slots
 
@@ -247,10 +247,10 @@ def simulate_missions(
     """
     space, seed = results.scenario(), results.store.manifest.seed
     teams = {name: load_team(name) for name in results.policies if not files_of(name)}
-    missions, chosen = [], [*_chosen(results, teams, count)]
+    missions, chosen = [], [*_missions_to_repeat(results, teams, count)]
     for done, (policy, replication) in enumerate(chosen, 1):
         record = simulate(space, teams[policy], seed, replication)
-        differs = difference(record, recorded(results, policy, 0, replication))
+        differs = difference_in_words(record, stored_record(results, policy, 0, replication))
         missions.append(SimulatedAgain(policy=policy, replication=replication, differs=differs))
         if progress:
             progress(done, len(chosen))
@@ -262,7 +262,9 @@ def simulate_missions(
     )
 
 
-def _chosen(results: Results, policies: Iterable[str], count: int) -> Iterator[tuple[str, int]]:
+def _missions_to_repeat(
+    results: Results, policies: Iterable[str], count: int
+) -> Iterator[tuple[str, int]]:
     """The policies and replications of the missions to simulate again, at the first point."""
     missions = results.missions[results.missions["point"] == 0]
     for policy in policies:
@@ -271,7 +273,9 @@ def _chosen(results: Results, policies: Iterable[str], count: int) -> Iterator[t
         yield from ((policy, int(replication)) for replication in replications[rows])
 
 
-def make(folder: str | Path, results: Results, progress: Progress | None = None) -> None:
+def ensure_cross_check(
+    folder: str | Path, results: Results, progress: Progress | None = None
+) -> None:
     """Simulate the missions and write them, unless the folder has those of these results.
 
     Args:
@@ -283,7 +287,7 @@ def make(folder: str | Path, results: Results, progress: Progress | None = None)
         InputError: If those of the folder are damaged, or new ones cannot be written.
     """
     try:
-        read(folder, results)
+        read_cross_check(folder, results)
     except (Missing, Outdated):
         check_target(Path(folder) / FILE)
         write(simulate_missions(results, progress=progress), folder)
@@ -304,7 +308,7 @@ def write(missions: CrossCheck, folder: str | Path) -> Path:
     return path
 
 
-def read(folder: str | Path, results: Results) -> CrossCheck:
+def read_cross_check(folder: str | Path, results: Results) -> CrossCheck:
     """Read missions.
 
     Args:
@@ -318,6 +322,6 @@ def read(folder: str | Path, results: Results) -> CrossCheck:
     """
     path, space, key = Path(folder) / FILE, results.scenario(), results.store.manifest.key
     missions = CrossCheck.load(path, _ALLOWED, fixed={"study": key})
-    if len(missions.rates) != len(offsets(space)):
+    if len(missions.rates) != len(offsets_of_node(space)):
         raise InputError(f"{path}: rates: are not those of the study; allowed: {_ALLOWED}")
     return missions

@@ -1,7 +1,7 @@
 """All checks of the page of the verification, on the results that they compare::
 
 suite = Suite("results")
-table = judge(suite.checks(block=100))
+table = judge_checks(suite.checks(block=100))
 """
 
 from pathlib import Path
@@ -12,7 +12,7 @@ import pandas as pd
 from dess import InputError
 from dess.analysis.answers.summary import best_policy
 from dess.analysis.metrics import METRICS, SUCCESS
-from dess.analysis.numbers import words
+from dess.analysis.numbers import join_words
 from dess.analysis.results.tables import load_results
 from dess.analysis.verification import balances, draws, measurements
 from dess.analysis.verification.checks import Check
@@ -36,7 +36,7 @@ class Suite:
         missions: The missions of one policy, since policies share the draws.
         best: The policy whose intervals are checked.
         arrivals: (T, K) data units that arrived in all realisations, by mission slot and node.
-        rates: The rates of a single UAV, as ``measurements.rates`` returns them.
+        rates: The rates of a single UAV, as ``measurements.compare_rates`` returns them.
     """
 
     def __init__(self, folder: str | Path):
@@ -55,21 +55,21 @@ class Suite:
                     f"{Path(folder) / STUDY}: its scenario has {section}, which this page cannot "
                     "check; allowed: a study without them"
                 )
-        self.again = measurements.read(folder, self.study)
+        self.again = measurements.read_cross_check(folder, self.study)
         self.others, self.damaged = balances.studies_in(Path(folder), but=STUDY)
         self.studies = {STUDY: self.study, **self.others}
         self.logs = measurements.logs_of(self.study)
-        self.realisations = measurements.longest(self.logs)
+        self.realisations = measurements.longest_logs(self.logs)
         self.missions = self._missions_of(self.study.policies[0])
         self.best = best_policy(self.study.missions)
-        self.arrivals = measurements.arrivals(self.realisations, self.space)
-        self.rates = measurements.rates(self.space, self.again.rates)
+        self.arrivals = measurements.arrivals_by_slot(self.realisations, self.space)
+        self.rates = measurements.compare_rates(self.space, self.again.rates)
 
     @property
     def names(self) -> str:
         """The names of the studies in words, including those that cannot be loaded."""
-        unread = f" (not read, incomplete or of other code: {words(self.damaged)})"
-        return words([f"`{name}`" for name in self.studies]) + (unread if self.damaged else "")
+        unread = f" (not read, incomplete or of other code: {join_words(self.damaged)})"
+        return join_words([f"`{name}`" for name in self.studies]) + (unread if self.damaged else "")
 
     def _missions_of(self, policy: str) -> pd.DataFrame:
         missions = self.study.missions
@@ -94,7 +94,7 @@ class Suite:
             *draws.arrival_checks(self.arrivals, space.arrival_rate),
             draws.arrived_check(self.missions, space),
             draws.rate_check(self.rates),
-            *draws.shadowing_checks(measurements.deviates(space, self.again.slots)),
+            *draws.shadowing_checks(measurements.shadowing_deviates(space, self.again.slots)),
             *draws.communication_checks(logs, seed),
             balances.conservation_check(self.studies),
             balances.balance_check(logs),

@@ -7,7 +7,7 @@ imports the simulator, pandas or torch when it runs.
 import sys
 from collections.abc import Sequence
 
-from dess.analysis.execution import variable
+from dess.analysis.execution import set_variable
 from dess.reports.interrupts import EXIT_CODE, LINE, Interrupts
 
 
@@ -22,7 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     words = sys.argv[1:] if arguments is None else [*arguments]
     # Workers import nothing from the working directory, which may be a results folder.
-    safe = variable("PYTHONSAFEPATH", "1")
+    safe = set_variable("PYTHONSAFEPATH", "1")
     with safe, Interrupts(is_last=arguments is None) as interrupts:
         try:  # the imports take a while, in which a signal may come
             from dess.reports.cli import console

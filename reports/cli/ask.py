@@ -82,7 +82,7 @@ def sweep(
     from dess.analysis.ask import around
     from dess.analysis.ask.question import sweep_question
     from dess.analysis.ask.sweep import Sweep
-    from dess.analysis.metrics import ALIASES, PRODUCT, SUCCESS, told
+    from dess.analysis.metrics import ALIASES, PRODUCT, SUCCESS, column_as_told
 
     question = sweep_question(
         options.all_values(settings or []),
@@ -96,7 +96,7 @@ def sweep(
         results,
     )
     measured = question.study.metrics
-    ranking = told(ALIASES.get(metric or PRODUCT, metric or PRODUCT), measured)
+    ranking = column_as_told(ALIASES.get(metric or PRODUCT, metric or PRODUCT), measured)
     if ranking not in measured:
         allowed = one_of(metric, [*ALIASES, *measured])
         raise InputError(f"--metric: {shown(metric)} is not measured{allowed}")
@@ -104,7 +104,9 @@ def sweep(
     found = _run(question, page, out, workers, dry_run, yes)
     answer = Sweep(question, found)
     parameters = {"metric": ranking} if metric else {}
-    changes = around.around(found, question.study.scenario) if question.study.selection else None
+    changes = (
+        around.question_around(found, question.study.scenario) if question.study.selection else None
+    )
     if changes:
         _run(changes, page, out, workers, dry_run, yes)
 
@@ -244,24 +246,24 @@ def _print_settings(answer: "Sweep", ranking: str) -> None:
     import pandas as pd
 
     from dess.analysis import numbers
-    from dess.analysis.answers.fleet import home
-    from dess.analysis.answers.settings import varied
+    from dess.analysis.answers.settings.home import with_way_home
+    from dess.analysis.answers.settings.points import varied_values
     from dess.analysis.metrics import COST, PRODUCT, SUCCESS, metric_of
-    from dess.analysis.names import parameter
+    from dess.analysis.names import field_named
 
     prices = answer.question.study.costs
     table = answer.table(ranking)
     top = table.head(SHOWN)
     cells = pd.DataFrame({"rank": top["rank"], "": np.where(top["tied"], "≈", "")})
     cells["policy"] = top["policy"]
-    for field in varied(answer.results):
-        cells[field] = top[field].map(parameter(field).cell)
-    shown = home.beside_success(answer.results, [ranking, SUCCESS, PRODUCT])
+    for field in varied_values(answer.results):
+        cells[field] = top[field].map(field_named(field).cell)
+    shown = with_way_home(answer.results, [ranking, SUCCESS, PRODUCT])
     for metric in map(metric_of, shown):
         if metric.column != COST:
-            cells[metric.head] = numbers.estimates(top, metric.column, metric.written)
+            cells[metric.head] = numbers.format_estimates(top, metric.column, metric.written)
     if prices:
-        cells[COST] = [numbers.money(cost, prices.currency) for cost in top[COST]]
+        cells[COST] = [numbers.format_money(cost, prices.currency) for cost in top[COST]]
     console.print_table([*map(str, cells)], cells.astype(str).to_numpy().tolist())
     first = f", the first {SHOWN} are shown" if len(table) > SHOWN else ""
     what = metric_of(ranking).within
@@ -278,7 +280,7 @@ def _print_fleets(answer: "Sweep", further: str) -> None:
         further: A metric that is shown beside those of the requirements.
     """
     from dess.analysis.answers.fleet import cheapest
-    from dess.analysis.answers.fleet.requirements import in_words, required
+    from dess.analysis.answers.fleet.requirements import requirements_in_words, requirements_of
     from dess.analysis.ask import around
     from dess.reports.cli.tables import print_frame
 
@@ -289,10 +291,10 @@ def _print_fleets(answer: "Sweep", further: str) -> None:
     shown = f", {SHOWN} of them shown" if len(rows) > SHOWN else ""
     console.say(
         f"{len(rows):,} pairs of a fleet and a policy{shown}, the cheapest first; required: "
-        f"{in_words(required(results))}; {cheapest.VERDICTS_EXPLAINED}"
+        f"{requirements_in_words(requirements_of(results))}; {cheapest.VERDICTS_EXPLAINED}"
     )
     if around.is_known(results):
-        print_frame("What if", around.table(results).cells.set_index("What if"))
+        print_frame("What if", around.table_around(results).cells.set_index("What if"))
 
 
 def _print_measures(answer: "WhatIf") -> None:

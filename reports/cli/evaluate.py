@@ -41,8 +41,8 @@ def evaluate(
         out: Keep the missions in this results folder, which dess study show and dess report read;
             with more missions, those that are there are not simulated again.
     """
-    from dess.analysis.execution.evaluation import Asked, check_evaluation, means
-    from dess.analysis.metrics import known_of
+    from dess.analysis.execution.evaluation import Asked, check_evaluation, estimate_means
+    from dess.analysis.metrics import metric_for_length
     from dess.analysis.study.study import engine_of
     from dess.model.record import measures_of
     from dess.policies.registry import typed
@@ -59,7 +59,7 @@ def evaluate(
         with console.compile_notice():
             check_evaluation(asked, yes)
         with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
-            evaluations = [means(of_team, bar.update) for of_team in asked]
+            evaluations = [estimate_means(of_team, bar.update) for of_team in asked]
         options.note_departures(policy, [space])
     unknown = dict.fromkeys(("mean", "low", "high"), nan)
     rows = [
@@ -72,7 +72,7 @@ def evaluate(
             "seconds": evaluation.seconds,
         }
         | {
-            name: of.interval(known_of(name, space.max_slots, space.units))._asdict()
+            name: of.interval(metric_for_length(name, space.max_slots, space.units))._asdict()
             for name, of in evaluation.moments.items()
         }
         | {name: unknown for name in measures_of(space) if name not in evaluation.moments}
@@ -115,11 +115,13 @@ def _without_nan(row: Any) -> Any:
 
 
 def _print_rows(rows: list[dict[str, Any]]) -> None:
-    from dess.analysis.metrics import told
+    from dess.analysis.metrics import column_as_told
 
     for row in rows:
         metrics = {name: of for name, of in row.items() if isinstance(of, dict)}
-        metrics = {name: of for name, of in metrics.items() if told(name, metrics) == name}
+        metrics = {
+            name: of for name, of in metrics.items() if column_as_told(name, metrics) == name
+        }
         cells = [[name, *(f"{x:.4f}" for x in value.values())] for name, value in metrics.items()]
         console.print_table([row["policy"], "mean", "low", "high"], cells)
         engine = ", SimPy engine" if row["engine"] == "events" else ""

@@ -84,7 +84,7 @@ def show_scenario(
         everything: Show the defaults and what is allowed as well, in full.
         figure: Draw the map of the sea into this file, also if its nodes or zones are refused.
     """
-    from dess.analysis.names import fields
+    from dess.analysis.names import declared_fields
     from dess.scenario.scenario import draft_scenario, scenario_description
 
     console.check_ending("--figure", figure, FIGURES, "a picture")
@@ -97,7 +97,7 @@ def show_scenario(
     space = load_space(name, settings)
     description = scenario_description(name)
     if as_json:
-        rows = [field._asdict() for field in fields(space)]
+        rows = [field._asdict() for field in declared_fields(space)]
         shown = {"scenario": name, "description": description, "fields": rows}
         units = {"units": space.units._asdict()} if space.units else {}
         print(json.dumps(shown | units, indent=2))
@@ -106,13 +106,13 @@ def show_scenario(
         if text:
             console.say(text)
     if everything:
-        for f in fields(space):
+        for f in declared_fields(space):
             default = f"default {_value(f.default)}" if f.default is not None else "no default"
             console.say(f"{f.name} = {_value(f.value)} {f.unit}".rstrip())
             console.say(f"    {f.meaning}; {default}; allowed: {f.allowed}")
         return
     heads = ["field", "value", "unit", "meaning"]
-    rows_ = [[f.name, cut(_value(f.value), 20), f.unit, f.meaning] for f in fields(space)]
+    rows_ = [[f.name, cut(_value(f.value), 20), f.unit, f.meaning] for f in declared_fields(space)]
     columns = [*zip(*rows_, strict=True)][:-1]
     rest = console.WIDTH - sum(max(map(len, column)) + 2 for column in columns)
     lines = [
@@ -137,7 +137,7 @@ def new_scenario(
         answers: An answer, such as endurance="35 min"; repeatable.
     """
     from dess.analysis.figures.missions import sea_figure
-    from dess.analysis.names import placing
+    from dess.analysis.names import node_placing_sentence
     from dess.scenario.new_sea import NewScenario
     from dess.scenario.scenario import DRAFT, parsed_scenario
 
@@ -161,7 +161,7 @@ def new_scenario(
         fill(file, text)
         save_figure(sea_figure(draft), drawing, "png")
     if on_land:
-        console.say(f"note: no-fly cells have nodes.{placing(draft)}", sys.stderr)
+        console.say(f"note: no-fly cells have nodes.{node_placing_sentence(draft)}", sys.stderr)
     try:
         space = parsed_scenario(text, path)
     except InputError as error:

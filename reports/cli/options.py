@@ -269,7 +269,7 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
     Raises:
         InputError: If the text has another form, or a range is none.
     """
-    from dess.analysis.ask.question import listed
+    from dess.analysis.ask.question import list_values
 
     field, equals, values = (part.strip() for part in text.partition("="))
     if equals:
@@ -277,7 +277,7 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
     if is_quantity(field):
         values = _quoted(values, is_single=False)
     elif found := _RANGE.fullmatch(values):
-        return field, listed(field, _range(field, text, **found.groupdict()))
+        return field, list_values(field, _range(field, text, **found.groupdict()))
     try:
         given = setting(f"{field}=[{values}]" if equals else text, allowed="")[1]
     except InputError:
@@ -287,7 +287,7 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
             _check_word(field, word)
         if not equals or len(named) < len(given):
             raise _refused(text, "is not KEY=VALUES", ALLOWED) from None
-    return field, listed(field, given)
+    return field, list_values(field, given)
 
 
 def _range(field: str, text: str, low: str, high: str, count: str | None) -> Any:

@@ -215,18 +215,18 @@ class _Mission:
 
     @property
     def outcome(self) -> str:
-        from dess.analysis.metrics import lasting
-        from dess.analysis.numbers import percent
-        from dess.analysis.results.event_log import causes
+        from dess.analysis.metrics import format_length
+        from dess.analysis.numbers import format_percent
+        from dess.analysis.results.event_log import causes_of_failure
 
         ends = [uav["end"] for uav in self.record.uav_rows()]
         ended = sum(end in ("quota", "landed") for end in ends)
         outcome = (
-            f"{percent(self.record.collection_ratio)} of the data collected in "
-            f"{lasting(self.record.slots, self.scenario.units)}; {ended} of {len(ends)} UAVs "
+            f"{format_percent(self.record.collection_ratio)} of the data collected in "
+            f"{format_length(self.record.slots, self.scenario.units)}; {ended} of {len(ends)} UAVs "
             f"{self.scenario.aim}."
         )
-        return " ".join([outcome, *(f"{c}." for c in causes(self.log, self.scenario))])
+        return " ".join([outcome, *(f"{c}." for c in causes_of_failure(self.log, self.scenario))])
 
 
 def _write_log(mission: _Mission, path: Path, kind: str) -> None:
@@ -297,19 +297,20 @@ def _metrics(mission: _Mission) -> dict[str, float]:
 
 def _told(values: dict[str, Any], mission: _Mission) -> dict[str, Any]:
     """Values of the mission; with a data sheet, in units as well."""
-    from dess.analysis.metrics import in_units
+    from dess.analysis.metrics import columns_in_units
 
     units = mission.scenario.units
-    return values | in_units(values, units) if units else values
+    return values | columns_in_units(values, units) if units else values
 
 
 def _print_mission(mission: _Mission) -> None:
-    from dess.analysis.metrics import measured_in, metric_of, told
-    from dess.analysis.results.event_log import causes, residual_data
+    from dess.analysis.metrics import column_as_told, measured_in, metric_of
+    from dess.analysis.results.event_log import causes_of_failure, residual_data
 
     metrics = _metrics(mission)
     rows = [
-        [name, f"{metrics[name]:g}"] for name in dict.fromkeys(told(n, metrics) for n in metrics)
+        [name, f"{metrics[name]:g}"]
+        for name in dict.fromkeys(column_as_told(n, metrics) for n in metrics)
     ]
     console.print_table(["", "mission"], rows)
     if measured := _told(mission.record.measured, mission):
@@ -324,5 +325,5 @@ def _print_mission(mission: _Mission) -> None:
         of_nodes = zip(names, mission.scenario.nodes, data[0], data[-1], strict=True)
         rows = [[name, str([*cell]), f"{had:g}", f"{left:g}"] for name, cell, had, left in of_nodes]
         console.print_table(["node", "cell", "data at the start", "at the end"], rows)
-    for cause in causes(mission.log, mission.scenario, first=0):  # as in the table
+    for cause in causes_of_failure(mission.log, mission.scenario, first=0):  # as in the table
         console.say(f"{cause}.")

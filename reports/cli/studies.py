@@ -118,21 +118,21 @@ def _run(study: "Study", out: Path, workers: int, scheduler: str | None, accept:
 
 def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
     """Print the missions that a run would simulate, and the range of its time."""
-    from dess.analysis.execution.effort import budget, total
+    from dess.analysis.execution.effort import largest_budget, total_time
 
     rows = [[p.policy, f"{p.missions:,}", f"{p.present:,}", str(p.seconds)] for p in plan]
     console.print_table(["policy", "missions", "present", "time on one core"], rows)
     per_cell = f"{study.first} replications"
     if study.rule:
         rule = "selection" if study.selection else "precision"
-        per_cell += f" and more, up to {budget(study):,} missions, as {rule} asks"
+        per_cell += f" and more, up to {largest_budget(study):,} missions, as {rule} asks"
     missions = sum(p.missions for p in plan[: len(study.policies)])
     console.say(
         f"{out}: {missions:,} missions of study {study.name} ({len(study.policies)} policies "
         f"x {study.size:,} design points x {per_cell})"
     )
     console.say(
-        f"{total(plan, workers)} with {workers} at work, by the usual speed of such missions; "
+        f"{total_time(plan, workers)} with {workers} at work, by the usual speed of such missions; "
         "compiling, on the first run, takes a few minutes more"
     )
 
@@ -160,7 +160,7 @@ def show(
     """
     from dess.analysis import numbers
     from dess.analysis.answers import summary
-    from dess.analysis.metrics import told
+    from dess.analysis.metrics import column_as_told
     from dess.reports.cli import tables as printed
 
     if as_csv and as_json:
@@ -171,11 +171,11 @@ def show(
         raise InputError(
             f"--policy: {policy!r} is not in the study{one_of(policy, results.policies)}"
         )
-    targets = {told(metric, results.missions): end for metric, end in targets.items()}
-    means = summary.meeting(summary.means(results), targets)
-    means = summary.with_verdicts(results, means)
+    targets = {column_as_told(metric, results.missions): end for metric, end in targets.items()}
+    means = summary.settings_meeting(summary.means_of_points(results), targets)
+    means = summary.add_verdicts(results, means)
     if as_csv:
-        console.say(numbers.csv(_with_values(results, means)).rstrip())
+        console.say(numbers.write_csv(_with_values(results, means)).rstrip())
     elif as_json:
         tables = _tables(results, means, policy, worst, folder)
         print(json.dumps(_document(results, tables, targets), indent=2))
@@ -225,21 +225,23 @@ def _tables(
     """All tables, by their names in the JSON."""
     import pandas as pd
 
-    from dess.analysis.answers import costs, optimality, summary
+    from dess.analysis.answers import optimality, summary
+    from dess.analysis.answers.fleet.costs import cost_front
+    from dess.analysis.answers.settings.sobol import sobol_indices_of
 
     policy = policy or summary.best_policy(results.missions)
     return {
         "means": means,
-        "distributions": summary.distributions(results),
-        "precisions": summary.precisions(results),
-        "comparisons": summary.comparisons(results),
-        "learned_against_heuristic": summary.learned_against_heuristic(results),
-        "sensitivities": summary.sensitivities(results),
-        "costs": costs.front(results) if results.study.costs else pd.DataFrame(),
-        "selected": summary.selections(results),
+        "distributions": summary.product_distributions(results),
+        "precisions": summary.reached_precisions(results),
+        "comparisons": summary.compare_with_best(results),
+        "learned_against_heuristic": summary.compare_learned_with_heuristic(results),
+        "sensitivities": sobol_indices_of(results),
+        "costs": cost_front(results) if results.study.costs else pd.DataFrame(),
+        "selected": summary.selected_settings(results),
         "gaps": optimality.by_fleet(results),
-        "checks": summary.checks(results),
-        "worst": summary.worst(results, policy, worst, folder=folder),
+        "checks": summary.means_of_check(results),
+        "worst": summary.worst_missions(results, policy, worst, folder=folder),
     }
 
 
@@ -287,7 +289,7 @@ def diff(
     from dess.analysis.answers import diff
     from dess.reports.cli.tables import print_diff
 
-    found = diff.diff(_results(a), _results(b))
+    found = diff.diff_results(_results(a), _results(b))
     if as_json:
         print(json.dumps(_diff_document(found, most), indent=2))
     else:
@@ -301,8 +303,8 @@ def _diff_document(found: "Diff", most: int) -> dict:
     identity = ["policy_a", "policy_b", "point_a", "point_b", "replication", "fields"]
     tables = {
         "alone": found.alone,
-        "policies": diff.effects(found),
-        "points": diff.effects(found, ["policy_a", "point_a"]),
+        "policies": diff.estimate_differences(found),
+        "points": diff.estimate_differences(found, ["policy_a", "point_a"]),
         "changed": found.changed[identity],
         "most_changed": diff.most_changed(found, most)[[*identity, "command_a", "command_b"]],
     }
@@ -313,7 +315,7 @@ def _diff_document(found: "Diff", most: int) -> dict:
         "paired": found.unpaired is None,
         "missions": len(found.missions),
         "differ": len(found.changed),
-        "origins": diff.origins(found),
+        "origins": diff.differing_origins(found),
         **{name: json.loads(table.to_json(orient="records")) for name, table in tables.items()},
     }
 

@@ -6,14 +6,16 @@ from pathlib import Path
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.answers import costs, diff, optimality, summary
+from dess.analysis.answers import diff, optimality, summary
 from dess.analysis.answers.fleet import cheapest
-from dess.analysis.answers.settings import in_words, setting_of
+from dess.analysis.answers.fleet.costs import setting_cells
+from dess.analysis.answers.settings.points import points_in_words, setting_in_words
+from dess.analysis.answers.settings.sobol import index_table
 from dess.analysis.metrics import EITHER, METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
 from dess.analysis.paper import values
 from dess.analysis.results.tables import Results
-from dess.analysis.tables import compared, counts
-from dess.analysis.tables import means as means_table
+from dess.analysis.tables import comparison_cells, format_counts
+from dess.analysis.tables import means_table as means_table
 from dess.reports.cli import console
 
 _SHORT = {name: metric_of(metric).head for metric, name in METRICS.items()}
@@ -29,24 +31,26 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         console.say(f" accepted: {change.text}")
     printed = values.PRINTED.get(study.name, {})
     if study.selection:
-        selected = summary.selections(results)
+        selected = summary.selected_settings(results)
         _print_selections(selected)
         is_search = "condition" in selected
         if is_search and study.costs:
-            for text in cheapest.sentences(results):
+            for text in cheapest.cheapest_sentences(results):
                 console.say(f" {text.translate(str.maketrans('', '', '*`'))}")
         if len(results.checks):
-            means = summary.checks(results)
+            means = summary.means_of_check(results)
             checks = study.selection.check
             if is_search:
                 pairs = means[["policy", "point"]].itertuples(index=False)
-                means = means.assign(policy=[setting_of(results, *pair) for pair in pairs])
+                means = means.assign(policy=[setting_in_words(results, *pair) for pair in pairs])
             _print_means(means, f"{checks} further missions", printed)
     elif len(results.store.manifest.points) == 1:
-        _print_means(summary.means(results), "mean, 95 % interval", printed)
+        _print_means(summary.means_of_points(results), "mean, 95 % interval", printed)
     elif short:
         few = len(results.store.manifest.points) <= MANY_POINTS
-        _print_by_point(results, summary.means(results) if few else pd.DataFrame(), [PRODUCT])
+        _print_by_point(
+            results, summary.means_of_points(results) if few else pd.DataFrame(), [PRODUCT]
+        )
 
 
 def print_details(
@@ -64,7 +68,7 @@ def print_details(
     printers = {
         "sensitivities": lambda table: _print_titled(
             "shares of the collection ratio's variance:",
-            summary.index_table(table[table["metric"] == RATIO]).cells.drop(columns="Metric"),
+            index_table(table[table["metric"] == RATIO]).cells.drop(columns="Metric"),
         ),
         "costs": lambda table: _print_costs(table, results.manifest["study"]["costs"]["currency"]),
         "means": lambda means: _print_by_point(results, means, metrics),
@@ -72,7 +76,7 @@ def print_details(
         "precisions": lambda table: _print_precisions(results, table),
         "comparisons": lambda table: _print_comparisons(results, table),
         "gaps": lambda table: print_frame(
-            "optimality gap", optimality.listed(table).set_index("Policy")
+            "optimality gap", optimality.fleet_bound_table(table).set_index("Policy")
         ),
         "learned_against_heuristic": _print_learners,
         "worst": _print_worst,
@@ -98,7 +102,7 @@ def _print_selections(selected: pd.DataFrame) -> None:
     """The selected point of every policy, and the guarantee of the procedure."""
     heads = ["condition"] if "condition" in selected and any(selected["condition"]) else []
     cells = selected.set_index("policy")[[*heads, "setting", "missions", "left"]]
-    cells["missions"] = counts(cells["missions"])
+    cells["missions"] = format_counts(cells["missions"])
     print_frame("selected for", cells)
     for guarantee in dict.fromkeys(selected["guarantee"]):
         console.say(f" {guarantee}")
@@ -109,15 +113,15 @@ def _print_costs(table: pd.DataFrame, currency: str) -> None:
     if len(table) > MANY_POINTS:
         console.say(f"the costs of {len(table)} settings are too many to list; --json has them")
         return
-    cells = costs.cells(table, [SUCCESS])
-    cells["On the front"] = table["probability"].map(numbers.percent)
+    cells = setting_cells(table, [SUCCESS])
+    cells["On the front"] = table["probability"].map(numbers.format_percent)
     _print_titled(f"cost [{currency}] against success:", cells)
 
 
 def _print_precisions(results: Results, table: pd.DataFrame) -> None:
     """The precision of each estimate beside its target, with the design points in words."""
     cells = summary.precision_table(table, most=None).cells
-    points = in_words(results)
+    points = points_in_words(results)
     cells["Point"] = cells["Point"].map(points.__getitem__)
     _print_titled("precision:", cells)
 
@@ -126,17 +130,19 @@ def _print_means(means: pd.DataFrame, title: str, printed: Mapping[str, float]) 
     """A row per policy, and one with the values that the paper prints; a column per metric."""
     cells = means_table(means).cells.drop(columns="Missions").set_index("Policy")
     if printed:
-        cells.loc["paper"] = [numbers.percent(printed[metric]) for metric in METRICS]
+        cells.loc["paper"] = [numbers.format_percent(printed[metric]) for metric in METRICS]
     print_frame(title, cells)
     measured = means[means["metric"].isin(EITHER)]
     if not measured.empty:
-        cells = numbers.wide(measured, "metric", "policy", numbers.quantities).fillna("")
+        cells = numbers.estimates_as_text(
+            measured, "metric", "policy", numbers.format_quantities
+        ).fillna("")
         print_frame(title, cells.rename(index=lambda metric: metric_of(metric).label))
 
 
 def _print_by_point(results: Results, means: pd.DataFrame, metrics: list[str]) -> None:
     """A table per metric, a row per design point, if there are several and not too many."""
-    points = in_words(results)
+    points = points_in_words(results)
     if len(points) == 1:
         return
     if len(points) > MANY_POINTS:
@@ -144,7 +150,9 @@ def _print_by_point(results: Results, means: pd.DataFrame, metrics: list[str]) -
         return
     for metric in metrics:
         rows = means[means["metric"] == metric]
-        cells = numbers.wide(rows, "point", "policy", metric_of(metric).written).fillna("")
+        cells = numbers.estimates_as_text(
+            rows, "point", "policy", metric_of(metric).written
+        ).fillna("")
         if metric == PRODUCT and "verdict" in rows and len(cells.columns) > 1:
             cells["best"] = _best(rows)
         print_frame(metric_of(metric).head, cells.rename(index=dict(enumerate(points))))
@@ -166,7 +174,7 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
 
     Args:
         results: The study.
-        means: Rows of ``summary.with_verdicts`` of these settings.
+        means: Rows of ``summary.add_verdicts`` of these settings.
         targets: Metric -> the least mean.
     """
     asked = [
@@ -177,12 +185,12 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
     product = means[means["metric"] == PRODUCT].set_index(["policy", "point"])
     count = f"{len(product):,} of {len(results.store.manifest.points) * len(results.policies):,}"
     meet = "meets" if len(product) == 1 else "meet"
-    console.say(f"{count} settings {meet} {numbers.words(asked)}, by the whole interval")
+    console.say(f"{count} settings {meet} {numbers.join_words(asked)}, by the whole interval")
     if product.empty:
         return
-    cells = numbers.wide(means[means["metric"].isin(METRICS)], ["policy", "point"])
+    cells = numbers.estimates_as_text(means[means["metric"].isin(METRICS)], ["policy", "point"])
     cells = cells.rename(columns=METRICS).assign(**{"of these policies": product["verdict"]})
-    names = [setting_of(results, *setting) for setting in cells.index]
+    names = [setting_in_words(results, *setting) for setting in cells.index]
     print_frame("setting", cells.set_axis(names, axis="index")[:MANY_POINTS])
     if len(cells) > MANY_POINTS:
         console.say(f" {len(cells) - MANY_POINTS:,} more settings; --csv has them")
@@ -191,7 +199,9 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
 def _print_distributions(table: pd.DataFrame) -> None:
     """Quantiles of the product over the missions, and the mean of the worst ones."""
     rows = table[(table["view"] != "quantile") | table["share"].isin(_QUANTILES)]
-    print_frame("spread of the product", summary.spread(rows, PRODUCT).cells.set_index("Policy"))
+    print_frame(
+        "spread of the product", summary.quantile_table(rows, PRODUCT).cells.set_index("Policy")
+    )
 
 
 def _print_comparisons(results: Results, table: pd.DataFrame) -> None:
@@ -202,7 +212,7 @@ def _print_comparisons(results: Results, table: pd.DataFrame) -> None:
     cells["pairing saves"] = gains
     print_frame(f"against {table['baseline'].iloc[0]} [points]", cells)
     console.say(f" {summary.correction_in_words(results)}")
-    if why := summary.allowance_in_words(table, "policy"):
+    if why := summary.allowance_for_difference(table, "policy"):
         console.say(f" {why}")
 
 
@@ -214,8 +224,8 @@ def _print_learners(table: pd.DataFrame) -> None:
 
 
 def differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """``compared`` by what is compared, and the rows of the product."""
-    cells = compared(table, who).set_index(who.capitalize())
+    """``comparison_cells`` by what is compared, and the rows of the product."""
+    cells = comparison_cells(table, who).set_index(who.capitalize())
     return cells, table[table["metric"] == PRODUCT].set_index(who)
 
 
@@ -225,7 +235,7 @@ def _print_worst(table: pd.DataFrame) -> None:
     console.say(f" worst missions of {policy}, by product:")
     for row in table.itertuples():
         outcome = "" if row.success else ", no success"
-        console.say(f"   {numbers.percent(row.collection_ratio)} collected{outcome}:")
+        console.say(f"   {numbers.format_percent(row.collection_ratio)} collected{outcome}:")
         console.say(f"     {row.command}")
 
 
@@ -244,7 +254,7 @@ def print_diff(found: diff.Diff, most: int) -> None:
         console.say(f"identical: the {missions:,} missions that both have")
     else:
         console.say(f"{differ:,} of {missions:,} missions differ")
-    for origin in diff.origins(found):
+    for origin in diff.differing_origins(found):
         console.say(f" {origin}")
     _print_alone(found.alone)
     if differ or found.unpaired is not None:
@@ -266,12 +276,12 @@ def _print_alone(alone: pd.DataFrame) -> None:
 
 def _print_effects(found: diff.Diff) -> None:
     """Differences by policy, and by policy and design point if there are several."""
-    table = diff.effects(found)
+    table = diff.estimate_differences(found)
     _print_differences(table.assign(who=table["policy_a"]))
     if len(found.a.store.manifest.points) > 1:
-        table = diff.effects(found, ["policy_a", "point_a"])
+        table = diff.estimate_differences(found, ["policy_a", "point_a"])
         pairs = table[["policy_a", "point_a"]].itertuples(index=False)
-        _print_differences(table.assign(who=[setting_of(found.a, *pair) for pair in pairs]))
+        _print_differences(table.assign(who=[setting_in_words(found.a, *pair) for pair in pairs]))
 
 
 def _print_differences(table: pd.DataFrame) -> None:
@@ -294,7 +304,7 @@ def _print_most_changed(found: diff.Diff, most: int) -> None:
         console.say(f" {side}, {results.store.folder}: {diff.at_hand(results)}")
     console.say(" most changed missions:")
     for row in diff.most_changed(found, most).itertuples():
-        where = setting_of(found.a, row.policy_a, row.point_a)
+        where = setting_in_words(found.a, row.policy_a, row.point_a)
         console.say(
             f"   {where}, replication {row.replication}: {_shortened(row.fields.split(', '))}"
         )

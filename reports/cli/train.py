@@ -125,9 +125,9 @@ def _bar(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
             if not is_said and ticks_done >= 2 and seconds > MEASURED:
                 each = seconds / ticks_done
                 is_said = True
-                rest = numbers.duration(each * (ticks - training.tick))
+                rest = numbers.format_duration(each * (ticks - training.tick))
                 bar.write(
-                    f"on this machine: {numbers.seconds(each)} a tick, about {rest} to go",
+                    f"on this machine: {numbers.format_seconds(each)} a tick, about {rest} to go",
                     file=sys.stderr,
                 )
             if bar.n == 0:  # a resumed training begins at its tick

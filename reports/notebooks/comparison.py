@@ -29,18 +29,18 @@ from dess.reports.pages import html
 
 # %%
 study = load_results(f"{results}/comparison")
-times = answers.read(results, study)
+times = answers.read_decision_times(results, study)
 pair = answers.pair_of(study, learned, heuristic)
-missions = answers.duels(study, pair)
-comparison = answers.overall(study, pair)
-worst = answers.worst(missions, 5)
+missions = answers.pair_missions(study, pair)
+comparison = answers.compare_pair(study, pair)
+worst = answers.worst_pair_missions(missions, 5)
 lost = answers.most_lost(missions.drop(worst.index), 5)
 
 # %%
-html.answer(answers.answer(comparison, missions, pair))
+html.answer(answers.pair_sentence(comparison, missions, pair))
 
 # %%
-html.lead(*answers.distribution(missions, pair))
+html.lead(*answers.draw_difference_distribution(missions, pair))
 
 # %% [markdown]
 # ## Why: where it is better
@@ -48,12 +48,17 @@ html.lead(*answers.distribution(missions, pair))
 # Each parameter is divided into at most five bins with about equally many missions.
 
 # %%
-lead = answers.along(missions, pair.candidates)
+lead = answers.differences_along_parameters(missions, pair.candidates)
 html.say("{colours}", colours=answers.colours_in_words(lead, pair))
 
 # %%
 too_few = html.say("Too few missions for bins of n = {least} or more.", least=answers.LEAST)
-html.show(answers.leads(missions, lead, pair, f"{pair.title}, 95 % intervals, ") or too_few)
+html.show(
+    answers.draw_differences_along_parameters(
+        missions, lead, pair, f"{pair.title}, 95 % intervals, "
+    )
+    or too_few
+)
 
 # %% [markdown]
 # ## Its worst missions
@@ -61,9 +66,9 @@ html.show(answers.leads(missions, lead, pair, f"{pair.title}, 95 % intervals, ")
 # The two missions with the lowest product of the learned policy, with both policies.
 
 # %%
-kept = logged.kept_missions(study, answers.drawn(missions, pair), results)
+kept = logged.kept_missions(study, answers.missions_to_draw(missions, pair), results)
 html.gallery(
-    logged.drawing(
+    logged.draw_mission(
         mission, f"Map of mission {mission.replication} by {mission.policy}", mission.caption
     )
     for mission in kept
@@ -78,19 +83,19 @@ html.gallery(
 
 # %%
 found = {
-    answers.pairing(comparison): comparison,
-    "every learner and the best heuristic": summary.learned_against_heuristic(study),
-    "every policy and the best one": summary.comparisons(study),
+    answers.pairing_sentence(comparison): comparison,
+    "every learner and the best heuristic": summary.compare_learned_with_heuristic(study),
+    "every policy and the best one": summary.compare_with_best(study),
 }
 for caption, rows in found.items():
     if len(rows):
-        shown = tables.compared(rows, rows.columns[0])
+        shown = tables.comparison_cells(rows, rows.columns[0])
         of = f"Points ahead of {rows['baseline'].iloc[0]} in n = {len(missions):,} missions"
         display(html.table(shown, f"{of}; {caption}. {tables.MARKED}, by p", data=rows))
 html.say(
     "{correction} {why} {weights}",
     correction=summary.correction_in_words(study),
-    why=summary.allowance_in_words(comparison, "policy"),
+    why=summary.allowance_for_difference(comparison, "policy"),
     weights=summary.weights_in_words(study),
 )
 
@@ -98,12 +103,12 @@ html.say(
 # ## Tables
 
 # %%
-depleted = answers.depleted(study, pair.policy, worst["replication"])
-html.table(answers.outcomes(missions, pair), "Outcomes of the missions")
+depleted = answers.count_depleted_uavs(study, pair.policy, worst["replication"])
+html.table(answers.pair_outcome_table(missions, pair), "Outcomes of the missions")
 
 # %%
 html.table(
-    answers.spread(lead, answers.dependence(missions)),
+    answers.dependence_table(lead, answers.dependence_on_parameters(missions)),
     "Lowest and highest mean difference [points] by parameter, the share of the variance that "
     "its bins explain, and the test of equal means (Alexander and Govern, Holm)",
 )
@@ -124,10 +129,10 @@ html.table(answers.time_table(times), "Time of a decision for the UAVs of a miss
 # ## How this page was made
 
 # %%
-lines = answers.commands(study, pair.policy, [*worst["replication"], *lost["replication"]])
+lines = answers.mission_commands(study, pair.policy, [*worst["replication"], *lost["replication"]])
 html.say(
     "{times} These commands simulate missions of the tables again:\n\n{lines}",
-    times=answers.remarks(times, study, pair),
+    times=answers.decision_time_sentences(times, study, pair),
     lines=html.commands(lines),
 )
 

@@ -21,8 +21,8 @@ results = "../../results"  # folder with the results folder of explorer
 from pathlib import Path
 
 from dess.analysis import load_results, metrics, numbers
-from dess.analysis.answers.fleet import home
-from dess.analysis.answers.settings import in_words
+from dess.analysis.answers.settings.home import way_home_range_sentence
+from dess.analysis.answers.settings.points import points_in_words
 from dess.reports.explorer import Grid, explorer
 from dess.reports.pages import html
 
@@ -45,19 +45,25 @@ html.say(
     "A dot is a mean over n = {missions} missions, its bar the 95 % interval. All settings have "
     "the same random draws, so two settings may differ although their intervals overlap; a "
     "[what-if question](what-if.html) compares them mission by mission.",
-    missions=numbers.span(start["n"]),
+    missions=numbers.format_span(start["n"]),
 )
 
 # %%
-html.say("{sentence}", sentence=home.range_sentence(study))
+html.say("{sentence}", sentence=way_home_range_sentence(study))
 
 # %% [markdown]
 # ## The setting at which the sliders start
 
 # %%
-table = numbers.wide(start, "policy").rename(columns=metrics.METRICS).reset_index(names="Policy")
+table = (
+    numbers.estimates_as_text(start, "policy")
+    .rename(columns=metrics.METRICS)
+    .reset_index(names="Policy")
+)
 html.table(
-    table, f"With {in_words(study)[grid.start]}; the CSV file has all settings", data=grid.table()
+    table,
+    f"With {points_in_words(study)[grid.start]}; the CSV file has all settings",
+    data=grid.table(),
 )
 
 # %% [markdown]

@@ -28,16 +28,16 @@ from dess.reports.pages import html
 # %%
 folder = Path(str(trained or TRAINED))
 trainings = answers.read_curves(folder / "curves.parquet")
-last = answers.finals(trainings)
+last = answers.last_rows(trainings)
 baseline = answers.BASELINE
-rungs = answers.ladder(last)
+rungs = answers.rows_of_ladder(last)
 equal = answers.of_equal_budget(last, baseline)
 
 # %%
-html.answer(answers.answer(rungs))
+html.answer(answers.methods_sentence(rungs))
 
 # %%
-html.lead(*answers.methods(rungs))
+html.lead(*answers.draw_method_ladder(rungs))
 
 # %% [markdown]
 # ## Why: the effect of each method
@@ -49,8 +49,10 @@ html.lead(*answers.methods(rungs))
 # is the paper's network.
 
 # %%
-table = answers.ablation(equal, baseline)
-html.figure(*answers.variants(table, equal, baseline, "The product that every variant reaches"))
+table = answers.compare_variants(equal, baseline)
+html.figure(
+    *answers.draw_variants(table, equal, baseline, "The product that every variant reaches")
+)
 
 # %% [markdown]
 # What a method adds depends on the methods that are there before it.
@@ -91,10 +93,10 @@ html.gallery(answers.shipped_drawings(shipped), answers.TRAININGS)
 # UAVs the same weight, so their mean of the same policy may differ by about a point.
 
 # %%
-transfers = answers.transfers(trainings, answers.SHOWN, shortest=values.CROSSING)
+transfers = answers.compare_all_transfers(trainings, answers.SHOWN, shortest=values.CROSSING)
 rules = dict(zip(answers.SHOWN, ("throughout", "passes"), strict=True))
 verdicts = {key: scorecard.RULES[rules[key[1]]].judge(t) for key, t in transfers.items()}
-best = last.groupby("variant")[answers.FINAL].max().map(numbers.percent)
+best = last.groupby("variant")[answers.FINAL].max().map(numbers.format_percent)
 pair, variants = [*answers.pairs_in(trainings).items()][-1]
 
 # %%
@@ -144,7 +146,7 @@ html.say(
 
 # %%
 again = "python -m benchmarks.learning_curves --out runs/learning"
-html.say("{lines}", lines=html.commands([again, *answers.commands(shipped)]))
+html.say("{lines}", lines=html.commands([again, *answers.training_commands(shipped)]))
 
 # %%
 html.weights(folder)

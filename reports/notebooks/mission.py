@@ -34,7 +34,7 @@ from dess.reports.player import READING, Shown, library, player, together
 CHOICES = 5  # missions that the first player offers at most; each is 35 kB of the page
 
 fig1, fig4 = (load_results(f"{results}/{name}") for name in ("fig1", "fig4"))
-ranked = summary.ranked_policies(fig4.missions)
+ranked = summary.rank_policies(fig4.missions)
 best = summary.best_policy(fig1.missions)
 shown_policy = policy or ranked[0]
 seed = fig4.manifest["seed"]
@@ -43,7 +43,7 @@ shown = [Mission.of(fig4, shown_policy, point, replication) for point in points]
 example = Mission.of(fig1, best, 0, replication)
 
 # %%
-html.answer(missions.answer(shown))
+html.answer(missions.shared_collection_sentence(shown))
 
 # %%
 library()
@@ -51,7 +51,8 @@ library()
 
 # %%
 def told(mission: Mission) -> Shown:
-    title = f"{mission.fleet}, {mission.policy}: {numbers.percent(mission.record[RATIO])} collected"
+    collected = numbers.format_percent(mission.record[RATIO])
+    title = f"{mission.fleet}, {mission.policy}: {collected} collected"
     choice = f"replication {mission.replication}"
     return Shown(mission.events, mission.scenario, title, choice)
 
@@ -123,7 +124,7 @@ caption = (
     f"{example.record.slots} mission slots, {example.collected}. {example.causes}"
 )
 alt = "Map of the mission; battery, residual data and charging"
-html.gallery([missions.drawing(example, alt, caption)])
+html.gallery([missions.draw_mission(example, alt, caption)])
 
 # %% [markdown]
 # ## How far to trust it

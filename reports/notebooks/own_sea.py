@@ -29,14 +29,15 @@ yes = False  # True if the sweep may take more than an hour
 # %%
 from dess import load_scenario
 from dess.analysis import sweep
-from dess.analysis.answers import costs, summary
+from dess.analysis.answers import summary
 from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.costs import cost_parts_table, fleets_in_words
+from dess.analysis.answers.fleet.figures import draw_cheapest
 from dess.analysis.answers.missions import map_caption
 from dess.analysis.ask import around
-from dess.analysis.ask.assumptions import assumptions
-from dess.analysis.figures import settings as figures
+from dess.analysis.ask.assumptions import assumption_sentences
 from dess.analysis.figures.missions import mission_figure, sea_figure
-from dess.analysis.names import placing
+from dess.analysis.names import node_placing_sentence
 from dess.analysis.results.resimulate import resimulate
 from dess.reports.pages import html, study
 
@@ -48,13 +49,13 @@ answer = sweep(*about, yes=yes, **fields)
 
 # %%
 found = answer.results
-html.answer(cheapest.answer(found), cheapest.cheapest_fleet(found))
+html.answer(cheapest.cheapest_sentence(found), cheapest.cheapest_fleet(found))
 
 # %%
-html.lead(*figures.deciding(found))
+html.lead(*draw_cheapest(found))
 
 # %%
-html.rendered("assumptions.html", lines=assumptions(found)) if sea.units else None
+html.rendered("assumptions.html", lines=assumption_sentences(found)) if sea.units else None
 
 # %% [markdown]
 # ## Why
@@ -67,10 +68,10 @@ policy = cheapest.best_policy(found)
 point = cheapest.shown_point(found)
 mission = resimulate(found, policy, point, 0)
 map_of_mission = mission_figure(mission.events, mission.scenario)
-about_mission = map_caption(mission, costs.fleets(found)[point])
+about_mission = map_caption(mission, fleets_in_words(found)[point])
 
 # %%
-about_sea = f"The n = {len(sea.nodes)} nodes and the zone.{placing(sea)}"
+about_sea = f"The n = {len(sea.nodes)} nodes and the zone.{node_placing_sentence(sea)}"
 html.gallery(
     [
         (sea_figure(sea), "Map of the sea", about_sea),
@@ -79,9 +80,9 @@ html.gallery(
 )
 
 # %%
-if asked := around.around(found, scenario):
+if asked := around.question_around(found, scenario):
     asked.ask(workers, yes=yes)
-    html.show(around.table(found))
+    html.show(around.table_around(found))
 
 # %% [markdown]
 # ## How far to trust it
@@ -98,10 +99,10 @@ html.show(no_check if found.checks.empty else cheapest.check_table(found))
 # %%
 if cheapest.has_conditions(found):
     html.show(cheapest.condition_table(found))
-html.show(costs.parts_table(found))
+html.show(cost_parts_table(found))
 
 # %%
-html.show(summary.worst_table(found, summary.worst(found, policy, point=point)))
+html.show(summary.worst_missions_table(found, summary.worst_missions(found, policy, point=point)))
 
 # %% [markdown]
 # ## With your own sea

@@ -23,7 +23,14 @@ from pathlib import Path
 
 from dess.analysis import load_results, metrics, names, numbers
 from dess.analysis.answers import main_effects, summary
-from dess.analysis.figures import settings
+from dess.analysis.answers.main_effects import plot_effect, plot_one_by_one
+from dess.analysis.answers.settings.sobol import (
+    index_table,
+    plot_indices,
+    ranges_in_words,
+    sobol_indices_of,
+)
+from dess.analysis.answers.summary import plot_performance
 from dess.analysis.paper import scorecard, values
 from dess.analysis.stats.intervals import LEVEL
 from dess.reports.pages import html
@@ -33,25 +40,25 @@ folder = Path(results)
 fig5, sweet, sobol = (load_results(folder / n) for n in ("fig5", "sweet-spot", "sensitivity"))
 policies = main_effects.leading_policies(fig5, learned, heuristic)
 leading = policies[0]
-effects = main_effects.effects(fig5)
+effects = main_effects.means_by_field(fig5)
 effects = effects[effects["policy"].isin(policies)]
-changes = main_effects.changes_by_field(fig5, effects)
-ratios = main_effects.changes_by_field(fig5, effects, metrics.RATIO)
-level = numbers.level(LEVEL)
-checks = summary.checks(sweet)
+changes = main_effects.compare_values_by_field(fig5, effects)
+ratios = main_effects.compare_values_by_field(fig5, effects, metrics.RATIO)
+level = numbers.format_level(LEVEL)
+checks = summary.means_of_check(sweet)
 
 # %%
-html.answer(main_effects.answer(effects, policies))
+html.answer(main_effects.strongest_fields_sentence(effects, policies))
 
 # %%
-most = effects[effects["field"].isin(main_effects.strongest(effects, leading))]
+most = effects[effects["field"].isin(main_effects.strongest_fields(effects, leading))]
 html.lead(
-    settings.one_by_one(effects, fig5.policies),
+    plot_one_by_one(effects, fig5.policies),
     "The product against every parameter",
-    f"n = {numbers.span(effects['n'])} missions per dot, with all other parameters drawn from "
-    f"Table II; bars are {level} intervals.",
+    f"n = {numbers.format_span(effects['n'])} missions per dot, with all other parameters drawn "
+    f"from Table II; bars are {level} intervals.",
     data=effects,
-    narrow=settings.one_by_one(most, fig5.policies),
+    narrow=plot_one_by_one(most, fig5.policies),
 )
 
 # %% [markdown]
@@ -64,14 +71,14 @@ html.lead(
 html.gallery(
     [
         (
-            settings.effect(effects, field, pairs, fig5.policies),
-            f"The three metrics against the {names.parameter(field).within}",
+            plot_effect(effects, field, pairs, fig5.policies),
+            f"The three metrics against the {names.field_named(field).within}",
             "",
             effects[effects["field"] == field],
         )
         for field, pairs in changes.items()
     ],
-    f"n = {numbers.span(effects['n'])} missions per dot; bars are {level} intervals.",
+    f"n = {numbers.format_span(effects['n'])} missions per dot; bars are {level} intervals.",
 )
 
 # %% [markdown]
@@ -86,7 +93,7 @@ html.say(
     "{paper:,}.",
     n=len(sweet.manifest["points"]),
     rule=rule,
-    margin=numbers.margin(scorecard.margin({"sweet-spot": sweet})),
+    margin=numbers.format_margin(scorecard.indifference_margin({"sweet-spot": sweet})),
     paper=values.SWEET_SPOT_MISSIONS,
 )
 
@@ -94,10 +101,10 @@ html.say(
 html.gallery(
     [
         (
-            settings.performance(checks, metric, values.SWEET_SPOT[metric]),
+            plot_performance(checks, metric, values.SWEET_SPOT[metric]),
             f"{name} of every policy at its best setting, and the paper's number",
-            f"n = {numbers.span(checks['n'])} missions; bars are {level} intervals. Dashed: the "
-            "paper.",
+            f"n = {numbers.format_span(checks['n'])} missions; bars are {level} intervals. Dashed: "
+            "the paper.",
         )
         for metric, name in metrics.METRICS.items()
         if len(checks)
@@ -112,12 +119,12 @@ html.gallery(
 # parameter: its share, below the dotted line, is noise that no setting removes.
 
 # %%
-indices = summary.sensitivities(sobol)
+indices = sobol_indices_of(sobol)
 of_ratio = indices[indices["metric"] == metrics.RATIO].dropna()
 caption = f"n = {indices['n'].min():,} missions; bars are {level} intervals, bootstrap over blocks."
 html.gallery(
     [
-        (settings.sensitivity(rows, policy), f"Sobol indices of {policy}", f"{policy}: {caption}")
+        (plot_indices(rows, policy), f"Sobol indices of {policy}", f"{policy}: {caption}")
         for policy, rows in of_ratio.groupby("policy", sort=False)
     ]
 )
@@ -134,14 +141,14 @@ html.gallery(
 
 # %%
 html.table(
-    main_effects.listed(effects, changes, ratios),
+    main_effects.main_effects_table(effects, changes, ratios),
     f"Product; differences in points with {level} intervals, also of the collection ratio",
     effects,
 )
 
 # %%
 html.table(
-    values.table(sweet),
+    values.best_settings_table(sweet),
     f"The selected settings and their checks: means with {level} intervals, the difference "
     "from the paper in points (▲ above, ▼ below, ≈ contains it), missions, settings not ruled "
     "out, and what the selection guarantees",
@@ -151,7 +158,7 @@ html.table(
 
 # %%
 html.table(
-    summary.index_table(of_ratio).cells,
+    index_table(of_ratio).cells,
     f"Sobol indices of the collection ratio, with {level} intervals (bootstrap over blocks)",
     data=indices,
 )
@@ -163,7 +170,7 @@ html.table(
 # ## How this page was made
 
 # %%
-ranges = summary.ranges_in_words(sobol.manifest["study"]["design"]["ranges"])
+ranges = ranges_in_words(sobol.manifest["study"]["design"]["ranges"])
 html.say(
     "The policies are the best learned one and the best heuristic of the study. For the Sobol "
     "indices all parameters are drawn together: {ranges}.",

@@ -25,29 +25,30 @@ from IPython.display import display
 from dess.analysis import load_results, numbers, summary, tables
 from dess.analysis.answers import optimality
 from dess.analysis.answers import summary as questions
-from dess.analysis.figures import comparison, settings
+from dess.analysis.answers.summary import plot_by_fleet, plot_performance
+from dess.analysis.figures import comparison
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from dess.analysis.paper import values
 from dess.reports.pages import html
 
 # %%
 table4, fig4 = (load_results(Path(results) / name) for name in ("table4", "fig4"))
-policies = questions.ranked_policies(table4.missions)
+policies = questions.rank_policies(table4.missions)
 overall = summary(table4.missions, by=["policy"]).set_index("policy").loc[policies].reset_index()
-fleets = questions.by_fleet(table4.missions)
-fig4_fleets = questions.by_fleet(fig4.missions)
+fleets = questions.means_by_fleet(table4.missions)
+fig4_fleets = questions.means_by_fleet(fig4.missions)
 bounded = optimality.results_in(Path(results) / "gap")
-caption = f"n = {numbers.span(overall['n'])} missions per policy; bars are 95 % intervals."
+caption = f"n = {numbers.format_span(overall['n'])} missions per policy; bars are 95 % intervals."
 
 # %%
 html.answer(
-    questions.against_paper(overall, policies[0], values.TABLE_IV),
-    questions.of_policy(overall, policies[0])[PRODUCT].partition(" [")[0],
+    questions.paper_sentence(overall, policies[0], values.TABLE_IV),
+    questions.metrics_of_policy(overall, policies[0])[PRODUCT].partition(" [")[0],
 )
 
 # %%
 html.lead(
-    settings.performance(overall, PRODUCT, values.TABLE_IV[PRODUCT]),
+    plot_performance(overall, PRODUCT, values.TABLE_IV[PRODUCT]),
     "The product of every policy, and the paper's number",
     f"{caption} Dashed: the paper's number.",
     overall,
@@ -57,13 +58,13 @@ html.lead(
 # ## Why
 
 # %%
-html.say("{text}", text=html.composed(questions.guard_in_words(overall)))
+html.say("{text}", text=html.composed(questions.guard_sentences(overall)))
 
 # %%
 html.gallery(
     [
         (
-            settings.performance(overall, metric, values.TABLE_IV[metric]),
+            plot_performance(overall, metric, values.TABLE_IV[metric]),
             f"{METRICS[metric]} of every policy, and the paper's number",
         )
         for metric in (SUCCESS, RATIO)
@@ -79,10 +80,10 @@ html.gallery(
 # %%
 html.gallery(
     [
-        (settings.by_fleet(fleets, metric), f"{name} against the number of UAVs")
+        (plot_by_fleet(fleets, metric), f"{name} against the number of UAVs")
         for metric, name in METRICS.items()
     ],
-    f"n = {numbers.span(fleets['n'])} missions per dot; bars are 95 % intervals.",
+    f"n = {numbers.format_span(fleets['n'])} missions per dot; bars are 95 % intervals.",
 )
 
 # %% [markdown]
@@ -92,9 +93,9 @@ html.gallery(
 html.gallery(
     [
         (
-            settings.by_fleet(fig4_fleets, m, {i: p[m] for i, p in values.FIG_4.items()}),
+            plot_by_fleet(fig4_fleets, m, {i: p[m] for i, p in values.FIG_4.items()}),
             f"{METRICS[m]} against the number of UAVs, and the paper's numbers",
-            f"n = {numbers.span(fig4_fleets['n'])} missions per dot; diamonds: the paper's "
+            f"n = {numbers.format_span(fig4_fleets['n'])} missions per dot; diamonds: the paper's "
             "numbers.",
             fig4_fleets[fig4_fleets["metric"] == m],
         )
@@ -117,11 +118,17 @@ html.say(
 )
 
 # %%
-if bounded and len(gaps := optimality.useful(optimality.by_fleet(bounded))):
-    caption = f"n = {numbers.span(gaps['n'])} missions of the study gap, with 95 % intervals."
+if bounded and len(gaps := optimality.fleets_with_useful_bound(optimality.by_fleet(bounded))):
+    caption = (
+        f"n = {numbers.format_span(gaps['n'])} missions of the study gap, with 95 % intervals."
+    )
     display(
-        html.figure(comparison.gaps(gaps), "The product of every policy, and the bound", caption),
-        html.table(optimality.listed(gaps), "Means, the upper bound, and the gap", data=gaps),
+        html.figure(
+            comparison.plot_gaps(gaps), "The product of every policy, and the bound", caption
+        ),
+        html.table(
+            optimality.fleet_bound_table(gaps), "Means, the upper bound, and the gap", data=gaps
+        ),
     )
 
 # %% [markdown]
@@ -130,24 +137,24 @@ if bounded and len(gaps := optimality.useful(optimality.by_fleet(bounded))):
 # %%
 marks = "▲ our interval is above the paper's number, ▼ below, ≈ contains it"
 html.table(
-    questions.beside_paper(overall, {None: values.TABLE_IV}),
+    questions.compare_with_paper(overall, {None: values.TABLE_IV}),
     f"Table IV: means with 95 % intervals, and the difference in points; {marks}",
     overall,
 )
 
 # %%
-html.say("{text}", text=html.composed(questions.home_in_words(overall)))
+html.say("{text}", text=html.composed(questions.way_home_in_words(overall)))
 
 # %%
 html.table(
-    questions.beside_paper(fig4_fleets, values.FIG_4),
+    questions.compare_with_paper(fig4_fleets, values.FIG_4),
     f"Fig. 4: means with 95 % intervals, and the difference in points; {marks}",
     fig4_fleets,
 )
 
 # %%
 html.table(
-    tables.estimates(fleets[fleets["metric"].isin(METRICS)], ["policy", "uavs", "n"]),
+    tables.estimate_cells(fleets[fleets["metric"].isin(METRICS)], ["policy", "uavs", "n"]),
     "Means with 95 % intervals, by number of UAVs",
     fleets,
 )

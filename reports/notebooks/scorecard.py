@@ -26,7 +26,7 @@ from IPython.display import display
 
 from dess.analysis import load_results, numbers
 from dess.analysis.answers.learning import read_curves
-from dess.analysis.figures.comparison import claims
+from dess.analysis.figures.comparison import plot_claims
 from dess.analysis.paper import scorecard
 from dess.analysis.results.chunks import MANIFEST
 from dess.base.files.reading import paths_in
@@ -42,16 +42,16 @@ rows = scorecard.scorecard(studies, read_curves(folder / "curves.parquet"))
 against = scorecard.against_paper(rows)
 
 # %%
-html.answer(scorecard.answer(rows))
+html.answer(scorecard.scorecard_sentence(rows))
 
 # %%
 html.lead(
-    claims(against),
+    plot_claims(against),
     "Our results minus the numbers that the paper prints, by policy",
-    f"n = {numbers.span(against['n'])} missions per dot. Bars are 95 % intervals, with that of the "
-    "paper's number where the paper says over how many missions it is a mean.",
+    f"n = {numbers.format_span(against['n'])} missions per dot. Bars are 95 % intervals, with that "
+    "of the paper's number where the paper says over how many missions it is a mean.",
     against,
-    claims(against, width=23),
+    plot_claims(against, width=23),
 )
 
 # %% [markdown]
@@ -66,7 +66,7 @@ html.lead(
 # %%
 def table(kind: str) -> None:
     if claims_of_kind := scorecard.of_kind(rows, kind):
-        values = {"columns": scorecard.names(rows), "caption": scorecard.KINDS[kind]}
+        values = {"columns": scorecard.policy_names(rows), "caption": scorecard.KINDS[kind]}
         display(html.rendered("scorecard.html", rows=claims_of_kind, **values))
 
 
@@ -81,7 +81,7 @@ table(scorecard.DIAGNOSTIC)
 # not say over how many missions a number is a mean, the number counts as exact.
 
 # %%
-html.table(scorecard.counts(rows), "Verdicts by policy")
+html.table(scorecard.count_verdicts(rows), "Verdicts by policy")
 
 # %% [markdown]
 # ## Tables
@@ -95,9 +95,9 @@ for kind in (scorecard.PASSED, scorecard.OPEN, scorecard.WEAKNESS):
 
 # %%
 for config in paths_in(folder, f"{scorecard.PAPERS_NETWORK}/config.json"):
-    departures = scorecard.departures(read_description(config.parent).training)
+    departures = scorecard.departures_in_words(read_description(config.parent).training)
     line = "`{name}` has the paper's observation, network and Algorithm 1, but for {all}."
-    shown = numbers.words(departures) if departures else "nothing"
+    shown = numbers.join_words(departures) if departures else "nothing"
     display(html.say(line, name=scorecard.PAPERS_NETWORK, all=shown))
 
 # %%

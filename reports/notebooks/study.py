@@ -24,9 +24,39 @@ from pathlib import Path
 import numpy as np
 
 from dess.analysis import distribution, load_results, tables
-from dess.analysis.answers import costs, settings, summary
-from dess.analysis.answers.fleet import cheapest, home
-from dess.analysis.figures import settings as figures
+from dess.analysis.answers import summary
+from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.costs import cost_front_table, cost_parts_table, prices_in_words
+from dess.analysis.answers.fleet.figures import draw_cost_fronts
+from dess.analysis.answers.main_effects import draw_one_at_a_time
+from dess.analysis.answers.main_figure import draw_main_figure
+from dess.analysis.answers.settings.baseline import baseline_in_words, baseline_table
+from dess.analysis.answers.settings.effects import effect_table
+from dess.analysis.answers.settings.figures import (
+    draw_curves,
+    draw_heat_maps,
+    draw_main_effects,
+    draw_scatter,
+    draw_small_multiples,
+    plot_distribution,
+)
+from dess.analysis.answers.settings.home import with_way_home
+from dess.analysis.answers.settings.points import varied_values
+from dess.analysis.answers.settings.ranking import (
+    allowance_for_setting,
+    best_of_policies_table,
+    best_settings_sentence,
+    best_settings_table,
+    missions_at_best,
+    rank_settings,
+)
+from dess.analysis.answers.settings.sobol import (
+    draw_indices,
+    index_table,
+    sobol_indices_of,
+    variance_sentence,
+)
+from dess.analysis.answers.summary import draw_performance
 from dess.analysis.metrics import METRICS, SUCCESS, metric_of
 from dess.reports.pages import html
 from dess.reports.pages import study as page
@@ -38,25 +68,25 @@ metrics = page.shown_metrics(study, by)
 called = metric_of(by).within
 
 # %% tags=["if-cheapest"]
-html.answer(cheapest.answer(study))
+html.answer(cheapest.cheapest_sentence(study))
 
 # %% tags=["if-answer"]
-ranked = settings.ranked(study, by)
+ranked = rank_settings(study, by)
 best = ranked.iloc[0]
 
 # %% tags=["if-answer"]
-html.answer(settings.answer(study, ranked, by))
+html.answer(best_settings_sentence(study, ranked, by))
 
 # %% tags=["if-sensitivity"]
-html.answer(summary.of_variance(study, by))
+html.answer(variance_sentence(study, by))
 
 # %%
-html.lead(*figures.leading(study, by))
+html.lead(*draw_main_figure(study, by))
 
 # %% tags=["if-sheet"]
-from dess.analysis.ask.assumptions import assumptions
+from dess.analysis.ask.assumptions import assumption_sentences
 
-html.rendered("assumptions.html", lines=assumptions(study, by))
+html.rendered("assumptions.html", lines=assumption_sentences(study, by))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## Why
@@ -82,7 +112,7 @@ html.show(cheapest.condition_table(study))
 # %% tags=["if-around"]
 from dess.analysis.ask import around
 
-html.show(around.table(study))
+html.show(around.table_around(study))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## How far to trust it
@@ -104,15 +134,15 @@ html.show(no_check if study.checks.empty else cheapest.check_table(study))
 
 # %% tags=["if-settings"]
 html.show(
-    settings.best_table(study, ranked, by),
-    settings.best_of_policies(study, by),
-    html.say("{why}", why=settings.allowance_in_words(study, ranked, by)),
+    best_settings_table(study, ranked, by),
+    best_of_policies_table(study, by),
+    html.say("{why}", why=allowance_for_setting(study, ranked, by)),
 )
 
 # %% tags=["if-one-setting"]
 html.show(
-    (figures.means(study, of) for of in METRICS),
-    tables.means(summary.means(study), metrics=home.beside_success(study, METRICS)),
+    (draw_performance(study, of) for of in METRICS),
+    tables.means_table(summary.means_of_points(study), metrics=with_way_home(study, METRICS)),
     html.say("{weights}", weights=summary.weights_in_words(study)),
 )
 
@@ -120,7 +150,7 @@ html.show(
 # ## Costs
 
 # %% tags=["if-priced-search"]
-html.show(costs.parts_table(study))
+html.show(cost_parts_table(study))
 
 # %% [markdown] tags=["if-costs"]
 # ## Costs
@@ -130,10 +160,10 @@ html.show(costs.parts_table(study))
 
 # %% tags=["if-costs"]
 html.show(
-    html.say("{prices}", prices=costs.prices_in_words(study)),
-    figures.fronts(study),
-    costs.front_table(study),
-    costs.parts_table(study),
+    html.say("{prices}", prices=prices_in_words(study)),
+    draw_cost_fronts(study),
+    cost_front_table(study),
+    cost_parts_table(study),
 )
 
 # %% [markdown] tags=["if-selection"]
@@ -146,8 +176,8 @@ html.show(
 html.show(
     summary.selection_table(study),
     html.say("{guarantees}", guarantees=page.guarantees(study)),
-    tables.means(
-        summary.checks(study), tables.CHECKED, metrics=home.beside_success(study, METRICS)
+    tables.means_table(
+        summary.means_of_check(study), tables.CHECKED, metrics=with_way_home(study, METRICS)
     ),
 )
 
@@ -157,36 +187,36 @@ html.show(
 # Missions were simulated until the estimates were precise enough, or the budget was spent.
 
 # %% tags=["if-precision"]
-html.show(summary.precision_table(summary.precisions(study)))
+html.show(summary.precision_table(summary.reached_precisions(study)))
 
 # %% [markdown] tags=["if-fields"]
 # ## Effects of the fields
 
 # %% tags=["if-one-field"]
-(field,) = settings.varied(study)
-html.gallery(figures.plot(study, field, metric=of) for of in metrics)
+(field,) = varied_values(study)
+html.gallery(draw_curves(study, field, metric=of) for of in metrics)
 
 # %% tags=["if-two-fields"]
-html.gallery(figures.heat_maps(study, metrics))
+html.gallery(draw_heat_maps(study, metrics))
 
 # %% tags=["if-many-fields"]
-html.gallery(figures.small_multiples(study, by))
+html.gallery(draw_small_multiples(study, by))
 
 # %% tags=["if-one-at-a-time"]
-html.gallery(figures.one_at_a_time(study))
+html.gallery(draw_one_at_a_time(study))
 
 # %% tags=["if-sampled"]
-html.gallery(figures.scatter(study, of) for of in metrics)
+html.gallery(draw_scatter(study, of) for of in metrics)
 
 # %% tags=["if-sensitivity"]
-html.show(figures.index_figures(study, by), summary.index_table(summary.sensitivities(study)))
+html.show(draw_indices(study, by), index_table(sobol_indices_of(study)))
 
 # %% [markdown] tags=["if-sensitivity"]
 # A Sobol index is the share of a metric's variance that a field explains: *alone*, or *with all
 # interactions*. The replication counts as a field: its share is noise that no setting removes.
 
 # %% tags=["if-effects"]
-html.show((figures.main_effects(study, of) for of in metrics), settings.effect_table(study, by))
+html.show((draw_main_effects(study, of) for of in metrics), effect_table(study, by))
 
 # %% [markdown] tags=["if-settings"]
 # ## Comparison with a baseline
@@ -196,11 +226,11 @@ html.say(
     "Every policy is compared with itself at design point "
     "{point}: {words}. The parameter `baseline` names another point.",
     point=baseline,
-    words=settings.baseline(study, baseline),
+    words=baseline_in_words(study, baseline),
 )
 
 # %% tags=["if-settings"]
-html.show(settings.baseline_table(study, baseline, by))
+html.show(baseline_table(study, baseline, by))
 
 # %% [markdown] tags=["if-policies"]
 # ## Comparison of the policies
@@ -209,7 +239,9 @@ html.show(settings.baseline_table(study, baseline, by))
 
 # %% tags=["if-policies"]
 compared = summary.comparison_table(study)
-html.show(compared, html.say("{why}", why=summary.allowance_in_words(compared.data, "policy")))
+html.show(
+    compared, html.say("{why}", why=summary.allowance_for_difference(compared.data, "policy"))
+)
 
 # %% tags=["if-learned"]
 html.show(summary.learner_table(study))
@@ -218,29 +250,31 @@ html.show(summary.learner_table(study))
 # ## Single missions
 
 # %% tags=["if-answer"]
-missions = settings.at_best(study, ranked)
+missions = missions_at_best(study, ranked)
 whose = f"every policy at its best setting by {called}"
-worst = summary.worst(study, best["policy"], point=best["point"])
+worst = summary.worst_missions(study, best["policy"], point=best["point"])
 
 # %% tags=["if-cheapest"]
 missions = cheapest.shown_missions(study)
 whose = "the fleet of the answer"
-worst = summary.worst(study, cheapest.best_policy(study), point=cheapest.shown_point(study))
+worst = summary.worst_missions(
+    study, cheapest.best_policy(study), point=cheapest.shown_point(study)
+)
 
 # %% tags=["if-ranked"]
 spread = distribution(missions, by, np.random.default_rng(study.store.manifest.seed))
 html.show(
     html.say("These figures show {whose}:", whose=whose),
-    [figures.distribution(missions, by)],
-    summary.spread(spread, by),
+    [plot_distribution(missions, by)],
+    summary.quantile_table(spread, by),
 )
 
 # %% tags=["if-sensitivity"]
-worst = summary.worst(study, summary.best_policy(study.missions))
+worst = summary.worst_missions(study, summary.best_policy(study.missions))
 
 # %%
 html.show(
-    summary.worst_table(study, worst),
+    summary.worst_missions_table(study, worst),
     html.say("{commands}", commands=page.commands(study, worst)),
 )
 

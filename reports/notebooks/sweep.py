@@ -25,7 +25,12 @@ yes = False  # True if the missions may take more than an hour
 
 # %%
 from dess.analysis import sweep
-from dess.analysis.answers import settings
+from dess.analysis.answers.settings.points import varied_values
+from dess.analysis.answers.settings.ranking import (
+    best_of_policies_table,
+    best_settings_sentence,
+    best_settings_table,
+)
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from dess.reports.pages import html, study
 
@@ -33,7 +38,7 @@ from dess.reports.pages import html, study
 answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **fields)
 
 ranked = answer.table()
-of_fields = " and ".join([*settings.varied(answer.results)][:2])
+of_fields = " and ".join([*varied_values(answer.results)][:2])
 each = f"n = {missions:,} missions per setting"
 drawn = {
     metric: (answer.plot(metric=metric), f"{name} by {of_fields}", f"{each}; 95 % intervals.")
@@ -41,7 +46,7 @@ drawn = {
 }
 
 # %%
-html.answer(settings.answer(answer.results, ranked, PRODUCT))
+html.answer(best_settings_sentence(answer.results, ranked, PRODUCT))
 
 # %%
 html.lead(*drawn[PRODUCT])
@@ -60,13 +65,13 @@ html.gallery([drawn[SUCCESS], drawn[RATIO]])
 # `charging.plan_waits` is false.
 
 # %%
-html.show(settings.best_table(answer.results, ranked, PRODUCT))
+html.show(best_settings_table(answer.results, ranked, PRODUCT))
 
 # %% [markdown]
 # ## Tables
 
 # %%
-html.show(settings.best_of_policies(answer.results, PRODUCT))
+html.show(best_of_policies_table(answer.results, PRODUCT))
 
 # %% [markdown]
 # ## Change the question

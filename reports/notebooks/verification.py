@@ -22,7 +22,7 @@ block = 100  # missions of a block, for the coverage of confidence intervals
 from IPython.display import Markdown, display
 
 from dess.analysis import numbers
-from dess.analysis.names import parameter
+from dess.analysis.names import field_named
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.verification import checks, draws
 from dess.analysis.verification import figures as drawings
@@ -32,16 +32,16 @@ from dess.reports.pages import html, stress_des
 # %%
 suite = Suite(results)
 space = suite.space
-level = numbers.level(LEVEL)
-judged = checks.judge(suite.checks(block))
+level = numbers.format_level(LEVEL)
+judged = checks.judge_checks(suite.checks(block))
 band = f"the band below, which contains all dots in {level} of such figures."
 
 # %%
-html.answer(checks.answer(judged))
+html.answer(checks.checks_sentence(judged))
 
 # %%
 html.lead(
-    drawings.rates(suite.rates, space),
+    drawings.plot_rates(suite.rates, space),
     "Mean rate of a lone UAV against its distance from the node",
     f"One of the checks: dots should lie on the curve of theory, and inside {band} "
     f"n = {suite.rates['n'].min():,} communication slots per distance.",
@@ -51,7 +51,7 @@ html.lead(
 # ## How far to trust it
 
 # %%
-html.say("{text}", text=html.composed(checks.overall(judged)))
+html.say("{text}", text=html.composed(checks.checks_summary(judged)))
 
 # %% [markdown]
 # ## Arrivals
@@ -70,7 +70,7 @@ html.say(
 # %%
 figures = [
     (
-        drawings.fit(fit, name, "data units that arrived"),
+        drawings.plot_fit(fit, name, "data units that arrived"),
         f"{name}: observed and expected numbers",
         f"n = {fit.n:,} counts; expected: Poisson with mean {mean:g}.",
     )
@@ -110,8 +110,8 @@ html.say("{verdicts} The missions are those of {names}.", verdicts=verdicts, nam
 display(html.say("{text}", text=html.composed(checks.on_topics(judged, checks.DRAWS))))
 figures = [
     (
-        drawings.fit(fit, parameter(field).label, "value"),
-        f"How often each value of the {parameter(field).within} was drawn",
+        drawings.plot_fit(fit, field_named(field).label, "value"),
+        f"How often each value of the {field_named(field).within} was drawn",
         f"n = {fit.n:,} missions.",
     )
     for field, fit in draws.parameter_fits(suite.missions, space).items()
@@ -148,7 +148,7 @@ display(Markdown(model.sections["1"]))
 display(html.table(model.studies, "The studies of these pages (1.3)", wrap=True))
 display(Markdown(model.sections["2"]))
 html.figure(
-    drawings.slot(*model.overview),
+    drawings.plot_slot(*model.overview),
     "Boxes, one below the other: what happens before the first mission slot and in each",
     "The base model (2.1): a mission slot from top to bottom; the arrow back is the next one. "
     f"n = {space.max_slots:,} slots at most.",

@@ -30,7 +30,7 @@ from IPython.display import display
 
 from dess.analysis import metrics, what_if
 from dess.analysis.answers import summary
-from dess.analysis.ask.what_if import measured
+from dess.analysis.ask.what_if import measured_columns
 from dess.analysis.metrics import metric_of
 from dess.reports.pages import html
 from dess.reports.pages import study as page
@@ -58,7 +58,7 @@ html.say("Of the pairs, {better}.", better=html.composed(asked.winners()))
 html.say("{contrasts}", contrasts=html.composed(asked.contrasts()))
 
 # %%
-extended = [metric for metric in measured(found) if found.missions[metric].any()]
+extended = [metric for metric in measured_columns(found) if found.missions[metric].any()]
 caption = f"n = {missions:,} missions per dot; bars are 95 % intervals of the means."
 
 # %%
@@ -92,7 +92,7 @@ html.say(
     "{answer}\n\n{reading}\n\n{why} {weights}\n\n{notes}",
     answer=html.composed(asked.answer()),
     reading=html.composed(asked.reading()),
-    why=summary.allowance_in_words(asked.table(), "policy"),
+    why=summary.allowance_for_difference(asked.table(), "policy"),
     weights=summary.weights_in_words(found),
     notes=page.notes(found),
 )

@@ -21,7 +21,7 @@ from threading import Thread
 from traceback import format_exception
 from typing import TYPE_CHECKING, NoReturn
 
-from dess.analysis.results.tables import keep
+from dess.analysis.results.tables import keep_results
 from dess.base.errors import InputError
 
 if TYPE_CHECKING:  # the process that only starts this one needs no shell
@@ -45,7 +45,7 @@ def _serve() -> None:
     _import_all(cell for cells in codes for cell in cells)
     for folder in work["folders"]:
         with suppress(InputError):  # will be that of the notebook
-            keep(folder)
+            keep_results(folder)
     set_start_method("fork" if hasattr(os, "fork") else "spawn")
     waiting = iter(enumerate(codes))
     running = set[Connection]()

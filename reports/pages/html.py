@@ -28,7 +28,7 @@ from markupsafe import Markup
 
 import dess
 from dess.analysis import numbers
-from dess.analysis.numbers import span
+from dess.analysis.numbers import format_span
 from dess.analysis.results.resimulate import Evidence, learned_files
 from dess.analysis.results.tables import Results
 from dess.analysis.study.study import budget_of
@@ -219,7 +219,7 @@ def _origins(evidence: Sequence[Evidence]) -> HTML:
             "Policies": ", ".join(team.policy for team in e.policies),
             "Weights": ", ".join(_weights(e)) or "none",
             "Design points": f"{e.points:,}",
-            "Missions per policy and point": span(e.missions),
+            "Missions per policy and point": format_span(e.missions),
             "Budget": budget_of(e.study),
             "Seed": e.seed,
             "Engine": e.study.engine,
@@ -443,7 +443,7 @@ def _downloads(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:
     """Links that save data as CSV and a table as LaTeX; the links contain the files."""
     name = re.sub(r"[^a-z0-9]+", "-", title.partition(":")[0].lower())[:80].strip("-")
     files = {
-        "CSV": ("csv", "text/csv", numbers.csv(data, DIGITS)),
+        "CSV": ("csv", "text/csv", numbers.write_csv(data, DIGITS)),
         "LaTeX": ("tex", "application/x-tex", latex(shown)),
     }
     links = [

@@ -173,9 +173,9 @@ def make(
     if COMPARISON in pages:
         study = load_results(results / COMPARISON)
         pair = comparison.pair_of(study, parameters.get("learned"), parameters.get("heuristic"))
-        drawn = comparison.drawn(comparison.duels(study, pair), pair)
+        drawn = comparison.missions_to_draw(comparison.pair_missions(study, pair), pair)
         keep_logs(study, drawn, results, show)
     for page in TIMED.keys() & {*pages}:
-        comparison.make(results, load_results(results / TIMED[page]), show)
+        comparison.ensure_decision_times(results, load_results(results / TIMED[page]), show)
     if VERIFICATION in pages:
-        measurements.make(results, load_results(results / VERIFICATION), show)
+        measurements.ensure_cross_check(results, load_results(results / VERIFICATION), show)

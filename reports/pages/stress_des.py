@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.numbers import level
+from dess.analysis.numbers import format_level
 from dess.analysis.stats.intervals import LEVEL
 from dess.model.record import EVENT_NAMES
 from dess.reports.pages.html import Marked, code, marked, template, text
@@ -37,7 +37,7 @@ class Description(NamedTuple):
         sections: The sections as Markdown, by their number: ``"1"`` to ``"6"``.
         studies: The studies, the table of item 1.3.
         overview: The order of events in a slot (Section III-C of the paper, item 2.1 of the
-            checklist), which ``verification.figures.slot`` draws.
+            checklist), which ``verification.figures.plot_slot`` draws.
         parameters: All input parameters with their values, the table of item 3.3.
     """
 
@@ -74,7 +74,7 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
         "swept": [code(field) for field in _swept([manifest, *others])],
         "policies": [code(name) for name in _policies([manifest, *others])],
         "events": [code(name) for name in EVENT_NAMES],
-        "level": level(LEVEL),
+        "level": format_level(LEVEL),
         "python": libraries.pop("python"),
         "libraries": [f"{library} {version}" for library, version in libraries.items()],
         "licence": about["License-Expression"] or about["License"],
@@ -91,7 +91,7 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
 
 def _words(names: Iterable[str]) -> Marked:
     """A list of names as ``a, b and c`` in Markdown."""
-    return Marked(numbers.words([n if isinstance(n, Marked) else text(n) for n in names]))
+    return Marked(numbers.join_words([n if isinstance(n, Marked) else text(n) for n in names]))
 
 
 def _study(manifest: Manifest) -> dict[str, str]:
@@ -105,7 +105,7 @@ def _study(manifest: Manifest) -> dict[str, str]:
         "Design": f"{study['design']['kind'] if study['design'] else 'one point'}",
         "Design points": _number(len(manifest["points"])),
         "Missions per policy and point": ", ".join(missions + [r for r, on in rules.items() if on]),
-        "Policies": numbers.words(study["policies"]),
+        "Policies": numbers.join_words(study["policies"]),
     }
 
 

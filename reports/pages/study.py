@@ -9,11 +9,15 @@ from typing import Any
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.answers import costs, settings, summary
+from dess.analysis.answers import summary
 from dess.analysis.answers.fleet import cheapest
-from dess.analysis.answers.fleet.requirements import required
+from dess.analysis.answers.fleet.costs import has_running_cost, prices_in_words
+from dess.analysis.answers.fleet.requirements import requirements_of
+from dess.analysis.answers.settings.baseline import baseline_in_words
+from dess.analysis.answers.settings.points import metrics_of_page, varied_values
+from dess.analysis.answers.settings.ranking import ranking_metric
 from dess.analysis.ask import around
-from dess.analysis.names import parameter, value_text
+from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results, load_results
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.selection import Selection
@@ -30,15 +34,15 @@ def simulated(results: Results) -> html.Marked:
     manifest = results.store.manifest
     study = manifest.study
     points = len(manifest.points)
-    fixed = [f"{parameter(field).within} {_set(value)}" for field, value in study.set.items()]
-    policies = numbers.words([html.code(policy) for policy in results.policies])
-    missions = numbers.span(n for of_policy in manifest.missions for n in of_policy)
+    fixed = [f"{field_named(field).within} {_set(value)}" for field, value in study.set.items()]
+    policies = numbers.join_words([html.code(policy) for policy in results.policies])
+    missions = numbers.format_span(n for of_policy in manifest.missions for n in of_policy)
     each = f" per policy{' and design point' * (points > 1)}"
     lines = [
         html.marked(
             "- **Scenario:** {scenario}{fixed}.",
             scenario=html.code(study.scenario),
-            fixed=", with " * bool(fixed) + numbers.words(fixed),
+            fixed=", with " * bool(fixed) + numbers.join_words(fixed),
         ),
         f"- **Policies:** {policies}.",
         *_design(results),
@@ -57,14 +61,14 @@ def notes(results: Results) -> html.Marked:
 
 def page_title(results: Results) -> str:
     """The question that a study answers."""
-    fields = [parameter(field).within for field in settings.varied(results)]
+    fields = [field_named(field).within for field in varied_values(results)]
     if isinstance(results.study.selection, Cheapest):
         question = "Which fleet is the cheapest on {}?"
     elif results.design == "saltelli":
         question = "Which parameters matter on {}?"
     elif 0 < len(fields) <= _MOST_FIELDS:
         verb = "is" if len(fields) == 1 else "are"
-        question = f"Which {numbers.words(fields)} {verb} the best on {{}}?"
+        question = f"Which {numbers.join_words(fields)} {verb} the best on {{}}?"
     elif fields:
         question = "Which setting is the best on {}?"
     else:
@@ -87,9 +91,9 @@ def leading_metric(results: Results, metric: str | None) -> str:
     Raises:
         InputError: If there is no such metric.
     """
-    if metric is None and required(results):
-        return cheapest.tightest(results)[0].column
-    return settings.ranking_metric(results, metric)
+    if metric is None and requirements_of(results):
+        return cheapest.tightest_requirement(results)[0].column
+    return ranking_metric(results, metric)
 
 
 def shown_metrics(results: Results, by: str) -> list[str]:
@@ -99,13 +103,13 @@ def shown_metrics(results: Results, by: str) -> list[str]:
         results: The study.
         by: The metric that the page is about, which comes first.
     """
-    asked = [requirement.column for requirement in required(results)]
-    return [*dict.fromkeys([by, *asked])] if asked else settings.shown_metrics(by)
+    asked = [requirement.column for requirement in requirements_of(results)]
+    return [*dict.fromkeys([by, *asked])] if asked else metrics_of_page(by)
 
 
 def guarantees(results: Results) -> html.Marked:
     """What is guaranteed about the selections, as a list."""
-    rows = summary.selections(results).itertuples()
+    rows = summary.selected_settings(results).itertuples()
     lines = [html.marked("- {name}: {known}", name=row.policy, known=row.guarantee) for row in rows]
     return html.Marked("\n".join(lines))
 
@@ -115,7 +119,7 @@ def commands(results: Results, missions: pd.DataFrame) -> html.Marked:
 
     Args:
         results: The study.
-        missions: Rows of ``summary.worst``.
+        missions: Rows of ``summary.worst_missions``.
     """
     return html.marked(
         "These commands simulate them again. {folder} stands for the results folder of the study, "
@@ -127,21 +131,25 @@ def commands(results: Results, missions: pd.DataFrame) -> html.Marked:
 
 def reasons(results: Results) -> html.Marked:
     """The prices, how sure the answer of a search is, the other answers, and the guarantee."""
-    lines = [f"- {text}" for text in (costs.prices_in_words(results), *cheapest.reasons(results))]
-    sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(cheapest.guarantees(results)))
+    lines = [
+        f"- {text}" for text in (prices_in_words(results), *cheapest.reason_sentences(results))
+    ]
+    sure = "\n\n".join(
+        f"Guarantee: {text}." for text in sorted(cheapest.guarantee_sentences(results))
+    )
     return html.composed("\n".join(lines) + f"\n\n{sure}")
 
 
 def _design(results: Results) -> Iterator[html.Marked]:
     """The fields that the design varies, as items of the list."""
     points = len(results.store.manifest.points)
-    if fields := settings.varied(results):
+    if fields := varied_values(results):
         line = "- **Design:** {kind}, {points:,} design points. It varies:"
         yield html.marked(line, kind=html.code(results.design), points=points)
     for field, values in fields.items():
-        unit = f" [{parameter(field).unit}]".removesuffix(" []")
+        unit = f" [{field_named(field).unit}]".removesuffix(" []")
         line = "    - {field}{unit}: {values}"
-        yield html.marked(line, field=parameter(field).within, unit=unit, values=_values(values))
+        yield html.marked(line, field=field_named(field).within, unit=unit, values=_values(values))
 
 
 def _values(values: Sequence[Any]) -> str:
@@ -174,8 +182,8 @@ def report_of(folder: Path, values: Mapping[str, Any] = MappingProxyType({})) ->
             has no such metric or baseline.
     """
     results = load_results(folder)
-    settings.ranking_metric(results, values.get("metric"))
-    settings.baseline(results, values.get("baseline", 0))
+    ranking_metric(results, values.get("metric"))
+    baseline_in_words(results, values.get("baseline", 0))
     study = results.study
     original = notebook.parsed(NOTEBOOK)
     kept = parts(results)
@@ -184,7 +192,7 @@ def report_of(folder: Path, values: Mapping[str, Any] = MappingProxyType({})) ->
     ]
     points = len(results.store.manifest.points)
     where = f"{points:,} design points" if points > 1 else f"the scenario {study.scenario}"
-    description = study.description or f"{numbers.words(results.policies)} at {where}."
+    description = study.description or f"{numbers.join_words(results.policies)} at {where}."
     title = page_title(results)
     original.cells[0].source = f"# {html.text(title)}\n\n{html.text(description)}"
     report = notebook.report_of(f"{PREFIX}{study.name}", original)
@@ -196,7 +204,7 @@ def parts(results: Results) -> dict[str, bool]:
     manifest = results.store.manifest
     study = results.study
     several = len(manifest.points) > 1
-    fields = len(settings.varied(results))
+    fields = len(varied_values(results))
     kind = results.design  # a design that varies one field at most is a grid
     kind = kind if kind in ("saltelli", "latin-hypercube") or fields > 1 else "grid"
     is_ranked = kind != "saltelli"
@@ -223,15 +231,15 @@ def parts(results: Results) -> dict[str, bool]:
         "if-sampled": kind == "latin-hypercube" or (kind == "table" and fields > 2),
         "if-sensitivity": not is_ranked,
         # Several policies with the same missions; some of them learned, some not.
-        "if-policies": not summary.comparisons(results).empty,
-        "if-learned": not summary.learned_against_heuristic(results).empty,
+        "if-policies": not summary.compare_with_best(results).empty,
+        "if-learned": not summary.compare_learned_with_heuristic(results).empty,
         # Tables of the study.
         "if-selection": isinstance(study.selection, Selection),
         "if-cheapest": is_search,
         "if-conditions": is_search and cheapest.has_conditions(results),
         "if-precision": study.precision is not None,
         "if-costs": study.costs is not None and not is_search,
-        "if-priced-search": is_search and costs.has_running_cost(results),
+        "if-priced-search": is_search and has_running_cost(results),
         # A scenario in units, and what changes a little around the cheapest fleet.
         "if-sheet": all(space.units for space in manifest.scenarios),
         "if-around": is_search and around.is_known(results),

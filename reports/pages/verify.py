@@ -24,8 +24,8 @@ from dess.analysis.results.parquet import EVENTS
 from dess.analysis.results.resimulate import (
     Evidence,
     SampleMission,
-    chosen,
-    difference,
+    difference_in_words,
+    draw_numbers,
     learned_files,
 )
 from dess.analysis.results.store import Store
@@ -81,7 +81,9 @@ class _Sampling:
 
     def drawn(self, missions: Sequence[_Item]) -> list[_Item]:
         """Those of some missions that are simulated again."""
-        return [missions[number] for number in chosen(len(missions), self.missions, self.seed)]
+        return [
+            missions[number] for number in draw_numbers(len(missions), self.missions, self.seed)
+        ]
 
     def admit(self, what: str, spaces: Sequence[ScenarioSpace]) -> None:
         """Refuse missions that take too much, before the first of them is simulated.
@@ -191,7 +193,7 @@ def _compared(evidence: Evidence, drawn: _Drawn, named: Collection[str] = ()) ->
     lines = []
     for mission, space, team in drawn:
         record = simulate(space, team, evidence.seed, mission.replication)
-        if changed := difference(record, mission.record):
+        if changed := difference_in_words(record, mission.record):
             of = (mission.policy, mission.values, mission.replication)
             command = tables.of_fields(evidence, *of)
             lines.append(f"{changed}; command: {command}")

@@ -20,7 +20,7 @@ from dess.analysis.results.chunks import (
     check_parts,
     parts_of,
     rows_of,
-    stacked,
+    stack_tables,
 )
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.results.store import Store
@@ -100,7 +100,7 @@ def _copy(source: Store, store: Store, parts: list[Part], cells: Any) -> None:
         tuple(Part(cell, p.replications) for cell, p in zip(cells, parts, strict=True)),
     )
     tables = zip(*source._tables_with("missions", parts), strict=True)
-    rows = [rows_of(parts, stacked(of_kind)) for of_kind in tables]
+    rows = [rows_of(parts, stack_tables(of_kind)) for of_kind in tables]
     keys = {part.cell.key: cell.key for part, cell in zip(parts, cells, strict=True)}
     columns = [{str(n): of[n].to_numpy() for n in of} for of in rows]
     columns = [of | {"cell": np.array([keys[key] for key in of["cell"]])} for of in columns]

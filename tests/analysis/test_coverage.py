@@ -14,18 +14,18 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from dess.analysis.metrics import AGE, MOST_SLOTS, PRODUCT, REWARD, known_in
-from dess.analysis.stats.differences import paired
+from dess.analysis.metrics import AGE, MOST_SLOTS, PRODUCT, REWARD, metric_in_missions
+from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.distribution import quantile_interval
 from dess.analysis.stats.intervals import (
     bounded_ends,
     column_intervals,
     level_after,
     mean_interval,
-    stratified,
-    wilson,
+    stratified_interval,
+    wilson_interval,
 )
-from dess.analysis.stats.learners import crossed
+from dess.analysis.stats.learners import compare_crossed
 from dess.analysis.study.cheapest import Cheapest, Setting
 
 Drawing = tuple[Callable[[np.random.Generator, tuple[int, int]], np.ndarray], float]
@@ -158,7 +158,7 @@ def test_stratified_intervals_cover_the_mean_over_the_points(shared, trials):
         fails = np.where(generator.random((60, 1)) < shared, common, own) < 0.1
         return np.where(fails, 0.0, means + generator.uniform(-0.05, 0.05, (60, 3)))
 
-    intervals = (stratified(values(), PRODUCT)[1:] for _ in range(trials))
+    intervals = (stratified_interval(values(), PRODUCT)[1:] for _ in range(trials))
     assert covered(intervals, 0.9 * means.mean()) >= 0.95 - max(0.02, error(trials))
 
 
@@ -182,7 +182,9 @@ def test_intervals_cover_after_a_search_has_decided_how_many_missions_there_are(
         samples = [{"success": s, "cost": c} for s, c in zip(success, costs, strict=True)]
         choice = rule.choice(samples, settings)
         for point, (n, looks) in enumerate(zip(choice.counts, choice.looks, strict=True)):
-            _, low, high = wilson(int(success[point][:n].sum()), n, float(level_after(looks)))
+            _, low, high = wilson_interval(
+                int(success[point][:n].sum()), n, float(level_after(looks))
+            )
             covers[trial, point] = low <= shares[point] <= high
     assert (covers.mean(axis=0) >= 0.95 - max(0.02, error(trials) / 2)).all()
 
@@ -218,7 +220,7 @@ def pairs(generator: np.random.Generator, n: int, difference: float) -> tuple[np
 @pytest.mark.parametrize("n", [20, 200])
 def test_the_paired_interval_covers_and_its_test_keeps_its_level(n, trials):
     generator = rng(7)
-    results = [paired(*pairs(generator, n, 0.0)) for _ in range(trials)]
+    results = [compare_pairs(*pairs(generator, n, 0.0)) for _ in range(trials)]
     assert holds(covered(((r.low, r.high) for r in results), 0.0), trials)
     assert np.mean([r.p <= 0.05 for r in results]) == pytest.approx(0.05, abs=error(trials, 0.05))
 
@@ -239,7 +241,7 @@ def lone(
 
 def compared(a: np.ndarray, b: np.ndarray, metric: str) -> tuple[np.ndarray, ...]:
     """The low and high ends of the differences, and the p-values, by trial."""
-    rows = [paired(*pair, metric=metric) for pair in zip(a, b, strict=True)]
+    rows = [compare_pairs(*pair, metric=metric) for pair in zip(a, b, strict=True)]
     return tuple(np.array([getattr(row, name) for row in rows]) for name in ("low", "high", "p"))
 
 
@@ -318,8 +320,8 @@ def watches(metric: str, share: float, n: int, trials: int) -> tuple[np.ndarray,
 def of_watches(metric: str, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The ends of the intervals of the differences, by trial."""
     missions = pd.DataFrame({metric: [0.0], MOST_SLOTS: [LONGEST]})
-    of = known_in(missions, metric)
-    rows = [paired(*pair, metric=of) for pair in zip(a, b, strict=True)]
+    of = metric_in_missions(missions, metric)
+    rows = [compare_pairs(*pair, metric=of) for pair in zip(a, b, strict=True)]
     return np.array([row.low for row in rows]), np.array([row.high for row in rows])
 
 
@@ -410,7 +412,7 @@ def layouts(
 @pytest.mark.parametrize("trainings", [3, 5])
 def test_the_interval_of_a_learner_covers_trainings_and_missions(trainings, trials):
     drawn = list(layouts((trainings, 200), 0.03, 0.1, 0.1, trials))
-    results = [crossed(d) for d, _ in drawn]
+    results = [compare_crossed(d) for d, _ in drawn]
     assert holds(covered(((r.low, r.high) for r in results), 0.0), trials)
     level = np.mean([r.p <= 0.05 for r in results])
     assert level == pytest.approx(0.05, abs=max(0.02, error(trials)))

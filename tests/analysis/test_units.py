@@ -8,14 +8,15 @@ import pytest
 
 from dess import InputError
 from dess.analysis import tables
-from dess.analysis.answers import costs, settings
 from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.costs import mean_cost_parts
+from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
 from dess.analysis.ask import around
-from dess.analysis.ask.assumptions import assumptions
+from dess.analysis.ask.assumptions import assumption_sentences
 from dess.analysis.ask.question import sweep_question, what_if_question
 from dess.analysis.ask.what_if import WhatIf
-from dess.analysis.metrics import AGE, metric_of, told
-from dess.analysis.names import fields, parameter
+from dess.analysis.metrics import AGE, column_as_told, metric_of
+from dess.analysis.names import declared_fields, field_named
 from dess.analysis.study.cheapest import Cheapest, Setting
 from tests.analysis.small import SHEET, write_scenario
 
@@ -45,13 +46,13 @@ def test_values_in_units_are_those_of_the_model_times_the_unit(searched):
     sizes = {"age": ("age_h", hours), "slots": ("slots_h", hours)}
     sizes |= {"uav_slots": ("uav_slots_h", hours), "collected": ("collected_MB", megabytes)}
     for column, (in_units, size) in sizes.items():
-        assert told(column, missions) == in_units
+        assert column_as_told(column, missions) == in_units
         np.testing.assert_allclose(missions[in_units], missions[column] * size, rtol=1e-12)
     assert searched.checks["age_h"].notna().all()
 
 
 def test_the_price_of_an_hour_takes_the_slot_of_the_sheet(searched):
-    hours = costs.parts(searched)["hours"]
+    hours = mean_cost_parts(searched)["hours"]
     means = searched.missions.groupby("point", sort=False)["slots"].mean()
     np.testing.assert_allclose(hours, 36 * means.to_numpy() * SLOT / 3600)
 
@@ -59,17 +60,17 @@ def test_the_price_of_an_hour_takes_the_slot_of_the_sheet(searched):
 def test_ages_of_missions_of_different_lengths_are_not_compared_without_saying_so(studied):
     results = studied(set={"age.measured": True})
     means = results.missions.groupby("policy")["slots"].mean().round()
-    text = settings.unequal_lengths(results, ["age"])
+    text = unequal_lengths_sentence(results, ["age"])
     assert f"after {means.min():.0f} mission slots to {means.max():.0f} mission slots" in text
     assert "compared by age of information over missions of different lengths" in text
-    assert settings.unequal_lengths(results, ["collection_ratio"]) == ""
+    assert unequal_lengths_sentence(results, ["collection_ratio"]) == ""
     alike = replace(results, missions=results.missions.assign(slots=480))
-    assert settings.unequal_lengths(alike, ["age"]) == ""
+    assert unequal_lengths_sentence(alike, ["age"]) == ""
 
 
 def test_without_a_sheet_nothing_is_told_in_units(studied):
     missions = studied(set={"age.measured": True}).missions
-    assert told(AGE, missions) == AGE
+    assert column_as_told(AGE, missions) == AGE
     assert not [name for name in missions if name.endswith(("_h", "_min", "_MB"))]
 
 
@@ -101,7 +102,7 @@ def test_an_age_is_required_to_be_at_most(column, age, verdict):
 
 
 def test_the_answer_has_every_requirement_in_its_unit(searched):
-    text = " ".join(cheapest.sentences(searched))
+    text = " ".join(cheapest.cheapest_sentences(searched))
     assert " h (at most 0.8333 h required)" in text
     # Half a percent of two hours more.
     assert "its age of information is at most 0.8433 h" in text
@@ -138,7 +139,7 @@ def test_the_fleet_is_asked_about_with_one_more_and_in_harder_conditions(searche
     monkeypatch.setattr(around, "FACTOR", 4)  # UAVs cannot fly against so much wind
     assert not around.is_known(searched)
     scenario = str(searched.store.folder.parents[1] / "small.toml")
-    question = around.around(searched, scenario, 10)
+    question = around.question_around(searched, scenario, 10)
     first, *rows = question.study.design.rows
     changes = [{k: v for k, v in row.items() if first.get(k) != v} for row in rows]
     assert changes == [
@@ -149,7 +150,7 @@ def test_the_fleet_is_asked_about_with_one_more_and_in_harder_conditions(searche
     ]
     found = question.ask()
     assert around.is_known(searched)
-    cells, caption, data = around.table(searched)
+    cells, caption, data = around.table_around(searched)
     assert caption.endswith("Cannot be simulated here: wind 16 m/s from SW")
     assert cells["What if"][0].startswith("the fleet: ")
     assert "data rate 12 MB/h" in {*cells["What if"]}
@@ -165,23 +166,25 @@ def test_the_fleet_is_asked_about_with_one_more_and_in_harder_conditions(searche
 
 
 def test_a_repair_of_0_reads_as_what_it_is():
-    repairs = [parameter(f"failures.{name}_repair") for name in ("uav", "pad", "node")]
+    repairs = [field_named(f"failures.{name}_repair") for name in ("uav", "pad", "node")]
     assert [repair.cell(0.0) for repair in repairs] == ["lost for good", *["never repaired"] * 2]
     assert [repair.cell(20.0) for repair in repairs] == ["20"] * 3
-    assert parameter("uavs").cell(0) == "0"
+    assert field_named("uavs").cell(0) == "0"
     row = {"failures.uav_repair": 0.0, "n": 8, "rate": 0.01, "mean": 0.9, "low": 0.8, "high": 1.0}
-    cells = tables.estimates(pd.DataFrame([row]), ["failures.uav_repair", "n"], "rate")
+    cells = tables.estimate_cells(pd.DataFrame([row]), ["failures.uav_repair", "n"], "rate")
     assert cells.iloc[0, 0] == "lost for good"
 
 
 def test_fields_that_follow_from_the_sheet_are_marked(searched):
     space = searched.scenario(0)
-    marked = {row.name for row in fields(space) if row.meaning.endswith(", from the data sheet")}
+    marked = {
+        row.name for row in declared_fields(space) if row.meaning.endswith(", from the data sheet")
+    }
     assert marked == set(space.data_sheet.fields()) and "cell_size" in marked
 
 
 def test_ten_lines_say_what_is_assumed(searched):
-    lines = assumptions(searched)
+    lines = assumption_sentences(searched)
     assert len(lines) == 10
     assert lines[1].startswith("A slot is 21 s, a hundredth of the endurance of 35 min")
     assert lines[2].startswith("A cell is 315 m wide, the way of a slot at 15 m/s.")

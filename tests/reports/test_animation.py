@@ -30,7 +30,7 @@ def test_a_film_draws_what_the_player_shows():
     log, scenario = mission()
     slots, residual = uav_slots(log), residual_data(log)
     assert slots["waiting"].any() and slots["charging"].any()
-    with style.look():
+    with style.figure_look():
         film = Film(log, scenario)
         for slot in range(film.end + 1):
             now = slots[slots["slot"] == slot - 1]

@@ -15,10 +15,10 @@ import dess
 from dess import InputError, policies, reports
 from dess.analysis.figures.style import node_colours
 from dess.analysis.results.event_log import (
-    ages,
+    ages_of_nodes,
     battery_levels,
-    duration,
     mean_age,
+    mission_length,
     residual_data,
     uav_slots,
 )
@@ -106,11 +106,11 @@ def test_uavs_are_in_their_state_until_their_mission_ends(mission, shown):
 def test_the_status_says_what_is_left_and_who_charges_and_waits(queue):
     told = data_in(played(queue, "one").data)["status"]
     log, slots = queue.log, uav_slots(queue.log)
-    assert len(told) == duration(log) + 1
+    assert len(told) == mission_length(log) + 1
     time = slots.loc[slots["waiting"], "slot"].iloc[0] + 1
     now, left = slots[slots["slot"] == time - 1], residual_data(log).iloc[time].sum()
     assert told[time] == (
-        f"slot {time} of {duration(log)} · {left:.1f} data units left · "
+        f"slot {time} of {mission_length(log)} · {left:.1f} data units left · "
         f"{now['charging'].sum()} of 1 pad in use, {now['waiting'].sum()} waiting"
     )
 
@@ -130,7 +130,7 @@ def test_ages_are_shown_where_the_scenario_measures_them(case):
     if not scenario.age.measured:
         assert shown["ages"] is shown["meanAge"] is None
         return
-    assert np.allclose(shown["ages"], ages(log), atol=0.0051, rtol=0)
+    assert np.allclose(shown["ages"], ages_of_nodes(log), atol=0.0051, rtol=0)
     assert np.allclose(shown["meanAge"], mean_age(log), atol=0.0051, rtol=0)
 
 
@@ -256,7 +256,9 @@ def test_a_click_on_a_curve_goes_to_its_slot_and_the_pointer_reads_the_map(visit
     assert box is not None
     # The end of the batteries.
     canvas.click(position={"x": box["width"] - 45, "y": 60})
-    expect(opened.page.locator("#first output")).to_contain_text(f"slot {duration(queue.log)} of")
+    expect(opened.page.locator("#first output")).to_contain_text(
+        f"slot {mission_length(queue.log)} of"
+    )
     titles = []
     for x in range(60, 400, 12):
         opened.page.mouse.move(box["x"] + x, box["y"] + x)

@@ -1,7 +1,7 @@
 """The answer of a search for the cheapest fleet that meets requirements.
 
     results = load_results("results/fleets")  # of a study that searches for the cheapest fleet
-    answer(results)  # in words
+    cheapest_sentence(results)  # in words
     fleet_table(results)  # the fleets by cost, with the answer marked
 
 A fleet is searched for every policy and under every condition and, if there are several conditions,
@@ -18,22 +18,47 @@ from pandas.api.types import is_numeric_dtype
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.answers import costs
-from dess.analysis.answers.fleet import home
+from dess.analysis.answers.fleet.costs import (
+    conditions_in_words,
+    cost_parts_in_words,
+    currency_of,
+    fleets_in_words,
+    format_amount,
+    has_running_cost,
+    mean_cost_parts,
+    pays_for_hours,
+    priced_settings,
+    prices_in_words,
+    prices_of,
+    purchase_prices,
+    setting_cells,
+)
 from dess.analysis.answers.fleet.requirements import (
     Requirement,
     Verdict,
-    in_words,
     least_spare,
-    required,
-    spare,
+    relative_spare,
+    requirements_in_words,
+    requirements_of,
 )
-from dess.analysis.answers.settings import edge, ends, intervals_in_words, points, unequal_lengths
+from dess.analysis.answers.settings.home import (
+    may_end_in_the_air,
+    stranded_sentence,
+    way_home_sentence,
+    with_way_home,
+)
+from dess.analysis.answers.settings.points import (
+    ends_of_point,
+    ends_sentence,
+    intervals_in_words,
+    values_of_points,
+)
+from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
 from dess.analysis.metrics import COST, HOME, SUCCESS, metric_of
 from dess.analysis.names import DECISIONS
-from dess.analysis.results.tables import Results, once
+from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.study.cheapest import Answer, Cheapest, CheapestChoice
-from dess.analysis.tables import INTERVALS, MOST_ROWS, Table, counts
+from dess.analysis.tables import INTERVALS, MOST_ROWS, Table, format_counts
 from dess.scenario.fields import ZONE_PADS
 
 ALL_CONDITIONS = "all conditions"
@@ -49,50 +74,50 @@ VERDICTS_EXPLAINED = (
 )
 
 
-@once
-def judged(results: Results) -> pd.DataFrame:
+@compute_once
+def judge_settings(results: Results) -> pd.DataFrame:
     """Which settings meet the requirements, and the cheapest of these under each condition.
 
     Args:
         results: A study that searches for the cheapest fleet.
 
     Returns:
-        The rows of ``costs.priced`` with two more columns: ``verdict`` (``met``, ``missed`` or
-        ``open``), and ``selected``, which is true for the cheapest setting of each policy under
-        each condition whose verdict is ``met``. Both have the guarantee of the search.
+        The rows of ``costs.priced_settings`` with two more columns: ``verdict`` (``met``,
+        ``missed`` or ``open``), and ``selected``, which is true for the cheapest setting of each
+        policy under each condition whose verdict is ``met``. Both have the guarantee of the search.
     """
     tables = []
-    for policy, rows in costs.priced(results).groupby("policy", sort=False):
-        choice = _choice(results, str(policy))
+    for policy, rows in priced_settings(results).groupby("policy", sort=False):
+        choice = _cheapest_choice(results, str(policy))
         selected = [a.points[0] for a in choice.answers if a.condition is not None and a.points]
         verdicts = rows["point"].map(dict(enumerate(choice.verdicts)))
         tables.append(rows.assign(verdict=verdicts, selected=rows["point"].isin(selected)))
     return pd.concat(tables).sort_index()
 
 
-@once
-def everywhere(results: Results) -> pd.DataFrame:
+@compute_once
+def judge_fleets_everywhere(results: Results) -> pd.DataFrame:
     """The fleets under all conditions together.
 
     Returns:
         A row per policy and fleet that the design has under every condition, the cheapest first,
-        with the columns of ``judged``: ``cost`` is the mean over the conditions, ``verdict`` holds
-        under all of them, and a metric is that of the condition under which the fleet is worst at
-        it. ``n`` is the least number of missions under a condition.
+        with the columns of ``judge_settings``: ``cost`` is the mean over the conditions,
+        ``verdict`` holds under all of them, and a metric is that of the condition under which the
+        fleet is worst at it. ``n`` is the least number of missions under a condition.
     """
-    table, rows = judged(results), []
+    table, rows = judge_settings(results), []
     conditions = table["condition"].nunique()
     for (policy, _), under_conditions in table.groupby(["policy", "fleet"], sort=False):
         if len(under_conditions) == conditions:
-            rows.append(_together(results, str(policy), under_conditions))
+            rows.append(_judge_under_all_conditions(results, str(policy), under_conditions))
     fleets = pd.DataFrame(rows, columns=table.columns)
     return fleets.sort_values(COST, kind="stable", ignore_index=True)
 
 
-def _together(results: Results, policy: str, rows: pd.DataFrame) -> pd.Series:
-    """The row of ``everywhere`` of a fleet, of its rows under all conditions."""
+def _judge_under_all_conditions(results: Results, policy: str, rows: pd.DataFrame) -> pd.Series:
+    """The row of ``judge_fleets_everywhere`` of a fleet, of its rows under all conditions."""
     together = rows.iloc[0].copy()
-    for column in _estimated(results):
+    for column in _reported_metrics(results):
         less = metric_of(column).less_is_better
         worst = rows[column].idxmax() if less else rows[column].idxmin()
         ends_of = _ends_of(column)
@@ -101,15 +126,15 @@ def _together(results: Results, policy: str, rows: pd.DataFrame) -> pd.Series:
     together["condition"] = ALL_CONDITIONS
     together["verdict"] = Verdict.of_all([*rows["verdict"]])
     together["n"] = rows["n"].min()
-    selected = _choice(results, policy).answers[-1].points
+    selected = _cheapest_choice(results, policy).answers[-1].points
     together["selected"] = {*selected} == {*rows["point"]}
     return together
 
 
-def _estimated(results: Results) -> list[str]:
+def _reported_metrics(results: Results) -> list[str]:
     """What the tables and sentences of a search tell of a fleet: success, and what is required."""
-    asked = [requirement.column for requirement in required(results)]
-    return home.beside_success(results, [SUCCESS, *asked])
+    asked = [requirement.column for requirement in requirements_of(results)]
+    return with_way_home(results, [SUCCESS, *asked])
 
 
 def _ends_of(column: str) -> list[str]:
@@ -117,31 +142,31 @@ def _ends_of(column: str) -> list[str]:
     return [column, f"{column}_low", f"{column}_high"]
 
 
-@once
-def checks(results: Results) -> pd.DataFrame:
+@compute_once
+def checked_settings(results: Results) -> pd.DataFrame:
     """The check of the selected settings on missions that were not used for the selection.
 
     Returns:
-        A row per policy and selected design point, with the columns of ``costs.priced``.
+        A row per policy and selected design point, with the columns of ``costs.priced_settings``.
     """
-    return costs.priced(replace(results, missions=results.checks))
+    return priced_settings(replace(results, missions=results.checks))
 
 
-@once
-def quoted(results: Results) -> pd.DataFrame:
+@compute_once
+def quoted_settings(results: Results) -> pd.DataFrame:
     """The settings with the estimates that answers quote.
 
     A search gives most missions to a setting whose results were good so far. The check had no part
     in the search, so its means are unbiased.
 
     Returns:
-        The rows of ``judged``. The metrics, the cost and ``n`` of settings that were checked are
-        those of ``checks``.
+        The rows of ``judge_settings``. The metrics, the cost and ``n`` of settings that were
+        checked are those of ``checked_settings``.
     """
-    table, setting = judged(results), ["policy", "point"]
+    table, setting = judge_settings(results), ["policy", "point"]
     if results.checks.empty:
         return table
-    rows, checked = table.set_index(setting), checks(results).set_index(setting)
+    rows, checked = table.set_index(setting), checked_settings(results).set_index(setting)
     rows.loc[checked.index, checked.columns] = checked
     return rows.reset_index()[[*table]]
 
@@ -164,7 +189,7 @@ class FleetAnswer:
 
     @cached_property
     def _choice(self) -> CheapestChoice:
-        return _choice(self.results, self.policy)
+        return _cheapest_choice(self.results, self.policy)
 
     @property
     def _answer(self) -> Answer:
@@ -177,16 +202,16 @@ class FleetAnswer:
 
     @cached_property
     def fleets(self) -> pd.DataFrame:
-        """The rows of ``judged`` or ``everywhere`` that the answer was chosen from."""
+        """The rows of ``judge_settings`` or ``judge_fleets_everywhere`` that it was chosen from."""
         together = self.condition == ALL_CONDITIONS
-        table = everywhere(self.results) if together else judged(self.results)
+        table = judge_fleets_everywhere(self.results) if together else judge_settings(self.results)
         is_asked = (table["policy"] == self.policy) & (table["condition"] == self.condition)
         return table[is_asked]
 
     @property
     def fleet(self) -> str:
         """The fleet in words; ``none`` if no fleet is known to meet the requirements."""
-        return costs.fleets(self.results)[self.points[0]] if self.points else "none"
+        return fleets_in_words(self.results)[self.points[0]] if self.points else "none"
 
     @property
     def cost(self) -> float:
@@ -199,18 +224,21 @@ class FleetAnswer:
         """The requirements, that with the least to spare first."""
         selected = self.fleets["selected"]
         if not selected.any():
-            return required(self.results)
-        room = {r.column: float(spare(self.fleets, r)[selected].iloc[0]) for r in self._required}
+            return requirements_of(self.results)
+        room = {
+            r.column: float(relative_spare(self.fleets, r)[selected].iloc[0])
+            for r in self._required
+        }
         return sorted(self._required, key=lambda requirement: room[requirement.column])
 
     @property
     def _required(self) -> list[Requirement]:
-        return required(self.results)
+        return requirements_of(self.results)
 
     def estimates(self, column: str) -> pd.Series:
         """The mean of a metric of the fleet with its interval, under its worst condition.
 
-        All sentences on the fleet take their numbers from here, from ``quoted``.
+        All sentences on the fleet take their numbers from here, from ``quoted_settings``.
 
         Args:
             column: The column of the metric.
@@ -218,7 +246,7 @@ class FleetAnswer:
         Returns:
             A row with the metric, the ends of its interval and ``n``.
         """
-        table = quoted(self.results)
+        table = quoted_settings(self.results)
         rows = table[(table["policy"] == self.policy) & table["point"].isin(self.points)]
         worst = rows[column].idxmax() if metric_of(column).less_is_better else rows[column].idxmin()
         return rows.loc[worst]
@@ -237,10 +265,10 @@ class FleetAnswer:
         """Which fleet is the cheapest that meets the requirements, and what it costs."""
         if not self.points:
             return f"{self._where}, no fleet is known to meet the requirements."
-        amount = numbers.money(self.cost, costs.currency(self.results))
+        amount = numbers.format_money(self.cost, currency_of(self.results))
         return (
             f"{self._where}, the cheapest fleet that meets the requirements is **{self.fleet}** "
-            f"for {amount}{costs.parts_in_words(self.results, self.policy, self.points)}."
+            f"for {amount}{cost_parts_in_words(self.results, self.policy, self.points)}."
         )
 
     def estimates_sentence(self) -> str:
@@ -266,20 +294,20 @@ class FleetAnswer:
         is_checked = not self.results.checks.empty
         source = f"{missions} that check it" if is_checked else f"the {missions} of the search"
         where = ", under the worst condition for each," if len(self.points) > 1 else ","
-        text = f"In {source}{where} {numbers.words(texts)}."
+        text = f"In {source}{where} {numbers.join_words(texts)}."
         if len(self.tightest_first) > 1:
             text += f" The tightest requirement is the {self.tightest_first[0].metric.within}."
         return text
 
     def home_sentence(self) -> str:
         """Whether the UAVs of the fleet could fly home, where missions may end in the air."""
-        if not self.points or not home.may_end_in_the_air(self.results):
+        if not self.points or not may_end_in_the_air(self.results):
             return ""
         row = self.estimates(HOME)
-        share = home.sentence(*row[_ends_of(HOME)])
-        parts = costs.parts(self.results)
+        share = way_home_sentence(*row[_ends_of(HOME)])
+        parts = mean_cost_parts(self.results)
         rows = parts[(parts["policy"] == self.policy) & parts["point"].isin(self.points)]
-        return f"{share} {home.stranded_sentence(self.results, rows['stranded'].mean())}".strip()
+        return f"{share} {stranded_sentence(self.results, rows['stranded'].mean())}".strip()
 
     def guarantee_sentence(self, policies: int = 1) -> str:
         """What the search has shown of the fleet, with its probability.
@@ -295,15 +323,17 @@ class FleetAnswer:
         shifted = [requirement.shifted(rule.tolerance, horizon) for requirement in self._required]
         shown = [f"its {each.metric.within} is {each.bound_in_words}" for each in shifted]
         where = " under every condition" if self._answer.condition is None else ""
-        sure = numbers.level(rule.shown(policies))
-        return f"With a probability of at least {sure}, {numbers.words(shown)}{where}."
+        sure = numbers.format_level(rule.shown(policies))
+        return f"With a probability of at least {sure}, {numbers.join_words(shown)}{where}."
 
     def ends_sentence(self) -> str:
         """At which ends of the values asked for the fleet lies, beyond which one may be cheaper."""
         if not self.points:
             return ""
         point = self.points[0]
-        return edge(self.results, point, _ends(self.results, point), "a cheaper one").strip()
+        return ends_sentence(
+            self.results, point, _ends_of_values(self.results, point), "a cheaper one"
+        ).strip()
 
     def budget_sentence(self) -> str:
         """Whether the budget ended before the answer was sure, and what would settle it."""
@@ -328,14 +358,14 @@ class FleetAnswer:
         if other.empty:
             return ""
         row = other.iloc[0]
-        amount = numbers.money(row[COST], costs.currency(self.results))
+        amount = numbers.format_money(row[COST], currency_of(self.results))
         measured = [
             f"{r.metric.within} {r.metric.written(*row[_ends_of(r.column)])}"
             for r in self._required
         ]
         return (
-            f"The {which} one, **{row['fleet']}** for {amount} with {numbers.words(measured)}, "
-            f"{_WHY_NOT[row['verdict']]}."
+            f"The {which} one, **{row['fleet']}** for {amount} with "
+            f"{numbers.join_words(measured)}, {_WHY_NOT[row['verdict']]}."
         )
 
     def headline(self) -> str:
@@ -358,10 +388,10 @@ class FleetAnswer:
         return " ".join(filter(None, parts))
 
 
-@once
+@compute_once
 def fleet_answers(results: Results) -> list[FleetAnswer]:
     """The answers of every policy: one for each condition, then one for all of them together."""
-    conditions = [*dict.fromkeys(costs.conditions(results))]
+    conditions = [*dict.fromkeys(conditions_in_words(results))]
     if len(conditions) > 1:
         conditions.append(ALL_CONDITIONS)
     return [
@@ -371,8 +401,8 @@ def fleet_answers(results: Results) -> list[FleetAnswer]:
     ]
 
 
-@once
-def the_answer(results: Results) -> FleetAnswer:
+@compute_once
+def cheapest_answer(results: Results) -> FleetAnswer:
     """The cheapest fleet of any policy under all conditions; that of the first policy if none."""
     return min(_last_answers(results), key=lambda answer: answer.cost)
 
@@ -385,12 +415,12 @@ def _last_answers(results: Results) -> list[FleetAnswer]:
 
 def best_policy(results: Results) -> str:
     """The policy whose fleet is the cheapest that meets the requirements under every condition."""
-    return the_answer(results).policy
+    return cheapest_answer(results).policy
 
 
 def cheapest_fleet(results: Results) -> str:
     """The cheapest fleet of all policies that meets the requirements under every condition."""
-    return the_answer(results).fleet
+    return cheapest_answer(results).fleet
 
 
 def shown_point(results: Results) -> int:
@@ -398,12 +428,12 @@ def shown_point(results: Results) -> int:
 
     Of a fleet for several conditions, it is that of the last condition.
     """
-    answer = the_answer(results)
+    answer = cheapest_answer(results)
     if answer.points:
         return answer.points[-1]
-    rows = judged(results)
+    rows = judge_settings(results)
     rows = rows[rows["policy"] == answer.policy]
-    return int(rows.loc[least_spare(rows, required(results)).idxmax(), "point"])
+    return int(rows.loc[least_spare(rows, requirements_of(results)).idxmax(), "point"])
 
 
 def shown_missions(results: Results) -> pd.DataFrame:
@@ -415,17 +445,17 @@ def shown_missions(results: Results) -> pd.DataFrame:
 
 def has_conditions(results: Results) -> bool:
     """Whether fleets have to work under several conditions."""
-    return len({*costs.conditions(results)}) > 1
+    return len({*conditions_in_words(results)}) > 1
 
 
-def answer(results: Results) -> str:
+def cheapest_sentence(results: Results) -> str:
     """In words: the cheapest fleet of all policies, and which the others would have named."""
-    return " ".join([the_answer(results).headline(), *dependence(results)])
+    return " ".join([cheapest_answer(results).headline(), *other_policies_sentences(results)])
 
 
-def dependence(results: Results) -> list[str]:
+def other_policies_sentences(results: Results) -> list[str]:
     """A sentence for each other policy: what its cheapest fleet is, so how much depends on it."""
-    best, sentences = the_answer(results), []
+    best, sentences = cheapest_answer(results), []
     for other in _last_answers(results):
         if other.policy == best.policy:
             continue
@@ -433,7 +463,7 @@ def dependence(results: Results) -> list[str]:
             if best.points:
                 sentences.append(f"With the policy `{other.policy}`, it is the same fleet.")
         elif other.points:
-            amount = numbers.money(other.cost, costs.currency(results))
+            amount = numbers.format_money(other.cost, currency_of(results))
             sentences.append(
                 f"With the policy `{other.policy}`, it would be **{other.fleet}** for {amount}."
             )
@@ -444,10 +474,13 @@ def dependence(results: Results) -> list[str]:
     return sentences
 
 
-def reasons(results: Results) -> list[str]:
+def reason_sentences(results: Results) -> list[str]:
     """How sure the answer is; then the answers of the other policies and conditions."""
-    best = the_answer(results)
-    lines = [best.reasons(len(results.policies)), unequal_lengths(results, _compared(results))]
+    best = cheapest_answer(results)
+    lines = [
+        best.reasons(len(results.policies)),
+        unequal_lengths_sentence(results, _length_dependent_metrics(results)),
+    ]
     lines += [
         f"{other.headline()} {other.reasons()}".strip()
         for other in fleet_answers(results)
@@ -456,25 +489,25 @@ def reasons(results: Results) -> list[str]:
     return [line for line in lines if line]
 
 
-def _compared(results: Results) -> list[str]:
+def _length_dependent_metrics(results: Results) -> list[str]:
     """The metrics by which fleets are compared that may depend on the length of a mission."""
-    asked = [requirement.column for requirement in required(results)]
-    return [*asked, COST] if costs.pays_for_hours(results) else asked
+    asked = [requirement.column for requirement in requirements_of(results)]
+    return [*asked, COST] if pays_for_hours(results) else asked
 
 
-def sentences(results: Results) -> list[str]:
+def cheapest_sentences(results: Results) -> list[str]:
     """In words: the answer, what is paid for, how sure it is, and the other answers."""
-    return [answer(results), costs.prices_in_words(results), *reasons(results)]
+    return [cheapest_sentence(results), prices_in_words(results), *reason_sentences(results)]
 
 
-def guarantees(results: Results) -> list[str]:
+def guarantee_sentences(results: Results) -> list[str]:
     """What is guaranteed about the selected fleets of every policy; none without a search."""
     choices = [results.cheapest(policy) for policy in results.policies]
     return [*dict.fromkeys(choice.guarantee for choice in choices if choice)]
 
 
-@once
-def selections(results: Results) -> pd.DataFrame:
+@compute_once
+def selected_fleets(results: Results) -> pd.DataFrame:
     """What was selected by a study that searches for the cheapest fleets.
 
     Returns:
@@ -485,7 +518,7 @@ def selections(results: Results) -> pd.DataFrame:
     """
     rows = []
     for found in fleet_answers(results):
-        choice = _choice(results, found.policy)
+        choice = _cheapest_choice(results, found.policy)
         of_one = choice.answers[found.number]
         is_point = of_one.points and of_one.condition is not None
         rows.append(
@@ -510,16 +543,17 @@ def fleet_rows(results: Results) -> pd.DataFrame:
     """The fleets that the answer was chosen from, of all policies, the cheapest first.
 
     Returns:
-        Rows of ``judged``, or of ``everywhere`` if there are several conditions, with the parts of
-        the cost (``purchase`` and ``running``) and ``answer``: ``answer`` for the answer,
-        ``selected`` for the cheapest fleet of another policy that meets the requirements.
+        Rows of ``judge_settings``, or of ``judge_fleets_everywhere`` if there are several
+        conditions, with the parts of the cost (``purchase`` and ``running``) and ``answer``:
+        ``answer`` for the answer, ``selected`` for the cheapest fleet of another policy that meets
+        the requirements.
     """
-    rows = everywhere(results) if has_conditions(results) else judged(results)
+    rows = judge_fleets_everywhere(results) if has_conditions(results) else judge_settings(results)
     rows = rows.sort_values(COST, kind="stable", ignore_index=True)
-    best = the_answer(results)
+    best = cheapest_answer(results)
     is_answer = rows["selected"] & (rows["policy"] == best.policy)
     marks = np.where(is_answer, "answer", np.where(rows["selected"], "selected", ""))
-    purchase = costs.purchases(results)
+    purchase = purchase_prices(results)
     bought = [purchase[point] for point in rows["point"]]
     return rows.assign(purchase=bought, running=rows[COST] - bought, answer=marks)
 
@@ -539,18 +573,18 @@ def fleet_cells(results: Results, rows: pd.DataFrame, further: str = SUCCESS) ->
         rows: The rows.
         further: A metric that is shown beside those of the requirements.
     """
-    cells = costs.cells(rows.assign(condition=""), [])
-    cells = cells.rename(columns={"Cost": f"Cost [{costs.currency(results)}]"})
+    cells = setting_cells(rows.assign(condition=""), [])
+    cells = cells.rename(columns={"Cost": f"Cost [{currency_of(results)}]"})
     place = cells.shape[1]
-    if costs.has_running_cost(results):
-        cells.insert(place, "Purchase", rows["purchase"].map(costs.amount))
-        cells.insert(place + 1, "Missions' cost", rows["running"].map(costs.amount))
+    if has_running_cost(results):
+        cells.insert(place, "Purchase", rows["purchase"].map(format_amount))
+        cells.insert(place + 1, "Missions' cost", rows["running"].map(format_amount))
     is_answer = rows["answer"] == "answer"
     cells["Requirements"] = rows["verdict"].where(~is_answer, rows["verdict"] + ": the answer")
-    for metric in map(metric_of, dict.fromkeys([*_estimated(results), further])):
+    for metric in map(metric_of, dict.fromkeys([*_reported_metrics(results), further])):
         if metric.column != COST:
-            cells[metric.name] = numbers.estimates(rows, metric.column, metric.written)
-    return cells.assign(n=counts(rows["n"]))
+            cells[metric.name] = numbers.format_estimates(rows, metric.column, metric.written)
+    return cells.assign(n=format_counts(rows["n"]))
 
 
 def fleet_table(results: Results, further: str = SUCCESS) -> Table:
@@ -562,7 +596,8 @@ def fleet_table(results: Results, further: str = SUCCESS) -> Table:
     """
     rows = fleet_rows(results)
     top = shown_rows(rows, MOST_ROWS)
-    caption = f"The fleets, the cheapest first. Required: {in_words(required(results))}. "
+    requirements = requirements_in_words(requirements_of(results))
+    caption = f"The fleets, the cheapest first. Required: {requirements}. "
     if len(top) < len(rows):
         caption += f"{len(top)} of {len(rows):,} rows, those about the answer; the data have all. "
     if has_conditions(results):
@@ -576,20 +611,20 @@ def fleet_table(results: Results, further: str = SUCCESS) -> Table:
 
 def condition_table(results: Results) -> Table:
     """The fleets under every condition, whether they meet the requirements there."""
-    rows = judged(results)
+    rows = judge_settings(results)
     top = rows.head(MOST_ROWS)
-    shown = costs.cells(top, _estimated(results))
+    shown = setting_cells(top, _reported_metrics(results))
     shown.insert(shown.columns.get_loc("Cost") + 1, "Requirements", top["verdict"])
     shown["Cheapest that meets them"] = top["selected"].map({True: "yes", False: ""})
-    shown["n"] = counts(top["n"])
+    shown["n"] = format_counts(top["n"])
     caption = f"The fleets under every condition; means with {intervals_in_words(results)}"
     return Table(shown, caption, rows)
 
 
 def check_table(results: Results) -> Table:
     """The check of the selected fleets: all that is required, and the way home."""
-    rows = checks(results)
-    shown = costs.cells(rows, _estimated(results)).assign(n=counts(rows["n"]))
+    rows = checked_settings(results)
+    shown = setting_cells(rows, _reported_metrics(results)).assign(n=format_counts(rows["n"]))
     caption = (
         "The check of the selected fleets on missions that had no part in the search: means with "
         f"{INTERVALS}"
@@ -597,12 +632,12 @@ def check_table(results: Results) -> Table:
     return Table(shown, caption, rows)
 
 
-def _ends(results: Results, point: int) -> dict[str, str]:
+def _ends_of_values(results: Results, point: int) -> dict[str, str]:
     """The ends of the swept values at which a fleet lies and beyond which one may be cheaper.
 
     With more UAVs or pads a fleet is cheaper only if that saves enough of the others.
     """
-    table, space, prices = points(results), results.scenario(point), costs.prices_of(results)
+    table, space, prices = values_of_points(results), results.scenario(point), prices_of(results)
     price_of = {"uavs": prices.uav, "pads": prices.pad, ZONE_PADS: prices.pad * len(space.zones)}
     price_of = {field: price for field, price in price_of.items() if field in table}
     spent = {
@@ -618,12 +653,12 @@ def _ends(results: Results, point: int) -> dict[str, str]:
 
     return {
         field: end
-        for field, end in ends(results, point).items()
+        for field, end in ends_of_point(results, point).items()
         if field in DECISIONS and may_be_cheaper(field, end)
     }
 
 
-def _choice(results: Results, policy: str) -> CheapestChoice:
+def _cheapest_choice(results: Results, policy: str) -> CheapestChoice:
     choice = results.cheapest(policy)
     if choice is None:
         raise InputError(
@@ -633,25 +668,25 @@ def _choice(results: Results, policy: str) -> CheapestChoice:
     return choice
 
 
-def tightest(results: Results) -> tuple[Requirement, str]:
+def tightest_requirement(results: Results) -> tuple[Requirement, str]:
     """The requirement that the answer is chosen by, and the condition under which it is.
 
     It is the one that alone asks for the most expensive fleet, with the policy of the answer; of
     several of these, the one that the answer keeps with the least to spare.
     """
-    best = the_answer(results)
-    rows = judged(results)
+    best = cheapest_answer(results)
+    rows = judge_settings(results)
     rows = rows[rows["policy"] == best.policy]
 
     def tightness(requirement: Requirement, part: pd.DataFrame) -> tuple[float, float]:
         keeps = requirement.margin(part[requirement.column]) >= 0
         cheapest_cost = part[COST][keeps].min() if keeps.any() else np.inf
-        room = spare(part, requirement)
+        room = relative_spare(part, requirement)
         selected = part["point"].isin(best.points)
         least_room = float(room[selected].iloc[0]) if selected.any() else float(room.max())
         return cheapest_cost, -least_room
 
     parts: Sequence[tuple[str, pd.DataFrame]] = [*rows.groupby("condition", sort=False)]
-    asked = [(each, str(name), part) for each in required(results) for name, part in parts]
+    asked = [(each, str(name), part) for each in requirements_of(results) for name, part in parts]
     requirement, condition, _ = max(asked, key=lambda found: tightness(found[0], found[2]))
     return requirement, condition

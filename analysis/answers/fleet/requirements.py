@@ -1,6 +1,6 @@
 """The requirements of a search for the cheapest fleet, and whether a fleet meets them.
 
-    for requirement in required(results):  # of a study that searches for the cheapest fleet
+    for requirement in requirements_of(results):  # of a study that searches for the cheapest fleet
         print(requirement.in_words, requirement.margin(0.995))
 
 A requirement is a bound on the mean of a metric, such as a success of at least 99 % or an age of
@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.metrics import Metric, metric_of, told
+from dess.analysis.metrics import Metric, column_as_told, metric_of
 from dess.analysis.results.tables import Results
 from dess.analysis.study.cheapest import Cheapest
 
@@ -85,23 +85,23 @@ class Requirement:
         return Verdict.MISSED if max(margins) < 0 else Verdict.OPEN
 
 
-def required(results: Results) -> list[Requirement]:
+def requirements_of(results: Results) -> list[Requirement]:
     """The requirements of a study that searches for the cheapest fleet; none of any other one."""
     rule = results.study.selection
     if not isinstance(rule, Cheapest):
         return []
     return [
-        Requirement(metric_of(told(metric, results.missions)), rule.amount(metric))
+        Requirement(metric_of(column_as_told(metric, results.missions)), rule.amount(metric))
         for metric in rule.requirements
     ]
 
 
-def in_words(requirements: Sequence[Requirement]) -> str:
+def requirements_in_words(requirements: Sequence[Requirement]) -> str:
     """Requirements as ``success of at least 99 % and collection ratio of at least 80 %``."""
-    return numbers.words([requirement.in_words for requirement in requirements])
+    return numbers.join_words([requirement.in_words for requirement in requirements])
 
 
-def spare(fleets: pd.DataFrame, requirement: Requirement) -> pd.Series:
+def relative_spare(fleets: pd.DataFrame, requirement: Requirement) -> pd.Series:
     """By how much every fleet keeps a requirement, on a scale that requirements share.
 
     It is the margin as a share of the range of the metric over the fleets that were compared. So a
@@ -119,5 +119,5 @@ def spare(fleets: pd.DataFrame, requirement: Requirement) -> pd.Series:
 
 
 def least_spare(fleets: pd.DataFrame, requirements: Sequence[Requirement]) -> pd.Series:
-    """By how much every fleet keeps the requirement that it keeps by the least, as ``spare``."""
-    return pd.concat([spare(fleets, each) for each in requirements], axis=1).min(axis=1)
+    """The ``relative_spare`` of every fleet for the requirement that it keeps by the least."""
+    return pd.concat([relative_spare(fleets, each) for each in requirements], axis=1).min(axis=1)

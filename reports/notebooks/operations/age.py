@@ -24,12 +24,12 @@ from dess.reports.pages import html
 
 # %%
 study = load_results(f"{results}/age")
-means = operations.means(study, [AGE, "peak_age", "age_p99", RATIO])
+means = operations.means_of_metrics(study, [AGE, "peak_age", "age_p99", RATIO])
 against = "the number of UAVs, by arrival rate"
-lead, *others = operations.drawings(means, "uavs", "arrival_rate", "policy", against).values()
+lead, *others = operations.draw_means(means, "uavs", "arrival_rate", "policy", against).values()
 
 # %%
-html.answer(operations.age(study))
+html.answer(operations.age_sentence(study))
 
 # %%
 html.lead(*lead)
@@ -51,7 +51,7 @@ html.gallery(others)
 # %%
 html.say(
     "Mathematics 13(21) 3564 reports, for another model, {published}.",
-    published=operations.published(),
+    published=operations.published_age_in_words(),
 )
 
 # %%
@@ -60,7 +60,9 @@ html.say("{why}", why=operations.allowance_in_words(change, "the age"))
 
 # %%
 html.table(
-    tables.estimates(change, ["policy", "uavs", "n"], "arrival_rate", operations.relative),
+    tables.estimate_cells(
+        change, ["policy", "uavs", "n"], "arrival_rate", operations.format_relative_change
+    ),
     "Change of the age from one UAV, with intervals of the ratio of means, by arrival rate",
     data=change,
 )
@@ -71,7 +73,9 @@ html.table(
 # %%
 of_age = means[means["metric"] == AGE]
 html.table(
-    tables.estimates(of_age, ["policy", "uavs", "n"], "arrival_rate", numbers.quantities),
+    tables.estimate_cells(
+        of_age, ["policy", "uavs", "n"], "arrival_rate", numbers.format_quantities
+    ),
     f"{metric_of(AGE).label}, by arrival rate",
     data=means,
 )
@@ -85,7 +89,7 @@ html.table(
 # `age` their age.
 
 # %%
-html.say("{lengths}", lengths=operations.lengths(study))
+html.say("{lengths}", lengths=operations.mission_lengths_sentence(study))
 
 # %%
 html.provenance([study])

@@ -21,7 +21,7 @@ from IPython.display import display
 
 from dess.analysis import load_results, numbers, tables
 from dess.analysis.answers import operations
-from dess.analysis.answers.fleet import home
+from dess.analysis.answers.settings.home import way_home_range_sentence
 from dess.analysis.metrics import PRODUCT, RATIO, SUCCESS, metric_of
 from dess.reports.pages import html
 
@@ -32,12 +32,12 @@ repair = operations.REPAIR
 metrics = [PRODUCT, SUCCESS, RATIO]
 counts = [c for c in ("failures", "slots_grounded", "lost") if c in study.missions]
 counts = [c for c in counts if study.missions[c].max() > 0]
-means = operations.means(study, metrics)
+means = operations.means_of_metrics(study, metrics)
 against = "the failure rate, by number of UAVs"
-lead, *others = operations.drawings(means, rate, "uavs", repair, against).values()
+lead, *others = operations.draw_means(means, rate, "uavs", repair, against).values()
 
 # %%
-html.answer(operations.failures(study))
+html.answer(operations.failures_sentence(study))
 
 # %%
 html.lead(*lead)
@@ -50,7 +50,7 @@ html.lead(*lead)
 # for it.
 
 # %%
-html.say("{sentence}", sentence=home.range_sentence(study))
+html.say("{sentence}", sentence=way_home_range_sentence(study))
 
 # %%
 html.gallery(others)
@@ -64,12 +64,14 @@ html.gallery(others)
 display(
     *(
         html.table(
-            tables.estimates(change, ["policy", "uavs", repair, "n"], rate, numbers.points),
+            tables.estimate_cells(
+                change, ["policy", "uavs", repair, "n"], rate, numbers.format_points
+            ),
             f"{metric_of(metric).name} minus that without failures, in points, by failure rate",
             data=change,
         )
         for metric in metrics
-        for change in [operations.changes(study, rate, 0.0, metric)]
+        for change in [operations.changes_from_reference(study, rate, 0.0, metric)]
     )
 )
 
@@ -80,11 +82,13 @@ display(
 display(
     *(
         html.table(
-            tables.estimates(rows, ["policy", "uavs", repair, "n"], rate, numbers.quantities),
+            tables.estimate_cells(
+                rows, ["policy", "uavs", repair, "n"], rate, numbers.format_quantities
+            ),
             f"{metric_of(metric).label} per mission, by failure rate; empty: nothing can fail",
         )
         for metric in counts
-        for rows in [operations.means(study, [metric])]
+        for rows in [operations.means_of_metrics(study, [metric])]
     )
 )
 

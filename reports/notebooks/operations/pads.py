@@ -22,19 +22,19 @@ from IPython.display import display
 
 from dess.analysis import load_results, numbers, tables
 from dess.analysis.answers import operations
-from dess.analysis.answers.fleet import home
+from dess.analysis.answers.settings.home import way_home_range_sentence
 from dess.analysis.metrics import PRODUCT, SUCCESS, metric_of
 from dess.reports.pages import html
 
 # %%
 study = load_results(f"{results}/pads")
 uses = ["waiting", "queue", "utilisation"]
-means = operations.means(study, [PRODUCT, SUCCESS, *uses])
+means = operations.means_of_metrics(study, [PRODUCT, SUCCESS, *uses])
 against = "the number of pads, by number of UAVs"
-drawn = operations.drawings(means, "pads", "uavs", "policy", against, linked=True)
+drawn = operations.draw_means(means, "pads", "uavs", "policy", against, linked=True)
 
 # %%
-html.answer(operations.pads(study, margin))
+html.answer(operations.enough_pads_sentence(study, margin))
 
 # %%
 html.lead(*drawn[PRODUCT])
@@ -46,13 +46,13 @@ html.lead(*drawn[PRODUCT])
 # return guard plans for waits and sends UAVs home earlier. What the fewest pads cost:
 
 # %%
-html.say("{lines}", lines=html.composed(operations.few_pads(study)))
+html.say("{lines}", lines=html.composed(operations.few_pads_sentence(study)))
 
 # %%
-html.say("{sentence}", sentence=home.range_sentence(study))
+html.say("{sentence}", sentence=way_home_range_sentence(study))
 
 # %%
-html.figure(*operations.waits(study, margin))
+html.figure(*operations.draw_queues(study, margin))
 
 # %%
 html.gallery([drawn[metric] for metric in (*uses, SUCCESS)])
@@ -65,16 +65,16 @@ html.say(
     "Pads are enough if the interval of the loss against a pad for every UAV is above −{margin}, "
     "here and with more pads. They are too few if it is below −{margin}. Between the two, more "
     "missions or other numbers of pads would decide.",
-    margin=numbers.margin(margin),
+    margin=numbers.format_margin(margin),
 )
 
 # %%
-lost = operations.changes(study, "pads", study.missions["pads"].max(), PRODUCT)
+lost = operations.changes_from_reference(study, "pads", study.missions["pads"].max(), PRODUCT)
 html.say("{why}", why=operations.allowance_in_words(lost, "the product"))
 
 # %%
 html.table(
-    tables.estimates(lost, ["policy", "pads", "n"], "uavs", numbers.points),
+    tables.estimate_cells(lost, ["policy", "pads", "n"], "uavs", numbers.format_points),
     "Product minus that with the most pads: paired differences in points, by number of UAVs",
     data=lost,
 )
@@ -86,7 +86,7 @@ html.table(
 display(
     *(
         html.table(
-            tables.estimates(rows, ["policy", "pads", "n"], "uavs", metric_of(metric).written),
+            tables.estimate_cells(rows, ["policy", "pads", "n"], "uavs", metric_of(metric).written),
             f"{metric_of(metric).label}, by number of UAVs",
         )
         for metric in uses

@@ -24,20 +24,20 @@ from dess.analysis import load_results, numbers, tables
 from dess.analysis.answers import comparison, optimality, summary
 from dess.analysis.answers import planner as answers
 from dess.analysis.figures import Drawing
-from dess.analysis.figures.comparison import gaps
+from dess.analysis.figures.comparison import plot_gaps
 from dess.reports.pages import html
 
 # %%
 study, bounded = (load_results(f"{results}/{name}") for name in ("planning", "gap"))
-times = comparison.read(results, study)
+times = comparison.read_decision_times(results, study)
 planners = [planner, *(name for name in [longer] if name in study.policies)]
-differences = answers.differences(study, planners, learner)
+differences = answers.compare_with_learner(study, planners, learner)
 pair = comparison.pair_of(study, planner, learner)
-missions = comparison.duels(study, pair)
+missions = comparison.pair_missions(study, pair)
 logged = study.manifest["study"]["logged"]
 
 # %%
-html.answer(*answers.answer(differences, planner))
+html.answer(*answers.planner_sentences(differences, planner))
 
 # %%
 html.lead(*answers.by_fleet(differences))
@@ -46,23 +46,25 @@ html.lead(*answers.by_fleet(differences))
 # ## Why: where each of them is ahead
 
 # %%
-lead = comparison.along(missions, pair.candidates)
+lead = comparison.differences_along_parameters(missions, pair.candidates)
 html.say("{colours}", colours=comparison.colours_in_words(lead, pair))
 
 # %%
 too_few = html.say("Too few missions for bins of n = {least} or more.", least=comparison.LEAST)
-html.show(comparison.leads(missions, lead, pair, f"{pair.title}, ") or too_few)
+html.show(
+    comparison.draw_differences_along_parameters(missions, lead, pair, f"{pair.title}, ") or too_few
+)
 
 # %%
-html.gallery(answers.coverages(study, planner, learner))
+html.gallery(answers.draw_coverage(study, planner, learner))
 
 # %%
-mission = answers.example(study, planner)
+mission = answers.first_logged_mission(study, planner)
 html.gallery(
     [
         answers.at_home(study, [planner, learner]),
-        answers.plan(study, mission),
-        answers.prices(bounded, mission.replication),
+        answers.draw_plan(study, mission),
+        answers.draw_prices(bounded, mission.replication),
     ]
 )
 
@@ -77,18 +79,22 @@ html.say(
     "{gap} {weights} {why}",
     gap=html.composed(optimality.in_words(bounded, planners[-1])),
     weights=summary.weights_in_words(study),
-    why=summary.allowance_in_words(differences[differences["uavs"] == optimality.ALL], "policy"),
+    why=summary.allowance_for_difference(
+        differences[differences["uavs"] == optimality.ALL], "policy"
+    ),
 )
 
 # %%
 bounds = optimality.by_fleet(bounded)
 counted = f"n = {len(missions):,} missions per policy."
-front = answers.front(study, times)
+front = answers.draw_decision_time_front(study, times)
 drawn = [front._replace(caption=f"{front.caption} {counted}")]
-if len(useful := optimality.useful(bounds)):
+if len(useful := optimality.fleets_with_useful_bound(bounds)):
     alt = "The product of every policy and the upper bound, by number of UAVs"
-    counted = f"n = {numbers.span(useful['n'])} missions. The band is the interval of the bound."
-    drawn.append(Drawing(gaps(useful), alt, counted))
+    counted = (
+        f"n = {numbers.format_span(useful['n'])} missions. The band is the interval of the bound."
+    )
+    drawn.append(Drawing(plot_gaps(useful), alt, counted))
 html.gallery(drawn, "Bars are 95 % intervals.")
 
 # %% [markdown]
@@ -97,18 +103,18 @@ html.gallery(drawn, "Bars are 95 % intervals.")
 # %%
 means = differences.assign(mean=differences["difference"])
 html.table(
-    tables.estimates(means, ["policy", "uavs", "n"], write=numbers.points),
+    tables.estimate_cells(means, ["policy", "uavs", "n"], write=numbers.format_points),
     f"Paired differences from {learner} in points, with 95 % intervals",
     data=differences,
 )
 
 # %%
 caption = "Means, the upper bound, and the gap in points"
-html.table(optimality.listed(bounds), caption, data=bounds)
+html.table(optimality.fleet_bound_table(bounds), caption, data=bounds)
 
 # %%
 html.table(
-    answers.returns(study, [planner, learner]),
+    answers.return_table(study, [planner, learner]),
     f"Means over charging sessions of the same {logged} missions",
 )
 
@@ -119,7 +125,7 @@ html.table(comparison.time_table(times), "Time of a decision for the UAVs of a m
 # ## How this page was made
 
 # %%
-html.say("{remarks}", remarks=comparison.remarks(times, study, pair))
+html.say("{remarks}", remarks=comparison.decision_time_sentences(times, study, pair))
 
 # %%
 html.provenance([study, bounded])

@@ -32,13 +32,13 @@ study, landing, horizon = (
 reference = reference or seas.reference_of(study)
 for name in (policy, reference, heuristic):
     study.check_policy(name)
-times = comparison.read(results, study)
+times = comparison.read_decision_times(results, study)
 
 # %%
-html.answer(seas.answer(study, times, policy, reference, heuristic))
+html.answer(seas.unseen_seas_sentence(study, times, policy, reference, heuristic))
 
 # %%
-html.lead(*seas.front(study, times))
+html.lead(*seas.draw_decision_time_front(study, times))
 
 # %% [markdown]
 # ## Why: what each family asks for
@@ -54,7 +54,7 @@ html.gallery(seas.by_group(study, reference))
 
 # %%
 html.table(
-    seas.worst(study, policy, reference),
+    seas.worst_seas_table(study, policy, reference),
     f"The seas on which {policy} is the farthest behind {reference}",
 )
 
@@ -63,9 +63,9 @@ html.table(
 
 # %%
 html.table(
-    seas.summary(study, times),
+    seas.policies_table(study, times),
     f"Every policy over all seas, and the time of a decision in batches on one core; "
-    f"{seas.counted(study)}",
+    f"{seas.count_seas_in_words(study)}",
 )
 
 # %% [markdown]
@@ -75,25 +75,30 @@ html.table(
 # hours of flying and charging. No shipped policy has learned on such missions.
 
 # %%
-counted = seas.counted(landing)
-html.table(seas.summary(landing, times), f"Missions with a quota that end on the ground; {counted}")
-
-# %%
-html.table(seas.summary(horizon, times), f"Eight hours without a quota; {seas.counted(horizon)}")
-
-# %%
-rows = seas.quality(study, "family", SUCCESS)
+counted = seas.count_seas_in_words(landing)
 html.table(
-    tables.estimates(rows, ["family"], "policy"),
+    seas.policies_table(landing, times), f"Missions with a quota that end on the ground; {counted}"
+)
+
+# %%
+html.table(
+    seas.policies_table(horizon, times),
+    f"Eight hours without a quota; {seas.count_seas_in_words(horizon)}",
+)
+
+# %%
+rows = seas.means_over_seas(study, "family", SUCCESS)
+html.table(
+    tables.estimate_cells(rows, ["family"], "policy"),
     f"{METRICS[SUCCESS]} by family: means over seas with 95 % intervals",
     data=rows,
 )
 
 # %%
-gains = seas.gains(study, heuristic, "family")
+gains = seas.differences_from_baseline(study, heuristic, "family")
 gains = gains.assign(mean=gains["difference"])
 html.table(
-    tables.estimates(gains, ["family"], "policy", tables.numbers.points),
+    tables.estimate_cells(gains, ["family"], "policy", tables.numbers.format_points),
     f"Points of the product more than {heuristic}, paired, with 95 % intervals",
     data=gains,
 )

@@ -13,7 +13,7 @@ from dess.analysis.answers import comparison, summary
 from dess.analysis.answers.comparison import AHEAD, BEHIND, CALLS, Pair
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.names import PARAMETERS
-from dess.analysis.stats.differences import adjust
+from dess.analysis.stats.differences import adjust_p_values
 from dess.analysis.stats.verdict import INCONCLUSIVE
 from tests.analysis.small import grid, small_study
 
@@ -43,7 +43,7 @@ def test_the_pair_is_the_best_learned_policy_and_the_best_other(
     means = results.missions.groupby("policy")[PRODUCT].mean()
     ranked = means.sort_values(ascending=False).index.tolist()
     taught = {f"learner {n}": [ranked[k] for k in of] for n, of in enumerate(learners)}
-    monkeypatch.setattr(comparison, "learners", lambda results: taught)
+    monkeypatch.setattr(comparison, "trained_policies_by_learner", lambda results: taught)
     asked = {name: ranked[k] for name, k in named.items()}
     policy, baseline, candidates = pair
     assert comparison.pair_of(results, **asked) == Pair(
@@ -54,8 +54,8 @@ def test_the_pair_is_the_best_learned_policy_and_the_best_other(
 def test_a_pair_has_one_p_value_in_every_table(results):
     """All tables are corrected for the same tests: of three pairs by three metrics."""
     pair = comparison.pair_of(results)
-    of_pair = comparison.overall(results, pair).set_index("metric")
-    table = summary.comparisons(results)
+    of_pair = comparison.compare_pair(results, pair).set_index("metric")
+    table = summary.compare_with_best(results)
     other = table[table["policy"] == {*pair[:2]}.difference(table["baseline"]).pop()]
     expected = other.set_index("metric")
     assert of_pair["p_adjusted"].to_dict() == expected["p_adjusted"].to_dict()
@@ -75,7 +75,7 @@ def test_what_is_no_pair_is_refused(results, studied):
         comparison.pair_of(alone)
     several = studied(design=grid(uavs=[1, 2]), missions=2)
     with pytest.raises(InputError, match="study trial: 2 design points"):
-        comparison.duels(several, Pair("greedy", "random", 1))
+        comparison.pair_missions(several, Pair("greedy", "random", 1))
 
 
 def test_missions_are_won_tied_lost_and_failed():
@@ -84,7 +84,7 @@ def test_missions_are_won_tied_lost_and_failed():
         success=[1] * 8 + [0, 0],
         success_baseline=[0, 0] + [1] * 7 + [0],
     )
-    table = comparison.outcomes(missions, PAIR)
+    table = comparison.pair_outcome_table(missions, PAIR)
     assert dict(zip(table["Outcome"], table["Missions"], strict=True)) == {
         "ours ahead": "5",
         "level": "3",
@@ -102,8 +102,8 @@ def test_the_worst_missions_and_the_most_lost():
         **{PRODUCT: [0.0, 0.4, 0.0, 0.5]},
         difference=[-0.9, 0.1, -0.2, -0.3],
     )
-    assert comparison.worst(missions, 3)["replication"].tolist() == [2, 0, 1]
-    assert comparison.drawn(missions, PAIR) == [
+    assert comparison.worst_pair_missions(missions, 3)["replication"].tolist() == [2, 0, 1]
+    assert comparison.missions_to_draw(missions, PAIR) == [
         *(("ours", 2), ("theirs", 2)),
         *(("ours", 0), ("theirs", 0)),
     ]
@@ -134,47 +134,51 @@ def missions_of(gap, n=400, seed=1, **fixed):
 
 
 def test_bins_are_the_values_or_hold_about_as_many():
-    codes, names = comparison.bins(pd.Series([3, 1, 2, 3]))
+    codes, names = comparison.divide_into_bins(pd.Series([3, 1, 2, 3]))
     assert (codes.tolist(), names) == ([2, 0, 1, 2], ["1", "2", "3"])
-    codes, names = comparison.bins(pd.Series(range(100)), 4)
+    codes, names = comparison.divide_into_bins(pd.Series(range(100)), 4)
     assert np.bincount(codes).tolist() == [25, 25, 25, 25]
     assert names == ["0–24", "25–49", "50–74", "75–99"]
     values = np.random.default_rng(1).uniform(5, 20, 1000)
-    codes, names = comparison.bins(pd.Series(values), 5)
+    codes, names = comparison.divide_into_bins(pd.Series(values), 5)
     assert set(np.bincount(codes)) == {200}
     assert all(values[codes == a].max() < values[codes == a + 1].min() for a in range(4))
     # Quantiles coincide.
-    codes, names = comparison.bins(pd.Series([0] * 90 + [*range(1, 11)]), 5)
+    codes, names = comparison.divide_into_bins(pd.Series([0] * 90 + [*range(1, 11)]), 5)
     assert len(names) == codes.max() + 1 < 5 and names[0] == "0"
 
 
 def test_along_a_parameter_the_difference_is_that_of_its_missions():
     missions = missions_of(lambda t: 0.05 * (t["uavs"] - 2))
-    table = comparison.along(missions, candidates=2)
+    table = comparison.differences_along_parameters(missions, candidates=2)
     assert table["field"].unique().tolist() == [*PARAMETERS]
     assert (table.groupby("field")["n"].sum() == len(missions)).all()
     by_uavs = table.query("field == 'uavs'").set_index("value")
     assert by_uavs["verdict"].to_dict() == {"1": BEHIND, "2": INCONCLUSIVE, "3": AHEAD}
     own = missions.query("uavs == 3")["difference"].mean()
     assert by_uavs.loc["3", "mean"] == pytest.approx(own)
-    expected = np.minimum(1, 2 * adjust(table["p"].to_numpy(), "holm"))
+    expected = np.minimum(1, 2 * adjust_p_values(table["p"].to_numpy(), "holm"))
     assert table["p_adjusted"].tolist() == expected.tolist()
 
 
 def test_a_bin_has_ten_missions_or_more():
     """Eight missions were drawn as bins of one or two."""
     few = missions_of(lambda t: 0.0, n=8)
-    assert comparison.along(few).empty
-    assert comparison.spread(comparison.along(few), comparison.dependence(few)).empty
-    assert comparison.along(missions_of(lambda t: 0.0, n=45))["n"].min() >= 10
+    assert comparison.differences_along_parameters(few).empty
+    assert comparison.dependence_table(
+        comparison.differences_along_parameters(few), comparison.dependence_on_parameters(few)
+    ).empty
+    assert (
+        comparison.differences_along_parameters(missions_of(lambda t: 0.0, n=45))["n"].min() >= 10
+    )
 
 
 def test_only_colours_that_occur_are_explained():
-    ahead = comparison.along(missions_of(lambda t: 0.5 + 0 * t["uavs"]))
+    ahead = comparison.differences_along_parameters(missions_of(lambda t: 0.5 + 0 * t["uavs"]))
     said = comparison.colours_in_words(ahead, PAIR)
     assert said.startswith("By Holm's test over all bins, ours is ahead where a dot is blue. ")
     assert "orange" not in said and "hollow" not in said
-    mixed = comparison.along(missions_of(lambda t: 0.05 * (t["uavs"] - 2)))
+    mixed = comparison.differences_along_parameters(missions_of(lambda t: 0.05 * (t["uavs"] - 2)))
     assert "ours is behind where a dot is orange" in comparison.colours_in_words(mixed, PAIR)
 
 
@@ -184,31 +188,42 @@ def test_only_colours_that_occur_are_explained():
 )
 def test_what_the_pairing_gains_is_said_in_words(reduction, said):
     table = pd.DataFrame({"metric": [PRODUCT], "variance_reduction": [reduction]})
-    assert comparison.pairing(table) == f"{said} independent missions would be as precise"
+    assert comparison.pairing_sentence(table) == f"{said} independent missions would be as precise"
 
 
 def test_what_all_missions_share_is_no_parameter():
     missions = missions_of(lambda t: 0.1, uavs=2, flying_time=80)
-    assert comparison.varied(missions) == ["charge_start", "charge_complete", "initial_data"]
-    assert set(comparison.along(missions)["field"]) == {*comparison.varied(missions)}
+    assert comparison.varying_parameters(missions) == [
+        "charge_start",
+        "charge_complete",
+        "initial_data",
+    ]
+    assert set(comparison.differences_along_parameters(missions)["field"]) == {
+        *comparison.varying_parameters(missions)
+    }
     fixed = {field: 50 for field in PARAMETERS}
     alike = missions_of(lambda t: 0.1, **fixed)
-    assert comparison.along(alike).empty and comparison.dependence(alike).empty
+    assert (
+        comparison.differences_along_parameters(alike).empty
+        and comparison.dependence_on_parameters(alike).empty
+    )
 
 
 def test_dependence_finds_what_the_difference_depends_on():
-    table = comparison.dependence(missions_of(lambda t: 0.02 * t["uavs"])).set_index("field")
+    table = comparison.dependence_on_parameters(missions_of(lambda t: 0.02 * t["uavs"])).set_index(
+        "field"
+    )
     assert table.index[0] == "uavs"
     assert table["explained"].is_monotonic_decreasing and 0.5 < table["explained"].iloc[0] < 1
     assert table.loc["uavs", "p_adjusted"] < 1e-6
     assert (table.drop("uavs")["p_adjusted"] > 0.05).all()
-    none = comparison.dependence(missions_of(lambda t: 0).assign(difference=0.1))
+    none = comparison.dependence_on_parameters(missions_of(lambda t: 0).assign(difference=0.1))
     assert (none["p"] == 1).all() and (none["explained"] == 0).all()
 
 
 def test_the_band_is_that_of_dvoretzky_kiefer_and_wolfowitz_by_hand():
     sample = pd.DataFrame({"difference": np.linspace(-0.2, 0.2, 60)})
-    (ax,) = comparison.distribution(sample, PAIR).figure.axes
+    (ax,) = comparison.draw_difference_distribution(sample, PAIR).figure.axes
     (band,) = (c for c in ax.collections if c.get_gid() == "band")
     x, y = band.get_paths()[0].vertices.T
     half = 0.17533  # sqrt(ln(2 / 0.05) / 120)
@@ -244,14 +259,14 @@ def timed_study(tmp_path_factory):
 @pytest.fixture(scope="module")
 def measured(timed_study):
     """Calls that all take 2 ticks, with a tick in between."""
-    return comparison.measure(timed_study, Ticks(TICK, 2 * TICK))
+    return comparison.measure_decision_times(timed_study, Ticks(TICK, 2 * TICK))
 
 
 def test_times_are_those_of_the_calls_alone(measured, timed_study):
     assert {(cost.median, cost.slow) for cost in measured.costs} == {(2 * TICK, 2 * TICK)}
     # Of ten calls, one takes 9 ticks.
     clock = Ticks(*([0.0, TICK] * 9), 0.0, 9 * TICK)
-    slow = comparison.measure(timed_study, clock).costs[0]
+    slow = comparison.measure_decision_times(timed_study, clock).costs[0]
     assert (slow.median, slow.slow) == (TICK, 9 * TICK)
 
 
@@ -262,11 +277,11 @@ def test_policies_that_are_files_are_not_run_and_have_no_times(measured):
 
 def test_they_are_measured_once_for_the_same_results(timed_study, tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"no such file; allowed: what is made by: dess report$"):
-        comparison.read(tmp_path, timed_study)
+        comparison.read_decision_times(tmp_path, timed_study)
     steps = []
-    comparison.make(tmp_path, timed_study, lambda *step: steps.append(step))
+    comparison.ensure_decision_times(tmp_path, timed_study, lambda *step: steps.append(step))
     assert steps == [(1, 3), (2, 3), (3, 3)]
-    kept = comparison.read(tmp_path, timed_study)
-    monkeypatch.delattr(comparison, "measure")
-    comparison.make(tmp_path, timed_study)
-    assert comparison.read(tmp_path, timed_study) == kept
+    kept = comparison.read_decision_times(tmp_path, timed_study)
+    monkeypatch.delattr(comparison, "measure_decision_times")
+    comparison.ensure_decision_times(tmp_path, timed_study)
+    assert comparison.read_decision_times(tmp_path, timed_study) == kept

@@ -10,7 +10,14 @@ from scipy import stats
 
 from dess import InputError
 from dess.analysis import load_results, load_study, run_study
-from dess.analysis.answers.diff import _differs, at_hand, diff, effects, most_changed, origins
+from dess.analysis.answers.diff import (
+    _field_differs,
+    at_hand,
+    diff_results,
+    differing_origins,
+    estimate_differences,
+    most_changed,
+)
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.results import provenance
 from dess.analysis.results.store import Store
@@ -34,9 +41,9 @@ def test_the_effects_are_paired_differences_b_minus_a(results):
     better = results.missions.copy()
     chosen = (better["policy"] == "random") & (better["point"] == 1)
     better.loc[chosen, "collection_ratio"] -= 0.25
-    found = diff(results, replace(results, missions=better))
+    found = diff_results(results, replace(results, missions=better))
     assert {*found.changed["fields"]} == {"collection_ratio"}
-    table = effects(found, ["policy_a", "point_a"])
+    table = estimate_differences(found, ["policy_a", "point_a"])
     first = table.iloc[0]
     assert (first["policy_a"], first["point_a"], first["differ"]) == ("random", 1, 10)
     ratios = table[table["metric"] == "collection_ratio"]
@@ -54,7 +61,7 @@ def test_the_most_changed_missions_come_first(results):
     for row, change in {3: 0.1, 17: -0.4, 30: 0.2}.items():
         missions.loc[row, "collection_ratio_and_communication"] += change
     missions.loc[8, "reward"] += 1000
-    found = diff(results, replace(results, missions=missions))
+    found = diff_results(results, replace(results, missions=missions))
     rows = most_changed(found, 3)
     named = [(r.policy_a, r.point_a, r.replication) for r in rows.itertuples()]
     assert named == [("greedy", 1, 7), ("random", 1, 0), ("greedy", 0, 3)]
@@ -68,7 +75,7 @@ def test_a_record_of_a_uav_that_differs_is_found(field, value, results):
     uavs.loc[row, "reward"] = 0.0
     changed = uavs.copy()
     changed.loc[row, field] = value
-    found = diff(replace(results, uavs=uavs), replace(results, uavs=changed))
+    found = diff_results(replace(results, uavs=uavs), replace(results, uavs=changed))
     (mission,) = found.changed.itertuples()
     assert (mission.policy_a, mission.point_a, mission.replication) == ("random", 1, 6)
     assert mission.fields == f"uav {field}"
@@ -76,13 +83,13 @@ def test_a_record_of_a_uav_that_differs_is_found(field, value, results):
 
 def test_a_field_that_one_side_has_not_measured_differs():
     pairs = pd.DataFrame({"age_a": [1.0, np.nan, 1.0], "age_b": [np.nan, np.nan, 1.0]})
-    assert _differs(pairs, "age").tolist() == [True, False, False]
+    assert _field_differs(pairs, "age").tolist() == [True, False, False]
 
 
 def test_design_points_are_matched_by_their_scenarios(results, tmp_path):
     """Whatever their numbers, and which of their fields the design sets."""
     other = results_of(tmp_path, "other", design=grid(quota=[60, 40]), missions=6)
-    found = diff(results, other)
+    found = diff_results(results, other)
     assert {*zip(found.missions["point_a"], found.missions["point_b"], strict=True)} == {(1, 0)}
     assert len(found.missions) == 12
     assert found.changed.empty
@@ -99,7 +106,7 @@ def test_equal_design_points_count_once(results, tmp_path):
     """Those of a Latin hypercube may fall together."""
     design = {"kind": "latin-hypercube", "size": 8, "seed": 1, "ranges": {"quota": [20, 22]}}
     twice = results_of(tmp_path, "twice", design=design)
-    found = diff(twice, twice)
+    found = diff_results(twice, twice)
     assert found.identical
     assert len(found.missions) == 2 * 10 * len({p.quota for p in twice.store.manifest.scenarios})
     assert len(found.missions) < len(twice.missions)
@@ -107,10 +114,12 @@ def test_equal_design_points_count_once(results, tmp_path):
 
 def test_with_other_seeds_all_missions_are_compared_without_pairs(results, tmp_path):
     other = results_of(tmp_path, "other", seed=8, design=grid(quota=[20, 60]))
-    found = diff(results, other)
+    found = diff_results(results, other)
     assert not found.identical and found.missions.empty and found.alone.empty
-    assert origins(found) == ["seeds: 7 and 8, so that missions are compared without pairs"]
-    table = effects(found, ["policy_a", "point_a"])
+    assert differing_origins(found) == [
+        "seeds: 7 and 8, so that missions are compared without pairs"
+    ]
+    table = estimate_differences(found, ["policy_a", "point_a"])
     row = table[table["metric"] == PRODUCT].iloc[1]
     assert (row["policy_a"], row["point_a"], row["n"]) == ("greedy", 1, 10)
     of = [r.missions.query("policy == 'greedy' and point == 1")[PRODUCT] for r in (other, results)]
@@ -124,9 +133,9 @@ def test_across_constants_the_points_of_the_same_values_are_compared(results, tm
     write_scenario(tmp_path, altitude=20.0)
     study = load_study(tmp_path / "trial.toml", design=grid(quota=[20, 60]))
     run_study(study, tmp_path / "high")
-    found = diff(results, load_results(tmp_path / "high"))
+    found = diff_results(results, load_results(tmp_path / "high"))
     assert (len(found.missions), found.alone.empty) == (40, True)
-    assert origins(found) == ["scenario: altitude 10.0 and 20.0"]
+    assert differing_origins(found) == ["scenario: altitude 10.0 and 20.0"]
 
 
 def test_folders_without_a_common_mission_are_refused(results, tmp_path):
@@ -135,10 +144,10 @@ def test_folders_without_a_common_mission_are_refused(results, tmp_path):
     with pytest.raises(
         InputError, match="no mission is in both: only A has policy greedy at communication quota"
     ):
-        diff(early, others)
+        diff_results(early, others)
     other = results_of(tmp_path, "other", policies=["nearest", "tour"])
     with pytest.raises(InputError, match="only A has policy greedy, only B has policy nearest"):
-        diff(results, other)
+        diff_results(results, other)
 
 
 def test_code_libraries_and_accepted_changes_that_differ_are_told(results):
@@ -150,7 +159,7 @@ def test_code_libraries_and_accepted_changes_that_differ_are_told(results):
     changes["code"] = manifest.code | {"dess.model.guard.moves": "0" * 64}
     store = Store(results.store.folder, manifest.model_copy(update=changes))
     other = replace(results, store=store)
-    assert origins(diff(results, other)) == [
+    assert differing_origins(diff_results(results, other)) == [
         "code: dess.model.guard.moves",
         f"libraries: numpy {manifest.libraries['numpy']} and 1.0",
         "accepted in B: other code of dess.model.rules after 7 missions",

@@ -12,7 +12,14 @@ from scipy import stats
 from dess import InputError
 from dess.analysis import marl_eval_data, rliable_scores
 from dess.analysis.answers import learning
-from dess.analysis.answers.learning import CURVE, CURVES, FINAL, difference, read_curve, read_curves
+from dess.analysis.answers.learning import (
+    CURVE,
+    CURVES,
+    FINAL,
+    difference_of_trainings,
+    read_curve,
+    read_curves,
+)
 from dess.analysis.metrics import SUCCESS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
@@ -23,7 +30,7 @@ from tests.policies.learner.tiny import tiny
 
 def test_the_difference_of_means_is_welchs():
     a, b = [1.0, 2.0, 4.0], [3.0, 3.5]
-    ends, p = difference(a, b)
+    ends, p = difference_of_trainings(a, b)
     test = stats.ttest_ind(a, b, equal_var=False)
     assert ends.mean == pytest.approx(np.mean(a) - np.mean(b))
     assert (ends.low, ends.high) == pytest.approx(tuple(test.confidence_interval(0.95)))
@@ -33,7 +40,7 @@ def test_the_difference_of_means_is_welchs():
 def test_a_single_training_is_held_against_the_spread_of_the_others():
     """By hand: the prediction interval of one more, mean +- t s sqrt(1 + 1/n)."""
     others = np.array([1.0, 2.0, 3.0])
-    ends, p = difference([5.0], others)
+    ends, p = difference_of_trainings([5.0], others)
     half = stats.t.ppf(0.975, 2) * 1.0 * np.sqrt(1 + 1 / 3)
     assert (ends.low, ends.high) == pytest.approx((3.0 - half, 3.0 + half))
     assert p == pytest.approx(2 * stats.t.sf(3.0 / np.sqrt(4 / 3), 2))
@@ -47,7 +54,7 @@ def finals(**products: list[float]) -> pd.DataFrame:
 
 
 def test_intervals_of_shares_end_where_these_do():
-    table = learning.ablation(finals(base=[1.0, 0.9, 0.2], once=[0.73]), "base")
+    table = learning.compare_variants(finals(base=[1.0, 0.9, 0.2], once=[0.73]), "base")
     base = table.set_index("variant").loc["base"]
     assert (base["low"], base["high"]) == (0.0, 1.0)
     assert (base["new_low"], base["new_high"]) == (0.0, 1.0)
@@ -76,11 +83,13 @@ def several(variant, ends, level=0.0, before=0):
 
 def compared(using, without, **options):
     both = pd.concat([several("with", using, **options), several("without", without)])
-    return learning.transfer(learning.smoothed(both, METRIC), "with", "without", STEPS[-1])
+    return learning.compare_transfer(
+        learning.smooth_curves(both, METRIC), "with", "without", STEPS[-1]
+    )
 
 
 def test_an_average_weighs_the_newest_and_begins_anew_with_every_phase():
-    table = learning.smoothed(training("one", 1, [4.0, 0.0, 8.0, 16.0], before=2), METRIC)
+    table = learning.smooth_curves(training("one", 1, [4.0, 0.0, 8.0, 16.0], before=2), METRIC)
     a = learning.ALPHA
     assert table["value"].tolist() == [4.0, 4.0 * (1 - a), 8.0, 8.0 * (1 - a) + 16.0 * a]
     assert table["updates"].tolist() == STEPS
@@ -88,7 +97,7 @@ def test_an_average_weighs_the_newest_and_begins_anew_with_every_phase():
 
 def test_a_curve_has_settled_where_it_stays_near_its_end():
     averages = pd.Series([0.2, 0.55, 0.725])
-    assert [learning.settled(averages, margin) for margin in (1.0, 0.2, 0.0)] == [0, 1, 2]
+    assert [learning.settling_position(averages, margin) for margin in (1.0, 0.2, 0.0)] == [0, 1, 2]
 
 
 def test_pairs_need_trainings_of_both_variants():
@@ -96,7 +105,7 @@ def test_pairs_need_trainings_of_both_variants():
         [several("quick", [1.0]), several("no transfer", [1.0]), several("no guard", [1.0])]
     )
     assert learning.pairs_in(curves) == {"all methods of this project": ("quick", "no transfer")}
-    (key,) = learning.transfers(curves, [METRIC], shortest=STEPS[-1])
+    (key,) = learning.compare_all_transfers(curves, [METRIC], shortest=STEPS[-1])
     assert key == ("all methods of this project", METRIC)
 
 
@@ -123,8 +132,8 @@ def test_transfer_is_judged_by_the_interval_of_the_end(using, without, level, ve
     late = compared(using, without, level=level, before=2)
     assert late.since is None or late.since >= STEPS[2]
     both = pd.concat([several("with", using), several("without", without)])
-    averages = learning.smoothed(both, METRIC)
-    short = learning.transfer(averages, "with", "without", shortest=STEPS[-1] + 1)
+    averages = learning.smooth_curves(both, METRIC)
+    short = learning.compare_transfer(averages, "with", "without", shortest=STEPS[-1] + 1)
     assert (short.verdict, short.length) == (INCONCLUSIVE, STEPS[-1])
 
 
@@ -184,7 +193,9 @@ def test_a_run_of_a_policy_without_trainings_is_a_block_of_missions(results):
 
 
 def test_a_run_of_a_learner_is_a_training_on_its_own_missions(results, monkeypatch):
-    monkeypatch.setattr(learning, "learners", lambda _: {"learner": ["random", "tour"]})
+    monkeypatch.setattr(
+        learning, "trained_policies_by_learner", lambda _: {"learner": ["random", "tour"]}
+    )
     scores = rliable_scores(results, OF_RUNS)
     assert [*scores] == ["learner", "greedy"]
     halves = range(10), range(10, 20)
@@ -197,7 +208,9 @@ def test_a_run_of_a_learner_is_a_training_on_its_own_missions(results, monkeypat
 
 
 def test_marl_eval_has_the_same_scores_at_every_level(results, monkeypatch):
-    monkeypatch.setattr(learning, "learners", lambda _: {"a,b": ["random", "tour"]})
+    monkeypatch.setattr(
+        learning, "trained_policies_by_learner", lambda _: {"a,b": ["random", "tour"]}
+    )
     data = json.loads(json.dumps(marl_eval_data(results, ["success", OF_RUNS])))
     scores = rliable_scores(results, OF_RUNS)
     [[study, tasks]] = data.items()
@@ -220,7 +233,7 @@ def test_what_has_no_scores_is_refused(results, studied, monkeypatch):
     with pytest.raises(InputError, match="missions: 9 for 10 runs"):
         rliable_scores(few)
     unequal = {"a": ["greedy"] * 2, "b": ["tour"] * 3}
-    monkeypatch.setattr(learning, "learners", lambda _: unequal)
+    monkeypatch.setattr(learning, "trained_policies_by_learner", lambda _: unequal)
     with pytest.raises(InputError, match=r"trainings: \[2, 3\]"):
         rliable_scores(results)
 
@@ -243,7 +256,7 @@ def test_the_answer_names_no_largest_step_and_counts_what_is_needed():
     one_less = {"no guard": [0.6] * 3, "no low-battery starts": [0.7] * 3}
     one_less["no early returns"] = [0.7] * 3
     last = of({"none of the three": [0.0] * 3, **one_less, "quick": [0.7, 0.7, 0.8]})
-    said = learning.answer(learning.ladder(last))
+    said = learning.methods_sentence(learning.rows_of_ladder(last))
     assert "step" not in said and "rises" not in said
     assert "0 of 3 (the paper's methods)" in said
     assert "3 of 3 without the guard" in learning.without_each(last)

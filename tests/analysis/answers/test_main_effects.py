@@ -10,7 +10,7 @@ from dess import InputError
 from dess.analysis.answers import main_effects
 from dess.analysis.answers.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
 from dess.analysis.metrics import PRODUCT, SUCCESS
-from dess.analysis.stats.differences import adjust, paired
+from dess.analysis.stats.differences import adjust_p_values, compare_pairs
 from dess.analysis.stats.intervals import by_replication
 from tests.analysis.small import grid
 
@@ -24,7 +24,7 @@ def results(studied):
 
 @pytest.fixture(scope="module")
 def table(results):
-    return main_effects.effects(results)
+    return main_effects.means_by_field(results)
 
 
 def pairs_of(steps, sure=True, half=0.001, widened=2):
@@ -45,14 +45,14 @@ def test_success_is_compared_where_the_number_of_uavs_is_drawn(results, table):
     """Its post-stratified values lie outside [0, 1]."""
     missions = results.missions.assign(success=results.missions["replication"] % 2)
     found = replace(results, missions=missions)
-    pairs = main_effects.changes(found, table, "random", "initial_data", SUCCESS)
+    pairs = main_effects.compare_values(found, table, "random", "initial_data", SUCCESS)
     assert (pairs["difference"] == 0).all() and (pairs["low"] < 0).all()
 
 
 def test_a_design_of_several_fields_is_refused(studied):
     several = studied(design=grid(uavs=[1, 2], quota=[20, 30]), missions=2)
     with pytest.raises(InputError, match="point 0: sets uavs, quota"):
-        main_effects.effects(several)
+        main_effects.means_by_field(several)
 
 
 @pytest.mark.parametrize(
@@ -69,8 +69,8 @@ def test_a_design_of_several_fields_is_refused(studied):
     ],
 )
 def test_shapes(steps, words, peaks):
-    assert main_effects.shape(pairs_of(steps)) == main_effects.Shape(words, peaks)
-    assert main_effects.shape(pairs_of(steps, sure=False)).words == LEVELS
+    assert main_effects.shape_of_changes(pairs_of(steps)) == main_effects.Shape(words, peaks)
+    assert main_effects.shape_of_changes(pairs_of(steps, sure=False)).words == LEVELS
 
 
 def test_the_best_policies_are_shown_unless_others_are_asked_for(results):
@@ -84,14 +84,18 @@ def test_the_best_policies_are_shown_unless_others_are_asked_for(results):
 
 def test_changes_are_paired_by_replication(results, table):
     """Intervals that hold for all three pairs at once are wider, by Bonferroni."""
-    pairs = main_effects.changes(results, table, "greedy", "initial_data", "collection_ratio")
+    pairs = main_effects.compare_values(
+        results, table, "greedy", "initial_data", "collection_ratio"
+    )
     assert pairs[["first", "second"]].to_numpy().tolist() == [[0, 1], [0, 2], [1, 2]]
     missions = results.missions.query("policy == 'greedy'")
     values = by_replication(missions, "collection_ratio", "point")
-    wide = paired(values[4].to_numpy(), values[3].to_numpy(), 1 - 0.05 / 3, "collection_ratio")
+    wide = compare_pairs(
+        values[4].to_numpy(), values[3].to_numpy(), 1 - 0.05 / 3, "collection_ratio"
+    )
     columns = ["difference", "wide_low", "wide_high"]
     assert pairs.loc[2, columns].tolist() == pytest.approx([*wide[:3]])
-    assert pairs["p_adjusted"].tolist() == adjust(pairs["p"].to_numpy(), "holm").tolist()
+    assert pairs["p_adjusted"].tolist() == adjust_p_values(pairs["p"].to_numpy(), "holm").tolist()
 
 
 def test_the_answer_says_of_every_policy_where_a_parameter_leads():
@@ -103,7 +107,7 @@ def test_the_answer_says_of_every_policy_where_a_parameter_leads():
         for policy, of_policy in means.items()
         for position, value in enumerate(("440", "600"))
     )  # fmt: skip
-    said = main_effects.answer(table, ["learned", "greedy"])
+    said = main_effects.strongest_fields_sentence(table, ["learned", "greedy"])
     assert (
         "of learned depends most on the communication quota (from 90.0 % at 440 to 78.5 % at 600)."
         in said

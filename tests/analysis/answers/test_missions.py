@@ -68,8 +68,8 @@ EVENTS = {
 
 def test_what_is_collected_and_held():
     """The battery at the start is no data."""
-    assert missions.collected(EVENTS, 2, 2).tolist() == [[2.0, 0.0], [1.5, 1.0]]
-    assert missions.held(EVENTS, 2).tolist() == [6.0, 5.0]
+    assert missions.data_by_uav_and_node(EVENTS, 2, 2).tolist() == [[2.0, 0.0], [1.5, 1.0]]
+    assert missions.data_by_node(EVENTS, 2).tolist() == [6.0, 5.0]
     # 3.5 of 6, 1 of 5.
     assert missions.left_behind(EVENTS, 2).tolist() == [False, True]
 
@@ -82,10 +82,10 @@ def test_the_far_edges_of_the_paper():
 
 
 def test_division():
-    assert missions.division(np.array([[3, 0], [0, 5]])) == 1
-    assert missions.division(np.array([[3, 5], [3, 5]])) == 0.5
-    assert missions.division(np.array([[4, 1], [0, 3]])) == 7 / 8
-    assert np.isnan(missions.division(np.zeros((2, 2))))
+    assert missions.share_of_main_uav(np.array([[3, 0], [0, 5]])) == 1
+    assert missions.share_of_main_uav(np.array([[3, 5], [3, 5]])) == 0.5
+    assert missions.share_of_main_uav(np.array([[4, 1], [0, 3]])) == 7 / 8
+    assert np.isnan(missions.share_of_main_uav(np.zeros((2, 2))))
 
 
 @pytest.mark.parametrize(
@@ -102,13 +102,13 @@ def test_division():
     ],
 )
 def test_sectors(first, second, share):
-    assert missions.sectors(np.array([first, second]), SQUARE) == pytest.approx(share)
-    assert missions.sectors(np.array([second, first]), SQUARE) == pytest.approx(share)
+    assert missions.share_in_own_sector(np.array([first, second]), SQUARE) == pytest.approx(share)
+    assert missions.share_in_own_sector(np.array([second, first]), SQUARE) == pytest.approx(share)
 
 
 def test_sectors_of_no_data_and_of_one_node():
-    assert np.isnan(missions.sectors(np.zeros((2, 4)), SQUARE))
-    assert missions.sectors(np.array([[3.0], [1.0]]), SQUARE[:1]) == 0.75
+    assert np.isnan(missions.share_in_own_sector(np.zeros((2, 4)), SQUARE))
+    assert missions.share_in_own_sector(np.array([[3.0], [1.0]]), SQUARE[:1]) == 0.75
 
 
 @given(st.floats(0, 2 * np.pi), st.floats(-12, 12))
@@ -116,7 +116,7 @@ def test_any_straight_line_makes_sectors(angle, offset):
     """Whatever way it runs, also beside the rows and columns of the paper's grid."""
     one = (PAPER - (13, 16)) @ (np.cos(angle), np.sin(angle)) < offset
     data = np.array([one, ~one], float)
-    assert missions.sectors(data, PAPER) == pytest.approx(1)
+    assert missions.share_in_own_sector(data, PAPER) == pytest.approx(1)
 
 
 @pytest.mark.parametrize(
@@ -164,6 +164,10 @@ def test_the_answer_counts_the_uavs_that_run_empty():
         record, fleet = Record(collection_ratio=0.5), f"{len(ends)} UAVs"
         return SimpleNamespace(policy="random", fleet=fleet, record=record, uavs=uavs)
 
-    said = missions.answer([mission("quota", "battery"), mission("battery", "battery", "quota")])
+    said = missions.shared_collection_sentence(
+        [mission("quota", "battery"), mission("battery", "battery", "quota")]
+    )
     assert "3 of 5 UAVs run out of battery in them." in said and "before" not in said
-    assert "No UAV runs out of battery in them." in missions.answer([mission("quota", "quota")])
+    assert "No UAV runs out of battery in them." in missions.shared_collection_sentence(
+        [mission("quota", "quota")]
+    )

@@ -33,14 +33,16 @@ def pads(studied):
 def test_a_change_is_the_paired_difference_from_the_same_setting(pads):
     shifted = planted(pads, PRODUCT, lambda row: 0.5 + 0.001 * row["replication"]
                       - 0.1 * (row["pads"] == 1) - 0.2 * (row["uavs"] == 4))  # fmt: skip
-    table = operations.changes(shifted, "pads", 4, PRODUCT).set_index(["uavs", "pads"])
+    table = operations.changes_from_reference(shifted, "pads", 4, PRODUCT).set_index(
+        ["uavs", "pads"]
+    )
     assert len(table) == 6  # the reference has no row
     for uavs in (2, 4):
         assert table.loc[(uavs, 1), "mean"] == pytest.approx(-0.1)
         assert table.loc[(uavs, 3), "mean"] == 0
         assert table.loc[(uavs, 1), "n"] == 40
     with pytest.raises(InputError, match="pads: is never 9"):
-        operations.changes(pads, "pads", 9, PRODUCT)
+        operations.changes_from_reference(pads, "pads", 9, PRODUCT)
 
 
 def test_the_fewest_pads_with_which_and_above_which_little_is_lost(pads):
@@ -53,7 +55,7 @@ def test_the_fewest_pads_with_which_and_above_which_little_is_lost(pads):
     assert found[["uavs", "pads"]].to_numpy().tolist() == [[2, 2], [4, 4]]
     assert found["too_few"].tolist() == [1, 3]
     assert operations.short_of_pads(planted(pads, PRODUCT, value), 0.1) == [0, 4, 6]
-    text = operations.pads(planted(pads, PRODUCT, value), 0.1)
+    text = operations.enough_pads_sentence(planted(pads, PRODUCT, value), 0.1)
     assert text.startswith(
         "Of charging pads, 2 are enough for 2 UAVs, 1 is too few; 4 are enough for 4 UAVs, 3 are"
     )
@@ -70,7 +72,7 @@ def test_the_lower_end_decides_and_one_pad_may_be_enough(pads):
     noisy = planted(
         pads, PRODUCT, lambda row: 0.5 + (row["pads"] < 3) * (row["replication"] % 2 - 0.55) / 2
     )
-    assert "3 are enough for 2 UAVs, 1 and 2 open" in operations.pads(noisy, 0.1)
+    assert "3 are enough for 2 UAVs, 1 and 2 open" in operations.enough_pads_sentence(noisy, 0.1)
     found = operations.enough_pads(planted(pads, PRODUCT, lambda row: 0.9), 0.1)
     assert found["pads"].tolist() == [1, 1]
     assert found["too_few"].tolist() == [0, 0]
@@ -80,7 +82,7 @@ def test_what_the_fewest_pads_cost_is_computed(pads):
     """One pad may cost the success of a large fleet and hardly any data."""
     failing = planted(pads, SUCCESS, lambda row: float(row["uavs"] == 2 or row["pads"] > 1))
     failing = planted(failing, RATIO, lambda row: 0.97 - 0.06 * (row["pads"] == 1))
-    lines = operations.few_pads(failing).splitlines()
+    lines = operations.few_pads_sentence(failing).splitlines()
     assert lines[0].startswith("- The success of 2 UAVs is 100.0 % with 1 pad and 100.0 % with 4: ")
     assert lines[1].startswith("- The success of 4 UAVs is 0.0 % with 1 pad and 100.0 % with 4: ")
     assert "−100.0 [" in lines[1] and lines[1].endswith(" points, n = 40.")
@@ -111,14 +113,16 @@ def test_the_age_is_compared_with_the_published_effect(studied):
     table = operations.age_changes(halved)
     assert table["mean"].tolist() == pytest.approx([-1 / 2, -2 / 3, -1 / 2, -2 / 3])
     assert table["published"].dropna().tolist() == [-0.46, -0.46]
-    text = operations.age(halved)
+    text = operations.age_sentence(halved)
     # By hand: 80 to 84 in five missions, so half a width of t * sqrt(2.5 / 5) with t = 2.776.
     assert "From 1 to 3 UAVs the mean age of the data falls from 82.0 [80.0, 84.0] to" in text
     assert "to 27.3 [26.7, 28.0] slots at an arrival rate of 0.5" in text
     grown = planted(results, AGE, lambda row: (80 + row["replication"]) * row["uavs"])
-    assert "From 1 to 3 UAVs the mean age of the data rises from 82.0 [" in operations.age(grown)
+    assert "From 1 to 3 UAVs the mean age of the data rises from 82.0 [" in operations.age_sentence(
+        grown
+    )
     level = planted(results, AGE, lambda row: 80 + row["replication"] % (2 + row["uavs"]))
-    assert "the mean age of the data does not surely change, from" in operations.age(level)
+    assert "the mean age of the data does not surely change, from" in operations.age_sentence(level)
 
 
 def test_failures_are_compared_with_none(studied):
@@ -130,7 +134,7 @@ def test_failures_are_compared_with_none(studied):
         return 0.5 + 0.001 * row["replication"] - lost
 
     fallen = planted(results, PRODUCT, value)
-    text = operations.failures(fallen)
+    text = operations.failures_sentence(fallen)
     assert "with probability 0.01, the product of 2 UAVs changes by −30.0 [" in text
     assert "points if it is lost and by −5.0 [" in text
     assert "points if it is repaired in 5 slots" in text
@@ -149,13 +153,13 @@ def test_a_uav_waits_from_its_request_until_it_charges_gives_up_or_ends():
         (8, "mission_end", -1),
     ]
     log = pd.DataFrame(events, columns=["time", "event", "uav"])
-    waiting = operations.waiting(log).tolist()
+    waiting = operations.count_waiting_uavs(log).tolist()
     assert waiting == [0, 1, 2, 1, 1, 0, 1, 0]
 
 
 def test_the_queue_of_the_logs_is_that_of_the_records(pads):
     # Four UAVs, one pad.
-    table = operations.queues(pads, "greedy", [4]).set_index("slot")
+    table = operations.queues_over_time(pads, "greedy", [4]).set_index("slot")
     missions = pads.missions.query("point == 4 and replication < 2")
     assert len(table) == missions["slots"].max()
     waited = (missions["queue"] * missions["slots"]).sum() / 2
@@ -166,6 +170,12 @@ def test_the_queue_of_the_logs_is_that_of_the_records(pads):
 def test_how_long_missions_last_is_counted(pads):
     longest = pads.scenario().max_slots
     lasting = planted(pads, "slots", lambda row: longest - (row["replication"] == 0))
-    assert operations.lengths(lasting) == f"312 of 320 missions last to the last slot, {longest:,}."
+    assert (
+        operations.mission_lengths_sentence(lasting)
+        == f"312 of 320 missions last to the last slot, {longest:,}."
+    )
     lasting = planted(pads, "slots", lambda row: longest)
-    assert operations.lengths(lasting) == f"Every mission lasts to its last slot, {longest:,}."
+    assert (
+        operations.mission_lengths_sentence(lasting)
+        == f"Every mission lasts to its last slot, {longest:,}."
+    )

@@ -58,7 +58,7 @@ def test_rows_are_by_number_of_uavs_then_over_all(made):
 def test_the_distance_to_the_bound_has_its_n_and_few_missions_tell_nothing(made, monkeypatch):
     few = "The bounds of n = 3 missions with 1 UAV are too few to tell."
     assert optimality.in_words(made, "low").startswith(few)
-    assert optimality.useful(optimality.by_fleet(made)).empty
+    assert optimality.fleets_with_useful_bound(optimality.by_fleet(made)).empty
     monkeypatch.setattr(optimality, "LEAST", 3)
     said = optimality.in_words(made, "low")
     assert said.startswith("`low` is at most 44.8 points with 1 UAV (mean gap 20.0 [−4.8, 44.8], n")

@@ -33,11 +33,11 @@ def results(tmp_path_factory):
 
 
 def test_the_answer_says_which_is_better(results):
-    table = planner.differences(results, ["greedy"], "random")
+    table = planner.compare_with_learner(results, ["greedy"], "random")
     cases = {"planner is": (0.1, 0.2), "learner is": (-0.2, -0.1), "missions do": (-0.1, 0.1)}
     for said, ends in cases.items():
         given = table.assign(low=ends[0], high=ends[1], difference=sum(ends) / 2)
-        sentence, number = planner.answer(given, "greedy")
+        sentence, number = planner.planner_sentences(given, "greedy")
         assert sentence.startswith(f"The {said}")
         assert bool(number) == (said != "missions do")  # nothing inconclusive is a headline
 
@@ -50,7 +50,7 @@ def test_coverage_is_what_the_logs_say_was_collected(results):
         had = by_node["mission_start"].add(by_node.get("arrival", 0.0), fill_value=0.0)
         shares.append(by_node["communication"].reindex(range(3), fill_value=0.0) / had)
     expected = np.mean(shares, axis=0)
-    np.testing.assert_allclose(planner.coverage(results, "greedy"), expected)
+    np.testing.assert_allclose(planner.collected_shares(results, "greedy"), expected)
     assert 0 < expected.min() <= expected.max() <= 1
 
 
@@ -66,7 +66,7 @@ def test_the_share_at_home_is_that_of_uavs_in_the_zone(results):
 
 
 def test_the_example_is_the_first_of_the_smallest_fleets_with_a_log(results):
-    example = planner.example(results, "greedy")
+    example = planner.first_logged_mission(results, "greedy")
     fleets = results.missions.query("policy == 'greedy'")["uavs"].to_numpy()[:LOGGED]
     assert example.replication == int(np.argmin(fleets))
 
@@ -77,14 +77,14 @@ def test_the_price_of_a_node_is_the_sum_over_cuts(results):
 
 def test_the_plan_begins_where_the_uavs_start(results, monkeypatch):
     monkeypatch.setattr(Planner, "budget", Budget(500, 0))
-    mission = planner.example(results, "greedy")
+    mission = planner.first_logged_mission(results, "greedy")
     planned = replace(mission, policy="planner")
-    (ax,) = planner.plan(results, planned).figure.axes
+    (ax,) = planner.draw_plan(results, planned).figure.axes
     ways = [line.get_xydata() for line in ax.lines if "plan" in str(line.get_gid())]
     log = mission.events
     starts = log[(log["event"] == "mission_start") & (log["uav"] >= 0)]
     assert [way[0].tolist() for way in ways] == starts[["x", "y"]].to_numpy().tolist()
     cells = np.array([text.xy for text in ax.texts if text.get_position() == (6, 6)])
     assert len(cells) and cells.min() >= 0 and cells.max() < 8
-    unplanned = planner.plan(results, mission)
+    unplanned = planner.draw_plan(results, mission)
     assert not any("plan" in str(line.get_gid()) for line in unplanned.figure.axes[0].lines)

@@ -28,23 +28,23 @@ def of_sea(results: Results, policy: str, metric: str = PRODUCT) -> np.ndarray:
 
 def test_a_sea_counts_once(results):
     means = of_sea(results, "greedy")
-    table = seas.quality(results).set_index("policy")
+    table = seas.means_over_seas(results).set_index("policy")
     assert table.loc["greedy", ["mean", "n"]].tolist() == pytest.approx([means.mean(), 4])
-    families = seas.quality(results, "family", SUCCESS).set_index(["family", "policy"])
+    families = seas.means_over_seas(results, "family", SUCCESS).set_index(["family", "policy"])
     assert families.loc[("scattered", "nearest"), "n"] == 2
     known = of_sea(results, "nearest", SUCCESS)[:2].mean()
     assert families.loc[("scattered", "nearest"), "mean"] == pytest.approx(known)
-    assert {*seas.quality(results, "nodes")["nodes"]} >= {"61 and more"}
+    assert {*seas.means_over_seas(results, "nodes")["nodes"]} >= {"61 and more"}
     # Seed 2 has five or six.
-    assert {*seas.quality(results, "uavs")["uavs"]} <= {5, 6}
+    assert {*seas.means_over_seas(results, "uavs")["uavs"]} <= {5, 6}
 
 
 def test_gains_and_shares_are_paired_by_sea(results):
     greedy, nearest = of_sea(results, "greedy"), of_sea(results, "nearest")
-    (gain,) = seas.gains(results, "greedy").to_dict("records")
+    (gain,) = seas.differences_from_baseline(results, "greedy").to_dict("records")
     assert gain["policy"] == "nearest"
     assert gain["difference"] == pytest.approx((nearest - greedy).mean())
-    share = seas.shares(results, "greedy").set_index("policy")
+    share = seas.shares_of_reference(results, "greedy").set_index("policy")
     assert share.loc["greedy", ["mean", "low", "high"]].tolist() == pytest.approx([1, 1, 1])
     assert share.loc["nearest", "mean"] == pytest.approx(nearest.mean() / greedy.mean())
     assert share.loc["nearest", "low"] < share.loc["nearest", "high"]
@@ -56,9 +56,9 @@ def test_gains_and_shares_are_paired_by_sea(results):
 
 def test_the_worst_seas_come_first(results):
     behind = of_sea(results, "nearest") - of_sea(results, "greedy")
-    table = seas.worst(results, "nearest", "greedy", count=2)
+    table = seas.worst_seas_table(results, "nearest", "greedy", count=2)
     assert [*table["Sea"]] == [SEAS[place] for place in np.argsort(behind)[:2] if behind[place] < 0]
-    assert seas.worst(results, "greedy", "greedy").empty  # behind on no sea
+    assert seas.worst_seas_table(results, "greedy", "greedy").empty  # behind on no sea
 
 
 def test_the_summary_has_shares_of_references_and_of_bounds_below_one(results, monkeypatch):
@@ -67,15 +67,15 @@ def test_the_summary_has_shares_of_references_and_of_bounds_below_one(results, m
     costs = [Cost(policy="greedy", calls=1, median=1, slow=1, batch=2.0)]
     bounded = np.where(results.missions["point"] == 1, 0.9, 1.0)
     with_bounds = replace(results, missions=results.missions.assign(**{BOUND: bounded}))
-    table = seas.summary(with_bounds, Times(processor="x", costs=costs)).set_index("Policy")
+    table = seas.policies_table(with_bounds, Times(processor="x", costs=costs)).set_index("Policy")
     known = of_sea(results, "greedy")[1] / 0.9
-    assert table.loc["greedy", "Of the bound"] == numbers.percent(known)
-    assert table.loc["nearest", "Of nearest"] == numbers.percent(1.0)
-    assert table["Decision"].tolist() == [numbers.seconds(2.0), ""]
+    assert table.loc["greedy", "Of the bound"] == numbers.format_percent(known)
+    assert table.loc["nearest", "Of nearest"] == numbers.format_percent(1.0)
+    assert table["Decision"].tolist() == [numbers.format_seconds(2.0), ""]
     assert "Of planner" not in table
 
 
 def test_a_study_of_one_sea_is_refused(studied):
     study = studied(missions=2)
     with pytest.raises(InputError, match="no study of seas"):
-        seas.quality(study)
+        seas.means_over_seas(study)

@@ -10,7 +10,7 @@ import pytest
 from dess import InputError
 from dess.analysis import load_study, run_study
 from dess.analysis.answers import summary
-from dess.analysis.answers.summary import sensitivity
+from dess.analysis.answers.settings.sobol import sobol_indices
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO
 from dess.analysis.stats.differences import compare
 from dess.analysis.study.design import Saltelli
@@ -55,7 +55,7 @@ KNOWN = {
 def test_known_shares_of_parameters_and_noise(case):
     function, first, total = KNOWN[case]
     design = unit(len(first) - 1, base=2048)
-    table = sensitivity(design, evaluated(design, y=function), ["y"])
+    table = sobol_indices(design, evaluated(design, y=function), ["y"])
     for index, truth in (("first", first), ("total", total)):
         low, high = table[f"{index}_low"], table[f"{index}_high"]
         room = (high - low) / 2  # some of so many intervals of 95 % miss
@@ -75,20 +75,20 @@ def test_a_metric_without_variance_has_no_shares():
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        table = sensitivity(design, missions, ["always", "tenth", "elsewhere", "y"])
+        table = sobol_indices(design, missions, ["always", "tenth", "elsewhere", "y"])
     assert table.loc[table["metric"] != "y", INDICES].isna().all(axis=None)
     assert table.loc[table["metric"] == "y", INDICES].notna().all(axis=None)
     with pytest.raises(InputError, match="160 are not .* one for each of its 80 design points$"):
-        sensitivity(design, pd.concat([missions, missions]), ["y"])
+        sobol_indices(design, pd.concat([missions, missions]), ["y"])
 
 
 def test_indices_depend_on_nothing_else():
     design = unit(1, base=64)
     missions = evaluated(design, other=lambda x, e: x * e, y=lambda x, e: x + e)
     np.random.seed(1)
-    alone = sensitivity(design, missions, ["y"])
+    alone = sobol_indices(design, missions, ["y"])
     np.random.seed(2)
-    both = sensitivity(design, missions, ["other", "y"])
+    both = sobol_indices(design, missions, ["other", "y"])
     pd.testing.assert_frame_equal(alone, both.iloc[2:].reset_index(drop=True))
 
 
@@ -112,13 +112,13 @@ def test_policies_are_compared_on_common_replications():
     spread = np.linspace(0.3, 0.8, 30)
     jitter = np.tile([0.19, 0.2], 15)
     results, means = stub(a=spread + jitter, b=spread, c=spread[::-1] - 0.3)
-    verdicts = summary.with_verdicts(results, means)["verdict"].tolist()
+    verdicts = summary.add_verdicts(results, means)["verdict"].tolist()
     assert verdicts == [summary.BEST, summary.WORSE, summary.WORSE]
     results, means = stub(a=spread + 0.01, b=spread)
-    assert summary.with_verdicts(results, means)["verdict"].tolist() == [summary.TIED] * 2
+    assert summary.add_verdicts(results, means)["verdict"].tolist() == [summary.TIED] * 2
     results, means = stub(a=spread, b=spread[::-1])
-    assert summary.with_verdicts(results, means)["verdict"].tolist() == [summary.TIED] * 2
-    assert summary.with_verdicts(results, means[1:])["verdict"].tolist() == [summary.ONLY]
+    assert summary.add_verdicts(results, means)["verdict"].tolist() == [summary.TIED] * 2
+    assert summary.add_verdicts(results, means[1:])["verdict"].tolist() == [summary.ONLY]
 
 
 def test_an_allowance_for_failures_is_said_with_both_intervals():
@@ -127,14 +127,14 @@ def test_an_allowance_for_failures_is_said_with_both_intervals():
     rows = [("a", n, value, 2) for n, value in enumerate(ratio + np.tile([0.095, 0.105], 150))]
     rows += [("b", n, value, 2) for n, value in enumerate(ratio)]
     missions = pd.DataFrame(rows, columns=["policy", "replication", PRODUCT, "uavs"])
-    text = summary.allowance_in_words(compare(missions, "b", [PRODUCT]), "policy")
+    text = summary.allowance_for_difference(compare(missions, "b", [PRODUCT]), "policy")
     # Student's t of ±0.5 points: 1.968 x 0.5 / sqrt(299); with 0.8 and -0.7 added: ±0.7 points.
     assert "300 missions without one do not rule out a failure in 100 missions" in text
     assert (
         "the difference of a in product would be known to ±0.057 points; with it, to ±0.7" in text
     )
     unlike = missions.assign(**{PRODUCT: np.random.default_rng(1).random(600)})
-    assert summary.allowance_in_words(compare(unlike, "b", [PRODUCT]), "policy") == ""
+    assert summary.allowance_for_difference(compare(unlike, "b", [PRODUCT]), "policy") == ""
 
 
 def test_it_is_said_how_means_weigh_the_numbers_of_uavs():
@@ -157,10 +157,13 @@ def test_targets_are_met_by_the_lower_end():
     means = pd.DataFrame(rows, columns=["policy", "point", "low"]).assign(metric=PRODUCT)
     product = means.assign(metric="success", low=[0.5, 0.9, 0.9])
     table = pd.concat([means, product], ignore_index=True)
-    left = summary.meeting(table, {PRODUCT: 0.9})
+    left = summary.settings_meeting(table, {PRODUCT: 0.9})
     assert [*zip(left["policy"], left["point"], strict=True)] == [("a", 0), ("b", 0)] * 2
-    assert summary.meeting(table, {PRODUCT: 0.9, "success": 0.6})["policy"].tolist() == ["b"] * 2
-    assert summary.meeting(table, {}).equals(table)
+    assert (
+        summary.settings_meeting(table, {PRODUCT: 0.9, "success": 0.6})["policy"].tolist()
+        == ["b"] * 2
+    )
+    assert summary.settings_meeting(table, {}).equals(table)
 
 
 def test_policies_are_ranked_by_the_mean_over_design_points():
@@ -174,7 +177,7 @@ def test_policies_are_ranked_by_the_mean_over_design_points():
     ]
     missions = pd.DataFrame(rows, columns=["policy", "point", PRODUCT])
     # A: (0.9 + 0.1) / 2.
-    assert summary.ranked_policies(missions) == ["b", "c", "a"]
+    assert summary.rank_policies(missions) == ["b", "c", "a"]
     assert summary.best_policy(missions) == "b"
     assert summary.best_policy(missions, among=["a", "c"]) == "c"
 
@@ -185,14 +188,14 @@ def test_checkpoints_of_one_learner_are_one_learner(tmp_path):
         return run_study(study, tmp_path / "-".join(policies))
 
     results = results_of("greedy", "random", "ddqn", "ddqn-2")
-    assert summary.learners(results) == {"ddqn": ["ddqn", "ddqn-2"]}
+    assert summary.trained_policies_by_learner(results) == {"ddqn": ["ddqn", "ddqn-2"]}
     mixed = results_of("greedy", "ddqn", "ddqn-paper", "ddqn,greedy")
-    assert sorted(summary.learners(mixed).values()) == [["ddqn"], ["ddqn-paper"]]
-    table = summary.learned_against_heuristic(results)
+    assert sorted(summary.trained_policies_by_learner(mixed).values()) == [["ddqn"], ["ddqn-paper"]]
+    table = summary.compare_learned_with_heuristic(results)
     assert set(table["about"]) == {"the learner"}
     assert set(table["trainings"]) == {2}
     alone = results_of("greedy", "ddqn")
-    assert set(summary.learned_against_heuristic(alone)["about"]) == {"this checkpoint"}
+    assert set(summary.compare_learned_with_heuristic(alone)["about"]) == {"this checkpoint"}
 
 
 def test_what_is_said_of_the_guard_is_computed():
@@ -203,6 +206,6 @@ def test_what_is_said_of_the_guard_is_computed():
         for policy, mean in shares.items()
         for metric in METRICS
     )
-    said = summary.guard_in_words(means)
+    said = summary.guard_sentences(means)
     assert "under the return guard: they succeed in 40.0 % to 90.0 % of the missions." in said
     assert "nearly all" not in said

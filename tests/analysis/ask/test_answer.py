@@ -10,7 +10,7 @@ from scipy import stats
 
 from dess import InputError
 from dess.analysis import sweep
-from dess.analysis.answers.settings import varied
+from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.ask import what_if as found
 from dess.analysis.ask.what_if import BASELINE, VARIATION
 from dess.analysis.metrics import PRODUCT
@@ -35,7 +35,7 @@ def asking(tmp_path):
 
 def test_settings_are_ranked(asking):
     answer = asking(uavs=range(1, 3), quota=np.array([20, 40]), pads=2)
-    assert [*varied(answer.results)] == ["uavs", "quota"]
+    assert [*varied_values(answer.results)] == ["uavs", "quota"]
     table = answer.table()
     assert len(table) == 2 * 2 * 2
     assert [*table["rank"]] == [*range(1, 9)]
@@ -82,7 +82,7 @@ def row(difference, low, high, p=0.01, n=100):
 def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(tmp_path):
     changes = {"age.reward": -1.0, "failures.uav_rate": 0.2}
     results = asked(tmp_path, 6, settings=changes, policies=["greedy"]).results
-    answers = found.answers(results).set_index("metric")
+    answers = found.compare_sides(results).set_index("metric")
     sides = results.missions.pivot(index="replication", columns="point", values="age")
     change = (sides[VARIATION] - sides[BASELINE]).mean()
     assert answers.loc["age", "difference"] == pytest.approx(change)
@@ -122,7 +122,7 @@ def test_what_one_side_measures_has_no_difference(tmp_path):
     ],
 )
 def test_the_whole_interval_decides(answer, side):
-    assert found.verdict(answer) == side
+    assert found.verdict_on_change(answer) == side
 
 
 def test_so_many_missions_show_the_difference_that_was_seen():
@@ -152,7 +152,7 @@ def with_missions(answer, before, after, ratios):
 def test_the_typical_mission_has_the_median_difference_and_the_worst_the_least_left(answer):
     before, after = [0.5, 0.5, 0.9, 0.1, 0.9], [0.6, 0.4, 0.0, 0.3, 0.0]
     made = with_missions(answer, before, after, [0.6, 0.4, 0.8, 0.3, 0.7])
-    differences = found.differences(made.results, "greedy").tolist()
+    differences = found.product_differences(made.results, "greedy").tolist()
     assert differences == pytest.approx([0.1, -0.1, -0.9, 0.2, -0.9])
     assert (made.typical().replication, made.worst().replication) == (1, 4)
     even = with_missions(answer, [0.0] * 4, [0.4, 0.1, 0.2, 0.2], [0.5] * 4)
@@ -179,21 +179,21 @@ def test_what_contradicts_the_mean_is_said_only_where_it_occurs(answer):
 def test_what_is_explained_occurs(answer, monkeypatch):
     """Intervals that overlap, marks that are used, and learned policies."""
     assert "learned policy" not in answer.reading()
-    monkeypatch.setattr(found, "verdict", lambda _: ABOVE)
+    monkeypatch.setattr(found, "verdict_on_change", lambda _: ABOVE)
     assert "≈" not in answer.reading()
-    monkeypatch.setattr(found, "verdict", lambda _: INCONCLUSIVE)
+    monkeypatch.setattr(found, "verdict_on_change", lambda _: INCONCLUSIVE)
     assert "≈" in answer.reading() and "overlap" not in answer.reading()
 
 
 def test_a_metric_that_is_equal_in_all_missions_has_no_correlation(answer, monkeypatch):
     table = answer.table().assign(variance_reduction=np.nan, correlation=np.nan)
-    monkeypatch.setattr(found, "answers", lambda _: table)
+    monkeypatch.setattr(found, "compare_sides", lambda _: table)
     assert set(answer.pairing()["Correlation"]) == {"no variance"}
     assert "nan" not in answer.pairing().to_string()
 
 
 def test_the_best_policy_of_each_side_is_found(answer):
-    table = found.means(answer.results)
+    table = found.means_of_sides(answer.results)
     for point in (BASELINE, VARIATION):
         side = table[(table["point"] == point) & (table["metric"] == PRODUCT)]
         best = side.loc[side["mean"].idxmax(), "policy"]
@@ -215,4 +215,4 @@ def test_a_conclusion_names_the_side_of_the_whole_interval_or_how_many_missions_
     ends, said
 ):
     about = {"policy": "greedy", "metric": PRODUCT, "before": 0.9, "after": 0.9 + ends[0]}
-    assert said in found.conclusion(pd.Series({**row(*ends, p=0.2), "n": 100, **about}))
+    assert said in found.conclusion_in_words(pd.Series({**row(*ends, p=0.2), "n": 100, **about}))

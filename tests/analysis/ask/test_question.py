@@ -8,7 +8,7 @@ import pytest
 
 from dess import InputError, load_scenario
 from dess.analysis import load_results, run_study
-from dess.analysis.answers.diff import diff
+from dess.analysis.answers.diff import diff_results
 from dess.analysis.ask.question import sweep_question, values_of, what_if_question
 from dess.analysis.execution import effort
 from dess.analysis.execution.effort import BASELINE, SECONDS
@@ -39,7 +39,7 @@ def sweep_of(fields, folder, **about):
 
 
 def check_equal_to_a_fresh_run(question, results, folder):
-    assert diff(results, run_study(question.study, folder / "fresh")).identical
+    assert diff_results(results, run_study(question.study, folder / "fresh")).identical
 
 
 OTHERS = {

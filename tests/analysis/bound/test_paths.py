@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dess import load_scenario
-from dess.analysis.bound.prices import Bounds, Detail, improve, known_of
+from dess.analysis.bound.prices import Bounds, Detail, improve_prices, known_of
 from dess.scenario.scenario import ScenarioSpace
 from tests.analysis.bound.tiny_sea import bound_of_data
 
@@ -55,7 +55,7 @@ def test_a_uav_can_take_all_that_its_node_has_had():
 
 def test_more_iterations_never_raise_the_bound():
     known = known_of(paper_like(), 4, 0)
-    ratios = [improve(known, iterations, Detail()).ratio for iterations in (0, 1, 5, 15)]
+    ratios = [improve_prices(known, iterations, Detail()).ratio for iterations in (0, 1, 5, 15)]
     assert ratios[0] == 1
     assert ratios == sorted(ratios, reverse=True)
     assert ratios[-1] < ratios[1]

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import norm
 
 from dess import load_scenario
-from dess.analysis.bound.service import POINTS, rates_of, spread, step_takings, step_values
+from dess.analysis.bound.service import POINTS, rates_of, spread_normal, step_takings, step_values
 from dess.model.channel import world_of
 from dess.model.state import EAST, HOVER, constants_of
 
@@ -22,12 +22,14 @@ def values_of(rates: np.ndarray, worth: list[float], local: list[float]) -> np.n
     values = np.empty((1, 5, 4, 4, len(local)))
     block = np.array([[0] * 4, [0] * 4, [0] * 4, [1] * 4])
     prices = np.tile(local, (2, 1)).astype(float)
-    step_values(np.array([worth]), prices, np.array(NODES), block, rates, spread(POINTS), values)
+    step_values(
+        np.array([worth]), prices, np.array(NODES), block, rates, spread_normal(POINTS), values
+    )
     return values[0]
 
 
 def test_the_points_are_a_mean_preserving_spread():
-    chances = np.diff(spread(POINTS))
+    chances = np.diff(spread_normal(POINTS))
     assert chances.min() > 0
     assert chances.sum() == pytest.approx(1)
     assert chances @ POINTS == pytest.approx(0, abs=1e-9)
@@ -51,6 +53,6 @@ def test_a_slot_is_worth_more_than_the_mean_of_the_best_node(worth):
 def test_takings_are_what_makes_up_the_worth():
     _, rates = world()
     worth, takings = np.array([0.7, 1.0]), np.zeros(2)
-    step_takings(2, 1, EAST, worth, np.array(NODES), rates, spread(POINTS), takings)
+    step_takings(2, 1, EAST, worth, np.array(NODES), rates, spread_normal(POINTS), takings)
     value = values_of(rates, [0.7, 1.0], [0.0])[EAST, 2, 1, 0]
     assert worth @ takings == pytest.approx(value)

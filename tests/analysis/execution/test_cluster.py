@@ -16,7 +16,7 @@ from dess.analysis import run_study
 from dess.analysis.execution import workers
 from dess.analysis.execution.jobs import MissionsJob
 from dess.analysis.execution.runner import CHUNK
-from dess.analysis.execution.workers import Cluster, _checked
+from dess.analysis.execution.workers import Cluster, _check_and_run
 from dess.analysis.results.chunks import Chunk, Part
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.results.provenance import engine_code, members_of
@@ -42,10 +42,10 @@ def test_a_worker_with_other_code_or_weights_does_nothing(tmp_path):
     chunk = Chunk(0, (Part(cell, range(1)),))
     job = MissionsJob(chunk, (study.scenarios[0],), "greedy", 7, "batch")
     code, members = engine_code(), members_of("greedy")
-    assert len(_checked(job, code, members).missions) == 1
+    assert len(_check_and_run(job, code, members).missions) == 1
     for others in (("0" * 64, members), (code, members_of("random"))):
         with pytest.raises(InputError, match="a worker has other code"):
-            _checked(job, *others)
+            _check_and_run(job, *others)
 
 
 @pytest.mark.slow
@@ -105,7 +105,7 @@ def test_a_worker_that_cannot_run_a_job_is_one_line(tmp_path, monkeypatch):
     def unprepared(*_):
         raise ModuleNotFoundError("No module named 'analysis'")
 
-    monkeypatch.setattr(workers, "_checked", unprepared)
+    monkeypatch.setattr(workers, "_check_and_run", unprepared)
     with distributed.LocalCluster(n_workers=1, processes=False, **OPTIONS) as cluster:
         line = "a worker cannot run jobs: ModuleNotFoundError: No module named 'analysis'"
         with pytest.raises(InputError, match=line):

@@ -22,13 +22,13 @@ from dess.analysis.execution.effort import (
     SPREAD,
     START,
     Range,
-    budget,
     check_run,
     check_workers,
     check_workers_memory,
+    largest_budget,
     plan_study,
     policies_for,
-    total,
+    total_time,
 )
 from dess.base.files import memory
 from dess.policies.registry import names
@@ -117,7 +117,7 @@ def test_a_plan_knows_what_is_there(tmp_path):
     assert files_of(tmp_path / "out") == before
     done = plan_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "out")
     assert [p.seconds for p in done] == [(0.0, 0.0)]
-    assert total(done, 1) == (0.0, 0.0)
+    assert total_time(done, 1) == (0.0, 0.0)
 
 
 DECISIONS = 2 * 60 / 4  # of a mission of the small scenario
@@ -132,7 +132,7 @@ def test_the_time_is_a_range_and_nothing_is_simulated(tmp_path, monkeypatch):
     for planned, seconds in zip(plan, expected, strict=True):
         assert planned.seconds == pytest.approx((seconds / SPREAD, seconds * SPREAD))
     ends = sum(expected) / 2 / SPREAD, sum(expected) / 2 * SPREAD + START
-    assert total(plan, 2) == pytest.approx(ends)
+    assert total_time(plan, 2) == pytest.approx(ends)
     assert str(Range(1.0, 90.0)) == "up to 90 seconds"
     assert str(Range(5.0, 90.0)) == "5 to 90 seconds"
     assert str(Range(5.0, 240.0)) == "5 seconds to 4 minutes"
@@ -141,10 +141,10 @@ def test_the_time_is_a_range_and_nothing_is_simulated(tmp_path, monkeypatch):
 def test_a_rule_has_a_least_and_a_most(tmp_path):
     study = precise(tmp_path)
     assert [p.missions for p in plan_study(study, tmp_path / "out")] == [2 * 5] * 2
-    assert budget(study) == 2 * 2 * 60
+    assert largest_budget(study) == 2 * 2 * 60
     study = selecting(tmp_path)
     assert [p.missions for p in plan_study(study, tmp_path / "out")] == [4 * 8] * 2
-    assert budget(study) == 2 * (400 + 5)
+    assert largest_budget(study) == 2 * (400 + 5)
     run_study(study, tmp_path / "out")
     done = plan_study(study, tmp_path / "out")
     assert all(p.missions == p.present > 4 * 8 for p in done)
@@ -153,7 +153,7 @@ def test_a_rule_has_a_least_and_a_most(tmp_path):
 def test_a_run_that_is_surely_long_has_to_be_confirmed(tmp_path, monkeypatch):
     """The lower end of the range decides; what may be long is run."""
     study, out = small_study(tmp_path), tmp_path / "out"
-    ends = total(plan_study(study, out, workers=2), 2)
+    ends = total_time(plan_study(study, out, workers=2), 2)
     monkeypatch.setattr(effort, "LONG_RUN", ends.low * 1.01)
     check_run(study, out, workers=2)
     monkeypatch.setattr(effort, "LONG_RUN", ends.low * 0.99)

@@ -4,7 +4,7 @@ import pytest
 
 from dess import InputError, load_scenario
 from dess.analysis.execution import effort, evaluation
-from dess.analysis.execution.evaluation import Asked, check_evaluation, evaluate, means
+from dess.analysis.execution.evaluation import Asked, check_evaluation, estimate_means, evaluate
 from dess.analysis.metrics import ALWAYS
 from dess.analysis.stats.intervals import interval_of, post_stratified
 from dess.base.files import memory
@@ -28,27 +28,27 @@ def handed(monkeypatch):
 
 def test_means_are_those_of_all_records(monkeypatch, handed):
     records = evaluate(SPACE, "greedy,random", 300, 5).records.missions
-    found = means(Asked(SPACE, "greedy,random", 300, 5, workers=2))
+    found = estimate_means(Asked(SPACE, "greedy,random", 300, 5, workers=2))
     for metric in ALWAYS:
         values = post_stratified(records[metric], records["uavs"])
         expected = pytest.approx(interval_of(metric, values), rel=1e-12)
         assert found.moments[metric].interval(metric) == expected
     assert found.uav_slots == records["uav_slots"].sum()
-    events = means(Asked(SPACE, "greedy,random", 300, 5, "events"))
+    events = estimate_means(Asked(SPACE, "greedy,random", 300, 5, "events"))
     assert events.moments == found.moments
     # 32 missions of three UAVs.
     monkeypatch.setattr(evaluation, "MEMORY", 20_000)
     handed.clear()
-    pieces = means(Asked(SPACE, "greedy,random", 300, 5))
+    pieces = estimate_means(Asked(SPACE, "greedy,random", 300, 5))
     assert handed == [1, *(range(n, min(n + 32, 300)) for n in range(0, 300, 32))]
     for metric in ALWAYS:
         assert pieces.moments[metric] == pytest.approx(found.moments[metric], rel=1e-12)
 
 
 def test_the_missions_that_are_simulated_together_do_not_grow(handed):
-    size = evaluation._together(SPACE)
+    size = evaluation._missions_at_once(SPACE)
     fleets = [load_scenario("paper", uavs=n) for n in (1, 16)]
-    assert evaluation._together(fleets[0]) > size > evaluation._together(fleets[1])
+    assert evaluation._missions_at_once(fleets[0]) > size > evaluation._missions_at_once(fleets[1])
     records = evaluate(SPACE, "random", 2).records
     assert sum(kind.nbytes for kind in records) / 2 * size <= evaluation.MEMORY
 

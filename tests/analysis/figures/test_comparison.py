@@ -4,16 +4,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess.analysis.figures import comparison, settings
+from dess.analysis.answers.summary import plot_by_fleet, plot_performance
+from dess.analysis.figures import comparison
 from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 
 
 @pytest.mark.parametrize(
     ("draw", "axis"),
     [
-        (lambda rows: settings.performance(rows.assign(policy=[*"abcd"]), SUCCESS), 0),
-        (lambda rows: settings.by_fleet(rows, SUCCESS, {}), 1),
-        (lambda rows: comparison.means(rows, SUCCESS, ["before", "after"]), 1),
+        (lambda rows: plot_performance(rows.assign(policy=[*"abcd"]), SUCCESS), 0),
+        (lambda rows: plot_by_fleet(rows, SUCCESS, {}), 1),
+        (lambda rows: comparison.plot_sides(rows, SUCCESS, ["before", "after"]), 1),
     ],
     ids=["performance", "by fleet", "means"],
 )
@@ -34,7 +35,7 @@ def test_the_spread_is_the_share_of_missions_up_to_a_difference():
         "ours": pd.Series([0.0, 0.1, -0.5, 0.1]),
         "theirs": pd.Series(np.linspace(-0.02, 0.04, 100)),
     }
-    above, below = comparison.spread(gaps).axes
+    above, below = comparison.plot_difference_spread(gaps).axes
     for ax in (above, below):
         for line, own in zip(ax.lines, gaps.values(), strict=False):
             for x, share in list(zip(line.get_xdata(), line.get_ydata(), strict=True))[1:]:
@@ -42,7 +43,7 @@ def test_the_spread_is_the_share_of_missions_up_to_a_difference():
             assert line.get_ydata()[0] == 0 and line.get_ydata()[-1] == 1
     assert below.get_xlim()[0] > above.get_xlim()[0]
 
-    comparison.spread({"ours": pd.Series([0.0, 0.0])}).canvas.draw()
+    comparison.plot_difference_spread({"ours": pd.Series([0.0, 0.0])}).canvas.draw()
 
 
 def test_a_panel_per_fleet_shows_products_and_the_bound():
@@ -51,7 +52,7 @@ def test_a_panel_per_fleet_shows_products_and_the_bound():
     for metric, least in ((PRODUCT, 0.1), (BOUND, 0.4)):
         table[metric] = np.linspace(least, least + 0.1, len(table))
         table[f"{metric}_low"], table[f"{metric}_high"] = table[metric] - 0.02, table[metric] + 0.01
-    figure = comparison.gaps(table)
+    figure = comparison.plot_gaps(table)
     for ax, (_, rows) in zip(figure.axes, table.groupby("uavs"), strict=True):
         bars = [bar.lines[0].get_xdata()[0] for bar in ax.containers]
         assert bars == pytest.approx(rows[PRODUCT])

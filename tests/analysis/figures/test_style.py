@@ -37,7 +37,7 @@ def test_differences_on_an_axis_are_signed_points():
 
 def test_a_figure_has_the_look_and_leaves_no_state_behind():
     before = dict(mpl.rcParams)
-    with pytest.raises(KeyError), style.panels(3) as (figure, _):
+    with pytest.raises(KeyError), style.new_panels(3) as (figure, _):
         assert figure.axes and not mpl.rcParams["text.parse_math"]
         raise KeyError
     assert dict(mpl.rcParams) == before
@@ -46,7 +46,7 @@ def test_a_figure_has_the_look_and_leaves_no_state_behind():
 def test_an_axis_holds_all_intervals_and_has_a_least_length():
     rows = pd.DataFrame({"low": [0.5, 0.6], "high": [0.52, 0.9]})
     for length, zero in ((0.0, False), (0.0, True), (0.1, False), (0.8, False)):
-        low, high = style.ends(rows, length, zero)
+        low, high = style.axis_ends(rows, length, zero)
         assert low < 0.5 and high > 0.9
         assert high - low >= length
         assert (low < 0) == zero
@@ -54,7 +54,7 @@ def test_an_axis_holds_all_intervals_and_has_a_least_length():
 
 def test_a_notebook_shows_a_figure_though_nothing_has_imported_pyplot():
     """Without pyplot, IPython has no hook for figures and shows the name of their class."""
-    with style.panels(2.0) as (figure, _):
+    with style.new_panels(2.0) as (figure, _):
         pass
     shown = DisplayFormatter().format
     for drawn in (figure, sea_figure(load_scenario("fig1"))):
@@ -64,7 +64,7 @@ def test_a_notebook_shows_a_figure_though_nothing_has_imported_pyplot():
 
 @pytest.mark.parametrize("width", [style.WIDTH, 4.3])
 def test_a_legend_is_no_wider_than_its_figure(width):
-    with style.panels(3.0, legend=5) as (figure, ax):
+    with style.new_panels(3.0, legend=5) as (figure, ax):
         for name in ("random-unguarded", "ddqn-paper", "greedy", "nearest", "tour"):
             ax.plot([0, 1], label=name)
     figure.resize(width, 3.0)

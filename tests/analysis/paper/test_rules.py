@@ -8,7 +8,7 @@ import pytest
 from dess.analysis.answers.learning import Transfer
 from dess.analysis.answers.main_effects import LEVELS, PEAK, RISES, VALLEY, Shape
 from dess.analysis.paper import rules, values
-from dess.analysis.paper.measures import Pairs, negated
+from dess.analysis.paper.measures import Pairs, negate_changes
 from dess.analysis.paper.scorecard import RULES
 from dess.analysis.stats.intervals import Interval
 from dess.analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
@@ -67,7 +67,7 @@ def test_a_rule_about_one_interval(rule, mean, half, verdict):
 
 def test_the_paper_s_figures_vary_as_well():
     """Newcombe's example: 56 of 70 against 48 of 80, 20 points [5.2, 33.4]."""
-    ours, theirs = values.spread(56 / 70, 70), values.spread(48 / 80, 80)
+    ours, theirs = values.interval_of_share(56 / 70, 70), values.interval_of_share(48 / 80, 80)
     assert tuple(rules.gap(ours, theirs)) == pytest.approx((0.2, 0.0524, 0.3339), abs=5e-5)
     assert tuple(rules.gap(around(0.8, 0.02), around(0.7, 0))) == pytest.approx((0.1, 0.08, 0.12))
     below = around(0.89, 0.009)
@@ -129,8 +129,8 @@ def chosen(best: int, *left: int) -> Choice:
         ("best", [leads_of([1, 1], 1)], REFUTED),
         # As high as the one before.
         ("best", [leads_of([1, 0], 2)], INCONCLUSIVE),
-        ("lowest", [negated(leads_of([1, 1], 0))], HOLDS),
-        ("lowest", [negated(leads_of([0, 1], 0))], INCONCLUSIVE),
+        ("lowest", [negate_changes(leads_of([1, 1], 0))], HOLDS),
+        ("lowest", [negate_changes(leads_of([0, 1], 0))], INCONCLUSIVE),
         ("no_lower", [leads_of([0, 0, 0], 0, 1)], HOLDS),
         ("no_lower", [leads_of([0, 0, 0], 0, 1, half=0.02)], INCONCLUSIVE),
         # By less than matters.

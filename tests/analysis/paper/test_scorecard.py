@@ -31,8 +31,8 @@ from dess.analysis.paper.scorecard import (
     VARIANTS,
     WEAKNESS,
     Row,
-    answer,
     scorecard,
+    scorecard_sentence,
 )
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
@@ -167,8 +167,8 @@ def test_a_claim_is_diagnostic_if_policies_without_learning_are_shown_to_fail(
     row = Row(claim, "a rule", findings)
     assert row.kind == kind
     passed = "the best learned policy passes 1 of these 1."
-    assert (passed in answer([row])) == (kind == DIAGNOSTIC)
-    assert f"has {weakness:d} of {weakness:d} weaknesses" in answer([row])
+    assert (passed in scorecard_sentence([row])) == (kind == DIAGNOSTIC)
+    assert f"has {weakness:d} of {weakness:d} weaknesses" in scorecard_sentence([row])
 
 
 def test_a_verdict_uses_the_intervals_that_are_shown(rows):

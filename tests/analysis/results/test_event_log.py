@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 import dess
 from dess import policies
 from dess.analysis.results.event_log import (
-    ages,
-    causes,
-    duration,
+    ages_of_nodes,
+    causes_of_failure,
     mean_age,
+    mission_length,
     residual_data,
     uav_slots,
 )
@@ -33,7 +33,7 @@ def assert_agree(record: Any, log: pd.DataFrame) -> None:
     assert flying.tolist() == record.uavs["slots_flying"].tolist()
     assert of_uav["battery"].last().tolist() == record.uavs["battery"].tolist()
     assert not (slots["charging"] & (slots["waiting"] | slots["moved"])).any()
-    assert duration(log) == record.slots == slots["slot"].max() + 1
+    assert mission_length(log) == record.slots == slots["slot"].max() + 1
     assert_residual(log)
 
 
@@ -69,13 +69,13 @@ def test_ages_of_a_log_are_those_of_the_record_and_those_that_policies_see(space
     witness = _Witness()
     record = dess.simulate(space, witness, seed, events=True)
     log = pd.DataFrame(record.events.columns())
-    of_nodes, curve = ages(log), mean_age(log)
+    of_nodes, curve = ages_of_nodes(log), mean_age(log)
     for slot, seen in witness.seen.items():
         assert np.allclose(of_nodes.loc[slot], seen, rtol=0, atol=1e-9)
     time, age = curve["time"].to_numpy(), curve["age"].to_numpy()
     area = ((age[1:] + age[:-1]) / 2 * np.diff(time)).sum()
-    assert area / duration(log) == pytest.approx(record.age, rel=1e-9)
-    assert of_nodes.loc[duration(log)].mean() == pytest.approx(age[-1], abs=1e-9)
+    assert area / mission_length(log) == pytest.approx(record.age, rel=1e-9)
+    assert of_nodes.loc[mission_length(log)].mean() == pytest.approx(age[-1], abs=1e-9)
     assert_residual(log)
 
 
@@ -169,4 +169,4 @@ ENDS = {
 def test_what_ended_a_mission_is_said(case):
     scenario = Scenario.of(**FIELDS | {"uavs": len(case.routes)} | case.fields)
     record, log = flown(scenario, *case.routes, starts=case.starts)
-    assert causes(log, scenario) == case.said
+    assert causes_of_failure(log, scenario) == case.said

@@ -10,7 +10,7 @@ import pytest
 from dess import simulate_batch
 from dess.analysis import run_study, summary
 from dess.analysis.metrics import measured_in
-from dess.analysis.results.resimulate import difference, recorded, resimulate
+from dess.analysis.results.resimulate import difference_in_words, resimulate, stored_record
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import interval_of
 from dess.policies import load
@@ -53,12 +53,12 @@ def test_a_resumed_study_and_one_that_takes_over_missions_have_them(tmp_path, re
 
 def test_a_mission_is_simulated_again_with_what_it_measured(results):
     mission = resimulate(results, "greedy", 1, 3)
-    fields = recorded(results, "greedy", 1, 3)
+    fields = stored_record(results, "greedy", 1, 3)
     assert fields["age"] == mission.record.age
     assert not any(isinstance(v, float) and math.isnan(v) for v in fields.values())
-    assert "age is 1.0 and" in difference(mission.record, fields | {"age": 1.0})
+    assert "age is 1.0 and" in difference_in_words(mission.record, fields | {"age": 1.0})
     without = {name: value for name, value in fields.items() if name != "age"}
-    assert "age is None and" in difference(mission.record, without)
+    assert "age is None and" in difference_in_words(mission.record, without)
 
 
 def test_missions_without_a_value_are_left_out_of_means_and_comparisons(results):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from dess import InputError, simulate_batch
 from dess.analysis import load_results, load_study, run_study
 from dess.analysis.results import parquet, provenance
-from dess.analysis.results.chunks import Chunk, Part, gaps, split
+from dess.analysis.results.chunks import Chunk, Part, gaps_between, split_into_chunks
 from dess.analysis.results.manifest import Cell
 from dess.analysis.results.store import Failure, Store
 from dess.policies import load
@@ -218,7 +218,7 @@ def test_a_failure_is_forgotten_once_its_chunk_is_there(tmp_path):
 
 def test_chunks_have_their_size_and_one_team():
     cells = [Cell(1, point, f"{point}", 0) for point in (0, 1, 2)]
-    chunks = [*split([Part(cell, range(3)) for cell in cells], 4)]
+    chunks = [*split_into_chunks([Part(cell, range(3)) for cell in cells], 4)]
     assert [(c.team, c.rows) for c in chunks] == [
         (1, [("0", 0, 3), ("1", 0, 1)]),
         (1, [("1", 1, 3), ("2", 0, 2)]),
@@ -232,7 +232,7 @@ def test_chunks_have_their_size_and_one_team():
 )
 def test_gaps_are_what_is_in_no_other_range(wanted, present):
     ranges = [range(*sorted(each)) for each in present]
-    missing = gaps(range(*sorted(wanted)), ranges)
+    missing = gaps_between(range(*sorted(wanted)), ranges)
     there = {r for each in ranges for r in each}
     assert [r for gap in missing for r in gap] == [
         r for r in range(*sorted(wanted)) if r not in there

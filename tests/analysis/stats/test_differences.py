@@ -7,8 +7,21 @@ from pandas.testing import assert_frame_equal
 from scipy import stats
 
 from dess import InputError
-from dess.analysis.metrics import MOST_LOST, MOST_SLOTS, PRODUCT, REWARD, SUCCESS, known_in
-from dess.analysis.stats.differences import Paired, adjust, column_tests, compare, paired
+from dess.analysis.metrics import (
+    MOST_LOST,
+    MOST_SLOTS,
+    PRODUCT,
+    REWARD,
+    SUCCESS,
+    metric_in_missions,
+)
+from dess.analysis.stats.differences import (
+    Paired,
+    adjust_p_values,
+    column_tests,
+    compare,
+    compare_pairs,
+)
 
 METRIC = "collection_ratio"
 
@@ -42,16 +55,16 @@ def ratios(policy, point=0):
 def test_adjusted_by_hand():
     p = np.array([0.01, 0.04, 0.03, 0.005])
     # Holm: 0.005 x 4, 0.01 x 3, 0.03 x 2, 0.04 x 1, never falling
-    assert adjust(p, "holm") == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert adjust_p_values(p, "holm") == pytest.approx([0.03, 0.06, 0.06, 0.02])
     # Benjamini and Hochberg: 0.005 x 4 / 1, 0.01 x 4 / 2, 0.03 x 4 / 3, 0.04
-    assert adjust(p, "fdr") == pytest.approx([0.02, 0.04, 0.04, 0.02])
-    assert adjust(p, None) == pytest.approx(p)
-    assert adjust(np.array([0.4, 0.9]), "holm") == pytest.approx([0.8, 0.9])
-    assert adjust(np.array([0.7, 0.9]), "holm") == pytest.approx([1.0, 1.0])
+    assert adjust_p_values(p, "fdr") == pytest.approx([0.02, 0.04, 0.04, 0.02])
+    assert adjust_p_values(p, None) == pytest.approx(p)
+    assert adjust_p_values(np.array([0.4, 0.9]), "holm") == pytest.approx([0.8, 0.9])
+    assert adjust_p_values(np.array([0.7, 0.9]), "holm") == pytest.approx([1.0, 1.0])
 
 
 def of_lists(a, b, **arguments):
-    return paired(np.array(a), np.array(b), **arguments)
+    return compare_pairs(np.array(a), np.array(b), **arguments)
 
 
 def test_pairs_by_hand():
@@ -133,7 +146,7 @@ def test_a_row_per_policy_group_and_metric():
 def test_pairs_are_the_missions_of_a_replication():
     row = compared(by=["point"]).set_index(["policy", "point"]).loc[("ddqn", 1)]
     fields = [*Paired._fields]
-    assert tuple(row[fields]) == paired(ratios("ddqn", 1), ratios("tour", 1), metric=METRIC)
+    assert tuple(row[fields]) == compare_pairs(ratios("ddqn", 1), ratios("tour", 1), metric=METRIC)
     assert row["difference"] == pytest.approx(0.02, abs=0.01)
     assert row["variance_reduction"] > 0.9  # the noise is common
 
@@ -149,7 +162,7 @@ def test_points_are_compared_as_policies_are():
     table = compared(baseline=0, of="point", by=["policy"]).set_index("policy")
     assert list(table.columns[:2]) == ["point", "baseline"]
     assert set(table["point"]) == {1}
-    ends = paired(ratios("ddqn", 1), ratios("ddqn", 0), metric=METRIC)[1:3]
+    ends = compare_pairs(ratios("ddqn", 1), ratios("ddqn", 0), metric=METRIC)[1:3]
     assert table.loc["ddqn", ["low", "high"]].tolist() == pytest.approx([*ends])
     assert table["difference"].tolist() == pytest.approx([0.2] * 4, abs=0.02)
 
@@ -157,7 +170,10 @@ def test_points_are_compared_as_policies_are():
 def test_p_values_are_corrected_over_all_rows():
     for correction in ("holm", "fdr", None):
         table = compared(metrics=[METRIC, "reward"], by=["point"], correction=correction)
-        assert table["p_adjusted"].tolist() == adjust(table["p"].to_numpy(), correction).tolist()
+        assert (
+            table["p_adjusted"].tolist()
+            == adjust_p_values(table["p"].to_numpy(), correction).tolist()
+        )
 
 
 def test_missions_without_point_and_seed_are_paired_by_replication():
@@ -191,7 +207,7 @@ def test_differences_of_shares_end_where_these_do():
 @pytest.mark.parametrize("difference", [0.0, 0.25])
 def test_equal_differences_of_bounded_values_have_an_interval_and_its_p_value(difference):
     a = np.full(20, 0.5 + difference)
-    result = paired(a, np.full(20, 0.5), metric=PRODUCT)
+    result = compare_pairs(a, np.full(20, 0.5), metric=PRODUCT)
     # A falls to 0, or B does, while the other one is as it was: that is the least it may be.
     expected = stats.ttest_1samp([difference] * 20 + [0.5 + difference, -0.5], 0)
     assert result.low < result.difference == difference < result.high
@@ -216,5 +232,5 @@ def test_equal_values_do_not_rule_out_a_failure(metric, value, column, largest, 
     assert row[["difference", "p"]].tolist() == [0.0, 1.0]
     assert row[["low", "high"]].tolist() == pytest.approx([*expected])
     alike = pd.Series(np.full(100, value))
-    table = column_tests(alike.to_frame("a"), alike, known_in(missions, metric))
+    table = column_tests(alike.to_frame("a"), alike, metric_in_missions(missions, metric))
     assert table.loc["a", ["low", "high"]].tolist() == pytest.approx([*expected])

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from dess.analysis.execution.evaluation import Asked, evaluate, means
-from dess.analysis.metrics import MOST_SLOTS, PRODUCT, RATIO, REWARD, SUCCESS, known_in
+from dess.analysis.execution.evaluation import Asked, estimate_means, evaluate
+from dess.analysis.metrics import MOST_SLOTS, PRODUCT, RATIO, REWARD, SUCCESS, metric_in_missions
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import (
     Moments,
@@ -21,9 +21,9 @@ from dess.analysis.stats.intervals import (
     mean_interval,
     post_stratified,
     skewness_of,
-    stratified,
+    stratified_interval,
     summary,
-    wilson,
+    wilson_interval,
 )
 from dess.scenario.scenario import ScenarioSpace
 
@@ -47,7 +47,7 @@ def test_it_has_a_length_holds_the_mean_and_ends_where_shares_do(values, level):
 
 @pytest.mark.parametrize(
     ("metric", "expected"),
-    [(SUCCESS, wilson(7, 8)), (RATIO, bounded_interval([1.0] * 7 + [0.0]))]
+    [(SUCCESS, wilson_interval(7, 8)), (RATIO, bounded_interval([1.0] * 7 + [0.0]))]
     # Hall's slope is -2.82843 / (3 sqrt(8)) = -1 / 3, t(0.975, 7) = 2.36462: the cube roots are
     # those of 1 - (2.36462 + 1 / 6) and 1 - (-2.36462 + 1 / 6), and s / sqrt(8) is 0.125
     + [(REWARD, (0.875, 0.875 - 0.125 * 6.45786, 0.875 + 0.125 * 1.41990))],
@@ -73,26 +73,26 @@ def at_points(generator: np.random.Generator, replications: int, common: float =
 @pytest.mark.parametrize("metric", [PRODUCT, REWARD])
 def test_a_single_point_is_a_plain_sample(metric):
     values = np.random.default_rng(3).beta(8, 2, (40, 1))
-    assert stratified(values, metric) == interval_of(metric, values[:, 0])
+    assert stratified_interval(values, metric) == interval_of(metric, values[:, 0])
 
 
 def test_points_that_share_all_chance_count_as_one():
     one = np.random.default_rng(4).beta(8, 2, (40, 1))
     alike = np.repeat(one, 5, axis=1)
-    assert stratified(alike, PRODUCT) == pytest.approx(bounded_interval(one[:, 0]))
-    assert stratified(alike, REWARD) == pytest.approx(interval_of(REWARD, one[:, 0]))
+    assert stratified_interval(alike, PRODUCT) == pytest.approx(bounded_interval(one[:, 0]))
+    assert stratified_interval(alike, REWARD) == pytest.approx(interval_of(REWARD, one[:, 0]))
     # Failures, none of which is seen, may hit all points at once.
     certain = np.ones((40, 5))
-    assert stratified(certain, SUCCESS) == pytest.approx(bounded_interval(np.ones(40)))
+    assert stratified_interval(certain, SUCCESS) == pytest.approx(bounded_interval(np.ones(40)))
 
 
 def test_points_of_unequal_numbers_have_the_same_weight():
     values = at_points(np.random.default_rng(6), 50)
     values[10:, 2] = np.nan
-    mean, low, high = stratified(values, PRODUCT)
+    mean, low, high = stratified_interval(values, PRODUCT)
     assert mean == pytest.approx(np.nanmean(values, axis=0).mean())
     assert low < mean < high
-    assert stratified(values, REWARD).mean == pytest.approx(mean)
+    assert stratified_interval(values, REWARD).mean == pytest.approx(mean)
 
 
 def test_a_summary_over_points_is_stratified_and_one_over_a_sample_of_points_is_not():
@@ -101,7 +101,7 @@ def test_a_summary_over_points_is_stratified_and_one_over_a_sample_of_points_is_
     table = table.assign(policy="tour", success=1, reward=0.0, **{RATIO: 0.5})
     table[PRODUCT] = values.ravel()
     row = summary(table).set_index("metric").loc[PRODUCT]
-    assert tuple(row[["mean", "low", "high"]]) == stratified(values, PRODUCT)
+    assert tuple(row[["mean", "low", "high"]]) == stratified_interval(values, PRODUCT)
     assert row["n"] == 90
     sample = table.assign(point=np.arange(90))
     row = summary(sample).set_index("metric").loc[PRODUCT]
@@ -111,7 +111,7 @@ def test_a_summary_over_points_is_stratified_and_one_over_a_sample_of_points_is_
 def test_an_interval_over_strata_is_that_of_the_means_of_the_replications():
     values = at_points(np.random.default_rng(8), 25, common=0.5)
     expected = interval_of(REWARD, values.mean(axis=1))
-    assert stratified(values, REWARD) == pytest.approx(expected)
+    assert stratified_interval(values, REWARD) == pytest.approx(expected)
 
 
 def test_without_skewness_the_interval_is_students():
@@ -125,9 +125,11 @@ def test_without_skewness_the_interval_is_students():
 @given(st.lists(st.floats(0, 250), min_size=2, max_size=30), st.sampled_from([0.5, 0.95, 0.999]))
 def test_an_interval_of_an_age_holds_the_mean_and_ends_where_ages_do(ages, level):
     missions = pd.DataFrame({"age": ages, MOST_SLOTS: 500})
-    mean, low, high = interval_of(known_in(missions, "age"), ages, level)
+    mean, low, high = interval_of(metric_in_missions(missions, "age"), ages, level)
     assert 0 <= low <= mean * (1 + 1e-9) and mean <= high * (1 + 1e-9) and high <= 250
-    ends = column_intervals(missions, known_in(missions, "age")).loc["age", ["low", "high"]]
+    ends = column_intervals(missions, metric_in_missions(missions, "age")).loc[
+        "age", ["low", "high"]
+    ]
     assert ends.between(0, 250).all()
 
 
@@ -145,10 +147,10 @@ def test_the_moments_of_parts_are_those_of_the_whole():
     [
         # z = 1.95996: centre (0.9 + z^2/20) / (1 + z^2/10) = 0.78899,
         # half width z sqrt(0.009 + z^2/400) / (1 + z^2/10) = 0.19314
-        (wilson(9, 10), (0.9, 0.59585, 0.98213)),
+        (wilson_interval(9, 10), (0.9, 0.59585, 0.98213)),
         # n / (n + z^2) for n of n, and its mirror image for none
-        (wilson(10, 10), (1.0, 0.72247, 1.0)),
-        (wilson(0, 10), (0.0, 0.0, 0.27753)),
+        (wilson_interval(10, 10), (1.0, 0.72247, 1.0)),
+        (wilson_interval(0, 10), (0.0, 0.0, 0.27753)),
         # mean 2, s = 1, t(0.975, 2) = 4.30265: 2 -+ 4.30265 / sqrt(3); t(0.95, 2) = 2.91999
         (mean_interval([1.0, 2.0, 3.0]), (2.0, -0.48414, 4.48414)),
         (mean_interval([1.0, 2.0, 3.0], 0.9), (2.0, 0.31414, 3.68586)),
@@ -182,7 +184,7 @@ def test_summary_has_a_row_per_group_and_metric():
     assert list(table["policy"].unique()) == ["tour", "greedy"]
     rows = table.set_index(["policy", "metric"])
     ends = ["mean", "low", "high"]
-    assert tuple(rows.loc[("tour", "success"), ends]) == wilson(2, 3)
+    assert tuple(rows.loc[("tour", "success"), ends]) == wilson_interval(2, 3)
     assert tuple(rows.loc[("tour", "reward"), ends]) == mean_interval([1.0, 2.0, 3.0])
     assert tuple(rows.loc[("greedy", "collection_ratio"), ends]) == bounded_interval([0.5, 0.5])
     assert rows.loc["tour", "n"].tolist() == [3] * 4
@@ -280,7 +282,7 @@ def test_an_evaluation_has_the_means_of_the_table_and_knows_which_sizes_may_be_d
     space = ScenarioSpace.of(uavs=uavs, quota=20)
     records = evaluate(space, "random", missions, seed=3).records.missions
     table = pd.DataFrame(records).assign(policy="random")
-    found = means(Asked(space, "random", missions, seed=3)).moments
+    found = estimate_means(Asked(space, "random", missions, seed=3)).moments
     rows = summary(table).set_index("metric")
     for metric in (SUCCESS, RATIO, PRODUCT, REWARD):
         of_table = rows.loc[metric, ["mean", "low", "high"]].tolist()

@@ -5,9 +5,9 @@ import pytest
 from pandas.testing import assert_frame_equal
 
 from dess import InputError
-from dess.analysis.stats.differences import adjust, compare
+from dess.analysis.stats.differences import adjust_p_values, compare
 from dess.analysis.stats.intervals import mean_interval
-from dess.analysis.stats.learners import compare_learners, crossed
+from dess.analysis.stats.learners import compare_crossed, compare_learners
 from tests.analysis.stats.test_differences import METRIC, STUDY, ratios, rng
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.filterwarnings("error")
 def test_crossed_by_hand():
     # Means 2 and 5 of the trainings, 2, 3 and 5.5 of the missions, 3.5 in all; the rest is -+ 0.5
     # and -+ 1: mean square 3 / 2. Components 4.5 - 1.5 / 3 = 4, 3.25 - 1.5 / 2 = 2.5 and 1.5.
-    result = crossed(np.array([[1, 2, 3], [3, 4, 8]]))
+    result = compare_crossed(np.array([[1, 2, 3], [3, 4, 8]]))
     assert result[-3:] == pytest.approx(np.sqrt([4, 2.5, 1.5]))
     # t(0.975, 1) = 12.706205, t(0.975, 2) = 4.302653
     half = np.hypot(12.706205 * np.sqrt(4.5 / 2), 4.302653 * np.sqrt(2.5 / 3))
@@ -36,32 +36,32 @@ def layout(seed, trainings=3, missions=50, training=0.02, mission=0.1, rest=0.05
 @pytest.mark.parametrize("seed", range(5))
 def test_p_is_where_the_interval_reaches_0(seed):
     d = layout(seed)
-    assert crossed(d, 1 - crossed(d).p).low == pytest.approx(0, abs=1e-9)
-    assert crossed(-d).p == crossed(d).p
+    assert compare_crossed(d, 1 - compare_crossed(d).p).low == pytest.approx(0, abs=1e-9)
+    assert compare_crossed(-d).p == compare_crossed(d).p
 
 
 def test_negative_variance_components_are_zero():
     # As many, elsewhere.
-    result = crossed(np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]]))
+    result = compare_crossed(np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]]))
     assert (result.training_sd, result.mission_sd) == (0.0, 0.0)
     assert result.low < 0 < result.high
     assert 0.05 < result.p < 1
 
 
 def test_equal_differences_of_trainings():
-    assert crossed(np.zeros((3, 4))) == (0, 0, 0, 0, 0, 1, 0, 0, 0)
-    result = crossed(np.full((3, 4), 0.1))
+    assert compare_crossed(np.zeros((3, 4))) == (0, 0, 0, 0, 0, 1, 0, 0, 0)
+    result = compare_crossed(np.full((3, 4), 0.1))
     assert result[:5] == pytest.approx((0.1,) * 5)
     assert result[5:] == (2 / 8, 0, 0, 0)
 
 
 def test_one_training_or_one_mission_leaves_deviations_unknown():
-    one = crossed(np.array([[1.0, 2.0, 3.0]]))
+    one = compare_crossed(np.array([[1.0, 2.0, 3.0]]))
     assert one[:3] == mean_interval([1.0, 2.0, 3.0])
     assert np.isnan(one[3:5]).all()
     assert np.isnan([one.training_sd, one.rest_sd]).all()
     assert one.mission_sd == 1
-    alone = crossed(np.array([[1.0], [2.0]]))
+    alone = compare_crossed(np.array([[1.0], [2.0]]))
     assert (alone.difference, alone.p) == (1.5, 1.0) and np.isnan(alone[1:5]).all()
 
 
@@ -74,16 +74,16 @@ def test_learners_are_known_by_their_trainings():
     assert rows["trainings"].tolist() == [2, 2, 1, 1]
     assert rows["n"].tolist() == [12] * 4
     trained, tour = np.stack([ratios(c) for c in ("ddqn", "ddqn-2")]), ratios("tour")
-    expected, row = crossed(trained - tour), rows.loc[("ddqn", 0)]
+    expected, row = compare_crossed(trained - tour), rows.loc[("ddqn", 0)]
     assert row["difference"] == pytest.approx(expected.difference)
     assert row[["training_sd", "rest_sd"]].tolist() == pytest.approx(expected[-3::2])
     # One trained policy falls to 0 while the baseline is at its mean, or the other way round.
     a, b = trained.mean(), tour.mean()
-    smooth = crossed(np.hstack([trained - tour, [[max(a, 1 - b), -max(b, 1 - a)]] * 2]))
+    smooth = compare_crossed(np.hstack([trained - tour, [[max(a, 1 - b), -max(b, 1 - a)]] * 2]))
     assert row[["low", "new_low", "p"]].tolist() == pytest.approx(
         [smooth.low, smooth.new_low, smooth.p]
     )
-    assert table["p_adjusted"].tolist() == adjust(table["p"].to_numpy(), "holm").tolist()
+    assert table["p_adjusted"].tolist() == adjust_p_values(table["p"].to_numpy(), "holm").tolist()
 
 
 @pytest.mark.parametrize("metric", ["success", METRIC])

@@ -6,7 +6,7 @@ import pytest
 from scipy import stats
 from scipy.special import ndtri
 
-from dess.analysis.metrics import MOST_SLOTS, SUCCESS, known_in
+from dess.analysis.metrics import MOST_SLOTS, SUCCESS, metric_in_missions
 from dess.analysis.stats.differences import difference_test
 from dess.analysis.stats.intervals import Interval
 from dess.analysis.stats.verdict import (
@@ -16,13 +16,13 @@ from dess.analysis.stats.verdict import (
     IN_PART,
     INCONCLUSIVE,
     REFUTED,
-    above,
-    judged,
+    front_membership,
+    judge_parts,
     may_be_best,
-    membership,
     on_front,
-    position,
     position_by_test,
+    position_of,
+    verdict_above,
 )
 
 
@@ -36,10 +36,10 @@ from dess.analysis.stats.verdict import (
     ],
 )
 def test_a_whole_interval_lies_on_one_side(low, high, side, part):
-    assert position(Interval((low + high) / 2, low, high)) == side
-    assert position(Interval((low + high) / 2 + 1, low + 1, high + 1), 1) == side
-    assert position(pd.Series({"low": low, "high": high})) == side
-    assert above(Interval((low + high) / 2, low, high)) is part
+    assert position_of(Interval((low + high) / 2, low, high)) == side
+    assert position_of(Interval((low + high) / 2 + 1, low + 1, high + 1), 1) == side
+    assert position_of(pd.Series({"low": low, "high": high})) == side
+    assert verdict_above(Interval((low + high) / 2, low, high)) is part
 
 
 @pytest.mark.parametrize(
@@ -57,10 +57,10 @@ def test_a_significant_difference_lies_on_one_side(difference, p, side):
 
 
 def test_verdicts_on_parts():
-    assert judged(True) == judged(True, True) == HOLDS
-    assert judged(True, False) == judged(True, None) == IN_PART
-    assert judged(False) == judged(False, None) == judged(False, False) == REFUTED
-    assert judged(None) == judged(None, None) == INCONCLUSIVE
+    assert judge_parts(True) == judge_parts(True, True) == HOLDS
+    assert judge_parts(True, False) == judge_parts(True, None) == IN_PART
+    assert judge_parts(False) == judge_parts(False, None) == judge_parts(False, False) == REFUTED
+    assert judge_parts(None) == judge_parts(None, None) == INCONCLUSIVE
 
 
 def slow_front(costs, values):
@@ -84,12 +84,12 @@ def test_equal_costs_stay_equal():
     """The same price: the better setting dominates the other one in every draw."""
     values = np.random.default_rng(2).normal(0.5, 0.1, (1, 200)) + np.array([[0.0], [0.01]])
     costs = np.full((2, 200), 0.1 + 0.2)
-    assert membership(costs, values, False, np.random.default_rng(1)).tolist() == [0, 1]
+    assert front_membership(costs, values, False, np.random.default_rng(1)).tolist() == [0, 1]
 
 
 def test_settings_that_never_failed_are_not_taken_for_certain():
     costs = np.repeat([[1.0], [2.0]], 100, axis=1)
-    found = membership(costs, np.ones((2, 100)), True, np.random.default_rng(1), 4000)
+    found = front_membership(costs, np.ones((2, 100)), True, np.random.default_rng(1), 4000)
     assert found[0] == 1
     assert found[1] == pytest.approx(0.5, abs=0.03)
 
@@ -98,7 +98,7 @@ def test_replications_need_not_be_common():
     generator = np.random.default_rng(3)
     values, costs = generator.normal(0.5, 0.1, (2, 60)), np.repeat([[1.0], [2.0]], 60, axis=1)
     values[0, 30:] = costs[0, 30:] = np.nan
-    found = membership(costs, values, False, np.random.default_rng(1))
+    found = front_membership(costs, values, False, np.random.default_rng(1))
     assert found[0] == 1
     assert 0 < found[1] < 1
 
@@ -138,7 +138,7 @@ def test_the_probabilities_are_calibrated(kind, problems, draws, allowed):
     for seed in range(problems):
         costs, means, paid, values = planted(seed, kind)
         generator = np.random.default_rng(seed)
-        stated.append(membership(paid, values, kind != "ratio", generator, draws))
+        stated.append(front_membership(paid, values, kind != "ratio", generator, draws))
         true.append(on_front(costs, means))
     probabilities, members = np.concatenate(stated), np.concatenate(true)
     bins = np.digitize(probabilities, [0.05, 0.2, 0.4, 0.6, 0.8, 0.95])
@@ -178,7 +178,10 @@ def test_it_is_the_paired_t_test_of_every_two_settings():
 def test_of_ages_the_lower_is_better_and_a_rare_one_is_the_largest():
     """An age of 4 in 12 missions against 10 is no evidence where a failure has one of 250."""
     missions = pd.DataFrame({"age": [4.0], MOST_SLOTS: [500]})
-    of, noise = known_in(missions, "age"), np.random.default_rng(2).normal(0, 0.1, (400, 2))
+    of, noise = (
+        metric_in_missions(missions, "age"),
+        np.random.default_rng(2).normal(0, 0.1, (400, 2)),
+    )
     ages = np.array([4.0, 10.0]) + noise
     assert may_be_best(ages[:12], "age").tolist() == [True, False]
     assert may_be_best(ages[:12], of).all()

@@ -11,7 +11,7 @@ from dess import InputError
 from dess.analysis import load_study
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.study.cheapest import Cheapest, MeanTest, Setting, _Search
-from dess.analysis.study.costs import PARTS, Costs, stranded
+from dess.analysis.study.costs import PARTS, Costs, stranded_uavs
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 from tests.analysis.study.test_selection import check_that_interruptions_leave_no_trace
 
@@ -52,7 +52,7 @@ def test_results_of_before_are_priced_if_charging_and_losses_have_no_price():
 
 def test_a_uav_that_cannot_fly_home_is_stranded_unless_it_is_lost():
     uavs = {"battery": [5, 6, 0, 3], "way_home": [6, 6, 9, 9], "down": [0, 0, 1, 1]}
-    assert stranded(uavs).tolist() == [True, False, False, False]
+    assert stranded_uavs(uavs).tolist() == [True, False, False, False]
 
 
 ERROR = 0.05

@@ -15,7 +15,14 @@ from dess.analysis import run_study
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess.analysis.verification import balances, draws, measurements
-from dess.analysis.verification.checks import ALPHA, Check, judge, overall, poisson_fit, uniform_fit
+from dess.analysis.verification.checks import (
+    ALPHA,
+    Check,
+    checks_summary,
+    judge_checks,
+    poisson_fit,
+    uniform_fit,
+)
 from dess.analysis.verification.measurements import STUDY, Log
 from dess.analysis.verification.suite import Suite
 from dess.model.mission import simulate
@@ -34,7 +41,7 @@ def check(**values: float) -> Check:
 
 def failing(checks: list[Check]) -> set[str]:
     """The tests that do not hold."""
-    table = judge(checks)
+    table = judge_checks(checks)
     return set(table.loc[table["verdict"] == REFUTED, "test"])
 
 
@@ -62,12 +69,14 @@ def with_records(results: Results, row: int, **changes: Callable[[Any], Any]) ->
 
 def test_p_values_are_corrected_for_their_number():
     p = 0.6 * ALPHA
-    assert judge([check(p=p), check(p=0.5)])["verdict"].tolist() == [HOLDS, HOLDS]
-    assert judge([check(p=p / 2), check(p=0.5)])["verdict"].tolist() == [REFUTED, HOLDS]
+    assert judge_checks([check(p=p), check(p=0.5)])["verdict"].tolist() == [HOLDS, HOLDS]
+    assert judge_checks([check(p=p / 2), check(p=0.5)])["verdict"].tolist() == [REFUTED, HOLDS]
     # Exact and open ones.
-    table = judge([check(p=p), check(error=0.0), check(), check()])
+    table = judge_checks([check(p=p), check(error=0.0), check(), check()])
     assert table["verdict"].tolist() == [REFUTED, HOLDS, INCONCLUSIVE, INCONCLUSIVE]
-    assert overall(table).startswith("**1 of 4 checks do not hold**: test. Too few observations")
+    assert checks_summary(table).startswith(
+        "**1 of 4 checks do not hold**: test. Too few observations"
+    )
 
 
 @pytest.mark.parametrize("mean", [0.02, 1.0, 40.0])
@@ -151,10 +160,12 @@ def test_starts_rates_and_shadowing_of_another_simulator_are_found_out():
     cells = np.random.default_rng(10).integers([x, y], [x + width, y + height], (400, 2))
     assert not failing([draws.start_check(cells, SPACE)])
     assert failing([draws.start_check(np.vstack([cells, [x + width, y]]), SPACE)])
-    rates = measurements.rates(SPACE, measurements.simulate_rates(SPACE, 11))
+    rates = measurements.compare_rates(SPACE, measurements.simulate_rates(SPACE, 11))
     assert not failing([draws.rate_check(rates)])
     assert failing([draws.rate_check(rates.assign(mean=1.01 * rates["mean"]))])
-    deviates = measurements.deviates(SPACE, measurements.simulate_slots(SPACE, 11, slots=800))
+    deviates = measurements.shadowing_deviates(
+        SPACE, measurements.simulate_slots(SPACE, 11, slots=800)
+    )
     assert not failing(draws.shadowing_checks(deviates))
     assert failing(draws.shadowing_checks(1.1 * deviates))
     assert failing(draws.shadowing_checks(np.repeat(deviates[::2], 2)))
@@ -208,7 +219,7 @@ def test_logs_and_missions_that_are_not_of_the_study_are_noticed(results, logs):
     assert fails(amount) and not fails(choice) and fails(balances.balance_check(trifle))
     other = altered(logs, "communication", 5, node=lambda node: (node + 1) % 3)
     assert fails(draws.communication_checks(other, 7)[0])
-    longest = measurements.longest(logs)
+    longest = measurements.longest_logs(logs)
     log = next(log for log in logs if log not in longest and log.arrivals.any())
     row = log.events.index[log.events["event"] == "arrival"][0]
     lossy = [replace(o, events=o.events.drop(index=row)) if o is log else o for o in logs]
@@ -259,7 +270,7 @@ ANOTHER = "f" * 16  # the key of another study
 
 
 def test_of_every_replication_the_longest_log_is_taken(logs):
-    kept = measurements.longest(logs)
+    kept = measurements.longest_logs(logs)
     assert [log.replication for log in kept] == list(range(8))
     for log in kept:
         others = [o.record["slots"] for o in logs if o.replication == log.replication]
@@ -274,16 +285,16 @@ def test_missions_are_kept_and_refused_where_they_are_not_of_these_results(
     last = int(results.missions["replication"].max())
     assert simulated == [(p, r) for p in results.policies for r in (0, last // 2, last)]
     with pytest.raises(InputError, match="no such file.*dess report verification"):
-        measurements.read(tmp_path, results)
+        measurements.read_cross_check(tmp_path, results)
     measurements.write(again, tmp_path)
-    measurements.make(tmp_path, results)
-    assert measurements.read(tmp_path, results) == again
+    measurements.ensure_cross_check(tmp_path, results)
+    assert measurements.read_cross_check(tmp_path, results) == again
     measurements.write(again.model_copy(update={"study": ANOTHER}), tmp_path)
     with pytest.raises(InputError, match="has study 'f+', not '.*'"):
-        measurements.read(tmp_path, results)
+        measurements.read_cross_check(tmp_path, results)
     monkeypatch.setattr(measurements, "simulate_missions", lambda results, progress: again)
-    measurements.make(tmp_path, results)
-    assert measurements.read(tmp_path, results) == again
+    measurements.ensure_cross_check(tmp_path, results)
+    assert measurements.read_cross_check(tmp_path, results) == again
 
 
 def test_a_study_with_failures_is_refused(tmp_path):

@@ -38,7 +38,7 @@ def test_the_list_of_an_engineer_is_recomputed_by_hand():
     assert space.arrival_rate == pytest.approx(3e6 * 8 / 3600 / 125e3)
     assert space.failures.uav_rate == pytest.approx(slot / (30 * 86400))
     # The rate at 2 km [data units per slot] is that of an SNR of 12 dB.
-    rate = float(closed_forms.rate(space, closed_forms.mean_snr(space, 2000.0)))
+    rate = float(closed_forms.rate_at_snr(space, closed_forms.mean_snr(space, 2000.0)))
     assert 4 * rate == pytest.approx(math.log2(1 + 10**1.2))
     # A wind of 10 m/s from the south-west: south and west are against it, at 45 degrees.
     along = 10 / math.sqrt(2)

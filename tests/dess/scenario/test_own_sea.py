@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from dess import InputError, load_scenario, simulate
-from dess.analysis.names import placing
+from dess.analysis.names import node_placing_sentence
 from dess.model.batch import simulate_batch
 from dess.physics.chart import chart_at, spread
 from dess.policies import load_team
@@ -194,7 +194,7 @@ def test_nodes_of_a_cell_are_merged_with_their_data_and_rates(sea):
     assert space.names == ("A +2", "C", "D")
     assert space.arrivals.merged == (3, 1, 1)
     assert space.node_data == ((15.0, 60.0), (5.0, 20.0), (5.0, 20.0))
-    assert "5 nodes in 3 cells; those of one cell are one node" in placing(space)
+    assert "5 nodes in 3 cells; those of one cell are one node" in node_placing_sentence(space)
     space = load_scenario(sea(nodes + GRID, n_csv=NEAR), arrival_rate=0.25)
     assert space.node_rates == (0.75, 0.25, 0.25)
 
@@ -208,7 +208,7 @@ def test_a_node_whose_cell_is_taken_or_closed_takes_the_nearest_free_one(sea):
         for (x, y), a, b in zip(space.nodes, (1, 4, 4, 4), (1, 4, 4, 4), strict=True)
     ]
     assert (steps, len({*space.nodes}), space.moved) == ([1, 0, 1, 1], 4, (0, 2, 3))
-    assert "Of the 4 nodes, 3 are in the nearest free cell" in placing(space)
+    assert "Of the 4 nodes, 3 are in the nearest free cell" in node_placing_sentence(space)
 
 
 def test_the_advice_for_shared_cells_can_be_followed(sea):

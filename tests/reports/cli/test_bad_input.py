@@ -85,7 +85,7 @@ def test_bad_input_gets_one_line_and_leaves_nothing(arguments, refusal, monkeypa
         raise AssertionError("a mission was simulated")
 
     monkeypatch.setattr(runner.Here, "run", mission)
-    monkeypatch.setattr(evaluation, "means", mission)
+    monkeypatch.setattr(evaluation, "estimate_means", mission)
     monkeypatch.setattr(MissionModel, "run", mission)
     line = refusal(*arguments.split(" "))
     for part in BAD[arguments]:

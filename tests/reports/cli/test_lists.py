@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from dess import ScenarioSpace, load_scenario
 from dess.analysis import load_study
-from dess.analysis.names import fields as fields_in
+from dess.analysis.names import declared_fields as fields_in
 from dess.analysis.study.study import study_names
 from dess.policies.registry import SHIPPED, trained_names
 from dess.reports.cli.commands import app

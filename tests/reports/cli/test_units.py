@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from dess import load_scenario, simulate
-from dess.analysis.metrics import lasting
+from dess.analysis.metrics import format_length
 from dess.analysis.results.event_log import path_text
 from dess.model.state import sample_scenario
 from dess.reports.cli import main
@@ -37,7 +37,9 @@ def test_single_missions_and_their_player_are_told_in_units(tmp_path, capsys):
     record = simulate(load_scenario(file), "greedy", events=True)
     playback = Playback(record.events.columns(), scenario)
     left = playback.residual[-1].sum() * UNIT / 8e6
-    assert playback.status(playback.end).startswith(f"{lasting(record.slots, scenario.units)} of")
+    assert playback.status(playback.end).startswith(
+        f"{format_length(record.slots, scenario.units)} of"
+    )
     assert f" · {left:,.3g} MB left · " in playback.status(playback.end)
     assert playback.data["units"]["length"] == ("km", pytest.approx(0.315))
     table, features, tracks = (

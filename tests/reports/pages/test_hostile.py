@@ -120,7 +120,7 @@ def test_a_block_of_commands_cannot_be_left():
 
 @pytest.mark.parametrize("name", ["$\\foo$", "$", "a$b$c", "\\$x"])
 def test_a_name_is_no_formula_in_a_figure(name):
-    with style.panels(3) as (drawing, axes):
+    with style.new_panels(3) as (drawing, axes):
         axes.plot([1, 2], label=name)
         axes.set_title(name)
     assert html.picture(drawing, "svg")
@@ -129,7 +129,7 @@ def test_a_name_is_no_formula_in_a_figure(name):
 
 def test_a_name_is_no_formula_in_a_spreadsheet():
     names = ["=1+1", "+1", "-1", "@x", "\t=1", "a=1", "a"]
-    rows = numbers.csv(pd.DataFrame({"policy": names, "mean": -1.5})).splitlines()[1:]
+    rows = numbers.write_csv(pd.DataFrame({"policy": names, "mean": -1.5})).splitlines()[1:]
     assert [row.startswith("'") for row in rows] == [True] * 5 + [False] * 2
     assert all(row.endswith(",-1.5") for row in rows)
 

@@ -63,7 +63,7 @@ def timed(results: Results, **_: Any) -> Times:
 def files(results, out):
     """All files of the reports, rendered once, by name."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(comparison, "measure", timed)
+        patch.setattr(comparison, "measure_decision_times", timed)
         render([], results, out, parameters=QUICK)
     return {path.name: path.read_text("utf-8") for path in out.iterdir()}
 

@@ -4,12 +4,14 @@ import pandas as pd
 import pytest
 
 from dess.analysis import numbers, run_study
-from dess.analysis.answers import costs, settings, summary
+from dess.analysis.answers import summary
 from dess.analysis.answers.fleet import cheapest
-from dess.analysis.stats.differences import paired
-from dess.analysis.stats.intervals import level_after, wilson
+from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings, prices_in_words
+from dess.analysis.answers.settings.baseline import compare_with_baseline
+from dess.analysis.stats.differences import compare_pairs
+from dess.analysis.stats.intervals import level_after, wilson_interval
 from dess.analysis.study.study import CHECK
-from tests.analysis.answers.test_costs import DESIGN, PRICES
+from tests.analysis.answers.fleet.test_costs import DESIGN, PRICES
 from tests.analysis.small import small_study
 
 RULE = {
@@ -28,12 +30,12 @@ def searched(studied):
     return studied(selection=RULE, design=DESIGN, costs=PRICES)
 
 
-ASKED = (cheapest.judged, cheapest.quoted, cheapest.checks)
+ASKED = (cheapest.judge_settings, cheapest.quoted_settings, cheapest.checked_settings)
 
 
 def test_a_search_is_kept_told_and_checked(searched):
     manifest = searched.store.manifest
-    selections = summary.selections(searched)
+    selections = summary.selected_settings(searched)
     for number, policy in enumerate(searched.policies):
         choice = searched.cheapest(policy)
         assert manifest.selected[number] == choice.selected
@@ -47,13 +49,13 @@ def test_a_search_is_kept_told_and_checked(searched):
         # Two conditions, and both.
         assert (selections["policy"] == policy).sum() == 3
     assert manifest.selected[0]  # or this test says little
-    assert len(cheapest.checks(searched)) == len(searched.checks) / 6
+    assert len(cheapest.checked_settings(searched)) == len(searched.checks) / 6
     assert searched.choice("greedy") is None
-    texts = "\n".join(cheapest.sentences(searched))
+    texts = "\n".join(cheapest.cheapest_sentences(searched))
     assert "With the policy `greedy` and under all conditions, the cheapest fleet" in texts
     assert "shown at" not in texts
     saving = "costs at most 50.00 EUR more than any"
-    assert all(saving in guarantee for guarantee in cheapest.guarantees(searched))
+    assert all(saving in guarantee for guarantee in cheapest.guarantee_sentences(searched))
 
 
 def test_an_answer_quotes_the_check_and_a_table_allows_for_the_search(searched):
@@ -62,12 +64,12 @@ def test_an_answer_quotes_the_check_and_a_table_allows_for_the_search(searched):
     assert quoted.loc[checks.index, checks.columns].equals(checks)
     assert quoted.loc[others].equals(found.loc[others])
     assert "intervals that allow for the search" in cheapest.fleet_table(searched).caption
-    assert "In 6 missions that check it" in " ".join(cheapest.sentences(searched))
+    assert "In 6 missions that check it" in " ".join(cheapest.cheapest_sentences(searched))
     for (policy, point), row in found.iterrows():
         missions = searched.missions.query("policy == @policy and point == @point")
         level = float(level_after(searched.looks(policy)[point]))
         assert level > 0.95
-        _, *ends = wilson(int(missions["success"].sum()), len(missions), level)
+        _, *ends = wilson_interval(int(missions["success"].sum()), len(missions), level)
         assert [row["success_low"], row["success_high"]] == pytest.approx(ends)
 
 
@@ -76,10 +78,12 @@ def test_differences_from_a_baseline_allow_for_the_search(searched):
     looks = searched.looks("greedy")
     missions = searched.missions.query("policy == 'greedy'")
     wide = missions.pivot(index="replication", columns="point", values="success")
-    for row in settings.against(searched, 0, ["success"]).query("policy == 'greedy'").itertuples():
+    for row in (
+        compare_with_baseline(searched, 0, ["success"]).query("policy == 'greedy'").itertuples()
+    ):
         both = wide[[row.point, 0]].dropna().to_numpy(float)
         level = float(level_after(min(looks[row.point], looks[0])))
-        expected = paired(*both.T, level, "success")
+        expected = compare_pairs(*both.T, level, "success")
         assert (row.low, row.high) == pytest.approx((expected.low, expected.high))
         assert row.p >= expected.p
 
@@ -96,12 +100,14 @@ def test_the_table_has_the_fleets_by_cost_with_verdicts_and_the_answer_marked(se
     cells, caption, _ = cheapest.fleet_table(searched)
     assert [text.split(":")[0] for text in cells["Requirements"]] == [*rows["verdict"]]
     marked = cells[cells["Requirements"] == "met: the answer"]
-    best = cheapest.the_answer(searched)
+    best = cheapest.cheapest_answer(searched)
     assert marked[["Fleet", "Policy"]].to_numpy().tolist() == [[best.fleet, best.policy]]
     assert "success of at least 80 %" in caption
     # Missions of the paper may end in the air; the required metric, the way home and n are there.
     assert [*cells][-3:] == ["Success", "Battery for the way home", "n"]
-    worst = cheapest.judged(searched).groupby(["policy", "fleet"])[["success", "home"]].min()
+    worst = (
+        cheapest.judge_settings(searched).groupby(["policy", "fleet"])[["success", "home"]].min()
+    )
     for row in rows.itertuples():
         assert (row.success, row.home) == tuple(worst.loc[row.policy, row.fleet])
         assert row.purchase + row.running == pytest.approx(row.cost)
@@ -115,35 +121,39 @@ def test_a_long_table_shows_the_rows_about_the_answer():
 
 
 def test_the_price_is_told_in_its_parts(searched):
-    best, table = cheapest.the_answer(searched), costs.parts(searched)
+    best, table = cheapest.cheapest_answer(searched), mean_cost_parts(searched)
     rows = table[(table["policy"] == best.policy) & table["point"].isin(best.points)]
     purchase, hours = rows["purchase"].mean(), rows["hours"].mean()
-    text = cheapest.answer(searched)
+    text = cheapest.cheapest_sentence(searched)
     assert f": {purchase:,.0f} EUR for the purchase and " in text
-    assert f"hours {numbers.money(hours, 'EUR')}" in text
+    assert f"hours {numbers.format_money(hours, 'EUR')}" in text
     assert best.cost == pytest.approx(rows["cost"].mean())
-    prices = costs.prices_in_words(searched)
+    prices = prices_in_words(searched)
     assert "1,000 EUR for a UAV, 100 EUR for a charging pad" in prices
     assert "The fleet is to make 5 missions." in prices
 
 
 def test_what_is_shown_of_missions_is_of_the_answer(searched):
-    best, shown = cheapest.the_answer(searched), cheapest.shown_missions(searched)
+    best, shown = cheapest.cheapest_answer(searched), cheapest.shown_missions(searched)
     assert {*shown["policy"]} == {best.policy}
     assert {*shown["point"]} == {best.points[-1]}
 
 
 def test_an_answer_says_whether_uavs_can_fly_home(searched):
-    best = cheapest.the_answer(searched)
+    best = cheapest.cheapest_answer(searched)
     means = (
         searched.checks[searched.checks["policy"] == best.policy].groupby("point")["home"].mean()
     )
     worst = means[[*best.points]].min()
-    assert f"At the end of {numbers.percent(worst)} [" in cheapest.answer(searched)
-    parts = costs.parts(searched)
+    assert f"At the end of {numbers.format_percent(worst)} [" in cheapest.cheapest_sentence(
+        searched
+    )
+    parts = mean_cost_parts(searched)
     rows = parts[(parts["policy"] == best.policy) & parts["point"].isin(best.points)]
-    number = numbers.quantity(round(rows["stranded"].mean(), 2))
-    assert f"On average {number} UAVs of a mission are left without" in cheapest.answer(searched)
+    number = numbers.format_quantity(round(rows["stranded"].mean(), 2))
+    assert f"On average {number} UAVs of a mission are left without" in cheapest.cheapest_sentence(
+        searched
+    )
 
 
 # A sea with a second zone, whose pads are paid for.
@@ -163,17 +173,17 @@ def searched_sea(folder, policies, requirements, values, **rule):
 def test_an_answer_says_what_is_guaranteed_names_all_that_is_paid_and_its_ends(tmp_path):
     values = {"uavs": [2, 3], "pads": [1, 2], "zones.pads": [1, 3]}
     found = searched_sea(tmp_path, ["greedy", "random"], {"success": 0.6}, values)
-    text = cheapest.answer(found)
+    text = cheapest.cheapest_sentence(found)
     assert "**2 UAVs, 1 pad and 1 pad in zone 2** for 2,200 EUR" in text
     # Of two policies.
-    first, other = cheapest.reasons(found)
+    first, other = cheapest.reason_sentences(found)
     assert "With a probability of at least 95 %, its success is at least 50 %." in first
     assert "With a probability of at least 97.5 %, its success is at least 50 %." in other
     assert "Of the values asked for, 2 UAVs is the least; a cheaper one may lie beyond." in first
-    assert {*costs.priced(found)["cost"]} == {
+    assert {*priced_settings(found)["cost"]} == {
         1000 * u + 100 * p for u in (2, 3) for p in (2, 3, 4, 5)
     }
-    assert "1 pad and 3 pads in zone 2" in "".join(costs.priced(found)["fleet"])
+    assert "1 pad and 3 pads in zone 2" in "".join(priced_settings(found)["fleet"])
 
 
 @pytest.mark.parametrize("first", [0, pytest.param(1, marks=pytest.mark.slow)])
@@ -182,20 +192,22 @@ def test_the_answer_is_the_cheapest_fleet_of_any_policy(first, tmp_path):
     policies, values = ["greedy", "nearest"], {"uavs": [1, 3], "pads": [1], "quota": [30]}
     asked = {"collection_ratio": 0.365}
     found = searched_sea(tmp_path, policies[:: 1 - 2 * first], asked, values, tolerance=0.01)
-    fleets = cheapest.selections(found).set_index("policy")["setting"].to_dict()
+    fleets = cheapest.selected_fleets(found).set_index("policy")["setting"].to_dict()
     one, three = (f"{uavs}, 1 pad and 1 pad in zone 2" for uavs in ("1 UAV", "3 UAVs"))
     # Or this test says little.
     assert fleets == {"greedy": one, "nearest": three}
-    assert cheapest.answer(found).startswith("With the policy `greedy`, the cheapest fleet")
+    assert cheapest.cheapest_sentence(found).startswith(
+        "With the policy `greedy`, the cheapest fleet"
+    )
     other = f"With the policy `nearest`, it would be **{three}** for 3,200 EUR."
-    assert cheapest.answer(found).endswith(other)
+    assert cheapest.cheapest_sentence(found).endswith(other)
     # Success was not required, and is told.
-    assert "its success is " in cheapest.answer(found)
-    assert "(none is required)" in cheapest.answer(found)
-    assert cheapest.sentences(found)[0] == cheapest.answer(found)
+    assert "its success is " in cheapest.cheapest_sentence(found)
+    assert "(none is required)" in cheapest.cheapest_sentence(found)
+    assert cheapest.cheapest_sentences(found)[0] == cheapest.cheapest_sentence(found)
     assert cheapest.cheapest_fleet(found) == one
     # One UAV is the least of all.
-    assert "Of the values" not in cheapest.reasons(found)[0]
+    assert "Of the values" not in cheapest.reason_sentences(found)[0]
 
 
 def test_an_answer_says_what_would_have_settled_it(studied, tmp_path):
@@ -204,7 +216,7 @@ def test_an_answer_says_what_would_have_settled_it(studied, tmp_path):
     values = {"uavs": [[1, 3]], "pads": [1]}
     short = {"tolerance": 0.02, "budget": 40}
     found = searched_sea(tmp_path, ["random"], {"collection_ratio": near}, values, **short)
-    (text,) = cheapest.reasons(found)
+    (text,) = cheapest.reason_sentences(found)
     enough = found.cheapest("random").enough
     assert 40 < enough < 40 * 64
     assert "The budget of 40 missions ended before this was decided; about" in text

@@ -3,7 +3,12 @@
 import pandas as pd
 import pytest
 
-from dess.analysis.answers.fleet.requirements import Requirement, Verdict, least_spare, spare
+from dess.analysis.answers.fleet.requirements import (
+    Requirement,
+    Verdict,
+    least_spare,
+    relative_spare,
+)
 from dess.analysis.metrics import AGE, RATIO, SUCCESS, metric_of
 
 RATIO_OF_80 = Requirement(metric_of(RATIO), 0.8)
@@ -47,6 +52,6 @@ def test_a_success_that_all_fleets_have_is_not_tight():
     """It is nearer to its bound than the ratio, but no fleet comes closer."""
     success = Requirement(metric_of(SUCCESS), 0.99)
     fleets = pd.DataFrame({SUCCESS: [1.0, 1.0, 1.0], RATIO: [0.68, 0.82, 0.88]})
-    assert spare(fleets, success).tolist() == [float("inf")] * 3
-    assert spare(fleets, RATIO_OF_80).tolist() == pytest.approx([-0.6, 0.1, 0.4])
+    assert relative_spare(fleets, success).tolist() == [float("inf")] * 3
+    assert relative_spare(fleets, RATIO_OF_80).tolist() == pytest.approx([-0.6, 0.1, 0.4])
     assert least_spare(fleets, [success, RATIO_OF_80]).tolist() == pytest.approx([-0.6, 0.1, 0.4])

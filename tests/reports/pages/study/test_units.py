@@ -35,7 +35,7 @@ def test_the_answer_the_figure_and_what_is_assumed_are_one_sheet_of_paper(tmp_pa
         folder=tmp_path / "results",
     )
     found = question.ask()
-    around.around(found, question.study.scenario, 5).ask()
+    around.question_around(found, question.study.scenario, 5).ask()
     path = render_study(question.out, tmp_path / "reports")
     text = words_of(path.read_text("utf-8"))
     for words in ("A slot is 21 s", "A cell is 315 m", "mean time between failures 100 h"):

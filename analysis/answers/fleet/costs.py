@@ -2,7 +2,7 @@
 
     results = load_results("results/fleets")  # of a study with a table [costs]
     prices_in_words(results)  # what is paid for
-    front(results, "success")  # cost and success, with the probability of being on the front
+    cost_front(results, "success")  # cost and success, with the probability of being on the front
 
 A setting is a policy at a design point. The fields that an operator decides on, such as the numbers
 of UAVs and pads, make up the fleet. All other fields that the design varies are conditions under
@@ -17,17 +17,23 @@ import pandas as pd
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.answers.fleet.requirements import required
-from dess.analysis.answers.settings import intervals_in_words, points, ranked, words_of
+from dess.analysis.answers.fleet.requirements import requirements_of
+from dess.analysis.answers.settings.points import (
+    intervals_in_words,
+    rows_in_words,
+    values_of_points,
+)
+from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of
-from dess.analysis.names import DECISIONS, parameter
-from dess.analysis.results.tables import Results, once
-from dess.analysis.stats.verdict import membership, on_front
-from dess.analysis.study.costs import PARTS, PURCHASE, Costs, stranded
+from dess.analysis.names import DECISIONS, field_named
+from dess.analysis.results.tables import Results, compute_once
+from dess.analysis.stats.verdict import front_membership, on_front
+from dess.analysis.study.costs import PARTS, PURCHASE, Costs, stranded_uavs
 from dess.analysis.tables import MOST_ROWS, Table
 from dess.base.errors import one_of
 from dess.scenario.fields import ZONE_PADS
 
+CERTAIN = 0.01  # settings with a lower probability of being on a front are not in the table
 COUNTED = ("uavs", "pads", ZONE_PADS)  # the numbers of what has a price
 # What the parts of a cost are called, and the price that makes each.
 _PART_NAMES = {"charging": "charging", "hours": "hours", "losses": "lost UAVs"}
@@ -41,29 +47,29 @@ _PAID_FOR = {
 }
 
 
-@once
-def priced(results: Results) -> pd.DataFrame:
+@compute_once
+def priced_settings(results: Results) -> pd.DataFrame:
     """The settings with their costs: condition by condition, the cheapest first.
 
     Returns:
         A row per policy and design point: ``condition`` and ``fleet`` in words, ``policy``,
         ``point``, the varied fields, for every metric and for ``cost`` the mean and the ends of its
-        95 % interval (as in ``settings.ranked``), and ``n`` missions.
+        95 % interval (as in ``ranking.rank_settings``), and ``n`` missions.
 
     Raises:
         InputError: If the study has no prices.
     """
     prices_of(results)
-    table = ranked(results, COST).drop(columns=["rank", "tied"])
-    of_points, words = conditions(results), fleets(results)
+    table = rank_settings(results, COST).drop(columns=["rank", "tied"])
+    of_points, words = conditions_in_words(results), fleets_in_words(results)
     table.insert(0, "condition", [of_points[point] for point in table["point"]])
     table.insert(1, "fleet", [words[point] for point in table["point"]])
     order = {"kind": "stable", "key": lambda texts: texts.map(of_points.index)}
     return table.sort_values("condition", ignore_index=True, **order)
 
 
-@once
-def parts(results: Results) -> pd.DataFrame:
+@compute_once
+def mean_cost_parts(results: Results) -> pd.DataFrame:
     """The mean parts of the cost of every setting.
 
     Returns:
@@ -79,15 +85,15 @@ def parts(results: Results) -> pd.DataFrame:
     table = missions[["policy", "point", COST]].assign(**amounts)
     means = table.groupby(["policy", "point"], sort=False, as_index=False)[[*PARTS, COST]].mean()
     is_recorded = "down" in uavs and uavs["down"].notna().all()  # results of before are not
-    count = stranded(uavs) if is_recorded else np.nan
+    count = stranded_uavs(uavs) if is_recorded else np.nan
     number = uavs[["policy", "point"]].assign(stranded=count)
     sums = number.groupby(["policy", "point"], sort=False)["stranded"].sum(min_count=1)
     per_setting = missions.groupby(["policy", "point"], sort=False).size()
     return means.join((sums / per_setting).rename("stranded"), on=["policy", "point"])
 
 
-@once
-def front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
+@compute_once
+def cost_front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
     """The Pareto front of cost and a metric: the settings that no other one dominates.
 
     Args:
@@ -95,23 +101,23 @@ def front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
         metric: A metric of the paper, or a required one.
 
     Returns:
-        The rows of ``priced`` with two more columns. ``on_front`` tells whether the setting is on
-        the front of the estimates, under its condition. ``probability`` is the probability that it
-        is on the front of the true means (``stats.verdict.membership``).
+        The rows of ``priced_settings`` with two more columns. ``on_front`` tells whether the
+        setting is on the front of the estimates, under its condition. ``probability`` is the
+        probability that it is on the front of the true means (``stats.verdict.front_membership``).
 
     Raises:
         InputError: If the study has no prices, or there is no such metric.
     """
-    known = [*METRICS, *(requirement.column for requirement in required(results))]
+    known = [*METRICS, *(requirement.column for requirement in requirements_of(results))]
     if metric not in known:
         raise InputError(f"metric: {metric!r} is unknown{one_of(metric, METRICS)}")
     sign = -1 if metric_of(metric).less_is_better else 1
     generator = np.random.default_rng(results.store.manifest.seed)
     tables = []
-    for _, rows in priced(results).groupby("condition", sort=False):
-        costs, values = (_samples(results, rows, name) for name in (COST, metric))
+    for _, rows in priced_settings(results).groupby("condition", sort=False):
+        costs, values = (_mission_values(results, rows, name) for name in (COST, metric))
         estimates = on_front(rows[COST].to_numpy(), sign * rows[metric].to_numpy())
-        share = membership(costs, sign * values, metric == SUCCESS, generator)
+        share = front_membership(costs, sign * values, metric == SUCCESS, generator)
         tables.append(rows.assign(on_front=estimates, probability=share))
     return pd.concat(tables, ignore_index=True)
 
@@ -130,7 +136,7 @@ def prices_of(results: Results) -> Costs:
     return prices
 
 
-def currency(results: Results) -> str:
+def currency_of(results: Results) -> str:
     """The currency of the prices of a study."""
     return prices_of(results).currency
 
@@ -146,18 +152,18 @@ def pays_for_hours(results: Results) -> bool:
     return bool(prices_of(results).hour)
 
 
-@once
-def purchases(results: Results) -> list[float]:
+@compute_once
+def purchase_prices(results: Results) -> list[float]:
     """The price of the UAVs and pads at every design point, the same with every policy."""
-    return parts(results).groupby("point")[PURCHASE].mean().sort_index().tolist()
+    return mean_cost_parts(results).groupby("point")[PURCHASE].mean().sort_index().tolist()
 
 
-def amount(value: float) -> str:
+def format_amount(value: float) -> str:
     """An amount without its currency, for a cell of a table."""
-    return numbers.amounts(value, value, value)
+    return numbers.format_amounts(value, value, value)
 
 
-def parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> str:
+def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> str:
     """The purchase and the missions of a fleet, to follow its cost; empty if only it is paid for.
 
     Args:
@@ -168,12 +174,12 @@ def parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> str:
     prices = prices_of(results)
     if not has_running_cost(results):
         return ""
-    table = parts(results)
+    table = mean_cost_parts(results)
     rows = table[(table["policy"] == policy) & table["point"].isin(fleet)]
     means = rows[[*PARTS]].mean()
 
     def money(value: float) -> str:
-        return numbers.money(value, prices.currency)
+        return numbers.format_money(value, prices.currency)
 
     running = [
         f"{name} {money(means[part])}"
@@ -183,7 +189,7 @@ def parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> str:
     total = money(means.sum() - means[PURCHASE])
     return (
         f": {money(means[PURCHASE])} for the purchase and {total} for "
-        f"{numbers.counted(prices.missions, 'mission')} ({numbers.words(running)})"
+        f"{numbers.format_count(prices.missions, 'mission')} ({numbers.join_words(running)})"
     )
 
 
@@ -194,18 +200,18 @@ def prices_in_words(results: Results) -> str:
     for price, thing in _PAID_FOR.items():
         value = getattr(prices, price)
         if value:
-            paid.append(f"{numbers.money(value, prices.currency)} for {thing}")
+            paid.append(f"{numbers.format_money(value, prices.currency)} for {thing}")
         else:
             free.append(thing)
-    text = f"Prices: {numbers.words(paid)}."
+    text = f"Prices: {numbers.join_words(paid)}."
     if has_running_cost(results):
-        text += f" The fleet is to make {numbers.counted(prices.missions, 'mission')}."
+        text += f" The fleet is to make {numbers.format_count(prices.missions, 'mission')}."
     if free:
-        text += f" Nothing is paid for {numbers.words(free, 'or')}."
+        text += f" Nothing is paid for {numbers.join_words(free, 'or')}."
     return text
 
 
-def _samples(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:
+def _mission_values(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:
     """The (k, n) values of the settings of k rows; nan where a setting lacks a replication."""
     missions = results.missions[results.missions["point"].isin(rows["point"])]
     wide = missions.pivot(index="replication", columns=["policy", "point"], values=name)
@@ -213,77 +219,76 @@ def _samples(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:
     return wide.reindex(columns=keys).to_numpy(float).T
 
 
-@once
-def fleets(results: Results) -> list[str]:
+@compute_once
+def fleets_in_words(results: Results) -> list[str]:
     """The fleet of every design point in words: all that has a price or varies."""
-    prices, table, fleets = prices_of(results), points(results), []
-    for point, others in enumerate(_words(results, True)):
+    prices, table, fleets = prices_of(results), values_of_points(results), []
+    for point, others in enumerate(_fields_in_words(results, True)):
         space, words = results.scenario(point), []
         if prices.uav or prices.lost_uav or "uavs" in table:
             low, high = space.uavs
-            words.append(parameter("uavs").words(low if low == high else [low, high]))
+            words.append(field_named("uavs").words(low if low == high else [low, high]))
         if prices.pad or {"pads", ZONE_PADS} & {*table}:
             for zone, pads in enumerate(space.zone_pads, 1):
-                words.append(parameter("pads").words(pads) + f" in zone {zone}" * (zone > 1))
-        fleets.append(numbers.words([*words, *others]) or "the fleet of the scenario")
+                words.append(field_named("pads").words(pads) + f" in zone {zone}" * (zone > 1))
+        fleets.append(numbers.join_words([*words, *others]) or "the fleet of the scenario")
     return fleets
 
 
-@once
-def conditions(results: Results) -> list[str]:
+@compute_once
+def conditions_in_words(results: Results) -> list[str]:
     """The condition of every design point in words."""
-    return [", ".join(row) for row in _words(results, False)]
+    return [", ".join(row) for row in _fields_in_words(results, False)]
 
 
-def _words(results: Results, decisions: bool) -> list[list[str]]:
+def _fields_in_words(results: Results, decisions: bool) -> list[list[str]]:
     """The fields of every design point that are decided on, or the rest; none of ``COUNTED``."""
-    table = points(results)
+    table = values_of_points(results)
     shown = [f for f in table if (f in DECISIONS) == decisions and f not in COUNTED]
-    return words_of(table[shown])
+    return rows_in_words(table[shown])
 
 
-CERTAIN = 0.01  # settings with a lower probability of being on a front are not in the table
-
-
-def fronts_of(results: Results) -> dict[str, pd.DataFrame]:
+def cost_fronts(results: Results) -> dict[str, pd.DataFrame]:
     """The fronts of the required metrics, or of success and the product."""
-    metrics = [requirement.column for requirement in required(results)] or [SUCCESS, PRODUCT]
-    return {metric: front(results, metric) for metric in metrics}
+    metrics = [requirement.column for requirement in requirements_of(results)] or [SUCCESS, PRODUCT]
+    return {metric: cost_front(results, metric) for metric in metrics}
 
 
-def cells(rows: pd.DataFrame, metrics: Iterable[str]) -> pd.DataFrame:
-    """Rows of ``priced`` as text: condition, fleet, policy, cost and metrics of settings."""
+def setting_cells(rows: pd.DataFrame, metrics: Iterable[str]) -> pd.DataFrame:
+    """Rows of ``priced_settings`` as text: condition, fleet, policy, cost and metrics."""
     columns = {"Condition": rows["condition"]} if rows["condition"].any() else {}
     columns |= {"Fleet": rows["fleet"], "Policy": rows["policy"]}
     for of in map(metric_of, (COST, *metrics)):
-        columns[of.name] = numbers.estimates(rows, of.column, of.written)
+        columns[of.name] = numbers.format_estimates(rows, of.column, of.written)
     return pd.DataFrame(columns)
 
 
-def front_table(results: Results) -> Table:
+def cost_front_table(results: Results) -> Table:
     """The settings that may be on one of the fronts, with the probabilities."""
-    fronts = fronts_of(results)
+    fronts = cost_fronts(results)
     first = next(iter(fronts.values()))
     shares = pd.DataFrame({metric: front["probability"] for metric, front in fronts.items()})
     top = first[(shares >= CERTAIN).any(axis=1)].head(MOST_ROWS)
-    shown = cells(top, fronts)
+    shown = setting_cells(top, fronts)
     for metric in fronts:
         head = f"On the front of {metric_of(metric).within}"
-        shown[head] = shares.loc[top.index, metric].map(numbers.percent)
+        shown[head] = shares.loc[top.index, metric].map(numbers.format_percent)
     caption = (
-        f"Settings that may be on a front: mean cost [{currency(results)}] and metrics "
+        f"Settings that may be on a front: mean cost [{currency_of(results)}] and metrics "
         f"with {intervals_in_words(results)}, and the probability that they are on it"
     )
     data = first.drop(columns=["on_front", "probability"])
     return Table(shown, caption, data.join(shares.add_prefix("on_front_of_")))
 
 
-def parts_table(results: Results) -> Table:
+def cost_parts_table(results: Results) -> Table:
     """The parts of the settings' costs."""
-    rows = priced(results).merge(parts(results).drop(columns=COST), on=["policy", "point"])
+    rows = priced_settings(results).merge(
+        mean_cost_parts(results).drop(columns=COST), on=["policy", "point"]
+    )
     top = rows.head(MOST_ROWS)
-    shown = cells(top, [])
+    shown = setting_cells(top, [])
     for part in PARTS:
         shown[part.capitalize()] = top[part].map("{:,.0f}".format)
-    caption = f"The mean cost of the settings [{currency(results)}], and its parts"
+    caption = f"The mean cost of the settings [{currency_of(results)}], and its parts"
     return Table(shown, caption, rows)

@@ -3,8 +3,13 @@
 import pytest
 
 from dess import InputError
-from dess.analysis.answers import costs
 from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.costs import (
+    cost_front,
+    mean_cost_parts,
+    priced_settings,
+    prices_in_words,
+)
 from dess.analysis.stats.verdict import on_front
 
 PRICES = {"uav": 1000, "pad": 100, "charge": 2, "hour": 6, "lost_uav": 1000}
@@ -21,7 +26,7 @@ def fixed(studied):
 
 @pytest.mark.parametrize("metric", ["success", "collection_ratio"])
 def test_each_condition_has_a_front_of_its_own(fixed, metric):
-    table = costs.front(fixed, metric)
+    table = cost_front(fixed, metric)
     for _, rows in table.groupby("condition"):
         expected = on_front(rows["cost"].to_numpy(), rows[metric].to_numpy())
         assert rows["on_front"].tolist() == expected.tolist()
@@ -31,19 +36,25 @@ def test_each_condition_has_a_front_of_its_own(fixed, metric):
 
 def test_bad_questions_get_one_line(fixed, studied):
     free = studied(missions=5)
-    for ask in (costs.priced, costs.parts, costs.front, costs.prices_in_words, cheapest.judged):
+    for ask in (
+        priced_settings,
+        mean_cost_parts,
+        cost_front,
+        prices_in_words,
+        cheapest.judge_settings,
+    ):
         with pytest.raises(InputError, match=r"no prices"):
             ask(free)
     with pytest.raises(InputError, match="metric: 'reward' is unknown"):
-        costs.front(fixed, "reward")
+        cost_front(fixed, "reward")
     with pytest.raises(InputError, match="does not search for the cheapest setting"):
-        cheapest.judged(fixed)
+        cheapest.judge_settings(fixed)
 
 
 def test_prices_of_zero_leave_what_is_paid_for(studied):
     results = studied(missions=5, costs={"uav": 10.5}, set={"uavs": 2})
     assert set(results.missions["cost"]) == {21.0}
-    table = costs.front(results)
+    table = cost_front(results)
     # What has a price is named.
     assert table["fleet"].tolist() == ["2 UAVs"] * 2
     assert table["condition"].tolist() == ["", ""]

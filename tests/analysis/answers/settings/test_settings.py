@@ -7,8 +7,22 @@ import pandas as pd
 import pytest
 
 from dess.analysis import compare
-from dess.analysis.answers import settings
+from dess.analysis.answers.settings.baseline import compare_with_baseline
+from dess.analysis.answers.settings.effects import (
+    BINS,
+    average_over_others,
+    fields_by_influence,
+    main_effects,
+)
+from dess.analysis.answers.settings.points import (
+    points_in_words,
+    setting_in_words,
+    values_of_points,
+    varied_values,
+)
+from dess.analysis.answers.settings.ranking import best_settings_sentence, rank_settings
 from dess.analysis.metrics import METRICS, PRODUCT
+from dess.analysis.stats.verdict import may_be_best
 from tests.analysis.small import grid
 
 
@@ -38,7 +52,7 @@ def test_long_and_unset_values_are_short_texts(studied):
         {"nodes": [[1, 1], [3, 2]], "forbid_swaps": True},
         {"nodes": [[1, 1], [2, 2]], "initial_data": [4, 4]},
     ]
-    table = settings.points(studied(design={"kind": "table", "rows": rows}, missions=2))
+    table = values_of_points(studied(design={"kind": "table", "rows": rows}, missions=2))
     # Without a number, as many as the zone has.
     assert table["pads"].tolist() == [2, 4, 6, 6, 6]
     assert table["zone"].tolist() == [
@@ -64,11 +78,11 @@ def test_a_planted_best_is_found_and_those_that_equal_it_are_tied(results):
         lead = (policy == 1) & np.isin(point, (2, 4))
         return luck + 0.5 * lead + noise * ~lead
 
-    table = settings.ranked(planted(results, metric))
+    table = rank_settings(planted(results, metric))
     tied = table[table["tied"]]
     assert {*zip(tied["policy"], tied["point"], strict=True)} == {("random", 2), ("random", 4)}
     assert table.head(2)["tied"].all()
-    own = settings.ranked(planted(results, metric), policy="greedy")
+    own = rank_settings(planted(results, metric), policy="greedy")
     assert {*own["policy"]} == {"greedy"} and own["tied"].iloc[0]
 
 
@@ -87,16 +101,16 @@ def test_a_setting_of_few_missions_is_not_tied_when_its_interval_is_below(result
 
     found = planted(replace(results, missions=many), metric)
     few = (found.missions["policy"] == "greedy") & (found.missions["replication"] >= 12)
-    table = settings.ranked(replace(found, missions=found.missions[~few]))
-    assert settings.may_be_best(np.array([[0.8, 1.0], [1.0, 0.7]] * 6)).all()
+    table = rank_settings(replace(found, missions=found.missions[~few]))
+    assert may_be_best(np.array([[0.8, 1.0], [1.0, 0.7]] * 6)).all()
     assert table["n"].tolist()[:2] == [300, 12] and table["tied"].tolist() == [True] + [False] * 11
 
 
 def test_where_all_settings_may_be_as_good_none_is_called_worse(results):
-    table = settings.ranked(results)
-    said = settings.answer(results, table.assign(tied=True), PRODUCT)
+    table = rank_settings(results)
+    said = best_settings_sentence(results, table.assign(tied=True), PRODUCT)
     assert "All 11 others may be as good." in said and "worse" not in said
-    said = settings.answer(results, table.assign(tied=table["rank"] <= 3), PRODUCT)
+    said = best_settings_sentence(results, table.assign(tied=table["rank"] <= 3), PRODUCT)
     assert "Of the 11 others, 2 may be as good (" in said
     assert "the rest are significantly worse." in said
 
@@ -104,23 +118,23 @@ def test_where_all_settings_may_be_as_good_none_is_called_worse(results):
 def test_of_costs_the_lowest_is_the_best(results):
     missions = results.missions
     priced = replace(results, missions=missions.assign(cost=100.0 + missions["point"]))
-    table = settings.ranked(priced, "cost")
+    table = rank_settings(priced, "cost")
     assert table["cost"].is_monotonic_increasing
     assert table[table["tied"]]["point"].tolist() == [0, 0]
-    assert settings.averaged(priced, ["uavs"], "cost").query("tied")["uavs"].tolist() == [3, 3]
+    assert average_over_others(priced, ["uavs"], "cost").query("tied")["uavs"].tolist() == [3, 3]
 
 
 # --- averages ---
 
 
 def test_the_partial_dependence_of_an_additive_metric_is_exact(results):
-    points = settings.points(results)
+    points = values_of_points(results)
     uavs, data = points["uavs"].to_numpy(), (points["initial_data"] == "10–20").to_numpy()
 
     def metric(policy, point, replication):
         return 0.1 * uavs[point] ** 2 + 0.03 * data[point] + 0.001 * np.asarray(replication)
 
-    effects = settings.main_effects(planted(results, metric), policy="greedy")
+    effects = main_effects(planted(results, metric), policy="greedy")
     of_uavs, of_data = (part for _, part in effects.groupby("field", sort=False))
     common = 0.001 * np.arange(12).mean()
     expected = 0.1 * np.array([1, 4, 9]) + 0.015 + common
@@ -128,13 +142,13 @@ def test_the_partial_dependence_of_an_additive_metric_is_exact(results):
     assert of_uavs["value"].tolist() == ["1", "2", "3"] and {*of_uavs["points"]} == {2}
     expected = 0.1 * np.mean([1, 4, 9]) + np.array([0, 0.03]) + common
     assert of_data["mean"].tolist() == pytest.approx(expected)
-    assert settings.by_influence(effects) == ["uavs", "initial_data"]
+    assert fields_by_influence(effects) == ["uavs", "initial_data"]
 
 
 def test_cells_count_the_replications_that_all_their_points_have(results):
     missions = results.missions
     shorter = missions[(missions["point"] != 1) | (missions["replication"] < 5)]
-    table = settings.averaged(replace(results, missions=shorter), ["uavs"])
+    table = average_over_others(replace(results, missions=shorter), ["uavs"])
     assert table[table["uavs"] == 3]["n"].tolist() == [5, 5]
     assert table[table["uavs"] == 1]["n"].tolist() == [12, 12]
 
@@ -142,10 +156,10 @@ def test_cells_count_the_replications_that_all_their_points_have(results):
 def test_many_numbers_are_cut_into_bins(studied):
     design = {"kind": "latin-hypercube", "size": 20, "ranges": {"arrival_rate": [0.0, 0.1]}}
     results = studied(design=design, missions=3)
-    effects = settings.main_effects(results, policy="greedy")
-    assert effects["position"].tolist() == [*range(settings.BINS)]
-    assert effects["points"].tolist() == [4] * settings.BINS
-    values = np.sort(settings.points(results)["arrival_rate"])
+    effects = main_effects(results, policy="greedy")
+    assert effects["position"].tolist() == [*range(BINS)]
+    assert effects["points"].tolist() == [4] * BINS
+    values = np.sort(values_of_points(results)["arrival_rate"])
     assert effects["value"].iloc[0] == f"{values[0]:.3g}–{values[3]:.3g}"
     assert {*effects["n"]} == {3}
 
@@ -153,7 +167,7 @@ def test_many_numbers_are_cut_into_bins(studied):
 def test_of_a_saltelli_design_the_independent_missions_count(studied):
     design = {"kind": "saltelli", "base": 8, "ranges": {"uavs": [1, 3], "charge_start": [10, 15]}}
     results = studied(design=design, missions=1)
-    effects = settings.main_effects(results, policy="greedy")
+    effects = main_effects(results, policy="greedy")
     first_and_last = results.missions.query("policy == 'greedy' and point % 5 in (0, 4)")
     for row in effects[effects["field"] == "uavs"].itertuples():
         values = first_and_last[first_and_last["uavs"] == int(row.value)][PRODUCT]
@@ -164,7 +178,7 @@ def test_of_a_saltelli_design_the_independent_missions_count(studied):
 
 
 def test_differences_to_a_baseline_are_those_of_compare(results):
-    table = settings.against(results, 2)
+    table = compare_with_baseline(results, 2)
     assert len(table) == len(METRICS) * 2 * 5
     assert 2 not in {*table["point"]}
     for policy in results.policies:
@@ -177,10 +191,10 @@ def test_differences_to_a_baseline_are_those_of_compare(results):
 
 
 def test_varied_fields_have_their_values_in_order(results, studied):
-    assert settings.varied(results) == {"uavs": [1, 2, 3], "initial_data": ["5–7.5", "10–20"]}
-    assert settings.points(results).iloc[1].tolist() == [3, "10–20"]
-    assert settings.in_words(results)[1] == "3 UAVs, initial data per node 10–20"
+    assert varied_values(results) == {"uavs": [1, 2, 3], "initial_data": ["5–7.5", "10–20"]}
+    assert values_of_points(results).iloc[1].tolist() == [3, "10–20"]
+    assert points_in_words(results)[1] == "3 UAVs, initial data per node 10–20"
     single = studied()
-    assert settings.varied(single) == {} and settings.main_effects(single).empty
-    assert settings.in_words(single) == [""]
-    assert settings.setting_of(single, "greedy", 0) == "greedy"
+    assert varied_values(single) == {} and main_effects(single).empty
+    assert points_in_words(single) == [""]
+    assert setting_in_words(single, "greedy", 0) == "greedy"

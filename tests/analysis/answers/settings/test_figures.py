@@ -7,8 +7,14 @@ import pandas as pd
 import pytest
 from matplotlib.patches import Rectangle
 
-from dess.analysis.answers import settings
-from dess.analysis.figures import settings as figures
+from dess.analysis.answers.comparison import plot_decision_times
+from dess.analysis.answers.settings.effects import average_over_others
+from dess.analysis.answers.settings.figures import (
+    MOST_PANELS,
+    draw_curves,
+    draw_heat_map,
+    evenly_spaced,
+)
 from dess.analysis.metrics import SUCCESS
 from tests.analysis.small import grid
 
@@ -28,8 +34,8 @@ def curves(ax):
 
 
 def test_curves_are_the_means_with_intervals_at_their_places(results):
-    (ax,) = figures.plot(results, "quota", metric=SUCCESS).figure.axes
-    table = settings.averaged(results, ["quota"], SUCCESS)
+    (ax,) = draw_curves(results, "quota", metric=SUCCESS).figure.axes
+    table = average_over_others(results, ["quota"], SUCCESS)
     for policy, (x, y, ends) in zip(results.policies, curves(ax), strict=True):
         own = table[table["policy"] == policy]
         assert x == pytest.approx([20, 40, 100], abs=3)
@@ -41,10 +47,10 @@ def test_curves_are_the_means_with_intervals_at_their_places(results):
 @pytest.mark.parametrize("facet", [None, "uavs"])
 def test_a_heat_map_frames_what_may_be_the_best_and_marks_the_best(results, facet):
     fields = ["initial_data", "quota", *([facet] if facet else [])]
-    drawing, _, caption, data = figures.heat_map(
+    drawing, _, caption, data = draw_heat_map(
         results, "quota", "initial_data", policy="random", facet=facet
     )
-    table = settings.averaged(results, fields, policy="random")
+    table = average_over_others(results, fields, policy="random")
     assert data["mean"].tolist() == table["mean"].tolist()
     assert ("Cells are averaged over number of UAVs. " in caption) == (facet is None)
     panels = [ax for ax in drawing.axes if ax.collections and ax.get_label() != "<colorbar>"]
@@ -63,15 +69,15 @@ def test_a_heat_map_frames_what_may_be_the_best_and_marks_the_best(results, face
 def test_of_costs_the_lowest_cell_is_marked(results):
     missions = results.missions
     priced = replace(results, missions=missions.assign(cost=1e4 * missions["uavs"]))
-    ax = figures.heat_map(priced, "uavs", "quota", "cost").figure.axes[0]
+    ax = draw_heat_map(priced, "uavs", "quota", "cost").figure.axes[0]
     assert ax.lines[0].get_xdata()[0] == 0.5  # the smaller fleet
     assert {text.get_text() for text in ax.texts} == {"10,000", "20,000"}
 
 
 def test_many_values_have_panels_that_are_spread_evenly():
-    assert figures.shown([1, 2, 3]) == [1, 2, 3]
-    some = figures.shown([*range(100)])
-    assert (len(some), some[0], some[-1]) == (figures.MOST_PANELS, 0, 99)
+    assert evenly_spaced([1, 2, 3]) == [1, 2, 3]
+    some = evenly_spaced([*range(100)])
+    assert (len(some), some[0], some[-1]) == (MOST_PANELS, 0, 99)
 
 
 def test_the_front_goes_through_policies_that_are_not_dominated():
@@ -79,7 +85,7 @@ def test_the_front_goes_through_policies_that_are_not_dominated():
         {"policy": ["a", "b", "c"], "seconds": [1e-5, 1e-4, 1e-3], "mean": [0.5, 0.4, 0.9]}
         | {"low": 0.3, "high": 0.95, "on_front": [True, False, True]}
     )
-    (ax,) = figures.decision_times(table).axes
+    (ax,) = plot_decision_times(table).axes
     (line,) = (line for line in ax.lines if line.get_label() == "Pareto front")
     assert (list(line.get_xdata()), list(line.get_ydata())) == ([1e-5, 1e-3], [0.5, 0.9])
     assert len(ax.containers) == 3

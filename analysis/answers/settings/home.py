@@ -20,7 +20,7 @@ def may_end_in_the_air(results: Results) -> bool:
     return HOME in results.missions and not all(space.landing for space in scenarios)
 
 
-def beside_success(results: Results, metrics: Iterable[str]) -> list[str]:
+def with_way_home(results: Results, metrics: Iterable[str]) -> list[str]:
     """Metrics, with that of the way home after success where missions may end in the air."""
     shown = [*dict.fromkeys(metrics)]
     if SUCCESS in shown and HOME not in shown and may_end_in_the_air(results):
@@ -28,20 +28,20 @@ def beside_success(results: Results, metrics: Iterable[str]) -> list[str]:
     return shown
 
 
-def share_sentence(results: Results, setting: pd.Series, metric: str = SUCCESS) -> str:
+def way_home_sentence_of(results: Results, setting: pd.Series, metric: str = SUCCESS) -> str:
     """In how many missions of a setting all UAVs could fly home; empty where there is no need.
 
     Args:
         results: The study.
-        setting: A row of ``settings.ranked``.
+        setting: A row of ``ranking.rank_settings``.
         metric: The metric that is spoken of; only success, and what is made of it, needs this.
     """
     if metric not in (SUCCESS, PRODUCT) or not may_end_in_the_air(results):
         return ""
-    return sentence(*setting[[HOME, f"{HOME}_low", f"{HOME}_high"]])
+    return way_home_sentence(*setting[[HOME, f"{HOME}_low", f"{HOME}_high"]])
 
 
-def sentence(mean: float, low: float, high: float) -> str:
+def way_home_sentence(mean: float, low: float, high: float) -> str:
     """The sentence on the share of the missions in which all UAVs could fly home."""
     share = metric_of(HOME).written(mean, low, high)
     return (
@@ -60,12 +60,12 @@ def stranded_sentence(results: Results, mean: float) -> str:
     if not may_end_in_the_air(results) or not mean > 0:
         return ""
     return (
-        f"On average {numbers.quantity(round(mean, 2))} UAVs of a mission are left without the "
-        "battery for the way home; no price counts them."
+        f"On average {numbers.format_quantity(round(mean, 2))} UAVs of a mission are left without "
+        "the battery for the way home; no price counts them."
     )
 
 
-def range_sentence(results: Results) -> str:
+def way_home_range_sentence(results: Results) -> str:
     """In how many missions of the settings all UAVs could fly home; empty where there is no need.
 
     Args:
@@ -74,7 +74,7 @@ def range_sentence(results: Results) -> str:
     if not may_end_in_the_air(results):
         return ""
     shares = results.missions.groupby(["policy", "point"])[HOME].mean()
-    ends = numbers.span([100 * shares.min(), 100 * shares.max()], "{:.1f}")
+    ends = numbers.format_span([100 * shares.min(), 100 * shares.max()], "{:.1f}")
     return (
         "Success does not ask for the way home: all UAVs have the battery for it at the end of "
         f"{ends} % of the missions, depending on the setting. With landing = true, missions end on "

@@ -1,0 +1,119 @@
+"""Figures of costs: the fronts of cost and a metric, and the cheapest fleet."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
+
+from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.costs import cost_fronts
+from dess.analysis.answers.fleet.requirements import Verdict, requirements_in_words, requirements_of
+from dess.analysis.answers.settings.figures import counted_missions
+from dess.analysis.figures import Drawing, style
+from dess.analysis.figures.style import plot_front
+from dess.analysis.metrics import COST, metric_of
+from dess.analysis.results.tables import Results
+from dess.analysis.tables import INTERVALS
+
+MOST_CONDITIONS = 9  # the largest number of conditions with a figure; the table has all
+
+
+WIDE = 20.0  # if the costs differ by this factor, their axis is logarithmic
+
+
+MOST_NAMES = 6  # largest number of settings that are named, of all or of those on the front
+
+
+FAINT = 0.15  # the opacity of a setting that is not on the front
+
+
+_MARKS = (
+    "The larger and darker a mark, the higher the probability that the setting is on the front."
+)
+
+
+def plot_costs(
+    table: pd.DataFrame, metric: str, currency: str, required: float | None = None
+) -> Figure:
+    """Cost against a metric under one condition, with 95 % intervals and the front.
+
+    The larger and darker a mark, the higher the probability that the setting is on the front.
+
+    Args:
+        table: Rows of ``fleet.costs.cost_front``.
+        metric: The metric of the front.
+        currency: The currency of the costs.
+        required: The required mean of the metric, drawn as a line.
+    """
+    looks = style.policy_colours(table["policy"])
+    best = table[table["on_front"]].sort_values(COST)
+    with style.new_panels(4.1) as (figure, ax):
+        if len(best) > 1:
+            plot_front(best[COST], best[metric], "front of the estimates", ax)
+        for _, row in table.iterrows():
+            colour, marker = looks[row["policy"]]
+            x_arm, y_arm = (
+                style.error_bar_arms(row, m, f"{m}_low", f"{m}_high") for m in (COST, metric)
+            )
+            ax.errorbar(row[COST], row[metric], xerr=x_arm, yerr=y_arm, color=colour, elinewidth=1,
+                        marker=marker, markersize=4 + 5 * row["probability"],
+                        alpha=FAINT + (1 - FAINT) * row["probability"])  # fmt: skip
+        for policy, (colour, marker) in looks.items():
+            ax.plot([], [], color=colour, marker=marker, linestyle="", label=policy)
+        named = table.sort_values(COST) if len(table) <= MOST_NAMES else best
+        for n, row in enumerate(named.to_dict("records") if len(named) <= MOST_NAMES else ()):
+            side = ("top", -5) if n % 2 else ("bottom", 5)  # so that neighbours do not overlap
+            ax.annotate(row["fleet"].replace(" and ", "\n"), (row[COST], row[metric]), va=side[0],
+                        fontsize=8, xytext=(7, side[1]), textcoords="offset points",
+                        **style.OUTLINED)  # fmt: skip
+        if required is not None:
+            ax.axhline(required, color=style.MUTED, linestyle="--", linewidth=1.1, label="required")
+        ax.margins(x=0.12, y=0.12)
+        style.set_axis_unit(ax.xaxis, "", 5)
+        if table[COST].max() > WIDE * table[COST].min() > 0:
+            ax.set_xscale("log")
+            ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            ax.xaxis.set_minor_locator(NullLocator())
+            ax.xaxis.set_major_formatter("{x:,g}")
+        of = metric_of(metric)
+        style.set_axis_unit(ax.yaxis, of.axis)
+        ylabel = of.within if of.in_percent else of.label
+        ax.set(xlabel=f"cost [{currency}]", ylabel=ylabel)
+    return figure
+
+
+def draw_cost_fronts(results: Results) -> Iterator[Drawing]:
+    """The cost against the metrics of the fronts, under every condition."""
+    for metric, front in cost_fronts(results).items():
+        for _, rows in [*front.groupby("condition", sort=False)][:MOST_CONDITIONS]:
+            yield _draw_costs(results, rows, metric, _MARKS)
+
+
+def draw_cheapest(results: Results) -> Drawing:
+    """The cost against the metric of the tightest requirement of a search, with the answer."""
+    answer = cheapest.cheapest_answer(results)
+    requirement, condition = cheapest.tightest_requirement(results)
+    rows = cheapest.judge_settings(results)
+    rows = rows[(rows["policy"] == answer.policy) & (rows["condition"] == condition)]
+    is_answer = rows["point"].isin(answer.points)
+    is_met = rows["verdict"] == Verdict.MET
+    rows = rows.assign(on_front=is_answer, probability=np.where(is_met, 1.0, 0.4))
+    marks = (
+        f"With the policy {answer.policy}. Large, dark marks meet all requirements "
+        f"({requirements_in_words(requirements_of(results))}); "
+        "small, faint ones miss them or are open. "
+    )
+    marks += "The answer is named." if is_answer.any() else "None is the answer."
+    return _draw_costs(results, rows, requirement.column, marks)
+
+
+def _draw_costs(results: Results, rows: pd.DataFrame, metric: str, marks: str) -> Drawing:
+    condition = rows["condition"].iloc[0]
+    bounds = {requirement.column: requirement.bound for requirement in requirements_of(results)}
+    least = bounds.get(metric)
+    drawing = plot_costs(rows, metric, results.manifest["study"]["costs"]["currency"], least)
+    alt = f"Cost against {metric_of(metric).within}{', ' * bool(condition)}{condition}"
+    counted = f"{INTERVALS}; n = {counted_missions(rows)} missions per setting."
+    return Drawing(drawing, alt, f"{alt}. {marks} Bars are {counted}", rows)

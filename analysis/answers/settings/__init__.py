@@ -1,0 +1,1 @@
+"""The settings of a study: design points, ranking, averages over others, Sobol indices."""

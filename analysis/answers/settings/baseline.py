@@ -1,0 +1,101 @@
+"""Every design point of a study compared with one of them, on common replications."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+
+from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.answers.settings.points import (
+    metrics_of_page,
+    missions_with_metric,
+    named_cells,
+    points_in_words,
+    values_of_points,
+)
+from dess.analysis.metrics import (
+    METRICS,
+    metric_in_missions,
+    metric_of,
+)
+from dess.analysis.results.tables import Results
+from dess.analysis.stats.differences import add_adjusted, column_tests
+from dess.analysis.stats.intervals import by_replication, level_after
+from dess.analysis.tables import (
+    INTERVALS,
+    MOST_ROWS,
+    Table,
+    format_counts,
+)
+
+
+def baseline_in_words(results: Results, point: int) -> str:
+    """The design point with which all others are compared, in words.
+
+    Raises:
+        InputError: If there is no such design point.
+    """
+    words = points_in_words(results)
+    if point not in range(len(words)):
+        raise InputError(f"baseline: {point!r} is not a design point; allowed: 0..{len(words) - 1}")
+    return words[point]
+
+
+def compare_with_baseline(
+    results: Results, point: int = 0, metrics: Iterable[str] = METRICS
+) -> pd.DataFrame:
+    """Every design point compared with a baseline point, with the same policy and replications.
+
+    Args:
+        results: The study.
+        point: The number of the baseline point.
+        metrics: The metrics.
+
+    Returns:
+        A row per metric, policy and other design point: ``metric``, ``policy``, ``point``, the
+        varied fields, ``difference`` (positive if more than at the baseline) with ``low`` and
+        ``high`` (95 % each), ``p``, ``p_adjusted`` (Holm, over the rows of the metric) and ``n``
+        pairs. Intervals and p-values allow for a search. A point without a replication of the
+        baseline has no row.
+
+    Raises:
+        InputError: If there is no such point or metric.
+    """
+    baseline_in_words(results, point)
+    tables = []
+    for metric in metrics:
+        parts = []
+        for policy, missions in missions_with_metric(results, metric, None).groupby(
+            "policy", sort=False
+        ):
+            wide = by_replication(missions, metric, "point")
+            of, others = metric_in_missions(results.missions, metric), wide.drop(columns=point)
+            looks = results.looks(str(policy))
+            # The pairs end with the missions of the one that has fewer.
+            seen = np.minimum(looks[others.columns.to_numpy()], looks[point])
+            tests = column_tests(others, wide[point], of, level_after(seen))
+            tests["p"] = (tests["p"] * np.maximum(seen * (seen + 1), 1)).clip(upper=1)
+            tests = tests[tests["n"] > 0].join(values_of_points(results)).reset_index()
+            parts.append(tests.assign(metric=metric, policy=policy))
+        tables.append(add_adjusted(pd.concat(parts, ignore_index=True), "holm"))
+    measured = ["difference", "low", "high", "p", "p_adjusted", "n"]
+    columns = ["metric", "policy", "point", *values_of_points(results), *measured]
+    return pd.concat(tables, ignore_index=True)[columns]
+
+
+def baseline_table(results: Results, point: int, metric: str) -> Table:
+    """Every design point compared with a baseline point."""
+    data, of = compare_with_baseline(results, point, metrics_of_page(metric)), metric_of(metric)
+    rows = data[data["metric"] == metric]
+    order = rows["difference"].abs().sort_values(ascending=False, kind="stable").index
+    top = rows.loc[order[:MOST_ROWS]].sort_values("difference", ascending=False, kind="stable")
+    cells = named_cells(results, top)
+    cells["Difference"] = [of.change(*row) for row in top[["difference", "low", "high"]].to_numpy()]
+    cells["p (Holm)"] = top["p_adjusted"].map(numbers.format_p_value)
+    cells["Pairs"] = format_counts(top["n"])
+    caption = (
+        f"{of.name}: paired difference from the baseline{' in percentage points' * of.in_percent} "
+        f"with {INTERVALS}; the {len(top):,} largest of {len(rows):,} differences"
+    )
+    return Table(cells, caption, data)

@@ -1,0 +1,180 @@
+"""Means of a metric at the values of some fields, averaged over all other varied fields.
+
+average_over_others(results, ["uavs"])  # by number of UAVs
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from pandas.api.types import is_numeric_dtype
+
+from dess import InputError
+from dess.analysis.answers.settings.points import (
+    missions_with_metric,
+    ordered_values,
+    values_of_points,
+)
+from dess.analysis.metrics import PRODUCT, Metric, metric_in_missions, metric_of
+from dess.analysis.names import field_named, value_text
+from dess.analysis.results.tables import Results, compute_once
+from dess.analysis.stats.intervals import (
+    by_replication,
+    column_intervals,
+    level_after,
+    stratified_interval,
+)
+from dess.analysis.stats.verdict import may_be_best
+from dess.analysis.tables import Table
+from dess.base.errors import one_of
+
+MOST_VALUES, BINS = 12, 5  # a field with more than MOST_VALUES numbers is divided into BINS bins
+
+
+@compute_once
+def average_over_others(
+    results: Results, by: Sequence[str], metric: str = PRODUCT, policy: str | None = None
+) -> pd.DataFrame:
+    """Means of every policy at each combination of values of some fields.
+
+    Where several design points have the same values of these fields, the mean is taken over these
+    points (partial dependence on the fields). The intervals are conditional on the design: its
+    points are strata, see ``stats.intervals.stratified_interval``. Only replications that all these
+    points have are counted.
+
+    Args:
+        results: The study.
+        by: One or more varied fields.
+        metric: The metric.
+        policy: The policy; by default all policies.
+
+    Returns:
+        A row per policy and combination, in the order of the study: ``policy``, the fields,
+        ``mean``, ``low``, ``high`` (95 %), ``n`` replications, ``points`` (number of points that
+        the mean is taken over), and ``tied``: whether the combination may be the best of this
+        policy.
+
+    Raises:
+        InputError: If there is no such field, metric or policy.
+    """
+    table = values_of_points(results)
+    if unknown := [field for field in by if field not in table]:
+        allowed = one_of(unknown[0], map(str, table))
+        raise InputError(f"{unknown[0]}: has not several values in the study{allowed}")
+    return _average_labelled(results, table[[*by]], metric, policy)
+
+
+@compute_once
+def main_effects(
+    results: Results, metric: str = PRODUCT, policy: str | None = None
+) -> pd.DataFrame:
+    """The partial dependence of a metric on every varied field, see ``average_over_others``.
+
+    A field with more than ``MOST_VALUES`` numbers, as in a sampled design, is divided into bins
+    with about equally many design points.
+
+    Returns:
+        A row per field, policy and value: ``field``, ``value`` in words, ``position`` (0, 1, ... in
+        the order of the values) and the columns of ``average_over_others`` but the fields.
+    """
+    tables = []
+    for field, values in values_of_points(results).items():
+        binned = _bin_values(values)
+        means = _average_labelled(results, binned.to_frame("value"), metric, policy)
+        for _, rows in means.groupby("policy", sort=False):
+            rows.insert(0, "field", field)
+            rows.insert(2, "position", rows["value"].map(ordered_values(binned).index).astype(int))
+            rows["value"] = rows["value"].map(value_text)
+            tables.append(rows.sort_values("position", kind="stable"))
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+
+
+def fields_by_influence(effects: pd.DataFrame) -> list[str]:
+    """The fields, sorted by the size of their effect on the metric, the largest first.
+
+    Args:
+        effects: Rows of ``main_effects``.
+    """
+    means = effects.groupby(["field", "policy"], sort=False)["mean"]
+    spans = (means.max() - means.min()).groupby("field", sort=False).mean()
+    return [str(field) for field in spans.sort_values(ascending=False, kind="stable").index]
+
+
+def _average_labelled(
+    results: Results, labels: pd.DataFrame, metric: str, policy: str | None
+) -> pd.DataFrame:
+    """``average_over_others`` at each combination of labels of design points."""
+    groups = labels.groupby([*labels], sort=False)
+    cell_of, cells = groups.ngroup().to_numpy(), labels.drop_duplicates(ignore_index=True)
+    sizes = np.bincount(cell_of)
+    missions, of = (
+        missions_with_metric(results, metric, policy),
+        metric_in_missions(results.missions, metric),
+    )
+    design = results.manifest["study"]["design"] or {}
+    if sampled := design.get("kind") == "saltelli":  # only its samples A and B are independent
+        last = len(design["ranges"]) + 2
+        missions = missions[(missions["point"] % (last + 1)).isin((0, last))]
+    missions = missions.assign(cell=cell_of[missions["point"].to_numpy()])
+    tables = []
+    for name, part in missions.groupby("policy", sort=False):
+        looks = results.looks(str(name))
+        seen = np.array([looks[cell_of == cell].min() for cell in range(len(cells))])
+        units = part.groupby(["cell", "replication"])[metric].agg(["mean", "size"])
+        if not sampled:  # only replications that all points of a cell have
+            units = units[units["size"] == sizes[units.index.get_level_values("cell")]]
+        wide = units["mean"].unstack("cell").reindex(columns=range(len(cells)))
+        if sampled:
+            ends = column_intervals(wide, of)
+        else:
+            at_points = by_replication(part, metric, "point")
+            at_points = at_points.reindex(columns=range(len(cell_of)))
+            ends = _intervals_over_points(at_points, cell_of, of, level_after(seen))
+        table = pd.concat([cells, ends], axis=1)
+        table = table.assign(points=sizes, tied=may_be_best(wide.to_numpy(float), of, seen))
+        table.insert(0, "policy", name)
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True)
+
+
+def _intervals_over_points(
+    values: pd.DataFrame, cell_of: np.ndarray, metric: Metric, levels: np.ndarray
+) -> pd.DataFrame:
+    """``mean``, ``low``, ``high`` and ``n`` of every cell, with its points as strata, or nan.
+
+    Args:
+        values: (R, K) a row per replication and a column per design point.
+        cell_of: (K,) the cell of every point.
+        metric: The metric.
+        levels: The confidence level of every cell.
+    """
+    rows = []
+    for cell in range(cell_of.max() + 1):
+        complete = values.loc[:, cell_of == cell].dropna().to_numpy(float)
+        level = float(levels[cell])
+        ends = stratified_interval(complete, metric, level) if len(complete) else [np.nan] * 3
+        rows.append((*ends, len(complete)))
+    return pd.DataFrame(rows, columns=["mean", "low", "high", "n"])
+
+
+def _bin_values(values: pd.Series) -> pd.Series:
+    """The values, or their bins if there are too many different numbers."""
+    if not is_numeric_dtype(values) or values.nunique() <= MOST_VALUES:
+        return values
+    places = pd.qcut(values, BINS, labels=False, duplicates="drop")
+    ends = values.groupby(places).agg(["min", "max"])
+    names = [f"{low:.3g}–{high:.3g}" for low, high in ends.to_numpy()]
+    return places.map(dict(enumerate(names))).astype(pd.CategoricalDtype(names, ordered=True))
+
+
+def effect_table(results: Results, metric: str) -> Table:
+    """The size of the effect of every field on a metric."""
+    effects, of, rows = main_effects(results, metric), metric_of(metric), []
+    for (field, policy), part in effects.groupby(["field", "policy"], sort=False):
+        low, high = part.loc[part["mean"].idxmin()], part.loc[part["mean"].idxmax()]
+        both = [f"{of.write(row['mean'])} at {row['value']}" for row in (low, high)]
+        span = of.write(high["mean"] - low["mean"]).replace(" %", " points")
+        rows.append((field_named(str(field)).name, policy, *both, span))
+    heads = ["Field", "Policy", "Lowest mean", "Highest mean", "Difference"]
+    caption = f"The effect of each field on {of.within}, averaged over the others"
+    return Table(pd.DataFrame(rows, columns=heads), caption, effects.drop(columns="tied"))

@@ -1,0 +1,159 @@
+"""The design points of a study, and the settings made of them, in values and in words.
+
+A setting is a policy at a design point.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+from pandas.api.types import is_numeric_dtype
+
+from dess import InputError
+from dess.analysis import numbers
+from dess.analysis.metrics import (
+    COST,
+    METRICS,
+    metrics_in,
+)
+from dess.analysis.names import field_named
+from dess.analysis.results.tables import Results, compute_once
+from dess.analysis.tables import (
+    INTERVALS,
+)
+from dess.base.errors import one_of
+
+
+def varied_values(results: Results) -> dict[str, list[Any]]:
+    """The fields that have more than one value over the design, in the order of the study.
+
+    Returns:
+        For each field its values: numbers in ascending order, others as text in the order of the
+        study.
+    """
+    table = values_of_points(results)
+    return {str(field): ordered_values(table[field]) for field in table}
+
+
+@compute_once
+def values_of_points(results: Results) -> pd.DataFrame:
+    """The values of the varied fields at every design point.
+
+    Returns:
+        A row per design point and a column per field. If a point does not set a field, the value is
+        that of the scenario. Values that are not numbers are text, such as ``5–7.5`` for a range.
+    """
+    manifest = results.store.manifest
+    columns = {}
+    for field in manifest.values[0]:
+        values = [of_point[field] for of_point in manifest.values]
+        if field == "pads":  # without a number, it depends on the zone
+            values = [results.scenario(number).zone_pads[0] for number in range(len(values))]
+        texts = field_named(field).comparable(values)
+        if len({*texts}) > 1:
+            columns[field] = texts
+    return pd.DataFrame(columns, index=range(len(manifest.points)))
+
+
+def points_in_words(results: Results) -> list[str]:
+    """Every design point in words, as ``3 UAVs, arrival rate 0.02``; empty if nothing varies."""
+    return [", ".join(words) for words in rows_in_words(values_of_points(results))]
+
+
+def rows_in_words(table: pd.DataFrame) -> list[list[str]]:
+    """Every row of some columns of ``values_of_points`` in words, each value with its field."""
+    rows = table.to_dict("records")
+    return [[field_named(str(f)).words(v) for f, v in row.items()] for row in rows]
+
+
+def setting_in_words(results: Results, policy: str, point: int) -> str:
+    """A setting in words: ``greedy with 3 UAVs``; the policy alone if nothing varies."""
+    words = points_in_words(results)[point]
+    return f"{policy} with {words}" if words else policy
+
+
+def ordered_values(values: pd.Series) -> list[Any]:
+    """The distinct values: numbers and bins in ascending order, others in order of appearance."""
+    unique = values.drop_duplicates()
+    ascends = is_numeric_dtype(unique) or isinstance(unique.dtype, pd.CategoricalDtype)
+    return (unique.sort_values() if ascends else unique).tolist()
+
+
+def ends_of_point(results: Results, point: int) -> dict[str, str]:
+    """The fields that have the least or the largest of their values at a design point.
+
+    Beyond such an end there may be a better setting. An end that is a limit of the scenario itself,
+    such as one UAV, or as many pads as the zone has cells, does not count.
+
+    Args:
+        results: The study.
+        point: The design point.
+
+    Returns:
+        For each of these fields ``least`` or ``largest``.
+    """
+    space, found = results.scenario(point), {}
+    for field, values in values_of_points(results).items():
+        if is_numeric_dtype(values) and field in space.numeric:
+            low, high = space.limits(field)
+            if values[point] == values.min() != low:
+                found[str(field)] = "least"
+            elif values[point] == values.max() != high:
+                found[str(field)] = "largest"
+    return found
+
+
+def ends_sentence(
+    results: Results, point: int, found: Mapping[str, str], better: str = "a better one"
+) -> str:
+    """A sentence that says at which ends a design point lies; empty if at none.
+
+    Args:
+        results: The study.
+        point: The design point.
+        found: Its ``ends_of_point``.
+        better: What may lie beyond.
+    """
+    values = values_of_points(results).loc[point]
+    named = [f"{field_named(f).words(values[f])} is the {word}" for f, word in found.items()]
+    return (
+        f" Of the values asked for, {numbers.join_words(named)}; {better} may lie beyond."
+        * bool(named)
+    )
+
+
+def intervals_in_words(results: Results) -> str:
+    """What the intervals of the means of a study's settings are called."""
+    is_search = any(results.looks(policy).any() for policy in results.policies)
+    return f"{INTERVALS} that allow for the search" if is_search else INTERVALS
+
+
+def check_metric(results: Results, metric: str) -> None:
+    """Raise ``InputError`` if the missions do not have the metric."""
+    known = [*metrics_in(results.missions), *([COST] if COST in results.missions else [])]
+    if metric not in known:
+        raise InputError(f"metric: {metric!r} is unknown{one_of(metric, known)}")
+
+
+def missions_with_metric(results: Results, metric: str, policy: str | None) -> pd.DataFrame:
+    """The missions of a policy, or of all, if they have the metric.
+
+    Raises:
+        InputError: If there is no such metric or policy.
+    """
+    check_metric(results, metric)
+    if policy is None:
+        return results.missions
+    results.check_policy(policy)
+    return results.missions[results.missions["policy"] == policy]
+
+
+def metrics_of_page(metric: str) -> list[str]:
+    """The metrics on the page of a study: the one that ranks the settings, and the paper's."""
+    return [*dict.fromkeys((metric, *METRICS))]
+
+
+def named_cells(results: Results, rows: pd.DataFrame) -> pd.DataFrame:
+    """The policy, the number of the design point and its varied fields as text."""
+    fields = {field_named(f).name: rows[f].map(field_named(f).cell) for f in varied_values(results)}
+    return pd.DataFrame({"Policy": rows["policy"], "Point": rows["point"]} | fields)

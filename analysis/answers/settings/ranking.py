@@ -1,0 +1,271 @@
+"""The settings of a study, the best first, and the sentences and tables on them.
+
+    results = load_results("results/fleets")
+    rank_settings(results)  # the best setting first, and those that may be as good
+
+Settings are compared on common replications: every setting meets the same random draws.
+``metric`` is a column of ``results.missions``.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+
+from dess.analysis import numbers
+from dess.analysis.answers.settings.home import way_home_sentence_of, with_way_home
+from dess.analysis.answers.settings.points import (
+    check_metric,
+    ends_of_point,
+    ends_sentence,
+    intervals_in_words,
+    metrics_of_page,
+    missions_with_metric,
+    named_cells,
+    points_in_words,
+    setting_in_words,
+    values_of_points,
+    varied_values,
+)
+from dess.analysis.metrics import (
+    AGE,
+    COST,
+    PRODUCT,
+    column_as_told,
+    format_length,
+    in_either,
+    metric_in_missions,
+    metric_of,
+    metrics_in,
+)
+from dess.analysis.results.tables import Results, compute_once
+from dess.analysis.stats.intervals import (
+    by_replication,
+    column_intervals,
+    level_after,
+    mean_interval,
+)
+from dess.analysis.stats.verdict import may_be_best, within_reach
+from dess.analysis.tables import MOST_ROWS, WIDER, YES, Table, allowance_sentence, format_counts
+
+MOST_NAMES = 3  # the largest number of settings that are named because they may be as good
+
+
+# What grows with the length of a mission, so that missions of the same length are to be compared.
+_OF_LENGTH = {*in_either(AGE, "peak_age", "age_p99"), COST}
+
+
+def ranking_metric(results: Results, metric: str | None = None) -> str:
+    """The metric that ranks the settings: the given one, the one of the selection, or the product.
+
+    Raises:
+        InputError: If there is no such metric.
+    """
+    if metric is None:
+        metric = getattr(results.study.selection, "metric", PRODUCT)
+    metric = column_as_told(metric, results.missions)
+    check_metric(results, metric)
+    return metric
+
+
+def best_settings_sentence(results: Results, table: pd.DataFrame, metric: str) -> str:
+    """The best setting, and how many settings may be as good.
+
+    Args:
+        results: The study.
+        table: The result of ``rank_settings`` for the metric.
+        metric: The metric.
+    """
+    policies = (
+        other_policies_sentences(results, table, metric) if len(results.policies) == 2 else []
+    )
+    return " ".join([best_setting_sentence(results, table, metric), *policies])
+
+
+def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) -> str:
+    """The best setting, how many may be as good, and what else is to be said of it.
+
+    Args:
+        results: The study.
+        table: The result of ``rank_settings`` for the metric.
+        metric: The metric.
+    """
+    of, best, others, tied = metric_of(metric), table.iloc[0], len(table) - 1, table[table["tied"]]
+    value = of.written(*best[[metric, f"{metric}_low", f"{metric}_high"]])
+    names = [setting_in_words(results, row.policy, row.point) for row in tied.itertuples()]
+    what, many = "setting" if varied_values(results) else "policy", len(names) - 1
+    named = f" ({'; '.join(names[1:])})" * (many <= MOST_NAMES)
+    if others == 1:
+        rest = f"The other {what} {'may be as good' if many else 'is significantly worse'}."
+    elif not many:
+        rest = f"All {others:,} others are significantly worse." if others else ""
+    elif many == others:
+        rest = f"All {others:,} others may be as good{named}."
+    else:
+        rest = (
+            f"Of the {others:,} others, {many:,} may be as good{named}; the rest are "
+            "significantly worse."
+        )
+    parts = [
+        f"The best {what} is {names[0]}: {of.within} {value}, n = {best['n']:,}.",
+        rest,
+        ends_sentence(results, best["point"], ends_of_point(results, best["point"])).strip(),
+        way_home_sentence_of(results, best, metric),
+        unequal_lengths_sentence(results, [metric]),
+    ]
+    return " ".join(filter(None, parts))
+
+
+def unequal_lengths_sentence(results: Results, metrics: Iterable[str]) -> str:
+    """That missions of different lengths are compared by what depends on it; empty if not so.
+
+    Ages grow while a mission lasts, and hours are paid for. A cost is only to be among the metrics
+    where it depends on them.
+
+    Args:
+        results: The study.
+        metrics: The metrics that are compared.
+    """
+    compared = [metric_of(metric).within for metric in metrics if metric in _OF_LENGTH]
+    missions = results.missions
+    has_quota = any(space.quota for space in results.store.manifest.scenarios)
+    if not compared or not has_quota or missions["slots"].nunique() == 1:
+        return ""
+    means = missions.groupby(["policy", "point"])["slots"].mean()
+    units = results.scenario().units
+    lengths = [format_length(round(slots), units) for slots in (means.min(), means.max())]
+    return (
+        f"Missions end with their last UAV, after {' to '.join(dict.fromkeys(lengths))} on "
+        f"average, so settings are compared by {numbers.join_words(compared)} over missions of "
+        "different lengths; with quota = 0, all missions last until max_slots."
+    )
+
+
+def other_policies_sentences(results: Results, ranked: pd.DataFrame, metric: str) -> list[str]:
+    """A sentence for each policy but the best: which setting it would have found, and its mean.
+
+    Args:
+        results: The study.
+        ranked: The result of ``ranked`` for the metric.
+        metric: The metric.
+    """
+    words, best = points_in_words(results), ranked.iloc[0]
+    others = ranked[ranked["policy"] != best["policy"]].drop_duplicates("policy")
+    ends = others[[metric, f"{metric}_low", f"{metric}_high"]].to_numpy()
+    named = zip(others["policy"], others["point"], ends, strict=True)
+    return [
+        f"With the policy {policy}, it would be {words[point]}: {metric_of(metric).within} "
+        f"{metric_of(metric).written(*of_metric)}."
+        for policy, point, of_metric in named
+        if len(words) > 1
+    ]
+
+
+@compute_once
+def rank_settings(
+    results: Results, metric: str = PRODUCT, policy: str | None = None
+) -> pd.DataFrame:
+    """The settings by the mean of a metric, the best first.
+
+    Args:
+        results: The study.
+        metric: The metric that ranks them.
+        policy: The policy whose settings are ranked; by default all policies.
+
+    Returns:
+        A row per policy and design point: ``rank``, ``policy``, ``point``, the varied fields, for
+        every metric ``METRIC``, ``METRIC_low`` and ``METRIC_high`` (95 % intervals as in
+        ``dess.analysis.summary``, which allow for a search), ``n`` missions, and ``tied``: whether
+        the setting may be the best, by ``may_be_best`` and ``within_reach`` over all rows. Of equal
+        settings, the first in the study has the lower rank.
+
+    Raises:
+        InputError: If there is no such metric or policy.
+    """
+    missions, cell = missions_with_metric(results, metric, policy), ["policy", "point"]
+    table = missions.groupby(cell, sort=False).size().rename("n").reset_index()
+    table = table.join(values_of_points(results), on="point")
+    looks = {policy: results.looks(policy) for policy in missions["policy"].unique()}
+    seen = np.array([looks[row.policy][row.point] for row in table.itertuples()])
+    others = [name for name in metrics_in(missions) if name != metric]
+    for name in (*others, metric):
+        wide = by_replication(missions, name, cell)
+        wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[cell]))
+        ends = column_intervals(wide, metric_in_missions(missions, name), level_after(seen))
+        table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
+    # By the ranking metric, which was computed last.
+    table["tied"] = may_be_best(wide.to_numpy(float), metric_in_missions(missions, metric), seen)
+    table["tied"] &= within_reach(table[f"{metric}_low"], table[f"{metric}_high"], metric)
+    less = metric_of(metric).less_is_better
+    table = table.sort_values(metric, ascending=less, kind="stable", ignore_index=True)
+    table.insert(0, "rank", np.arange(1, len(table) + 1))
+    return table
+
+
+def missions_at_best(results: Results, table: pd.DataFrame) -> pd.DataFrame:
+    """The missions of every policy at its best design point.
+
+    Args:
+        results: The study.
+        table: The result of ``rank_settings``.
+    """
+    best = table.drop_duplicates("policy")[["policy", "point"]]
+    return results.missions.merge(best, on=["policy", "point"])
+
+
+def allowance_for_setting(results: Results, rows: pd.DataFrame, metric: str) -> str:
+    """Why a setting may be the best although its mean is lower; empty if intervals hardly allow it.
+
+    Args:
+        results: The study.
+        rows: Its ``rank_settings``.
+        metric: The metric that ranks them.
+    """
+    first, of = rows.iloc[0], metric_of(metric)
+    missions = missions_with_metric(results, metric, first["policy"])
+    values = missions.loc[missions["point"] == first["point"], metric].to_numpy(float)
+    plain = mean_interval(values[~np.isnan(values)])
+    half = (plain.high - plain.low) / 2
+    wide = (first[f"{metric}_high"] - first[f"{metric}_low"]) / 2
+    if not of.is_bounded or not wide > WIDER * half:
+        return ""
+    best = setting_in_words(results, first["policy"], first["point"])
+    alone, allowing = (f"±{100 * end:.2g} points" for end in (half, wide))
+    return allowance_sentence(f"the {of.within} of {best}", alone, allowing, int(first["n"]))
+
+
+def best_settings_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
+    """The best settings.
+
+    Args:
+        results: The study.
+        rows: Its ``rank_settings``.
+        metric: The metric that ranks them.
+    """
+    top = rows.head(MOST_ROWS)
+    cells = _ranking_cells(results, top, metric)
+    cells.insert(0, "Rank", top["rank"])
+    cells.insert(1, "May be the best", top["tied"].map(YES))
+    caption = (
+        f"The first {len(top)} of {len(rows):,} settings by {metric_of(metric).within}: "
+        f"means with {intervals_in_words(results)}"
+    )
+    return Table(cells, caption, rows)
+
+
+def best_of_policies_table(results: Results, metric: str) -> Table:
+    """The best setting of every policy, and how many of its settings may be as good."""
+    own = [rank_settings(results, metric, policy) for policy in results.policies]
+    best = pd.concat([rows.head(1) for rows in own], ignore_index=True)
+    cells = _ranking_cells(results, best, metric)
+    cells["May be its best"] = [f"{rows['tied'].sum():,} of {len(rows):,} settings" for rows in own]
+    caption = f"The best setting of every policy by {metric_of(metric).within}"
+    return Table(cells, caption, best.drop(columns=["rank", "tied"]))
+
+
+def _ranking_cells(results: Results, rows: pd.DataFrame, metric: str) -> pd.DataFrame:
+    """Rows of ``rank_settings`` as text."""
+    cells = named_cells(results, rows)
+    for of in map(metric_of, with_way_home(results, metrics_of_page(metric))):
+        cells[of.name] = numbers.format_estimates(rows, of.column, of.written)
+    return cells.assign(Missions=format_counts(rows["n"]))
