@@ -309,6 +309,7 @@ def _format_cell(value: float, metric: Metric) -> str:
 
 
 def counted_missions(table: pd.DataFrame) -> str:
+    """The smallest and the largest number of missions of the rows of a table."""
     return numbers.format_span(table["n"])
 
 
