@@ -33,8 +33,8 @@ from dess.envs.observations.states import CompactStates, compact_states, masks
 from dess.model.guard import guard
 from dess.model.view import View
 from dess.policies.learner.config import MISSION_SEED, TrainingConfig, load_config
-from dess.policies.learner.network import SetNetwork, arrays_of
-from dess.policies.learner.trained import policy_of, save_policy
+from dess.policies.learner.network import SetNetwork, to_arrays
+from dess.policies.learner.trained import make_policy, save_policy
 from dess.policies.learner.training import soft_update
 from dess.policies.planner import LongPlanner, Planner
 from dess.scenario.families import FAMILIES, SETS
@@ -123,7 +123,7 @@ def examples_on(name: str, kind: Round, weights: Path | None) -> Examples:
     space = load_scenario(name, uavs=uavs)
     other = None
     if weights:
-        other = policy_of(load_config("any"), None, Sets, arrays_of(torch.load(weights)))
+        other = make_policy(load_config("any"), None, Sets, to_arrays(torch.load(weights)))
     planner = TEACHERS.get(family, Planner)()
     demonstrator = Demonstrator(planner, kind.deviations, other, int(seed))
     simulate_batch(space, demonstrator, MISSION_SEED + int(seed), len(kind.deviations))

@@ -30,7 +30,7 @@ from dess.model.guard import guard
 from dess.model.view import View
 from dess.policies.learner.config import MISSION_SEED, TrainingConfig, load_config
 from dess.policies.learner.dqn import Batch, DQNLearner, DQNTraining
-from dess.policies.learner.trained import save_policy, weights_of
+from dess.policies.learner.trained import read_weights, save_policy
 from dess.policies.registry import TRAINED
 
 RECORDED, EVALUATED = 777_002, 777_001  # seeds of the planner's missions and of the evaluation
@@ -52,10 +52,10 @@ class ImitatingLearner(DQNLearner):
 
     environments, flown, has_td, weight = 1, 0, True, 0.0
 
-    def loss(self, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
+    def compute_loss(self, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
         """The loss of the TD error and of the margin, and the values of the actions."""
         is_shown = batch.rows % self.environments < self.flown
-        loss, chosen = super().loss(batch if self.has_td else _part_of(batch, ~is_shown))
+        loss, chosen = super().compute_loss(batch if self.has_td else _part_of(batch, ~is_shown))
         if self.weight and is_shown.any():
             excess = self._excess(_part_of(batch, is_shown))
             loss = loss + self.weight * excess.sum() / len(batch.rows)
@@ -63,7 +63,7 @@ class ImitatingLearner(DQNLearner):
 
     def _excess(self, batch: Batch) -> torch.Tensor:
         """By how much the planner's actions are not the highest by the margin; (B,) values."""
-        values = self.values(self.online, batch.state, batch.rows, batch.uav)
+        values = self.action_values(self.online, batch.state, batch.rows, batch.uav)
         planned = torch.from_numpy(batch.action)[:, None]
         margins = torch.full_like(values, MARGIN).scatter_(1, planned, 0.0)
         allowed = torch.from_numpy(masks(batch.state, batch.rows, batch.uav))
@@ -90,12 +90,12 @@ class ImitatingTraining(DQNTraining):
         self.learner.environments, self.learner.flown = config.num_envs, flown
         self.learner.has_td, self.learner.weight = has_td, weight * has_margin
 
-    def _collect(self, epsilon: float) -> None:
+    def _collect_slot(self, epsilon: float) -> None:
         # The memory of a trained network is not to begin with random actions.
-        super()._collect(min(epsilon, self.phase.epsilon[0]))
+        super()._collect_slot(min(epsilon, self.phase.epsilon[0]))
 
-    def _launch(self, environments: np.ndarray) -> None:
-        super()._launch(environments[environments >= self.flown])
+    def _launch_missions(self, environments: np.ndarray) -> None:
+        super()._launch_missions(environments[environments >= self.flown])
         again = environments[environments < self.flown]
         if not len(again):
             return
@@ -108,10 +108,10 @@ class ImitatingTraining(DQNTraining):
         self.early[again] = False
         self.stepper.start_at(MISSION_SEED + self.config.seed, own)
 
-    def _explore(
+    def _choose_exploring(
         self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray, epsilon: float
     ) -> np.ndarray:
-        actions = super()._explore(states, missions, uavs, epsilon)
+        actions = super()._choose_exploring(states, missions, uavs, epsilon)
         again = missions < self.flown
         now = self.stepper.state.missions[missions[again]]
         actions[again] = self.planned[now["replication"], now["slot"], uavs[again]]
@@ -177,8 +177,8 @@ def main() -> None:
             if not folder.exists():
                 training = ImitatingTraining(config, planned, *VARIANTS[variant], given.weight)
                 if given.start:
-                    training.begin_with(weights_of(TRAINED / given.start))
-                training.run(given.ticks)
+                    training.begin_with(read_weights(TRAINED / given.start))
+                training.run_ticks(given.ticks)
                 save_policy(folder, training.best, config, training.space)
         for name in [*folders, given.start] if given.start else folders:
             policy = policies.load(name)

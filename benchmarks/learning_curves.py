@@ -27,7 +27,7 @@ from dess.base.files.reading import paths_in
 from dess.base.files.tables import read_table, write_table
 from dess.policies.learner.config import TrainingConfig, load_config
 from dess.policies.learner.dqn import DQNTraining
-from dess.policies.learner.session import device_of
+from dess.policies.learner.session import choose_device
 from dess.policies.registry import TRAINED, Policy, load
 
 EVALUATION_SEED, MISSIONS = 900_000_001, 1000  # of the final evaluation
@@ -69,9 +69,9 @@ VARIANTS: dict[str, dict[str, Any]] = {
 
 def run(config: TrainingConfig) -> pd.DataFrame:
     """Train once; the curve, with the metrics of the selected weights on new missions."""
-    training = DQNTraining(config, device_of("cpu"))
-    training.run(config.ticks)
-    return _evaluated(pd.DataFrame(training.curve), training.policy(training.best), config)
+    training = DQNTraining(config, choose_device("cpu"))
+    training.run_ticks(config.ticks)
+    return _evaluated(pd.DataFrame(training.curve), training.make_policy(training.best), config)
 
 
 def shipped() -> pd.DataFrame:

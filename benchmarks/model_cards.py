@@ -21,7 +21,7 @@ from dess.analysis.stats.intervals import interval_of, post_stratified
 from dess.base.files.reading import read_text
 from dess.base.files.writing import write_file
 from dess.policies.learner.config import MISSION_SEED, load_config, read_description
-from dess.policies.learner.trained import weights_of
+from dess.policies.learner.trained import read_weights
 from dess.policies.registry import CARD, HEURISTICS, load
 
 # The seed of the missions of model cards, which neither training nor selection of weights uses.
@@ -67,7 +67,7 @@ def card(folder: Path, command: str, missions: int) -> str:
         seed=EVALUATION_SEED,
         mission_seed=MISSION_SEED,
         described=described,
-        weights=sum(weight.size for weight in weights_of(folder).values()),
+        weights=sum(weight.size for weight in read_weights(folder).values()),
         curve=curve.assign(**{name: curve[of] for name, of in evaluated.items()}).iloc[shown],
         random_missions=_means({folder.name: learned} | fleets | others),
         gains={

@@ -29,8 +29,8 @@ def test_ticks(benchmark, name: str, device: str) -> None:
     training = new_training(config, torch.device(device))
     ticks = 20 if config.algorithm == "dqn" else 1
     if benchmark.enabled:  # otherwise one round shows that it runs
-        training.run(ticks)
-    benchmark.pedantic(training.run, args=(ticks,), rounds=10)
+        training.run_ticks(ticks)
+    benchmark.pedantic(training.run_ticks, args=(ticks,), rounds=10)
 
 
 def test_decisions_of_ddqn(benchmark) -> None:

@@ -116,7 +116,7 @@ def draw_gallery(pages: Path) -> None:
 def draw_model() -> Iterator[tuple[str, bytes]]:
     """The pictures of *The model*, by file name; the same code draws the same bytes."""
     for draw in (sea, slot, battery):
-        yield f"{draw.__name__}.svg", html.picture(draw(), "svg")
+        yield f"{draw.__name__}.svg", html.encode_figure(draw(), "svg")
 
 
 def sea() -> Figure:

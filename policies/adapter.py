@@ -73,12 +73,12 @@ class Adapter:
         fleet = view.state.uavs.shape[1]
         sea = geometry(view.world.chart)
         nodes = view.world.nodes.tolist()
-        observer = _observer(self.observation, self.guarded, fleet, repr((sea, nodes)))
+        observer = _make_observer(self.observation, self.guarded, fleet, repr((sea, nodes)))
         seen = observer.observe(view.state, view.mission, view.uav)
         return checked_actions(self._choose(*seen), view.mission.shape)
 
 
 @lru_cache
-def _observer(kind: str, guarded: bool, uavs: int, sea: str) -> Observer:
+def _make_observer(kind: str, guarded: bool, uavs: int, sea: str) -> Observer:
     fields, nodes = literal_eval(sea)
     return Observer(ScenarioSpace.of(uavs=uavs, nodes=nodes, **fields), kind, guarded)

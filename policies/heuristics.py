@@ -1,8 +1,8 @@
 """Heuristic policies: random, nearest, greedy, tour and age under the guard, random without it.
 
-Each policy has its own rule for choosing a goal (``_goal``). All share the rule for the next action
-(``step_towards``): the safe action that brings the UAV nearest to its goal and avoids teammates.
-These functions are compiled and work on the arrays of one mission.
+Each policy has its own rule for choosing a goal (``_choose_goal``). All share the rule for the next
+action (``step_towards``): the safe action that brings the UAV nearest to its goal and avoids
+teammates. These functions are compiled and work on the arrays of one mission.
 """
 
 from functools import lru_cache
@@ -44,7 +44,9 @@ class Random:
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
-        return _choose(view.state.missions, view.state.uavs, guard(view), view.mission, view.uav)
+        return _choose_at_random(
+            view.state.missions, view.state.uavs, guard(view), view.mission, view.uav
+        )
 
 
 class RandomUnguarded:
@@ -54,7 +56,9 @@ class RandomUnguarded:
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
-        return _choose(view.state.missions, view.state.uavs, view.legal, view.mission, view.uav)
+        return _choose_at_random(
+            view.state.missions, view.state.uavs, view.legal, view.mission, view.uav
+        )
 
 
 class _Heuristic:
@@ -70,8 +74,8 @@ class _Heuristic:
         chart = view.world.chart
         circuit = _NO_CIRCUIT
         if self._kind == _TOUR:
-            circuit = _circuit(nodes.tobytes(), chart.zones.tobytes(), chart.zones.shape)
-        return _decide(
+            circuit = _plan_circuit(nodes.tobytes(), chart.zones.tobytes(), chart.zones.shape)
+        return _choose_actions(
             self._kind, state.missions, state.uavs, state.residual, state.sensors, nodes, circuit,
             *chart, reach_of(state.missions, chart), view.mission, view.uav,
         )  # fmt: skip
@@ -114,7 +118,7 @@ class Age(_Heuristic):
 
 
 @kernel
-def _choose(missions, uavs, allowed, rows_mission, rows_uav):
+def _choose_at_random(missions, uavs, allowed, rows_mission, rows_uav):
     """Random allowed moves into uncontested cells; Hover where there is none."""
     actions = np.empty(len(rows_mission), np.int64)
     for row in range(len(rows_mission)):
@@ -141,7 +145,7 @@ def _choose(missions, uavs, allowed, rows_mission, rows_uav):
 
 
 @kernel
-def _decide(
+def _choose_actions(
     kind, missions, uavs, residual, sensors, nodes, circuit,
     zones, parking, sizes, nearest, ways, rows, reach, rows_mission, rows_uav,
 ):  # fmt: skip
@@ -156,7 +160,7 @@ def _decide(
         if b != last:
             last = b
             left = data_left(missions[b], residual[b])
-        actions[row] = _action(
+        actions[row] = _choose_action(
             kind, missions[b], uavs[b], i, residual[b], left, sensors[b], nodes, circuit, chart,
             reach, memory,
         )  # fmt: skip
@@ -164,7 +168,9 @@ def _decide(
 
 
 @inlined
-def _action(kind, mission, team, i, data, left, sensors, nodes, circuit, chart, reach, memory):
+def _choose_action(
+    kind, mission, team, i, data, left, sensors, nodes, circuit, chart, reach, memory
+):
     """The action of UAV ``i``; ``left`` are all data, ``memory`` is that of its parking cell."""
     u = team[i]
     charge = must_charge(mission, u, left)
@@ -173,7 +179,9 @@ def _action(kind, mission, team, i, data, left, sensors, nodes, circuit, chart, 
         home = parking_cell(mission, team, i, chart, memory, reach)
     safe = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
     goal_x, goal_y = home.x, home.y
-    node = _goal(kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach)
+    node = _choose_goal(
+        kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach
+    )
     if node >= 0:
         goal_x = np.int64(nodes[node, 0])
         goal_y = np.int64(nodes[node, 1])
@@ -201,7 +209,7 @@ def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
 
 
 @inlined
-def _goal(
+def _choose_goal(
     kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach
 ):  # fmt: skip
     """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
@@ -216,7 +224,7 @@ def _goal(
         if data[k] <= 0.0:
             continue
         x, y = nodes[k, 0], nodes[k, 1]
-        slots = _slots(u, chart, x, y)
+        slots = _slots_to_cell(u, chart, x, y)
         spent = slots
         if charge:
             spent = round_trip(mission, u, chart, x, y, home, reach)
@@ -227,7 +235,7 @@ def _goal(
         elif kind == _GREEDY:
             score = data[k] / (slots + _SLOTS_AT_NODE)
         elif kind == _AGE:
-            score = _staleness(mission, data, sensors, nodes, chart, k, slots)
+            score = _score_by_age(mission, data, sensors, nodes, chart, k, slots)
         else:
             score = 1.0 / (1.0 + _circuit_position(mission, i, circuit[k]))
         if score <= best:  # the weights below are at most 1
@@ -243,7 +251,7 @@ def _goal(
 
 
 @inlined
-def _staleness(mission, data, sensors, nodes, chart, k, slots):
+def _score_by_age(mission, data, sensors, nodes, chart, k, slots):
     """The age per slot of distance of node ``k``, and a share of that of all nodes beyond it."""
     here, beyond = 0.0, 0  # an integer, since a sum of floats depends on the order of the nodes
     for other in range(len(nodes)):
@@ -259,7 +267,7 @@ def _staleness(mission, data, sensors, nodes, chart, k, slots):
 
 
 @inlined
-def _slots(u, chart, x, y):
+def _slots_to_cell(u, chart, x, y):
     """The slots that UAV ``u`` takes to a cell."""
     return distance(chart, u.x, u.y, x, y) * u.slots_per_cell
 
@@ -269,7 +277,7 @@ def _teammate_is_nearer(mission, team, i, chart, x, y, slots):
     for j in range(mission.uavs):
         o = team[j]
         if j != i and flies(o):
-            other = _slots(o, chart, x, y)
+            other = _slots_to_cell(o, chart, x, y)
             if other < slots or (other == slots and j < i):
                 return True
     return False
@@ -286,17 +294,17 @@ _NO_CIRCUIT = np.zeros(0, np.int64)
 
 
 @lru_cache(maxsize=64)
-def _circuit(nodes: bytes, zones: bytes, shape: tuple[int, int]) -> np.ndarray:
+def _plan_circuit(nodes: bytes, zones: bytes, shape: tuple[int, int]) -> np.ndarray:
     """The (K,) position of each node on a short round trip (nearest neighbour, then 2-opt)."""
     cells = np.frombuffer(nodes, np.int64).reshape(-1, 2)
     chart = np.frombuffer(zones, np.int8)
     places = cells @ [1, shape[1]]
     ways = [spread(chart.reshape(shape), cell[None])[0][places] for cell in cells]
-    return _round_trip(np.stack(ways).astype(np.int64))
+    return _find_round_trip(np.stack(ways).astype(np.int64))
 
 
 @kernel
-def _round_trip(slots):
+def _find_round_trip(slots):
     count = len(slots)
     order = np.arange(count)
     for step in range(1, count):

@@ -43,7 +43,7 @@ class PaperNetwork:
     rows = 32
 
     @staticmethod
-    def layers(shapes: Shapes, hidden: Sequence[int] = ()) -> Sizes:
+    def layer_sizes(shapes: Shapes, hidden: Sequence[int] = ()) -> Sizes:
         """The sizes of the layers.
 
         Args:
@@ -56,23 +56,23 @@ class PaperNetwork:
         for name, (layers, rows, columns) in zip(("local", "far"), shapes[:2], strict=True):
             sizes |= {f"{name}.0": (KERNELS, layers, *size), f"{name}.2": (KERNELS, KERNELS, *size)}
             width += KERNELS * (rows - NARROWEST + 1) * (columns - NARROWEST + 1)
-        return sizes | _dense_layers([width, *DENSE]) | {"values": (ACTIONS, DENSE[-1])}
+        return sizes | _dense_layer_sizes([width, *DENSE]) | {"values": (ACTIONS, DENSE[-1])}
 
     def __init__(self, weights: Weights, dtype: Any) -> None:
         """Make it of weights for computing in ``dtype``, float32 or float64."""
         self._maps = [
-            [_convolution(weights, f"{name}.{number}", dtype) for number in (0, 2)]
+            [_read_convolution(weights, f"{name}.{number}", dtype) for number in (0, 2)]
             for name in ("local", "far")
         ]
-        self._hidden = _dense(weights, dtype)
-        self._values = _in(dtype, *_layer(weights, "values"))
+        self._hidden = _read_dense_layers(weights, dtype)
+        self._values = _cast_layer(dtype, *_read_layer(weights, "values"))
 
     def __call__(self, local: np.ndarray, far: np.ndarray, own: np.ndarray) -> np.ndarray:
         """The values (R, 5) of the actions, from the arrays of ``Maps.encode``."""
         maps = zip((local, far), self._maps, strict=True)
-        seen = [_convolved(each, *layers) for each, layers in maps]
+        seen = [_apply_convolutions(each, *layers) for each, layers in maps]
         matrix, bias = self._values
-        return _through(self._hidden, np.concatenate([*seen, own], 1)) @ matrix + bias
+        return _apply_layers(self._hidden, np.concatenate([*seen, own], 1)) @ matrix + bias
 
 
 class DuelingNetwork:
@@ -81,22 +81,22 @@ class DuelingNetwork:
     rows = 1024
 
     @staticmethod
-    def layers(shapes: Shapes, hidden: Sequence[int]) -> Sizes:
+    def layer_sizes(shapes: Shapes, hidden: Sequence[int]) -> Sizes:
         """The sizes of the layers, as for ``PaperNetwork``."""
         widths = [*shapes[0], *hidden]
         ends = {"value": (1, widths[-1]), "advantage": (ACTIONS, widths[-1])}
-        return _dense_layers(widths) | ends
+        return _dense_layer_sizes(widths) | ends
 
     def __init__(self, weights: Weights, dtype: Any) -> None:
         """Make it of weights for computing in ``dtype``, float32 or float64."""
-        self._hidden = _dense(weights, dtype)
-        ends = zip(_layer(weights, "value"), _layer(weights, "advantage"), strict=True)
-        self._values = _in(dtype, *(v + a - a.mean(-1, keepdims=True) for v, a in ends))
+        self._hidden = _read_dense_layers(weights, dtype)
+        ends = zip(_read_layer(weights, "value"), _read_layer(weights, "advantage"), strict=True)
+        self._values = _cast_layer(dtype, *(v + a - a.mean(-1, keepdims=True) for v, a in ends))
 
     def __call__(self, vector: np.ndarray) -> np.ndarray:
         """The values (R, 5) of the actions, from vectors (R, inputs)."""
         matrix, bias = self._values
-        return _through(self._hidden, vector) @ matrix + bias
+        return _apply_layers(self._hidden, vector) @ matrix + bias
 
 
 class SetNetwork:
@@ -105,7 +105,7 @@ class SetNetwork:
     rows = 64
 
     @staticmethod
-    def layers(shapes: Shapes, hidden: Sequence[int]) -> Sizes:
+    def layer_sizes(shapes: Shapes, hidden: Sequence[int]) -> Sizes:
         """The sizes of the layers, as for ``PaperNetwork``."""
         (own,), (_, action), *sets = shapes
         nodes, others, joint = hidden
@@ -122,7 +122,7 @@ class SetNetwork:
         """Make it of weights for computing in ``dtype``, float32 or float64."""
 
         def layer(name: str) -> Layer:
-            return _in(dtype, *_layer(weights, name))
+            return _cast_layer(dtype, *_read_layer(weights, name))
 
         def of_sets(*names: str) -> list[np.ndarray]:
             return [layer(f"sets.{number}.{name}")[0] for number in SETS for name in names]
@@ -149,69 +149,71 @@ class SetNetwork:
         for layers, lines, factors in zip(self._sets, sets[::2], sets[1::2], strict=True):
             context, (inputs, _), layer, (values, shift) = layers
             each = lines.reshape(-1, lines.shape[2]) @ inputs
-            _rectify(each, own @ context[0] + context[1], lines.shape[1])
-            each = (_through([layer], each) @ values).reshape(*lines.shape[:2], len(shift))
-            _pool(each, shift, factors, state, moves, at)
+            _add_and_rectify(each, own @ context[0] + context[1], lines.shape[1])
+            each = (_apply_layers([layer], each) @ values).reshape(*lines.shape[:2], len(shift))
+            _pool_products(each, shift, factors, state, moves, at)
             at = at[0] + len(shift), at[1] + 2 * len(shift)
-        state = _through([self._own], state)
+        state = _apply_layers([self._own], state)
         each = np.empty((ACTIONS, *state.shape), own.dtype)
         np.matmul(moves, self._moves, out=each[:HOVER])
         np.matmul(actions[:, HOVER], self._action, out=each[HOVER])
         each = each.reshape(-1, len(bias))
-        _rectify(each, state @ self._state[0] + self._state[1], 1)
-        advantage = (_through([self._hidden], each) @ self._advantage).reshape(ACTIONS, rows)
+        _add_and_rectify(each, state @ self._state[0] + self._state[1], 1)
+        advantage = (_apply_layers([self._hidden], each) @ self._advantage).reshape(ACTIONS, rows)
         return state @ self._value[0] + self._value[1] + (self._centred @ advantage).T
 
 
-def forms_of(layers: Sizes) -> dict[str, tuple[int, ...]]:
+def weight_shapes(layers: Sizes) -> dict[str, tuple[int, ...]]:
     """The shapes of the weights of layers, by name."""
     biased = {name: size for name, size in layers.items() if name.split(".")[-1] not in UNBIASED}
     forms = {f"{name}.weight": size for name, size in layers.items()}
     return forms | {f"{name}.bias": size[:1] for name, size in biased.items()}
 
 
-def _dense_layers(widths: Sequence[int]) -> Sizes:
+def _dense_layer_sizes(widths: Sequence[int]) -> Sizes:
     """The sizes of dense layers of the given widths, inputs first."""
     pairs = enumerate(pairwise(widths))
     return {f"hidden.{2 * number}": (outputs, inputs) for number, (inputs, outputs) in pairs}
 
 
-def _layer(weights: Weights, name: str) -> Layer:
+def _read_layer(weights: Weights, name: str) -> Layer:
     """A linear layer in double precision; one without a bias has zeros."""
     matrix = weights[f"{name}.weight"].T.astype(np.float64)
     bias = weights.get(f"{name}.bias", np.zeros(matrix.shape[1]))
     return matrix, bias.astype(np.float64)
 
 
-def _dense(weights: Weights, dtype: Any) -> list[Layer]:
+def _read_dense_layers(weights: Weights, dtype: Any) -> list[Layer]:
     """The dense layers, each of which is followed by a ReLU."""
     count = sum(name.startswith("hidden.") for name in weights) // 2
-    return [_in(dtype, *_layer(weights, f"hidden.{2 * number}")) for number in range(count)]
+    return [
+        _cast_layer(dtype, *_read_layer(weights, f"hidden.{2 * number}")) for number in range(count)
+    ]
 
 
-def _convolution(weights: Weights, name: str, dtype: Any) -> Layer:
+def _read_convolution(weights: Weights, name: str, dtype: Any) -> Layer:
     """A convolution as the layer of a window: rows, columns and layers are its inputs."""
     matrix = weights[f"{name}.weight"].transpose(2, 3, 1, 0).reshape(-1, KERNELS)
-    return _in(dtype, matrix, weights[f"{name}.bias"])
+    return _cast_layer(dtype, matrix, weights[f"{name}.bias"])
 
 
-def _in(dtype: Any, matrix: np.ndarray, bias: np.ndarray) -> Layer:
+def _cast_layer(dtype: Any, matrix: np.ndarray, bias: np.ndarray) -> Layer:
     return np.ascontiguousarray(matrix, dtype), bias.astype(dtype)
 
 
-def _through(layers: Sequence[Layer], values: np.ndarray) -> np.ndarray:
+def _apply_layers(layers: Sequence[Layer], values: np.ndarray) -> np.ndarray:
     """What (R, inputs) become in layers that are followed by a ReLU."""
     for matrix, bias in layers:
         values = values @ matrix
-        _rectify(values, bias[None], 1)
+        _add_and_rectify(values, bias[None], 1)
     return values
 
 
-def _convolved(maps: np.ndarray, first: Layer, second: Layer) -> np.ndarray:
+def _apply_convolutions(maps: np.ndarray, first: Layer, second: Layer) -> np.ndarray:
     """What (R, layers, rows, columns) become in two convolutions: (R, layers * rows * columns)."""
     rows, columns = (width - KERNEL_SIZE + 1 for width in maps.shape[2:])
     seen = np.empty((len(maps), rows, columns * KERNELS), maps.dtype)
-    _convolve(maps, *first, seen.reshape(len(maps), rows, columns, KERNELS))
+    _convolve_maps(maps, *first, seen.reshape(len(maps), rows, columns, KERNELS))
     matrix, bias = second
     windows = sliding_window_view(seen, KERNEL_SIZE * KERNELS, axis=2)[:, :, ::KERNELS]
     height = rows - KERNEL_SIZE + 1
@@ -221,12 +223,12 @@ def _convolved(maps: np.ndarray, first: Layer, second: Layer) -> np.ndarray:
     out = np.zeros((len(maps) * height * width, KERNELS), maps.dtype)
     for row, part in enumerate(np.split(matrix, KERNEL_SIZE)):
         out += (windows[:, row * width : (row + height) * width] @ part).reshape(out.shape)
-    _rectify(out, bias[None], 1)
+    _add_and_rectify(out, bias[None], 1)
     return out.reshape(len(maps), -1, KERNELS).swapaxes(1, 2).reshape(len(maps), -1)
 
 
 @kernel
-def _convolve(maps, matrix, bias, out):
+def _convolve_maps(maps, matrix, bias, out):
     """Convolve (R, layers, rows, columns), most of which are 0; make sums 0 or more."""
     zero = bias.dtype.type(0)
     layers, height, width = maps.shape[1:]
@@ -252,7 +254,7 @@ def _convolve(maps, matrix, bias, out):
 
 
 @kernel
-def _rectify(values, shifts, each):
+def _add_and_rectify(values, shifts, each):
     """Add (S, C) shifts, each to so many rows in turn, to (R, C) values; make them 0 or more."""
     zero = values.dtype.type(0)
     count = len(shifts)
@@ -263,7 +265,7 @@ def _rectify(values, shifts, each):
 
 
 @kernel
-def _pool(values, bias, factors, state, moves, at):
+def _pool_products(values, bias, factors, state, moves, at):
     """Write the highest products, or 0, of values (R, N, C) and factors (R, 9, N).
 
     Those of the last factors are columns of the state (R, :) from ``at[0]`` on. Those of the eight

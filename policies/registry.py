@@ -33,7 +33,7 @@ from dess.base.errors import InputError, one_of, shown
 from dess.base.files.reading import Missing, paths_in, read_text
 from dess.base.sources import path_of
 from dess.model.view import View
-from dess.policies.learner.config import CHECKPOINT, CONFIG, ranges_of, read_description
+from dess.policies.learner.config import CHECKPOINT, CONFIG, field_ranges, read_description
 from dess.scenario.fields import SAMPLED
 from dess.scenario.scenario import ScenarioSpace, load_scenario, scenario_names
 
@@ -106,7 +106,7 @@ class TypedByUser(str):
 def names() -> list[str]:
     """All policies by name, the shipped ones first."""
     shipped = [*SHIPPED, *trained_names()]
-    return [*shipped, *sorted(set(_outside()) - set(shipped))]
+    return [*shipped, *sorted(set(_registered_policies()) - set(shipped))]
 
 
 def trained_names() -> list[str]:
@@ -114,14 +114,14 @@ def trained_names() -> list[str]:
     return [path.parent.name for path in paths_in(TRAINED, f"*/{CONFIG}")]
 
 
-def descriptions() -> dict[str, str]:
+def describe_policies() -> dict[str, str]:
     """The descriptions of all policies, in the order of ``names``.
 
     Those of other packages are loaded; if one cannot be loaded, its description says so.
     """
     known = {name: description for name, (_, description) in SHIPPED.items()}
-    known |= {name: _description(TRAINED / name) for name in trained_names()}
-    outside = {name: _outside_description(point) for name, point in _outside().items()}
+    known |= {name: _describe_trained(TRAINED / name) for name in trained_names()}
+    outside = {name: _describe_registered(point) for name, point in _registered_policies().items()}
     return {name: (outside | known)[name] for name in names()}
 
 
@@ -142,7 +142,7 @@ def load(name: str | Path) -> Policy:
     name = str(name)
     if name in SHIPPED:
         module = f"dess.policies.{'planner' if name in PLANNERS else 'heuristics'}"
-        return _made(name, module, lambda: _class_of(module, SHIPPED[name][0]))
+        return _make_policy(name, module, lambda: _find_class(module, SHIPPED[name][0]))
     if folder := folder_of(name):
         from dess.policies.learner.trained import load_policy  # imports numba
 
@@ -160,9 +160,9 @@ def load(name: str | Path) -> Policy:
         kind = file["kind"]
         if not os.path.isfile(path):  # False for a name that no file can have
             raise InputError(f"policy: {path}: no such file; allowed: FILE.py:CLASS")
-        return _made(kind, str(path), lambda: _class_of(_importable(path), kind))
-    if point := _outside().get(name):
-        return _made(name, point.value, point.load)
+        return _make_policy(kind, str(path), lambda: _find_class(_import_name(path), kind))
+    if point := _registered_policies().get(name):
+        return _make_policy(name, point.value, point.load)
     _check_untrained(Path(name))
     raise InputError(f"policy: {shown(name)} is unknown{one_of(name, names(), _OTHERS)}")
 
@@ -185,11 +185,11 @@ def _check_untrained(folder: Path) -> None:
 
 def package_of(name: str) -> str:
     """The package that adds a policy, with its version; empty for all other policies."""
-    point = _outside().get(name)
+    point = _registered_policies().get(name)
     return f"{point.dist.name} {point.dist.version}" if point and point.dist else ""
 
 
-def _made(name: str, where: str, load_class: Callable[[], Callable[[], Any]]) -> Policy:
+def _make_policy(name: str, where: str, load_class: Callable[[], Callable[[], Any]]) -> Policy:
     """A policy of a class, which may be anybody's."""
     try:
         policy = load_class()()
@@ -203,7 +203,7 @@ def _made(name: str, where: str, load_class: Callable[[], Callable[[], Any]]) ->
     return policy
 
 
-def _class_of(module: str, name: str) -> Callable[[], Any]:
+def _find_class(module: str, name: str) -> Callable[[], Any]:
     """A class by the name of its module and its own.
 
     Raises:
@@ -218,7 +218,7 @@ def _class_of(module: str, name: str) -> Callable[[], Any]:
     return found[name]
 
 
-def _importable(path: Path) -> str:
+def _import_name(path: Path) -> str:
     """The name under which a file is imported, once its folder is on ``sys.path``.
 
     Raises:
@@ -249,7 +249,7 @@ def load_team(text: str, uavs: int | None = None) -> list[Policy]:
     return [load(kind(name.strip())) for name in text.split(",")[:uavs]]
 
 
-def files_of(team: str) -> list[str]:
+def python_files_in(team: str) -> list[str]:
     """Those policies of a team that are classes of Python files, which ``load_team`` would run.
 
     Nothing is imported to find out.
@@ -277,11 +277,11 @@ def confirmed(team: str, named: Iterable[str]) -> str:
         team: The team.
         named: The teams that the user has typed.
     """
-    known = {file for text in named for file in files_of(text)}
-    return TypedByUser(team) if known.issuperset(files_of(team)) else team
+    known = {file for text in named for file in python_files_in(text)}
+    return TypedByUser(team) if known.issuperset(python_files_in(team)) else team
 
 
-def _outside_description(point: EntryPoint) -> str:
+def _describe_registered(point: EntryPoint) -> str:
     """What a policy of another package is, or why it cannot be loaded."""
     origin = f"of the package {package_of(point.name)}"
     try:
@@ -292,11 +292,11 @@ def _outside_description(point: EntryPoint) -> str:
     return f"{words.partition(chr(10))[0].rstrip('.')} ({origin})" if words else origin
 
 
-def _outside() -> dict[str, EntryPoint]:
+def _registered_policies() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=GROUP)}
 
 
-def _description(folder: Path) -> str:
+def _describe_trained(folder: Path) -> str:
     """The description in the config of a trained policy, or the policy that it repeats."""
     training = read_description(folder).training
     if training.name == folder.name:
@@ -330,7 +330,7 @@ class About(NamedTuple):
     card: str
 
 
-def about(name: str) -> About:
+def describe_policy(name: str) -> About:
     """What there is to know about a policy that a user asks for.
 
     Raises:
@@ -344,18 +344,18 @@ def about(name: str) -> About:
     trained_on = described.training.scenario if described and described.layout else ""
     return About(
         name=name,
-        origin=_origin(name),
+        origin=_describe_origin(name),
         code=f"{type(policy).__module__}:{type(policy).__qualname__}",
         requires=requires,
         scenarios=[n for n, fields in scenarios.items() if requires.items() <= fields.items()],
         trained_on={field: scenarios[trained_on][field] for field in SAMPLED}
         if trained_on in scenarios
         else {},
-        card=_card(folder) or inspect.getdoc(type(policy)) or "",
+        card=_read_card(folder) or inspect.getdoc(type(policy)) or "",
     )
 
 
-def departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) -> list[str]:
+def list_departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) -> list[str]:
     """A line for each trained policy that has to act outside of the ranges of its training.
 
     Args:
@@ -363,13 +363,13 @@ def departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) -> list
         spaces: The scenarios in which they act.
     """
     lines = []
-    here = ranges_of(spaces)
+    here = field_ranges(spaces)
     for name in dict.fromkeys(name for team in policies for name in team.split(",")):
         with suppress(InputError):  # whoever loads it says what is wrong
             folder = folder_of(name)
             trained = read_description(folder).ranges if folder else {}
             beyond = [
-                f"{field} {_span(here[field])} (trained on {_span([low, high])})"
+                f"{field} {_format_range(here[field])} (trained on {_format_range([low, high])})"
                 for field, (low, high) in trained.items()
                 if field in here and not low <= here[field][0] <= here[field][1] <= high
             ]
@@ -378,11 +378,11 @@ def departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) -> list
     return lines
 
 
-def _span(ends: Iterable[float]) -> str:
+def _format_range(ends: Iterable[float]) -> str:
     return " to ".join(dict.fromkeys(f"{end:g}" for end in ends))
 
 
-def _card(folder: Path | None) -> str:
+def _read_card(folder: Path | None) -> str:
     """The model card in the folder of a trained policy; empty without one."""
     try:
         return read_text(folder / CARD, CARD_LIMIT) if folder else ""
@@ -390,7 +390,7 @@ def _card(folder: Path | None) -> str:
         return ""
 
 
-def _origin(name: str) -> str:
+def _describe_origin(name: str) -> str:
     """Where a policy comes from, in words."""
     if name in (*SHIPPED, *trained_names()):
         return f"shipped with dess {version('dess')}"

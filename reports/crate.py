@@ -25,7 +25,7 @@ from dess.analysis.results.tables import Results
 from dess.base.files import documents, tables
 from dess.base.files.reading import read_bytes
 from dess.base.files.writing import write_zip
-from dess.reports.pages.html import template
+from dess.reports.pages.html import load_template
 from dess.reports.pages.page import LARGEST, LIMIT, Page
 
 _TABLES = ("missions", "uavs", "events", BOUNDS)
@@ -48,19 +48,19 @@ def write_crate(results: Results, page: Path, path: Path, published: date, licen
         raise InputError(
             f"{damaged}: has been changed since it was written; allowed: results without damage"
         )
-    files = _files(results, page)
-    about = template("ro-crate-metadata.json").render(
+    files = _collect_files(results, page)
+    about = load_template("ro-crate-metadata.json").render(
         study=results.manifest["study"],
         manifest=results.store.manifest,
-        description=_description(results),
+        description=_describe_crate(results),
         published=published.isoformat(),
-        licence=licence_of(licence),
+        licence=find_licence(licence),
         sizes={name: len(content) for name, content in files.items()},
         page=page.name,
         dess=metadata.metadata("dess"),
     )
     entries = {"ro-crate-metadata.json": about.encode()} | files
-    write_zip(path, [*entries.items(), *_tables(results)])
+    write_zip(path, [*entries.items(), *_find_tables(results)])
 
 
 def check_page(page: Path, results: Results) -> None:
@@ -76,7 +76,7 @@ def check_page(page: Path, results: Results) -> None:
         raise InputError(f"{page}: does not show the results of this study; allowed: {allowed}")
 
 
-def licence_of(text: str) -> str:
+def find_licence(text: str) -> str:
     """The identifier of a licence, in the spelling of SPDX.
 
     Raises:
@@ -94,7 +94,7 @@ def licence_of(text: str) -> str:
     return licence
 
 
-def _files(results: Results, page: Path) -> dict[str, bytes]:
+def _collect_files(results: Results, page: Path) -> dict[str, bytes]:
     """The page, the study and its scenario as TOML files, the manifest, the licence of dess."""
     study, scenario = (_without_none(results.manifest[name]) for name in ("study", "scenario"))
     if study.keys() & {"precision", "selection"}:
@@ -109,7 +109,7 @@ def _files(results: Results, page: Path) -> dict[str, bytes]:
     }
 
 
-def _tables(results: Results) -> Iterator[tuple[str, bytes]]:
+def _find_tables(results: Results) -> Iterator[tuple[str, bytes]]:
     """The names and contents of the tables: their files, and nothing else that lies there."""
     yield from ((f"results/{name}", b"") for name in ("", *(f"{table}/" for table in _TABLES)))
     places = [Path(name, partition_name(policy)) for name in _TABLES for policy in results.policies]
@@ -126,7 +126,7 @@ def _without_none(value: Any) -> Any:
     return [_without_none(item) for item in value] if isinstance(value, list) else value
 
 
-def _description(results: Results) -> str:
+def _describe_crate(results: Results) -> str:
     manifest = results.store.manifest
     asked = results.study.description
     made = f"{len(results.missions):,} missions of {numbers.join_words(results.policies)}"

@@ -20,7 +20,7 @@ from dess.analysis.answers import summary
 from dess.analysis.answers.settings.points import points_in_words, values_of_points, varied_values
 from dess.analysis.figures import style
 from dess.analysis.results.tables import Results
-from dess.reports.pages.html import rendered
+from dess.reports.pages.html import render_part
 
 
 class Grid:
@@ -71,7 +71,7 @@ class Grid:
         """The rows of ``means`` of the design point ``start``."""
         return self.means[self.means["point"] == self.start]
 
-    def answer(self) -> str:
+    def describe_start(self) -> str:
         """The policies at the design point ``start``, which it names, the best first."""
         rows = self.at_start()
         best = rows[rows["metric"] == metrics.PRODUCT].sort_values("mean", ascending=False)
@@ -82,20 +82,20 @@ class Grid:
             f"With {setting}, the product is {numbers.join_words(parts)} (n = {counted} missions)."
         )
 
-    def table(self) -> pd.DataFrame:
+    def means_table(self) -> pd.DataFrame:
         """The means of all settings: the fields, then the columns of ``dess.analysis.summary``."""
         return self.means.join(values_of_points(self.results), on="point")[
             [*self._places, "policy", "metric", "mean", "low", "high", "n"]
         ]
 
-    def settings(self, field: str) -> list[str]:
+    def format_settings(self, field: str) -> list[str]:
         """The values of a field in the form of ``--set``, such as ``initial_data=[5, 7.5]``."""
         first = self._places.reset_index().groupby(field)["index"].first()
         design = self.results.store.manifest.points
         return [f"{field}={json.dumps(design[point].values[field])}" for point in first]
 
 
-def explorer(results: Results) -> HTML:
+def make_explorer(results: Results) -> HTML:
     """Sliders, a choice of policies, the three metrics of each, and a curve along a slider.
 
     Args:
@@ -122,20 +122,21 @@ def explorer(results: Results) -> HTML:
                 "name": field.plain,
                 "unit": field.unit,
                 "values": [names.value_text(value) for value in grid.values[field.key]],
-                "settings": grid.settings(field.key),
+                "settings": grid.format_settings(field.key),
             }
             for field in fields
         ],
         # Of each estimate in the order of the means: the mean and the ends of its interval, in
         # tenths of a percent, and the number of missions.
         "estimates": [
-            [*map(_tenths, ends), n] for *ends, n in grid.means[columns].itertuples(index=False)
+            [*map(_round_to_tenths, ends), n]
+            for *ends, n in grid.means[columns].itertuples(index=False)
         ],
     }
     shown = {"fields": fields, "policies": looks, "metrics": metrics.METRICS, "texts": texts}
-    return rendered("explorer.html", data=data, **shown)
+    return render_part("explorer.html", data=data, **shown)
 
 
-def _tenths(share: float) -> int:
+def _round_to_tenths(share: float) -> int:
     """A share in tenths of a percent, rounded like ``numbers.format_percent``."""
     return round(10 * float(f"{100 * share:.1f}"))

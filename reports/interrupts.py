@@ -50,15 +50,15 @@ class Interrupts(AbstractContextManager["Interrupts"]):
 
     def __enter__(self) -> "Interrupts":
         if threading.current_thread() is threading.main_thread():
-            sys.unraisablehook = self._unraisable
+            sys.unraisablehook = self._ignore_unraisable
             for number in NUMBERS:
                 if signal.getsignal(number) not in (signal.SIG_IGN, None):
-                    self._handlers[number] = signal.signal(number, self._receive)
+                    self._handlers[number] = signal.signal(number, self._receive_signal)
             if self.is_last and os.name == "posix":
                 seen, told = os.pipe()
                 os.set_blocking(told, False)
                 signal.set_wakeup_fd(told, warn_on_full_buffer=False)
-                threading.Thread(target=self._watch, args=(seen,), daemon=True).start()
+                threading.Thread(target=self._watch_main_thread, args=(seen,), daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -70,27 +70,27 @@ class Interrupts(AbstractContextManager["Interrupts"]):
         if threading.current_thread() is threading.main_thread():
             sys.unraisablehook = self._hook
 
-    def _receive(self, number: int, frame: Any) -> None:
+    def _receive_signal(self, number: int, frame: Any) -> None:
         if not self.received and hasattr(signal, "setitimer"):
-            self._handlers[signal.SIGALRM] = signal.signal(signal.SIGALRM, self._receive)
+            self._handlers[signal.SIGALRM] = signal.signal(signal.SIGALRM, self._receive_signal)
             signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
         self.received = True
         if not _is_handled():
             raise KeyboardInterrupt
 
-    def _watch(self, seen: int) -> None:
+    def _watch_main_thread(self, seen: int) -> None:
         """End the process if the main thread does not notice a signal."""
         while number := os.read(seen, 1):
             end = time.process_time() + UNNOTICED
             while time.process_time() < end and not self.received:
                 time.sleep(0.05)
-            if not self.received and signal.getsignal(number[0]) == self._receive:
+            if not self.received and signal.getsignal(number[0]) == self._receive_signal:
                 if writing := sys.modules.get("dess.base.files.writing"):
                     writing.remove_temporaries()
                 os.write(2, f"\n{LINE}\n".encode())  # there may be a progress bar
                 os._exit(EXIT_CODE)
 
-    def _unraisable(self, error: Any) -> None:
+    def _ignore_unraisable(self, error: Any) -> None:
         """Say nothing of an interrupt that came in a finalizer or callback: it comes again."""
         if not isinstance(error.exc_value, KeyboardInterrupt):
             self._hook(error)

@@ -1,7 +1,7 @@
 """A mission played slot by slot: in a page, with buttons, a slider or the keyboard, or in a file.
 
-A page contains ``library()`` once, before its first ``player``; then it needs no network. What is
-drawn is in ``templates/player.js``.
+A page contains ``player_script()`` once, before its first ``make_player``; then it needs no
+network. What is drawn is in ``templates/player.js``.
 
     display(library())
     display(player([Shown(log, scenario, "One UAV")], "player-1"))
@@ -33,7 +33,7 @@ from dess.analysis.figures import missions, style
 from dess.analysis.figures.style import node_colours, uav_colours
 from dess.analysis.metrics import format_length, size_of
 from dess.analysis.results import event_log
-from dess.reports.pages.html import Part, figures, template
+from dess.reports.pages.html import Part, load_template, make_figures
 from dess.scenario.scenario import Scenario
 
 TRAIL = 12  # number of last moves that are drawn behind a UAV
@@ -89,14 +89,14 @@ class Playback:
         """
         self._log = pd.DataFrame(events)
         self.scenario = scenario
-        _check(self._log, scenario)
+        _check_log(self._log, scenario)
         self.residual = event_log.residual_data(self._log).to_numpy()
         self.end = len(self.residual) - 1
-        self.fleet = self._fleet()
+        self.fleet = self._replay_fleet()
         self.uav_colours = uav_colours(scenario.uavs)
         self.node_colours = node_colours(len(scenario.nodes))
 
-    def _fleet(self) -> dict[str, np.ndarray]:
+    def _replay_fleet(self) -> dict[str, np.ndarray]:
         slots = event_log.uav_slots(self._log)
         levels = event_log.battery_levels(self._log)
         first = slots.groupby("uav", as_index=False).first()
@@ -111,7 +111,7 @@ class Playback:
             fleet[name] = table[name].where(active, value).to_numpy(type(value))
         return fleet | {"over": ~active.shift(-1, fill_value=False).to_numpy(bool)}
 
-    def status(self, slot: int) -> str:
+    def describe_slot(self, slot: int) -> str:
         """The residual data and the pads in use after a slot, in words."""
         charging, waiting = (self.fleet[state][slot].sum() for state in ("charging", "waiting"))
         pads = self.scenario.charging_pads
@@ -126,17 +126,17 @@ class Playback:
             return f"{now} of {end} · {left * data:,.3g} MB left · {used}"
         return f"slot {slot} of {self.end} · {left:.1f} data units left · {used}"
 
-    def jumps(self) -> Iterator[tuple[int, str]]:
+    def find_jumps(self) -> Iterator[tuple[int, str]]:
         """The slots at which something notable is seen, in their order, and what it is in words."""
         by_slot: dict[int, list[str]] = {}
         log = self._log[self._log["event"].isin([*JUMPS])]
         for row in log.itertuples():
             slot = int(row.time) + (row.event in AT_START)
-            by_slot.setdefault(slot, []).append(JUMPS[row.event].format(self._name(row)))
+            by_slot.setdefault(slot, []).append(JUMPS[row.event].format(self._name_of_row(row)))
         for slot in sorted(by_slot):
             yield slot, ", ".join(by_slot[slot])
 
-    def _name(self, row: Any) -> str | int:
+    def _name_of_row(self, row: Any) -> str | int:
         """The number of the UAV of an event, or the name of its node."""
         if row.uav >= 0:
             return int(row.uav) + 1
@@ -159,7 +159,7 @@ class Playback:
     @property
     def paths(self) -> list[list[tuple[int, int]]]:
         """For every UAV the corners of its path, from its start to where its mission ended."""
-        return [_corners(self.fleet["x"][:, uav], self.fleet["y"][:, uav])
+        return [_find_corners(self.fleet["x"][:, uav], self.fleet["y"][:, uav])
                 for uav in range(self.scenario.uavs)]  # fmt: skip
 
     @property
@@ -176,18 +176,18 @@ class Playback:
             "colours": {"uavs": self.uav_colours, "nodes": self.node_colours},
             "pads": scenario.charging_pads,
             "trail": TRAIL,
-            "units": units_of(scenario),
+            "units": choose_units(scenario),
             "filled": np.isin(range(scenario.uavs), filled).tolist(),
             "fleet": {name: (1 * values).tolist() for name, values in self.fleet.items()},
             "residual": self.residual.round(2).tolist(),
-            "status": [self.status(slot) for slot in range(self.end + 1)],
-            "events": [*self.jumps()],
+            "status": [self.describe_slot(slot) for slot in range(self.end + 1)],
+            "events": [*self.find_jumps()],
             "ages": event_log.ages_of_nodes(log).round(2).to_numpy().tolist() if aged else None,
             "meanAge": event_log.mean_age(log).round(2).to_numpy().tolist() if aged else None,
         }
 
 
-def _corners(x: np.ndarray, y: np.ndarray) -> list[tuple[int, int]]:
+def _find_corners(x: np.ndarray, y: np.ndarray) -> list[tuple[int, int]]:
     """The cells at which a path begins, turns and ends."""
     cells = np.column_stack([x, y])
     moves = np.diff(cells, axis=0)
@@ -197,7 +197,7 @@ def _corners(x: np.ndarray, y: np.ndarray) -> list[tuple[int, int]]:
     return [(int(x), int(y)) for x, y in cells[turns]]
 
 
-def units_of(scenario: Scenario) -> dict[str, tuple[str, float]]:
+def choose_units(scenario: Scenario) -> dict[str, tuple[str, float]]:
     """The units in which a player tells lengths, times and data, and what 1 of the model is."""
     if not (units := scenario.units):
         return {"length": ("cells", 1), "time": ("mission slots", 1), "data": ("data units", 1)}
@@ -205,7 +205,7 @@ def units_of(scenario: Scenario) -> dict[str, tuple[str, float]]:
     return {what: (unit, size_of(unit, units)) for what, unit in told.items()}
 
 
-def _check(log: pd.DataFrame, scenario: Scenario) -> None:
+def _check_log(log: pd.DataFrame, scenario: Scenario) -> None:
     for edge in ("mission_start", "mission_end"):
         rows = log[log["event"] == edge]
         for what, count in (("uav", scenario.uavs), ("node", len(scenario.nodes))):
@@ -234,22 +234,22 @@ AGE_READING = (
 )
 
 
-def reading(scenario: Scenario) -> str:
+def explain_player(scenario: Scenario) -> str:
     """How to read the player of a mission of this scenario."""
     return READING + (AGE_READING if scenario.age.measured else "")
 
 
-def library() -> HTML:
+def player_script() -> HTML:
     """The script of all players, which a page needs once, before its players."""
-    return HTML(f"<script>{template('player.js').render(style=style)}</script>")
+    return HTML(f"<script>{load_template('player.js').render(style=style)}</script>")
 
 
-def together(players: Iterable[Part]) -> Part:
+def join_players(players: Iterable[Part]) -> Part:
     """Several players side by side, which show the same slot."""
-    return figures([player.values["figures"][0] for player in players], "gallery together")
+    return make_figures([player.values["figures"][0] for player in players], "gallery together")
 
 
-def player(missions: Sequence[Shown], name: str, caption: str = "") -> Part:
+def make_player(missions: Sequence[Shown], name: str, caption: str = "") -> Part:
     """A player: a mission can be chosen, played, paused and shown slot by slot.
 
     Args:
@@ -263,10 +263,10 @@ def player(missions: Sequence[Shown], name: str, caption: str = "") -> Part:
     playbacks = [Playback(shown.events, shown.scenario) for shown in missions]
     texts = [{"title": shown.title, "choice": shown.choice} for shown in missions]
     data = [played.data | text for played, text in zip(playbacks, texts, strict=True)]
-    drawn = template("player.html").render(
+    drawn = load_template("player.html").render(
         name=name, missions=data, first=playbacks[0], style=style
     )
-    return figures([{"name": name, "player": drawn, "caption": caption}])
+    return make_figures([{"name": name, "player": drawn, "caption": caption}])
 
 
 GIF, MP4 = "gif", "mp4"
@@ -319,7 +319,7 @@ def check_ffmpeg() -> None:
 def _write_gif(film: "Film", file: str | Path) -> None:
     """Frames share the colours of the first one, so that the file stays small."""
     pictures: list[Image.Image] = []
-    for pixels in film.frames():
+    for pixels in film.draw_frames():
         palette = pictures[0] if pictures else None
         picture = Image.fromarray(pixels).convert("RGB")
         pictures.append(picture.quantize(palette=palette, dither=Image.Dither.NONE))
@@ -333,10 +333,10 @@ def _write_video(film: "Film", file: str | Path) -> None:
     writer = FFMpegWriter(SLOTS_PER_SECOND, codec="h264", extra_args=exact)
     width, height = film.figure.get_size_inches()
     screen = Figure(figsize=(width, height), dpi=DPI)
-    picture = screen.figimage(film.frame(0))
+    picture = screen.figimage(film.draw_frame(0))
     try:
         with writer.saving(screen, str(file), DPI):
-            for pixels in film.frames():
+            for pixels in film.draw_frames():
                 picture.set_data(pixels)
                 writer.grab_frame()
     except CalledProcessError as error:
@@ -379,29 +379,29 @@ class Film:
             draw(events, scenario, ax)
         for ax in self.curves[:-1]:
             ax.set_xlabel("")
-        self._discs(self.playback.residual.max(axis=0), facecolors="white",
+        self._draw_discs(self.playback.residual.max(axis=0), facecolors="white",
                     edgecolors=self.playback.node_colours, linewidths=1)  # fmt: skip
         self.canvas = FigureCanvasAgg(self.figure)
         self.canvas.draw()
         self._background = self.canvas.copy_from_bbox(self.figure.bbox)
 
-    def frames(self) -> Iterator[np.ndarray]:
+    def draw_frames(self) -> Iterator[np.ndarray]:
         """The pixels of every slot, (height, width, 4), and the last ones for a while."""
         for slot in range(self.end + 1):
-            pixels = self.frame(slot)
+            pixels = self.draw_frame(slot)
             yield pixels
         for _ in range(LAST_SECONDS * SLOTS_PER_SECOND):
             yield pixels
 
-    def frame(self, slot: int) -> np.ndarray:
+    def draw_frame(self, slot: int) -> np.ndarray:
         """The pixels of the mission after a number of slots, (height, width, 4)."""
         self.canvas.restore_region(self._background)
-        for artist in self.moving(slot):
+        for artist in self.moving_artists(slot):
             self.figure.draw_artist(artist)
             artist.remove()
         return np.array(self.canvas.buffer_rgba())
 
-    def moving(self, slot: int) -> Iterator[Artist]:
+    def moving_artists(self, slot: int) -> Iterator[Artist]:
         """All that moves, as it is after a number of slots, from the bottom to the top."""
         playback = self.playback
         fleet = self.playback.fleet
@@ -414,7 +414,7 @@ class Film:
                 yield from self.sea.plot(
                     link[0], link[1], color=playback.node_colours[node], linewidth=2
                 )
-        yield self._discs(playback.residual[slot], c=playback.node_colours, linewidths=0)
+        yield self._draw_discs(playback.residual[slot], c=playback.node_colours, linewidths=0)
         for state, fill in (("waiting", "none"), ("charging", style.ZONE_EDGE)):
             spots = cells[slot, fleet[state][slot]].T
             yield self.sea.scatter(spots[0], spots[1], PAD_SIZE**2, marker="s", facecolors=fill,
@@ -425,11 +425,11 @@ class Film:
         for uav in range(len(x)):
             yield self.sea.text(x[uav], y[uav], str(uav + 1), size=7, color="white", weight="bold",
                                 ha="center", va="center_baseline")  # fmt: skip
-        yield self.sea.text(0, 1.02, playback.status(slot), transform=self.sea.transAxes)
+        yield self.sea.text(0, 1.02, playback.describe_slot(slot), transform=self.sea.transAxes)
         for ax in self.curves:
             yield ax.axvline(slot, color=style.INK, linewidth=1.2)
 
-    def _discs(self, data: np.ndarray, **look: Any) -> Artist:
+    def _draw_discs(self, data: np.ndarray, **look: Any) -> Artist:
         """A disc per node, whose area is proportional to its data."""
         areas = NODE_SIZE**2 * data / max(self.playback.residual.max(), 1e-9)
         x, y = zip(*self.playback.scenario.nodes, strict=True)

@@ -84,7 +84,7 @@ def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):
 @kernel
 def _goal(kind, mission, uavs, i, residual, sensors, nodes, chart, home, reach):
     charge = battery.must_charge(mission, uavs[i], rules.data_left(mission, residual))
-    return heuristics._goal(
+    return heuristics._choose_goal(
         kind, mission, uavs, i, residual, sensors, nodes, np.zeros(0, np.int64), chart, charge,
         home, reach,
     )  # fmt: skip

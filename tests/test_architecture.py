@@ -64,7 +64,7 @@ MAY_RUN_FILES = {
     },
     "dess.policies.load": set(),
     "dess.policies.load_team": {"dess.api"},  # what a user gives as a policy
-    "dess.policies.registry.about": {"dess.reports.cli.lists"},
+    "dess.policies.registry.describe_policy": {"dess.reports.cli.lists"},
     "dess.analysis.execution.evaluation.evaluate": {"dess.analysis"},
     **{
         f"dess.analysis.ask.question.{name}_question": {

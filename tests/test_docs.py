@@ -123,7 +123,7 @@ def test_commands_are_accepted(arguments):
     for team in {*map(str, np.atleast_1d(given.get("policy") or []))} - trained:
         assert policies.load_team(team)
     if arguments[0] == "sweep":
-        values = options.all_values(given["settings"])
+        values = options.parse_all_values(given["settings"])
         assert load_scenario(given["scenario"], **{field: of[0] for field, of in values.items()})
     elif given.get("scenario"):
         assert options.load_space(given["scenario"], given["settings"])

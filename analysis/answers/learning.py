@@ -25,7 +25,7 @@ from dess.analysis.stats.verdict import INCONCLUSIVE, MARKS, judge_parts, positi
 from dess.base.errors import one_of
 from dess.base.files.reading import paths_in
 from dess.base.files.tables import read_table
-from dess.policies.learner.config import TrainingConfig, learner_of, read_description
+from dess.policies.learner.config import TrainingConfig, learner_identifier, read_description
 
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.axes import Axes
@@ -663,7 +663,7 @@ def curves_by_learner(policies: Iterable[Trained]) -> pd.DataFrame:
     """
     learners: dict[str, list[Trained]] = {}
     for policy in policies:
-        learners.setdefault(learner_of(policy.config), []).append(policy)
+        learners.setdefault(learner_identifier(policy.config), []).append(policy)
     return pd.concat(
         policy.curve.assign(
             variant=numbers.join_words([p.name for p in group]), seed=policy.config.seed

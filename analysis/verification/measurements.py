@@ -33,7 +33,7 @@ from dess.base.files.reading import Missing
 from dess.base.files.writing import check_target, write_file
 from dess.model.state import HOVER
 from dess.model.view import View
-from dess.policies.registry import files_of, load_team
+from dess.policies.registry import load_team, python_files_in
 from dess.scenario.scenario import ScenarioSpace
 
 
@@ -246,7 +246,7 @@ def simulate_missions(
         progress: Called after every mission.
     """
     space, seed = results.scenario(), results.store.manifest.seed
-    teams = {name: load_team(name) for name in results.policies if not files_of(name)}
+    teams = {name: load_team(name) for name in results.policies if not python_files_in(name)}
     missions, chosen = [], [*_missions_to_repeat(results, teams, count)]
     for done, (policy, replication) in enumerate(chosen, 1):
         record = simulate(space, teams[policy], seed, replication)

@@ -23,15 +23,15 @@ from dess.model.state import ACTION_NAMES, END_NAMES, State, constants_of, types
 from dess.policies.learner import trained
 from dess.policies.learner.config import CHECKPOINT, Name, Number, TrainingConfig
 from dess.policies.learner.dqn import DQNTraining
-from dess.policies.learner.network import arrays_of, tensors_of
+from dess.policies.learner.network import to_arrays, to_tensors
 from dess.policies.learner.ppo import ProximalTraining
 from dess.policies.learner.trained import (
     Arrays,
-    array_of,
-    bytes_of,
-    form,
-    part,
+    array_without_memory,
+    arrays_under,
+    from_bytes,
     require_version,
+    to_bytes,
 )
 from dess.policies.learner.training import METRICS, Training
 from dess.scenario.fields import SAMPLED
@@ -103,15 +103,15 @@ def save_training(path: Path, training: Training) -> None:
     Raises:
         InputError: If it cannot be written.
     """
-    values = _arrays(training)
+    values = _common_arrays(training)
     for optimizer, of_optimizer in training.learner.optimizers.items():
         for index, state in of_optimizer.state_dict()["state"].items():
-            values |= arrays_of({f"{optimizer}.{index}.{key}": state[key] for key in state})
+            values |= to_arrays({f"{optimizer}.{index}.{key}": state[key] for key in state})
     if training.finished:
-        values["finished"] = bytes_of(np.concatenate(training.finished))
+        values["finished"] = to_bytes(np.concatenate(training.finished))
     for name in training.losses[0] if training.losses else ():
         losses = torch.stack([loss[name] for loss in training.losses])
-        values |= arrays_of({f"losses.{name}": losses})
+        values |= to_arrays({f"losses.{name}": losses})
     header = {
         "format": FORMAT,
         "config": training.config.model_dump(mode="json"),
@@ -126,7 +126,7 @@ def save_training(path: Path, training: Training) -> None:
     if isinstance(training, DQNTraining):
         header["stepper"] = [training.stepper.seed, training.stepper.replication]
         header["replay"] = training.replay.count if training.config.checkpoint_replay else None
-    header["sha256"] = trained.digest(header, values)
+    header["sha256"] = trained.hash_arrays(header, values)
     trained.write_arrays(path, values, {"dess": json.dumps(header)})
 
 
@@ -160,7 +160,10 @@ def load_training(
             "allowed: the one it began with"
         )
     require_version(header.observation_version, training.observation, path)
-    if trained.digest({k: v for k, v in raw.items() if k != "sha256"}, values) != header.sha256:
+    if (
+        trained.hash_arrays({k: v for k, v in raw.items() if k != "sha256"}, values)
+        != header.sha256
+    ):
         raise InputError(
             f"{path}: damaged: its content has not the checksum of its header; allowed: {_WHOLE}"
         )
@@ -169,8 +172,8 @@ def load_training(
         for name, value in raw["progress"].items():
             setattr(training, name, value)
         finished = len(values.get("finished", ())) // MISSION_RECORD.itemsize
-        trained.require_forms(values, _forms(training, finished), str(path))
-        _restore(training, values, raw)
+        trained.require_same_forms(values, _expected_arrays(training, finished), str(path))
+        _restore_training(training, values, raw)
     except (LookupError, ValueError, TypeError, RuntimeError, OverflowError) as error:
         problem = str(error).removeprefix(f"{path}: ").partition("; allowed:")[0]
         raise InputError(
@@ -179,33 +182,33 @@ def load_training(
     return training
 
 
-def _restore(training: Training, values: Arrays, header: dict[str, Any]) -> None:
+def _restore_training(training: Training, values: Arrays, header: dict[str, Any]) -> None:
     """Restore the state of a saved training in a new training that is in the same phase."""
     with torch.no_grad():
-        for name, network in _networks(training).items():
-            for key, value in tensors_of(part(values, name)).items():
+        for name, network in _network_arrays(training).items():
+            for key, value in to_tensors(arrays_under(values, name)).items():
                 network[key].copy_(value)
     for optimizer, of_optimizer in training.learner.optimizers.items():
         states: dict[int, dict[str, torch.Tensor]] = {}
-        for key, value in tensors_of(part(values, optimizer)).items():
+        for key, value in to_tensors(arrays_under(values, optimizer)).items():
             index, _, field = key.partition(".")
             states.setdefault(int(index), {})[field] = value
         groups = of_optimizer.state_dict()["param_groups"]
         of_optimizer.load_state_dict({"state": states, "param_groups": groups})
     if isinstance(training, DQNTraining):
         training.stepper.start_at(*header["stepper"])
-        for name, array in _missions(training).items():
+        for name, array in _mission_arrays(training).items():
             held = values[name]
             is_bytes = name.startswith("stepper.")
-            restored = array_of(held, array.dtype) if is_bytes else held
+            restored = from_bytes(held, array.dtype) if is_bytes else held
             array[...] = restored.reshape(array.shape)
         _check_state(training.stepper.state, training.stepper.space)
         if training.config.checkpoint_replay:
             training.replay.count = int(header["replay"])
             _check_replay(training.replay.arrays, max(training.space.size))
     if "finished" in values:
-        training.finished = [array_of(values["finished"], MISSION_RECORD)]
-    losses = tensors_of(part(values, "losses"), training.device)
+        training.finished = [from_bytes(values["finished"], MISSION_RECORD)]
+    losses = to_tensors(arrays_under(values, "losses"), training.device)
     for row in zip(*losses.values(), strict=True):
         training.losses.append(dict(zip(losses, row, strict=True)))
     training.curve = header["curve"]
@@ -213,7 +216,7 @@ def _restore(training: Training, values: Arrays, header: dict[str, Any]) -> None
     torch.set_rng_state(torch.tensor(values["random.torch"]))
 
 
-def _forms(training: Training, finished: int) -> Arrays:
+def _expected_arrays(training: Training, finished: int) -> Arrays:
     """Arrays of the forms that a checkpoint of a training has at its tick.
 
     Args:
@@ -221,36 +224,36 @@ def _forms(training: Training, finished: int) -> Arrays:
         finished: The number of missions that ended since the last evaluation.
     """
     config = training.config
-    forms = _arrays(training)
+    forms = _common_arrays(training)
     for optimizer, of_optimizer in training.learner.optimizers.items():
-        if training.tick - training.phase_start <= training.learner.waits(optimizer):
+        if training.tick - training.phase_start <= training.learner.ticks_before_step(optimizer):
             continue
         for index, weight in enumerate(of_optimizer.param_groups[0]["params"]):
-            forms[f"{optimizer}.{index}.step"] = form(())
+            forms[f"{optimizer}.{index}.step"] = array_without_memory(())
             for name in ("exp_avg", "exp_avg_sq"):
-                forms[f"{optimizer}.{index}.{name}"] = form(weight.shape)
+                forms[f"{optimizer}.{index}.{name}"] = array_without_memory(weight.shape)
     last = training.tick - training.tick % config.evaluate_every
     updates = (training.tick - max(last, training.phase_start)) * config.updates
     if updates and not training.done:
         for name in ("loss", "value", "gradient_norm"):
-            forms[f"losses.{name}"] = form((updates,))
+            forms[f"losses.{name}"] = array_without_memory((updates,))
     if finished:
-        forms["finished"] = form((finished * MISSION_RECORD.itemsize,), np.uint8)
+        forms["finished"] = array_without_memory((finished * MISSION_RECORD.itemsize,), np.uint8)
     return forms
 
 
-def _arrays(training: Training) -> Arrays:
+def _common_arrays(training: Training) -> Arrays:
     """The arrays that every checkpoint of a training has, by name."""
-    arrays = arrays_of({"random.torch": torch.get_rng_state()})
-    for name, network in _networks(training).items():
-        arrays |= arrays_of({f"{name}.{key}": value for key, value in network.items()})
-    for name, array in _missions(training).items():
+    arrays = to_arrays({"random.torch": torch.get_rng_state()})
+    for name, network in _network_arrays(training).items():
+        arrays |= to_arrays({f"{name}.{key}": value for key, value in network.items()})
+    for name, array in _mission_arrays(training).items():
         is_bytes = name.startswith("stepper.")
-        arrays[name] = bytes_of(array) if is_bytes else array
+        arrays[name] = to_bytes(array) if is_bytes else array
     return arrays
 
 
-def _missions(training: Training) -> dict[str, np.ndarray]:
+def _mission_arrays(training: Training) -> dict[str, np.ndarray]:
     """The arrays of the missions in progress and of the replay memory, if a training has them."""
     if not isinstance(training, DQNTraining):
         return {}
@@ -261,7 +264,7 @@ def _missions(training: Training) -> dict[str, np.ndarray]:
     return arrays
 
 
-def _networks(training: Training) -> dict[str, dict[str, torch.Tensor]]:
+def _network_arrays(training: Training) -> dict[str, dict[str, torch.Tensor]]:
     """The weights of all networks of a training, by name."""
     networks = {name: of.state_dict() for name, of in training.learner.networks.items()}
     return networks | {"best": training.best}

@@ -259,7 +259,7 @@ class TrainingConfig(_Settings):
         """
         return load_scenario(self.scenario, **self.set)
 
-    def spaces(self, of_evaluations: bool = False) -> list[ScenarioSpace]:
+    def mission_spaces(self, of_evaluations: bool = False) -> list[ScenarioSpace]:
         """The scenarios that missions are drawn from: the seas or, without them, the one scenario.
 
         Args:
@@ -301,7 +301,7 @@ def load_config(
         InputError: If the config does not exist, or it or its scenario is not valid.
     """
     where, values = _CONFIGS.load(name_or_path)
-    config = config_of(values | overrides, where)
+    config = validate_config(values | overrides, where)
     config = config.model_copy(update={"set": config.set | dict(fields or {})})
     for key in sorted(config.set.keys() & TrainingConfig.model_fields.keys()):
         raise InputError(
@@ -315,7 +315,7 @@ def load_config(
     return config
 
 
-def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
+def validate_config(values: dict[str, Any], where: str) -> TrainingConfig:
     """Validate plain values, read from ``where``; the scenario's file need not exist.
 
     Raises:
@@ -329,7 +329,7 @@ def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
     return validated(TrainingConfig, values, where)
 
 
-def learner_of(config: TrainingConfig) -> str:
+def learner_identifier(config: TrainingConfig) -> str:
     """An identifier that trainings share if they differ only in the seed: name and hash."""
     settings = config.model_dump(mode="json", exclude={"seed", "description"})
     parts: list[tuple[dict[str, Any], type[BaseModel]]] = [(settings, TrainingConfig)]
@@ -420,7 +420,7 @@ class Description(Document):
 _PLACES = {"grid", "rows", "cell_size", "max_slots", "zones.pads", "wind.seed"}
 
 
-def ranges_of(spaces: Iterable[ScenarioSpace]) -> dict[str, list[float]]:
+def field_ranges(spaces: Iterable[ScenarioSpace]) -> dict[str, list[float]]:
     """The least and the largest value of each numeric field in the missions of scenarios.
 
     Left out is what decides nothing, as rewards, or cannot be compared by a range, as the map.

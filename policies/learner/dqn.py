@@ -67,12 +67,12 @@ class ReplayMemory:
         self.arrays = self._states._asdict() | outcomes
 
     @staticmethod
-    def bytes_for(capacity: int, num_envs: int, uavs: int, nodes: int) -> int:
+    def count_bytes(capacity: int, num_envs: int, uavs: int, nodes: int) -> int:
         """The size of such a memory [bytes]."""
         one = ReplayMemory(1, 1, uavs, nodes)
         return capacity * num_envs * sum(array.nbytes for array in one.arrays.values())
 
-    def add(self, states: CompactStates, *outcome: np.ndarray) -> None:
+    def add_slot(self, states: CompactStates, *outcome: np.ndarray) -> None:
         """Add one slot of all environments.
 
         Args:
@@ -87,7 +87,7 @@ class ReplayMemory:
                 ring[here] = new
         self.count += 1
 
-    def sample(
+    def draw_batch(
         self, size: int, n_step: int, discount: float, generator: np.random.Generator
     ) -> Batch:
         """Draw transitions uniformly, with replacement, among those whose later state is stored.
@@ -136,13 +136,13 @@ class ReplayMemory:
         reward = np.empty(size, np.float32)
         factor = np.empty(size, np.float32)
         known = (self.arrays[name] for name in ("reward", "terminated", "truncated"))
-        _returns(row, uav, n_step, discount, self.num_envs, *known, later, reward, factor)
+        _compute_returns(row, uav, n_step, discount, self.num_envs, *known, later, reward, factor)
         action = self.arrays["action"][row, uav].astype(np.int64)
         return Batch(self._states, row, later, uav, action, reward, factor)
 
 
 @kernel
-def _returns(
+def _compute_returns(
     rows, uavs, n_step, discount, num_envs, rewards, terminated, truncated, later, total, factor
 ):
     """Compute n-step returns, which end when the UAV's mission ends.
@@ -204,14 +204,14 @@ class DQNLearner(training.Learner):
         average = copy.deepcopy(self.target) if config.average_rate < 1.0 else None
         super().__init__(config, device, online=network, target=self.target, average=average)
 
-    def values(
+    def action_values(
         self, network: nn.Module, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> torch.Tensor:
         """The (R, 5) action values of UAV ``uavs[r]`` in state ``missions[r]``."""
         parts = self.observation.encode(states, missions, uavs)
-        return network(*map(self.tensor, parts))
+        return network(*map(self.to_tensor, parts))
 
-    def update(self, batch: Batch, learning_rate: float) -> dict[str, torch.Tensor]:
+    def update_networks(self, batch: Batch, learning_rate: float) -> dict[str, torch.Tensor]:
         """Make one gradient step on a minibatch; return loss, mean Q-value and gradient norm.
 
         Args:
@@ -221,7 +221,7 @@ class DQNLearner(training.Learner):
         Raises:
             DivergenceError: If one of them is not finite; the weights are then as before.
         """
-        loss, chosen = self.loss(batch)
+        loss, chosen = self.compute_loss(batch)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         norm = nn.utils.clip_grad_norm_(self.online.parameters(), self.config.gradient_norm)
@@ -231,20 +231,20 @@ class DQNLearner(training.Learner):
         training.soft_update(self.target, self.online, self.config.target_rate)
         return done
 
-    def loss(self, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
+    def compute_loss(self, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
         """The loss of the TD error on a minibatch, and the (B,) values of the actions in it."""
-        values = self.values(self.online, batch.state, batch.rows, batch.uav)
+        values = self.action_values(self.online, batch.state, batch.rows, batch.uav)
         with torch.no_grad():
             parts = self.observation.encode(batch.state, batch.later, batch.uav)
-            later = [*map(self.tensor, parts)]
+            later = [*map(self.to_tensor, parts)]
             q_target = double_dqn_target(
-                self.tensor(batch.reward) * self.config.reward_scale,
-                self.tensor(batch.discount),
+                self.to_tensor(batch.reward) * self.config.reward_scale,
+                self.to_tensor(batch.discount),
                 self.online(*later),
                 self.target(*later),
-                self.tensor(masks(batch.state, batch.later, batch.uav)),
+                self.to_tensor(masks(batch.state, batch.later, batch.uav)),
             )
-        chosen = values.gather(1, self.tensor(batch.action)[:, None]).squeeze(1)
+        chosen = values.gather(1, self.to_tensor(batch.action)[:, None]).squeeze(1)
         return _LOSSES[self.config.loss](chosen, q_target), chosen
 
 
@@ -263,7 +263,7 @@ class DQNTraining(training.Training):
 
     learner: DQNLearner
 
-    def _learner(self, network: nn.Module) -> DQNLearner:
+    def _make_learner(self, network: nn.Module) -> DQNLearner:
         return DQNLearner(network, self.observation, self.config, self.device)
 
     def _begin_missions(self) -> None:
@@ -277,22 +277,24 @@ class DQNTraining(training.Training):
         self.replay = ReplayMemory(config.replay, config.num_envs, fleet, len(self.space.nodes))
         home = spread(zones, self.space.chart.parking)[0].reshape(zones.shape)
         self.home = np.pad(home, 1, constant_values=FAR)
-        self._launch(self.stepper.indices)
+        self._launch_missions(self.stepper.indices)
 
-    def _learn(self, share: float) -> None:
+    def _learn_in_tick(self, share: float) -> None:
         config = self.config
-        epsilon = training.between(self.phase.epsilon, share / self.phase.epsilon_decay)
+        epsilon = training.interpolate_ends(self.phase.epsilon, share / self.phase.epsilon_decay)
         if self.replay.count == 0:
             for _ in range(config.learning_starts):
-                self._collect(1.0 if self.tick == 0 else epsilon)
-        self._collect(epsilon)
-        rate = training.between(self.phase.learning_rate, share)
+                self._collect_slot(1.0 if self.tick == 0 else epsilon)
+        self._collect_slot(epsilon)
+        rate = training.interpolate_ends(self.phase.learning_rate, share)
         for _ in range(config.updates):
-            batch = self.replay.sample(config.batch, config.n_step, config.discount, self.generator)
-            self.losses.append(self.learner.update(batch, rate))
+            batch = self.replay.draw_batch(
+                config.batch, config.n_step, config.discount, self.generator
+            )
+            self.losses.append(self.learner.update_networks(batch, rate))
             self.updates += 1
 
-    def _launch(self, environments: np.ndarray) -> None:
+    def _launch_missions(self, environments: np.ndarray) -> None:
         """Start new missions, some of them with a low battery; draw which UAVs return early."""
         self.stepper.launch(environments)
         draws = self.generator.random((len(environments), self.early.shape[1]))
@@ -305,26 +307,26 @@ class DQNTraining(training.Training):
             state = self.stepper.state
             _lower_batteries(state.missions, state.uavs, state.residual, low, draws)
 
-    def _collect(self, epsilon: float) -> None:
+    def _collect_slot(self, epsilon: float) -> None:
         """Run one slot of all environments with the exploring policy, and store it."""
         state = self.stepper.state
         over = np.nonzero(state.missions["active"] == 0)[0]
-        states, missions, uavs = training.acting(self.stepper, self.config.guard)
+        states, missions, uavs = training.find_acting_uavs(self.stepper, self.config.guard)
         actions = np.full(state.uavs.shape, HOVER)
         if len(missions):
-            actions[missions, uavs] = self._explore(states, missions, uavs, epsilon)
+            actions[missions, uavs] = self._choose_exploring(states, missions, uavs, epsilon)
         outcome = self.stepper.step(actions)
-        self.replay.add(
+        self.replay.add_slot(
             states, actions, outcome["reward"],
             *(outcome[n] for n in ("acted", "terminated", "truncated")),
         )  # fmt: skip
         self.uav_slots += int(outcome["acted"].sum())
-        ended = training.just_ended(self.stepper, outcome)
+        ended = training.find_ended_missions(self.stepper, outcome)
         if len(ended):
             self.finished.append(self.stepper.records(ended).missions)
-        self._launch(over)
+        self._launch_missions(over)
 
-    def _explore(
+    def _choose_exploring(
         self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray, epsilon: float
     ) -> np.ndarray:
         """Epsilon-greedy or softmax actions among the allowed ones."""
@@ -335,16 +337,16 @@ class DQNTraining(training.Training):
             return random
         with torch.no_grad():
             learner = self.learner
-            values = learner.values(learner.online, states, missions, uavs).cpu().numpy()
+            values = learner.action_values(learner.online, states, missions, uavs).cpu().numpy()
         if self.phase.temperature > 0.0:  # Gumbel noise samples from the softmax
             values = values / self.phase.temperature - np.log(-np.log(noise))
         choice = np.where(allowed, values, -np.inf).argmax(1)
         if self.config.early_returns > 0.0:
-            homeward = allowed & self._homeward(states, missions, uavs)
+            homeward = allowed & self._find_homeward_actions(states, missions, uavs)
             choice = np.where(homeward.any(1), np.where(homeward, noise, -1.0).argmax(1), choice)
         return np.where(self.generator.random(len(choice)) < epsilon, random, choice)
 
-    def _homeward(
+    def _find_homeward_actions(
         self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> np.ndarray:
         """The (R, 5) mask of the actions of UAVs that return early, to arrive with C_S left.

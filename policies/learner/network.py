@@ -23,7 +23,7 @@ from dess.policies.learner.config import TrainingConfig
 from dess.policies.network import ACTIONS, DENSE, KERNEL_SIZE, KERNELS
 
 
-def network_of(config: TrainingConfig, shapes: Sequence[Sequence[int]]) -> nn.Module:
+def make_network(config: TrainingConfig, shapes: Sequence[Sequence[int]]) -> nn.Module:
     """A new network of a config, for inputs whose rows have these shapes."""
     precision = getattr(torch, config.precision)
     if config.observation == "sets":
@@ -33,12 +33,12 @@ def network_of(config: TrainingConfig, shapes: Sequence[Sequence[int]]) -> nn.Mo
     return DuelingNetwork(shapes[0][0], config.hidden, precision)
 
 
-def arrays_of(tensors: Mapping[str, Tensor]) -> dict[str, np.ndarray]:
+def to_arrays(tensors: Mapping[str, Tensor]) -> dict[str, np.ndarray]:
     """The values of tensors as arrays, which may share their memory."""
     return {name: value.detach().cpu().numpy() for name, value in tensors.items()}
 
 
-def tensors_of(arrays: Mapping[str, np.ndarray], device: Any = "cpu") -> dict[str, Tensor]:
+def to_tensors(arrays: Mapping[str, np.ndarray], device: Any = "cpu") -> dict[str, Tensor]:
     """The values of arrays as tensors with memory of their own."""
     return {name: torch.tensor(value, device=device) for name, value in arrays.items()}
 
@@ -64,10 +64,10 @@ class PaperNetwork(nn.Module):
         super().__init__()
         local, far, _ = shapes
         self.precision = precision
-        self.local = _convolutions(local[0])
-        self.far = _convolutions(far[0])
-        _, width = acting.PaperNetwork.layers(shapes)["hidden.0"]
-        self.hidden = _dense([width, *DENSE])
+        self.local = _make_convolutions(local[0])
+        self.far = _make_convolutions(far[0])
+        _, width = acting.PaperNetwork.layer_sizes(shapes)["hidden.0"]
+        self.hidden = _make_dense_layers([width, *DENSE])
         self.values = nn.Linear(DENSE[-1], ACTIONS)
 
     def forward(self, local: Tensor, far: Tensor, own: Tensor) -> Tensor:
@@ -104,7 +104,7 @@ class DuelingNetwork(nn.Module):
         super().__init__()
         self.precision = precision
         sizes = [inputs, *hidden]
-        self.hidden = _dense(sizes)
+        self.hidden = _make_dense_layers(sizes)
         self.value = nn.Linear(sizes[-1], 1)
         self.advantage = nn.Linear(sizes[-1], ACTIONS)
 
@@ -172,11 +172,11 @@ class SetNetwork(nn.Module):
         value = self.value(state.to(self.value.weight.dtype))
         return value + advantage - advantage.mean(1, keepdim=True)
 
-    def of_state(self, own: Tensor, _: Tensor, *sets: Tensor) -> Tensor:
+    def value_of_state(self, own: Tensor, _: Tensor, *sets: Tensor) -> Tensor:
         """The values (R,) of the states alone, the means of those of the actions."""
         state = self.own(own)
         for pool, rows, moves in zip(self.sets, sets[::2], sets[1::2], strict=True):
-            state += cast(_Pool, pool).of_state(own, rows, moves)
+            state += cast(_Pool, pool).value_of_state(own, rows, moves)
         return self.value(torch.relu_(state)).squeeze(1)
 
 
@@ -195,23 +195,23 @@ class _Pool(nn.Module):
 
     def forward(self, own: Tensor, rows: Tensor, moves: Tensor) -> tuple[Tensor, Tensor]:
         """What (R, N, columns) mean for the state (R, joint) and for the moves (R, 4, joint)."""
-        pooled = highest(self.each(own, rows), moves)
+        pooled = highest_products(self.value_of_rows(own, rows), moves)
         nearer = self.nearer(pooled[:, :4])
         along = self.along(pooled[:, 4:8])
         return self.of_all(pooled[:, 8]), nearer.add_(along)
 
-    def of_state(self, own: Tensor, rows: Tensor, moves: Tensor) -> Tensor:
+    def value_of_state(self, own: Tensor, rows: Tensor, moves: Tensor) -> Tensor:
         """What the rows mean for the state alone."""
-        return self.of_all(highest(self.each(own, rows), moves[:, 8:])[:, 0])
+        return self.of_all(highest_products(self.value_of_rows(own, rows), moves[:, 8:])[:, 0])
 
-    def each(self, own: Tensor, rows: Tensor) -> Tensor:
+    def value_of_rows(self, own: Tensor, rows: Tensor) -> Tensor:
         """What each of (R, N, columns) rows is worth (R, N, C), of which the highest counts."""
         each = torch.relu_(self.inputs(rows).add_(self.context(own)[:, None]))
         each = torch.relu_(self.layer(each))
         return torch.relu_(self.values(each))
 
 
-def highest(values: Tensor, factors: Tensor) -> Tensor:
+def highest_products(values: Tensor, factors: Tensor) -> Tensor:
     """The highest product (R, M, C) of the rows' values (R, N, C) and factors (R, M, N), or 0."""
     if values.device.type == "cpu":
         return _Highest.apply(values, factors)
@@ -222,7 +222,7 @@ def highest(values: Tensor, factors: Tensor) -> Tensor:
 
 
 class _Highest(torch.autograd.Function):
-    """``highest`` on the CPU, in compiled code that touches each product once."""
+    """``highest_products`` on the CPU, in compiled code that touches each product once."""
 
     @staticmethod
     def forward(context: Any, values: Tensor, factors: Tensor) -> Tensor:
@@ -233,7 +233,7 @@ class _Highest(torch.autograd.Function):
         out = torch.zeros(shape, dtype=values.dtype)
         best = torch.full(shape, -1, dtype=torch.int16)
         arrays = (tensor.detach().numpy() for tensor in (values, factors, out, best))
-        _pool(*arrays)
+        _pool_products(*arrays)
         context.save_for_backward(factors, best)
         return out
 
@@ -243,12 +243,12 @@ class _Highest(torch.autograd.Function):
         factors, best = context.saved_tensors
         shape = len(factors), factors.shape[2], gradient.shape[2]
         out = torch.zeros(shape, dtype=gradient.dtype)
-        _give_back(gradient.contiguous().numpy(), factors.numpy(), best.numpy(), out.numpy())
+        _pass_gradients(gradient.contiguous().numpy(), factors.numpy(), best.numpy(), out.numpy())
         return out, None
 
 
 @kernel
-def _pool(values, factors, out, best):
+def _pool_products(values, factors, out, best):
     for row in range(len(values)):
         for number in range(values.shape[1]):
             value = values[row, number]
@@ -264,7 +264,7 @@ def _pool(values, factors, out, best):
 
 
 @kernel
-def _give_back(gradient, factors, best, out):
+def _pass_gradients(gradient, factors, best, out):
     for row in range(len(gradient)):
         for move in range(gradient.shape[1]):
             for c in range(gradient.shape[2]):
@@ -273,7 +273,7 @@ def _give_back(gradient, factors, best, out):
                     out[row, number, c] += factors[row, move, number] * gradient[row, move, c]
 
 
-def units_of(network: nn.Module, shapes: Sequence[Sequence[int]]) -> int:
+def count_units(network: nn.Module, shapes: Sequence[Sequence[int]]) -> int:
     """The numbers that a row is and becomes in all layers of a network on the ``meta`` device.
 
     Args:
@@ -302,12 +302,12 @@ def _hidden_precision(
     return nullcontext()
 
 
-def _convolutions(channels: int) -> nn.Sequential:
+def _make_convolutions(channels: int) -> nn.Sequential:
     first = nn.Conv2d(channels, KERNELS, KERNEL_SIZE)
     return nn.Sequential(first, nn.ReLU(), nn.Conv2d(KERNELS, KERNELS, KERNEL_SIZE), nn.ReLU())
 
 
-def _dense(sizes: Sequence[int]) -> nn.Sequential:
+def _make_dense_layers(sizes: Sequence[int]) -> nn.Sequential:
     """Dense layers of the given widths, inputs first, each followed by a ReLU."""
     layers: list[nn.Module] = []
     for inputs, outputs in pairwise(sizes):

@@ -63,14 +63,14 @@ class LearnedPolicy:
         states = compact_states(view.state, view.world.chart, self.guarded)
         allowed = masks(states, view.mission, view.uav)
         actions = np.empty(len(view), np.int64)
-        for of_sea, encoder in self._seas(view):
+        for of_sea, encoder in self._rows_by_sea(view):
             for first in range(0, len(of_sea), self._network.rows):
                 rows = of_sea[first : first + self._network.rows]
                 parts = encoder.encode(states, view.mission[rows], view.uav[rows])
-                actions[rows] = self._best(parts, allowed[rows])
+                actions[rows] = self._best_actions(parts, allowed[rows])
         return actions
 
-    def _best(self, parts: tuple[np.ndarray, ...], allowed: np.ndarray) -> np.ndarray:
+    def _best_actions(self, parts: tuple[np.ndarray, ...], allowed: np.ndarray) -> np.ndarray:
         """The (R,) allowed actions with the highest values."""
         values = np.where(allowed, self._network(*parts).astype(np.float64), -np.inf)
         second, best = np.partition(values, -2)[:, -2:].T
@@ -80,7 +80,7 @@ class LearnedPolicy:
             values[close] = np.where(allowed[close], exact.round(DECIMALS), -np.inf)
         return values.argmax(1)
 
-    def _seas(self, view: View) -> Iterator[tuple[np.ndarray, Any]]:
+    def _rows_by_sea(self, view: View) -> Iterator[tuple[np.ndarray, Any]]:
         """The rows of a view sea by sea, with the encoder of the sea."""
         if self.layout is not None:
             if self._last[0] is not view.world:
@@ -92,9 +92,9 @@ class LearnedPolicy:
         for kind in np.unique(kinds):
             of_kind = np.flatnonzero(kinds == kind)
             mission = view.state.missions[view.mission[of_kind[0]]]
-            yield of_kind, self._encoder(mission, view.world)
+            yield of_kind, self._encoder_of_sea(mission, view.world)
 
-    def _encoder(self, mission: np.void, world: World) -> Any:
+    def _encoder_of_sea(self, mission: np.void, world: World) -> Any:
         """The encoder of the sea of a mission; the last one is kept for the next slot."""
         last_world, last_constants, encoder = self._last
         constants = sea_constants(mission)

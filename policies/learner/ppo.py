@@ -29,7 +29,7 @@ from dess.model.record import MISSION_RECORD
 from dess.model.state import HOVER
 from dess.physics.chart import spread
 from dess.policies.learner import training
-from dess.policies.learner.config import MISSION_SEED, TrainingConfig, ranges_of
+from dess.policies.learner.config import MISSION_SEED, TrainingConfig, field_ranges
 from dess.policies.learner.network import SetNetwork
 from dess.scenario.scenario import ScenarioSpace
 
@@ -65,7 +65,7 @@ class Decisions(NamedTuple):
     advantages: np.ndarray
     returns: np.ndarray
 
-    def picked(self, rows: np.ndarray) -> "Decisions":
+    def select_rows(self, rows: np.ndarray) -> "Decisions":
         """Those in some of the rows."""
         return Decisions(self.encoder, self.states, *(part[rows] for part in self[2:]))
 
@@ -84,24 +84,26 @@ class ProximalLearner(training.Learner):
         average = copy.deepcopy(network).requires_grad_(False)
         super().__init__(config, device, online=network, critic=self.critic, average=average)
 
-    def restart(self) -> None:
+    def reset_optimizers(self) -> None:
         """Reset the optimizers."""
-        super().restart()
+        super().reset_optimizers()
         critic = torch.optim.Adam(self.critic.parameters(), lr=CRITIC_RATE, fused=True)
         self.optimizers["critic_optimizer"] = critic
 
-    def waits(self, optimizer: str) -> int:
+    def ticks_before_step(self, optimizer: str) -> int:
         """The ticks of a phase before an optimizer makes its first step."""
         return self.config.learning_starts if optimizer == "optimizer" else 0
 
-    def judged(
+    def judge_actions(
         self, seen: Sequence[np.ndarray], allowed: np.ndarray, temperature: float
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """The (R, 5) logarithms of the probabilities of actions, and the (R,) values of states."""
-        inputs = [*map(self.tensor, seen)]
-        return self._likelihoods(inputs, allowed, temperature), self.critic.of_state(*inputs)
+        inputs = [*map(self.to_tensor, seen)]
+        return self._log_probabilities(inputs, allowed, temperature), self.critic.value_of_state(
+            *inputs
+        )
 
-    def update(
+    def update_networks(
         self, parts: Sequence[Decisions], temperature: float, rate: float, decides: bool
     ) -> dict[str, torch.Tensor]:
         """Make a gradient step of both networks; return loss, mean value and gradient norm.
@@ -120,7 +122,7 @@ class ProximalLearner(training.Learner):
         learns = [*self.critic.parameters(), *(self.online.parameters() if decides else ())]
 
         def of_part(part: Decisions) -> tuple[torch.Tensor, ...]:
-            loss, values = self._loss(part, temperature, decides)
+            loss, values = self._compute_loss(part, temperature, decides)
             gradients = torch.autograd.grad(loss / rows, learns, materialize_grads=True)
             return loss.detach() / rows, values.detach().sum() / rows, *gradients
 
@@ -139,29 +141,29 @@ class ProximalLearner(training.Learner):
             self.step(rate)
         return done
 
-    def _loss(
+    def _compute_loss(
         self, part: Decisions, temperature: float, decides: bool
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """The loss of decisions, summed, and the (R,) values of their states."""
         seen = part.encoder.encode(part.states, part.missions, part.uavs)
-        inputs = [*map(self.tensor, seen)]
-        values = self.critic.of_state(*inputs)
-        loss = (values - self.tensor(part.returns)).pow(2).sum()
+        inputs = [*map(self.to_tensor, seen)]
+        values = self.critic.value_of_state(*inputs)
+        loss = (values - self.to_tensor(part.returns)).pow(2).sum()
         if not decides:
             return loss, values
         allowed = masks(part.states, part.missions, part.uavs)
-        likelihoods = self._likelihoods(inputs, allowed, temperature)
-        chosen = likelihoods.gather(1, self.tensor(part.actions)[:, None]).squeeze(1)
-        ratio = (chosen - self.tensor(part.likelihoods)).exp()
-        advantage = self.tensor(part.advantages)
+        likelihoods = self._log_probabilities(inputs, allowed, temperature)
+        chosen = likelihoods.gather(1, self.to_tensor(part.actions)[:, None]).squeeze(1)
+        ratio = (chosen - self.to_tensor(part.likelihoods)).exp()
+        advantage = self.to_tensor(part.advantages)
         gain = torch.min(ratio * advantage, ratio.clamp(1 - CLIP, 1 + CLIP) * advantage)
         return loss - gain.sum(), values
 
-    def _likelihoods(
+    def _log_probabilities(
         self, inputs: Sequence[torch.Tensor], allowed: np.ndarray, temperature: float
     ) -> torch.Tensor:
         logits = self.online(*inputs) / temperature
-        return torch.log_softmax(logits.masked_fill(~self.tensor(allowed), -1e9), 1)
+        return torch.log_softmax(logits.masked_fill(~self.to_tensor(allowed), -1e9), 1)
 
 
 class ProximalTraining(training.Training):
@@ -177,27 +179,29 @@ class ProximalTraining(training.Training):
     def ranges(self) -> dict[str, list[float]]:
         """The least and the largest value of each field in the missions, short ones included."""
         short = self.spaces if self.config.short_ranges else []
-        return ranges_of([*self.spaces, *(_with_range(space, RANGES[0]) for space in short)])
+        return field_ranges([*self.spaces, *(_shorten_range(space, RANGES[0]) for space in short)])
 
-    def _learner(self, network: SetNetwork) -> ProximalLearner:
+    def _make_learner(self, network: SetNetwork) -> ProximalLearner:
         return ProximalLearner(network, self.config, self.device)
 
     def _begin_missions(self) -> None:
         # A UAV more makes more decisions in a mission, so large fleets have fewer missions.
         weights = np.array([1 / np.mean(space.uavs) for space in self.spaces])
         self.shares = weights / weights.sum()
-        self._sea = lru_cache(SEAS)(self._encoded)
+        self._sea = lru_cache(SEAS)(self._make_encoder)
 
-    def _encoded(self, number: int) -> tuple[ScenarioSpace, Sets]:
+    def _make_encoder(self, number: int) -> tuple[ScenarioSpace, Sets]:
         """A sea by its number, and the encoder of its states."""
         space = self._in_phase(self.spaces[number])
         return space, encoder_of("sets", space)
 
-    def _learn(self, share: float) -> None:
+    def _learn_in_tick(self, share: float) -> None:
         config, generator = self.config, self.generator
         seas = config.seas_per_tick
         numbers = generator.choice(len(self.spaces), seas, len(self.spaces) < seas, self.shares)
-        simulated = [self._simulated(place, int(number)) for place, number in enumerate(numbers)]
+        simulated = [
+            self._simulate_missions(place, int(number)) for place, number in enumerate(numbers)
+        ]
         shown = [decisions for decisions, _ in simulated if len(decisions.actions)]
         if not shown:
             raise InputError(
@@ -208,16 +212,18 @@ class ProximalTraining(training.Training):
         self.uav_slots += sum(int(records["uav_slots"].sum()) for _, records in simulated)
         spread = np.concatenate([decisions.advantages for decisions in shown]).std() + 1e-6
         shown = [d._replace(advantages=d.advantages / spread) for d in shown]
-        rate = training.between(self.phase.learning_rate, share)
+        rate = training.interpolate_ends(self.phase.learning_rate, share)
         decides = self.tick - self.phase_start >= config.learning_starts
         each = max(config.batch // len(shown), 1)
         for _ in range(config.updates):
             rows = [generator.integers(0, len(d.actions), each) for d in shown]
-            parts = [d.picked(chosen) for d, chosen in zip(shown, rows, strict=True)]
-            self.losses.append(self.learner.update(parts, self.phase.temperature, rate, decides))
+            parts = [d.select_rows(chosen) for d, chosen in zip(shown, rows, strict=True)]
+            self.losses.append(
+                self.learner.update_networks(parts, self.phase.temperature, rate, decides)
+            )
             self.updates += 1
 
-    def _simulated(self, place: int, number: int) -> tuple[Decisions, np.ndarray]:
+    def _simulate_missions(self, place: int, number: int) -> tuple[Decisions, np.ndarray]:
         """Missions on a sea: the decisions in which UAVs had a choice, and the records.
 
         Args:
@@ -228,7 +234,7 @@ class ProximalTraining(training.Training):
         space, encoder = self._sea(number)
         generator = np.random.default_rng([config.seed, self.tick, place])
         if generator.random() < config.short_ranges:
-            space = _with_range(space, generator.uniform(*RANGES))
+            space = _shorten_range(space, generator.uniform(*RANGES))
         stepper = MissionStepper(space, config.num_envs, MISSION_SEED + config.seed)
         place_in_phase = self.tick * config.seas_per_tick + place
         first = place_in_phase * config.num_envs % training.MISSIONS_PER_PHASE
@@ -240,21 +246,21 @@ class ProximalTraining(training.Training):
         seen: list[CompactStates] = []
         decided: list[tuple[np.ndarray, ...]] = []
         while missions["active"].any():
-            states, at, uavs = training.acting(stepper, config.guard)
+            states, at, uavs = training.find_acting_uavs(stepper, config.guard)
             actions = np.full(states.uavs.shape[:2], HOVER)
-            actions[at, uavs], *known = self._drawn(encoder, states, at, uavs, generator)
+            actions[at, uavs], *known = self._draw_actions(encoder, states, at, uavs, generator)
             decided.append((np.full(len(at), len(seen)), at, uavs, actions[at, uavs], *known))
             seen.append(states)
             outcome = stepper.step(actions)
             collected.append(collected[-1] + outcome["team_collected"].max(1))
-            ended = training.just_ended(stepper, outcome)
+            ended = training.find_ended_missions(stepper, outcome)
             records[ended] = stepper.records(ended).missions
         states = CompactStates(*(np.concatenate(parts) for parts in zip(*seen, strict=True)))
         columns = [np.concatenate(parts) for parts in zip(*decided, strict=True)]
         shares = np.array(collected) / np.maximum(records["initial"] + records["arrived"], 1e-9)
-        return self._decisions(encoder, states, columns, WORTH * shares, records), records
+        return self._select_decisions(encoder, states, columns, WORTH * shares, records), records
 
-    def _decisions(
+    def _select_decisions(
         self,
         encoder: Sets,
         states: CompactStates,
@@ -276,15 +282,15 @@ class ProximalTraining(training.Training):
         products = WORTH * records[training.SELECT_BY]
         fleet = states.uavs.shape[1]
         so_far = earned[slots, missions]
-        advantages = _advantages(missions, uavs, so_far, values, products, fleet)
+        advantages = _compute_advantages(missions, uavs, so_far, values, products, fleet)
         centred = (advantages - advantages.mean()).astype(np.float32)
         returns = (advantages + values).astype(np.float32)
         rows = slots * len(records) + missions
         known = Decisions(encoder, states, rows, uavs, actions, likelihoods, centred, returns)
-        return known.picked(np.flatnonzero(masks(states, rows, uavs).sum(1) > 1))
+        return known.select_rows(np.flatnonzero(masks(states, rows, uavs).sum(1) > 1))
 
     @torch.inference_mode()
-    def _drawn(
+    def _draw_actions(
         self,
         encoder: Sets,
         states: CompactStates,
@@ -299,7 +305,7 @@ class ProximalTraining(training.Training):
         for first in range(0, len(uavs), ROWS):
             rows = slice(first, first + ROWS)
             parts = encoder.encode(states, missions[rows], uavs[rows])
-            judged = self.learner.judged(parts, allowed[rows], self.phase.temperature)
+            judged = self.learner.judge_actions(parts, allowed[rows], self.phase.temperature)
             found.append([part.cpu().numpy() for part in judged])
         if not found:
             return np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros(0, np.float32)
@@ -308,7 +314,7 @@ class ProximalTraining(training.Training):
         return drawn, likelihoods[np.arange(len(drawn)), drawn], values
 
 
-def _with_range(space: ScenarioSpace, times: float) -> ScenarioSpace:
+def _shorten_range(space: ScenarioSpace, times: float) -> ScenarioSpace:
     """A scenario in which a charged battery lasts so many times the way to the farthest node.
 
     The quota shrinks with the battery. If the battery is smaller already, nothing changes.
@@ -327,7 +333,7 @@ def _with_range(space: ScenarioSpace, times: float) -> ScenarioSpace:
 
 
 @kernel
-def _advantages(missions, uavs, earned, values, products, fleet):
+def _compute_advantages(missions, uavs, earned, values, products, fleet):
     """Generalized advantages of (R,) decisions in the order of time.
 
     What a UAV decides counts until it decides again, and its last decision until its mission ends.

@@ -31,8 +31,8 @@ from dess.model.state import MISSION, UAV
 from dess.policies.learner.checkpoint import load_training, new_training, save_training
 from dess.policies.learner.config import CHECKPOINT, MODEL, TrainingConfig
 from dess.policies.learner.dqn import ReplayMemory
-from dess.policies.learner.network import arrays_of, network_of, units_of
-from dess.policies.learner.trained import observed, save_policy, weights_of
+from dess.policies.learner.network import count_units, make_network, to_arrays
+from dess.policies.learner.trained import make_observation, read_weights, save_policy
 from dess.policies.learner.training import Training
 from dess.scenario.scenario import ScenarioSpace
 
@@ -55,7 +55,7 @@ _LOSS = 2000
 _TAGS = {name: "losses" for name in ("loss", "gradient_norm", "value")}
 
 
-def device_of(name: str) -> torch.device:
+def choose_device(name: str) -> torch.device:
     """The device ``auto`` (CUDA if available), ``cpu`` or ``cuda``.
 
     Raises:
@@ -80,12 +80,12 @@ class Sizes(NamedTuple):
     total: int
 
 
-def sizes_of(config: TrainingConfig) -> Sizes:
+def estimate_sizes(config: TrainingConfig) -> Sizes:
     """The memory that a training takes.
 
     A checkpoint is written from a copy, so what it holds counts twice.
     """
-    spaces = config.spaces()
+    spaces = config.mission_spaces()
     has_replay = config.algorithm == "dqn"
 
     def memory(space: ScenarioSpace) -> int:
@@ -95,17 +95,17 @@ def sizes_of(config: TrainingConfig) -> Sizes:
         slots = config.replay if has_replay else flown
         missions = config.num_envs
         missions *= config.seas_per_tick
-        return ReplayMemory.bytes_for(slots, missions, space.uavs[1], len(space.nodes))
+        return ReplayMemory.count_bytes(slots, missions, space.uavs[1], len(space.nodes))
 
     missions = max(map(memory, spaces))
     fleet, nodes = (max(n) for n in zip(*((s.uavs[1], len(s.nodes)) for s in spaces), strict=True))
     largest = max(spaces, key=lambda space: len(space.nodes))
     with torch.device("meta"):  # the sizes of the network, without its memory
-        network = network_of(config, observed(config, spaces[0])[1].shapes)
+        network = make_network(config, make_observation(config, spaces[0])[1].shapes)
     shapes = encoder_of(config.observation, largest).shapes
     weights = sum(weight.numel() for weight in network.parameters())
     rows = max(2 * config.batch, config.num_envs * fleet, BATCH_SIZE * fleet)
-    row = 3 * units_of(network, shapes)  # outputs, their gradients, the later state
+    row = 3 * count_units(network, shapes)  # outputs, their gradients, the later state
     state = MISSION.itemsize + fleet * UAV.itemsize + 8 * nodes
     evaluation = config.evaluation_missions * (MISSION_RECORD.itemsize + fleet * 8 * 8)
     losses = _LOSS * config.updates * min(config.evaluate_every, config.ticks)
@@ -158,9 +158,9 @@ def train(
             folder; if the folder cannot be written; if the machine's memory is too small.
     """
     path = out / CHECKPOINT
-    place = device_of(device)
+    place = choose_device(device)
     _check_folder(out, resume)
-    sizes = sizes_of(config)
+    sizes = estimate_sizes(config)
     if not accept_size:
         allowed = "a smaller network, replay memory or batch, fewer environments, or --yes"
         check_memory(f"training {config.name}", sizes.total, allowed)
@@ -174,7 +174,7 @@ def train(
             else:
                 training = new_training(config, place)
                 if start:
-                    training.begin_with(weights_of(Path(start)))
+                    training.begin_with(read_weights(Path(start)))
                 save_training(path, training)
         except (MemoryError, RuntimeError) as error:
             if isinstance(error, RuntimeError) and "alloc" not in str(error):
@@ -183,14 +183,14 @@ def train(
                 f"training {config.name}: about {sizes.total / 2**30:.1f} GiB of memory are "
                 "too much for this machine; allowed: fewer environments or slots"
             ) from error
-        with _threads(training):
-            _run(training, out, progress)
+        with _limit_threads(training):
+            _run_training(training, out, progress)
             _save_results(out, training)
     return training
 
 
 @contextmanager
-def _threads(training: Training) -> Iterator[None]:
+def _limit_threads(training: Training) -> Iterator[None]:
     """Compute a small network in one thread, unless OMP_NUM_THREADS says in how many.
 
     More threads wait for each other longer than they compute, above all beside other work.
@@ -206,21 +206,23 @@ def _threads(training: Training) -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def _run(training: Training, out: Path, progress: Callable[[Training, int], None] | None) -> None:
+def _run_training(
+    training: Training, out: Path, progress: Callable[[Training, int], None] | None
+) -> None:
     """Train until the end or a signal; save a checkpoint now and then, and every better policy."""
-    with _tensorboard(out / EVENTS, training) as show, _stop_signal() as stopped:
+    with _log_to_tensorboard(out / EVENTS, training) as show, _watch_for_signal() as stopped:
         # the last ticks without and with an evaluation
         saved = time.monotonic()
         took = [0.0, 0.0]
         while not training.done and not stopped():
             rows = len(training.curve)
-            evaluates = _evaluates(training)
+            evaluates = _is_evaluation_due(training)
             began = time.monotonic()
-            training.run(1)
+            training.run_ticks(1)
             now = time.monotonic()
             took[evaluates] = now - began
             # A signal does not wait for the end of a tick that takes long.
-            is_due = now - saved > CHECKPOINT_EVERY or took[_evaluates(training)] > TICK_END
+            is_due = now - saved > CHECKPOINT_EVERY or took[_is_evaluation_due(training)] > TICK_END
             if is_due:
                 save_training(out / CHECKPOINT, training)
                 saved = now
@@ -233,7 +235,7 @@ def _run(training: Training, out: Path, progress: Callable[[Training, int], None
     save_training(out / CHECKPOINT, training)
 
 
-def _evaluates(training: Training) -> bool:
+def _is_evaluation_due(training: Training) -> bool:
     """Whether the next tick ends with an evaluation."""
     return (training.tick + 1) % training.config.evaluate_every == 0
 
@@ -276,7 +278,7 @@ def _save_results(out: Path, training: Training) -> None:
         "selection_score": training.best_score,
     }
     save_policy(
-        out, arrays_of(training.kept), training.config, training.space, run, training.ranges
+        out, to_arrays(training.kept), training.config, training.space, run, training.ranges
     )
     if not training.curve:
         return
@@ -286,7 +288,7 @@ def _save_results(out: Path, training: Training) -> None:
 
 
 @contextmanager
-def _stop_signal() -> Iterator[Callable[[], bool]]:
+def _watch_for_signal() -> Iterator[Callable[[], bool]]:
     """Let a signal stop the session after the tick; a second signal stops it at once.
 
     A tick that compiles or evaluates may take long: then the first signal is sent once more. A
@@ -319,7 +321,9 @@ def _stop_signal() -> Iterator[Callable[[], bool]]:
 
 
 @contextmanager
-def _tensorboard(folder: Path, training: Training) -> Iterator[Callable[[dict[str, Any]], None]]:
+def _log_to_tensorboard(
+    folder: Path, training: Training
+) -> Iterator[Callable[[dict[str, Any]], None]]:
     """Write the rows of the curve for TensorBoard, if it is installed."""
     try:
         from torch.utils.tensorboard import SummaryWriter

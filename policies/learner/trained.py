@@ -35,8 +35,8 @@ from dess.policies.learner.config import (
     Run,
     TrainingConfig,
     config_names,
-    learner_of,
-    ranges_of,
+    field_ranges,
+    learner_identifier,
     read_description,
     resume_command,
 )
@@ -60,7 +60,7 @@ def write_arrays(path: Path, arrays: Weights, metadata: dict[str, str]) -> None:
     """
     with replacing(path) as temporary:
         try:
-            save_file(_contiguous(arrays), temporary, metadata)
+            save_file(_make_contiguous(arrays), temporary, metadata)
         except SafetensorError as error:
             raise InputError(f"{path}: cannot be written: {error}; allowed: another path") from None
 
@@ -78,30 +78,30 @@ def read_arrays(path: Path, limit: int) -> tuple[Arrays, dict[str, str]]:
     except InputError:
         raise
     except (OSError, SafetensorError, ValueError, TypeError) as error:
-        raise damaged(path, error) from None
+        raise describe_damage(path, error) from None
 
 
-def damaged(path: Path, error: Exception) -> InputError:
+def describe_damage(path: Path, error: Exception) -> InputError:
     """What is said about a file that cannot be read."""
     problem = f"numbers of the type {error}" if isinstance(error, KeyError) else error
     return InputError(f"{path}: damaged: {problem}; allowed: a safetensors file")
 
 
-def digest(content: Any, arrays: Weights) -> str:
+def hash_arrays(content: Any, arrays: Weights) -> str:
     """A SHA-256 of plain values and of named arrays."""
     hashed = hashlib.sha256(json.dumps(content).encode())
-    for name, value in sorted(_contiguous(arrays).items()):
+    for name, value in sorted(_make_contiguous(arrays).items()):
         hashed.update(name.encode() + b"\0")
         hashed.update(value.reshape(-1).view(np.uint8).data)
     return hashed.hexdigest()
 
 
-def form(shape: Sequence[int], dtype: Any = np.float32) -> np.ndarray:
+def array_without_memory(shape: Sequence[int], dtype: Any = np.float32) -> np.ndarray:
     """An array of a form, without its memory."""
     return np.broadcast_to(np.zeros((), dtype), shape)
 
 
-def require_forms(arrays: Weights, wanted: Weights, where: str) -> None:
+def require_same_forms(arrays: Weights, wanted: Weights, where: str) -> None:
     """Refuse arrays whose names, types or shapes are not the wanted ones, or that are not finite.
 
     Args:
@@ -123,7 +123,7 @@ def require_forms(arrays: Weights, wanted: Weights, where: str) -> None:
             raise InputError(f"{where}: {name} has impossible values; allowed: finite numbers")
 
 
-def part(arrays: Weights, name: str) -> Arrays:
+def arrays_under(arrays: Weights, name: str) -> Arrays:
     """The arrays whose names begin with ``name.``, without that prefix."""
     prefix = name + "."
     return {
@@ -131,7 +131,7 @@ def part(arrays: Weights, name: str) -> Arrays:
     }
 
 
-def bytes_of(array: np.ndarray) -> np.ndarray:
+def to_bytes(array: np.ndarray) -> np.ndarray:
     """The bytes of an array, which may be structured; those between its fields are 0."""
     if array.dtype.names:
         whole, array = array, np.zeros(array.shape, array.dtype)
@@ -140,12 +140,12 @@ def bytes_of(array: np.ndarray) -> np.ndarray:
     return np.frombuffer(array.tobytes(), np.uint8)
 
 
-def array_of(content: np.ndarray, dtype: np.dtype) -> np.ndarray:
-    """The (N,) array of a type that ``bytes_of`` made the bytes of."""
+def from_bytes(content: np.ndarray, dtype: np.dtype) -> np.ndarray:
+    """The (N,) array of a type that ``to_bytes`` made the bytes of."""
     return np.frombuffer(content.tobytes(), dtype).copy()
 
 
-def _contiguous(arrays: Weights) -> Arrays:
+def _make_contiguous(arrays: Weights) -> Arrays:
     return {name: np.asarray(value, order="C") for name, value in arrays.items()}
 
 
@@ -168,7 +168,7 @@ _KINDS: dict[str, tuple[Any, Any]] = {
 }
 
 
-def observed(config: TrainingConfig, space: ScenarioSpace) -> tuple[Layout | None, Any]:
+def make_observation(config: TrainingConfig, space: ScenarioSpace) -> tuple[Layout | None, Any]:
     """What a policy of a config sees of missions of a scenario.
 
     Returns:
@@ -188,13 +188,15 @@ def observed(config: TrainingConfig, space: ScenarioSpace) -> tuple[Layout | Non
     return layout, _KINDS[config.observation][0](layout)
 
 
-def forms_of(config: TrainingConfig, observation: Any) -> Arrays:
+def expected_weights(config: TrainingConfig, observation: Any) -> Arrays:
     """Arrays of the forms of the weights of a config's network, without their memory."""
-    layers = _KINDS[config.observation][1].layers(observation.shapes, config.hidden)
-    return {name: form(shape) for name, shape in network.forms_of(layers).items()}
+    layers = _KINDS[config.observation][1].layer_sizes(observation.shapes, config.hidden)
+    return {
+        name: array_without_memory(shape) for name, shape in network.weight_shapes(layers).items()
+    }
 
 
-def policy_of(
+def make_policy(
     config: TrainingConfig, layout: Layout | None, observation: Any, weights: Weights
 ) -> LearnedPolicy:
     """The policy of a config with these weights."""
@@ -234,16 +236,18 @@ def save_policy(
         layout=layout
         and LayoutTable(grid=layout.grid, zone=layout.zone.tolist(), nodes=layout.nodes.tolist()),
         training=config,
-        ranges=ranges or ranges_of([space]),
+        ranges=ranges or field_ranges([space]),
         run=Run(**(run or {})),
     )
-    content = save(_contiguous(weights), {"format": str(FORMAT)})
-    sums = [_sha256(content)]
+    content = save(_make_contiguous(weights), {"format": str(FORMAT)})
+    sums = [_hash_content(content)]
     with suppress(Missing):
-        held = _sha256(read_bytes(folder / MODEL, MODEL_LIMIT))
-        write_file(folder / CONFIG, _text(description, [*dict.fromkeys([*sums, held])]))
+        held = _hash_content(read_bytes(folder / MODEL, MODEL_LIMIT))
+        write_file(
+            folder / CONFIG, _write_description(description, [*dict.fromkeys([*sums, held])])
+        )
     write_file(folder / MODEL, content)
-    write_file(folder / CONFIG, _text(description, sums))
+    write_file(folder / CONFIG, _write_description(description, sums))
 
 
 def load_policy(folder: Path) -> LearnedPolicy:
@@ -257,28 +261,28 @@ def load_policy(folder: Path) -> LearnedPolicy:
     Raises:
         InputError: If a file is missing, damaged, of another version or of another shape.
     """
-    content, description = _read(folder)
-    return copy.copy(_policy(folder, content, description.model_dump_json()))
+    content, description = _read_folder(folder)
+    return copy.copy(_make_cached_policy(folder, content, description.model_dump_json()))
 
 
-def weights_of(folder: Path) -> Arrays:
+def read_weights(folder: Path) -> Arrays:
     """The weights that ``save_policy`` wrote.
 
     Raises:
         InputError: If a file is missing or damaged.
     """
-    return _weights_in(_read(folder)[0], folder / MODEL)
+    return _parse_weights(_read_folder(folder)[0], folder / MODEL)
 
 
-def _read(folder: Path) -> tuple[bytes, Description]:
+def _read_folder(folder: Path) -> tuple[bytes, Description]:
     """The content of the file of weights, and its description."""
     path = folder / MODEL
     description = read_description(folder)
     content = read_bytes(path, MODEL_LIMIT, "the folder of a trained policy")
     sums = description.model_sha256
-    if sums is not None and _sha256(content) not in sums:
+    if sums is not None and _hash_content(content) not in sums:
         if read_description(folder) != description:  # a training has just replaced both files
-            return _read(folder)
+            return _read_folder(folder)
         raise InputError(
             f"{path}: damaged: it has not the checksum in {CONFIG}; allowed: the file it was made "
             "with"
@@ -287,7 +291,7 @@ def _read(folder: Path) -> tuple[bytes, Description]:
 
 
 @lru_cache(maxsize=4)
-def _policy(folder: Path, content: bytes, text: str) -> LearnedPolicy:
+def _make_cached_policy(folder: Path, content: bytes, text: str) -> LearnedPolicy:
     """The policy of these weights and their description; every process loads one many times."""
     path = folder / MODEL
     where = folder / CONFIG
@@ -295,15 +299,15 @@ def _policy(folder: Path, content: bytes, text: str) -> LearnedPolicy:
     config = description.training
     values = description.layout and description.layout.model_dump()
     try:
-        layout, observation = observed(config, ScenarioSpace.of(uavs=1, **(values or {})))
+        layout, observation = make_observation(config, ScenarioSpace.of(uavs=1, **(values or {})))
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     require_version(description.observation_version, observation, where)
-    weights = _weights_in(content, path)
-    require_forms(weights, forms_of(config, observation), str(path))
-    policy = policy_of(config, layout, observation, weights)
-    policy.learner = learner_of(config)
-    policy.weights = digest([config.observation, config.guard, values], weights)
+    weights = _parse_weights(content, path)
+    require_same_forms(weights, expected_weights(config, observation), str(path))
+    policy = make_policy(config, layout, observation, weights)
+    policy.learner = learner_identifier(config)
+    policy.weights = hash_arrays([config.observation, config.guard, values], weights)
     ticks = description.run.ticks
     if ticks is not None and ticks < config.ticks:
         name = config.name if config.name in config_names() else "CONFIG"
@@ -325,20 +329,20 @@ def require_version(version: int, observation: Any, path: Path) -> None:
         raise InputError(f"{path}: observation version {version!r}; allowed: {observation.version}")
 
 
-def _weights_in(content: bytes, path: Path) -> Arrays:
+def _parse_weights(content: bytes, path: Path) -> Arrays:
     try:
         return load(content)
     except (SafetensorError, ValueError, KeyError) as error:
-        raise damaged(path, error) from None
+        raise describe_damage(path, error) from None
 
 
-def _text(description: Description, sums: list[str]) -> str:
+def _write_description(description: Description, sums: list[str]) -> str:
     content = description.model_dump(mode="json") | {"model_sha256": sums}
     content["run"] = description.run.model_dump(exclude_unset=True)
     return json.dumps(content, indent=2) + "\n"
 
 
-def _sha256(content: bytes) -> str:
+def _hash_content(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 

@@ -19,10 +19,15 @@ from dess.envs.observations import states as column
 from dess.envs.observations.states import CompactStates, compact_states
 from dess.envs.stepper import MissionStepper
 from dess.model.batch import simulate_batch
-from dess.policies.learner.config import Phase, TrainingConfig, ranges_of
-from dess.policies.learner.network import arrays_of, network_of, tensors_of
+from dess.policies.learner.config import Phase, TrainingConfig, field_ranges
+from dess.policies.learner.network import make_network, to_arrays, to_tensors
 from dess.policies.learner.policy import LearnedPolicy
-from dess.policies.learner.trained import forms_of, observed, policy_of, require_forms
+from dess.policies.learner.trained import (
+    expected_weights,
+    make_observation,
+    make_policy,
+    require_same_forms,
+)
 from dess.policies.network import Weights
 from dess.scenario.scenario import ScenarioSpace
 
@@ -52,14 +57,14 @@ class Learner:
         self.networks = {name: each.to(device) for name, each in made.items()}
         self.online = self.networks["online"]
         self.average = self.networks.get("average")
-        self.restart()
+        self.reset_optimizers()
 
-    def restart(self) -> None:
+    def reset_optimizers(self) -> None:
         """Reset the optimizers."""
         self.optimizer = torch.optim.Adam(self.online.parameters(), fused=True)
         self.optimizers = {"optimizer": self.optimizer}
 
-    def waits(self, optimizer: str) -> int:
+    def ticks_before_step(self, optimizer: str) -> int:
         """The ticks of a phase before an optimizer makes its first step."""
         return 0
 
@@ -68,7 +73,7 @@ class Learner:
         """The network that is evaluated: ``average`` or, without one, ``online``."""
         return self.online if self.average is None else self.average
 
-    def tensor(self, array: np.ndarray) -> torch.Tensor:
+    def to_tensor(self, array: np.ndarray) -> torch.Tensor:
         """An array on the device."""
         return torch.from_numpy(array).to(self.device)
 
@@ -98,15 +103,15 @@ class Training:
         self.device = device
         self.generator = np.random.default_rng(config.seed)
         torch.manual_seed(config.seed)
-        self.spaces = config.spaces()
+        self.spaces = config.mission_spaces()
         self.space = self.spaces[0]
-        self.layout, self.observation = observed(config, self.space)
-        network = network_of(config, self.observation.shapes)
-        self.learner = self._learner(network)
+        self.layout, self.observation = make_observation(config, self.space)
+        network = make_network(config, self.observation.shapes)
+        self.learner = self._make_learner(network)
         self.tick = self.updates = self.uav_slots = 0
         self.seconds = 0.0
         self.curve: list[dict[str, Any]] = []
-        self.best = _weights(network)
+        self.best = _copy_weights(network)
         self.finished: list[np.ndarray] = []
         self.losses: list[dict[str, torch.Tensor]] = []
         self.enter_phase(0)
@@ -114,9 +119,9 @@ class Training:
     @cached_property
     def ranges(self) -> dict[str, list[float]]:
         """The least and the largest value of each field in the missions."""
-        return ranges_of(self.spaces)
+        return field_ranges(self.spaces)
 
-    def _learner(self, network: Any) -> Any:
+    def _make_learner(self, network: Any) -> Any:
         """The networks and their optimizers, for a new network."""
         raise NotImplementedError
 
@@ -124,7 +129,7 @@ class Training:
         """Begin the missions of a phase."""
         raise NotImplementedError
 
-    def _learn(self, share: float) -> None:
+    def _learn_in_tick(self, share: float) -> None:
         """Simulate the missions of a tick, and update.
 
         Args:
@@ -142,7 +147,7 @@ class Training:
         """Whether all phases are over."""
         return self.tick >= self.config.ticks
 
-    def run(self, ticks: int) -> None:
+    def run_ticks(self, ticks: int) -> None:
         """Train for that many ticks, or until the last phase ends."""
         for _ in range(min(ticks, self.config.ticks - self.tick)):
             began = time.perf_counter()
@@ -151,11 +156,11 @@ class Training:
 
     def step(self) -> None:
         """Run one tick: the missions, the updates and, if due, an evaluation."""
-        self._learn((self.tick - self.phase_start) / self.phase.ticks)
+        self._learn_in_tick((self.tick - self.phase_start) / self.phase.ticks)
         self.tick += 1
         over = self.tick - self.phase_start == self.phase.ticks
         if over or self.tick % self.config.evaluate_every == 0:
-            self._evaluate()
+            self._evaluate_policy()
         elif self.tick == max(self.config.evaluate_every // EARLY, 1):
             self._evaluate_early()
         if over and not self.done:
@@ -163,9 +168,9 @@ class Training:
                 network.load_state_dict(self.best)
             self.enter_phase(self.phase_index + 1)
 
-    def policy(self, weights: Mapping[str, torch.Tensor]) -> LearnedPolicy:
+    def make_policy(self, weights: Mapping[str, torch.Tensor]) -> LearnedPolicy:
         """A policy with these weights."""
-        return policy_of(self.config, self.layout, self.observation, arrays_of(weights))
+        return make_policy(self.config, self.layout, self.observation, to_arrays(weights))
 
     def begin_with(self, weights: Weights) -> None:
         """Begin with the weights of another training.
@@ -173,22 +178,22 @@ class Training:
         Raises:
             InputError: If they are not those of such a network.
         """
-        require_forms(weights, forms_of(self.config, self.observation), "from")
+        require_same_forms(weights, expected_weights(self.config, self.observation), "from")
         for network in self.learner.networks.values():
-            network.load_state_dict(tensors_of(weights))
-        self.best = _weights(self.learner.evaluated)
+            network.load_state_dict(to_tensors(weights))
+        self.best = _copy_weights(self.learner.evaluated)
 
     @property
     def kept(self) -> dict[str, torch.Tensor]:
         """The best weights so far; before the first evaluation the present ones."""
-        return self.best if self.curve else _weights(self.learner.evaluated)
+        return self.best if self.curve else _copy_weights(self.learner.evaluated)
 
     def enter_phase(self, index: int) -> None:
         """Begin a phase with new missions and new optimizers."""
         self.phase_index = index
         self.phase_start = self.tick
         self._begin_missions()
-        self.learner.restart()
+        self.learner.reset_optimizers()
         self.scores: list[float] = []
         self.best_score: float | None = None
 
@@ -196,7 +201,7 @@ class Training:
         """A scenario as the missions of the present phase have it."""
         return ScenarioSpace.of(space, flight_cost=1 if self.phase.battery else 0)
 
-    def _evaluate(self) -> None:
+    def _evaluate_policy(self) -> None:
         """Simulate the selection missions; keep the weights with the best moving average."""
         config = self.config
         records = self._selection_missions()
@@ -205,9 +210,9 @@ class Training:
         average = float(np.mean(self.scores))
         is_best = not settled or self.best_score is None or average > self.best_score
         if is_best:
-            self.best = _weights(self.learner.evaluated)
+            self.best = _copy_weights(self.learner.evaluated)
             self.best_score = average
-        self.curve.append(self._row(records, average, is_best))
+        self.curve.append(self._make_row(records, average, is_best))
         self.finished, self.losses = [], []
 
     def _evaluate_early(self) -> None:
@@ -217,23 +222,25 @@ class Training:
         changes: the training goes on as if there had been no early evaluation.
         """
         records = self._selection_missions()
-        self.best = _weights(self.learner.evaluated)
-        self.curve.append(self._row(records, float(records[SELECT_BY].mean()), True))
+        self.best = _copy_weights(self.learner.evaluated)
+        self.curve.append(self._make_row(records, float(records[SELECT_BY].mean()), True))
 
     def _selection_missions(self) -> np.ndarray:
         """The records of the selection missions under the present policy."""
         missions = range(self.config.evaluation_missions)
-        spaces = [self._in_phase(space) for space in self.config.spaces(of_evaluations=True)]
+        spaces = [
+            self._in_phase(space) for space in self.config.mission_spaces(of_evaluations=True)
+        ]
         return simulate_batch(
             [spaces[mission % len(spaces)] for mission in missions]
             if len(spaces) > 1
             else spaces[0],
-            self.policy(self.learner.evaluated.state_dict()),
+            self.make_policy(self.learner.evaluated.state_dict()),
             self.config.evaluation_seed,
             missions,
         ).missions
 
-    def _row(self, records: np.ndarray, average: float, is_best: bool) -> dict[str, Any]:
+    def _make_row(self, records: np.ndarray, average: float, is_best: bool) -> dict[str, Any]:
         """A row of the curve: progress, metrics of an evaluation, metrics and losses since."""
         share = (self.tick - self.phase_start) / self.phase.ticks
         row = {
@@ -242,8 +249,8 @@ class Training:
             "uav_slots": self.uav_slots,
             "updates": self.updates,
             "seconds": self.seconds,
-            "epsilon": between(self.phase.epsilon, share / self.phase.epsilon_decay),
-            "learning_rate": between(self.phase.learning_rate, share),
+            "epsilon": interpolate_ends(self.phase.epsilon, share / self.phase.epsilon_decay),
+            "learning_rate": interpolate_ends(self.phase.learning_rate, share),
             "moving_average": average,
             "is_best": is_best,
         }
@@ -256,17 +263,19 @@ class Training:
         return row
 
 
-def between(ends: tuple[float, float], share: float) -> float:
+def interpolate_ends(ends: tuple[float, float], share: float) -> float:
     """Linear interpolation between the ends, constant beyond a share of 1."""
     return ends[0] + (ends[1] - ends[0]) * min(max(share, 0.0), 1.0)
 
 
-def _weights(network: nn.Module) -> dict[str, torch.Tensor]:
+def _copy_weights(network: nn.Module) -> dict[str, torch.Tensor]:
     """A copy of a network's weights."""
     return {name: value.detach().clone() for name, value in network.state_dict().items()}
 
 
-def acting(stepper: MissionStepper, guarded: bool) -> tuple[CompactStates, np.ndarray, np.ndarray]:
+def find_acting_uavs(
+    stepper: MissionStepper, guarded: bool
+) -> tuple[CompactStates, np.ndarray, np.ndarray]:
     """The present states of missions, and the missions and numbers of the R UAVs that act."""
     states = compact_states(stepper.state, stepper.world.chart, guarded)
     is_acting = states.uavs[..., column.ACTIVE] > states.uavs[..., column.CHARGING]
@@ -274,7 +283,7 @@ def acting(stepper: MissionStepper, guarded: bool) -> tuple[CompactStates, np.nd
     return states, missions, uavs
 
 
-def just_ended(stepper: MissionStepper, outcome: np.ndarray) -> np.ndarray:
+def find_ended_missions(stepper: MissionStepper, outcome: np.ndarray) -> np.ndarray:
     """The environments whose missions have ended in the slot with this outcome."""
     is_over = stepper.state.missions["active"] == 0
     return np.flatnonzero(is_over & outcome["acted"].any(1))

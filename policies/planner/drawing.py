@@ -10,9 +10,15 @@ import numpy as np
 
 from dess.model.mission import MissionModel, simulate
 from dess.model.view import View, decide
-from dess.policies.planner.fluid import MOST_SLOTS, Plan, begin, empty_flight, fly
-from dess.policies.planner.policy import Planner, memory_of
-from dess.policies.planner.rates import rates_of
+from dess.policies.planner.fluid import (
+    MOST_SLOTS,
+    Plan,
+    begin_flight,
+    empty_flight,
+    simulate_flight,
+)
+from dess.policies.planner.policy import Planner, recall_plans
+from dess.policies.planner.rates import load_rates
 from dess.scenario.scenario import Scenario, ScenarioSpace
 
 
@@ -86,35 +92,35 @@ class _Watched:
 
     def act(self, view: View) -> np.ndarray:
         actions = self.planner.act(view)
-        self.plans[int(view.constants["slot"][0])] = _courses(view, self.planner)
+        self.plans[int(view.constants["slot"][0])] = _draw_courses(view, self.planner)
         return actions
 
 
-def _courses(view: View, planner: Planner) -> list[Course]:
+def _draw_courses(view: View, planner: Planner) -> list[Course]:
     """The courses of a planner's present plan for the mission of a view."""
     state = view.state
-    rates = rates_of(view)
+    rates = load_rates(view)
     mission = state.missions[0]
     uavs = state.uavs[0]
     residual = state.residual[0]
-    memory = memory_of(state, planner.budget)
+    memory = recall_plans(state, planner.budget)
     plan = Plan(memory.waypoints[0].copy(), memory.lengths[0].copy())
     flight = empty_flight(MOST_SLOTS, len(uavs), len(residual))
-    begin(mission, uavs, residual, flight)
+    begin_flight(mission, uavs, residual, flight)
     crafts = [flight.team[0].copy()]
     slots = min(mission["max_slots"] - mission["slot"], MOST_SLOTS)
     for slot in range(1, int(slots) + 1):
-        fly(mission, rates, plan, flight, 0, flight, slot, np.inf)
+        simulate_flight(mission, rates, plan, flight, 0, flight, slot, np.inf)
         if flight.last[1] < slot:
             break
         crafts.append(flight.team[flight.last[0]].copy())
     return [
-        _course(plan.waypoints[i, : plan.lengths[i]], np.stack(crafts)[:, i])
+        _draw_course(plan.waypoints[i, : plan.lengths[i]], np.stack(crafts)[:, i])
         for i in range(mission["uavs"])
     ]
 
 
-def _course(waypoints: np.ndarray, crafts: np.ndarray) -> Course:
+def _draw_course(waypoints: np.ndarray, crafts: np.ndarray) -> Course:
     """The course of a UAV from its waypoints and its states in all slots."""
     cells = np.stack([crafts["x"], crafts["y"]], 1)
     slots = int(crafts["active"].sum())  # it is active until its last slot

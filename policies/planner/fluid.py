@@ -83,7 +83,7 @@ def last_charge(plan, i):
 
 
 @kernel
-def insert(plan, i, place, x, y, stay, turned):
+def insert_waypoint(plan, i, place, x, y, stay, turned):
     """Insert a waypoint of UAV ``i`` before one of its."""
     for number in range(plan.lengths[i], place, -1):
         w = plan.waypoints[i, number - 1]
@@ -93,7 +93,7 @@ def insert(plan, i, place, x, y, stay, turned):
 
 
 @kernel
-def remove(plan, i, place):
+def remove_waypoint(plan, i, place):
     """Take out a waypoint of UAV ``i``."""
     plan.lengths[i] -= 1
     for number in range(place, plan.lengths[i]):
@@ -178,7 +178,7 @@ def empty_flight(slots: int, uavs: int, nodes: int) -> Flight:
 
 
 @kernel
-def begin(mission, uavs, residual, flight):
+def begin_flight(mission, uavs, residual, flight):
     """Make the present state the first snapshot of a flight."""
     for i in range(mission.uavs):
         u = uavs[i]
@@ -193,7 +193,7 @@ def begin(mission, uavs, residual, flight):
         v.action = u.executed
         v.quota, v.slots_per_cell, v.rate = u.quota, u.slots_per_cell, u.rate
         v.charge_slots = u.charge_slots
-    wait = _revival(mission)
+    wait = _slots_until_data(mission)
     for k in range(mission.nodes):
         node = flight.sea[0, k]
         node.base = residual[k]
@@ -209,7 +209,7 @@ def planned_slots(mission):
 
 
 @inlined
-def _revival(mission):
+def _slots_until_data(mission):
     """The slots after which an emptied node has data again."""
     slots = _HALF_A_PACKET / mission.arrival_rate  # infinite at a rate of 0
     return int(math.ceil(slots)) if slots < NEVER else NEVER
@@ -225,7 +225,7 @@ def copy_snapshot(mission, source, first, target, second):
 
 
 @kernel
-def fly(mission, rates, plan, source, first, flight, slots, lag):
+def simulate_flight(mission, rates, plan, source, first, flight, slots, lag):
     """Fly a plan from a snapshot on, and return its value.
 
     Args:
@@ -251,13 +251,13 @@ def fly(mission, rates, plan, source, first, flight, slots, lag):
     collected, penalty = source.sums[first, 0], source.sums[first, 1]
     active = 0
     for i in range(mission.uavs):
-        _take(plan, i, team[i], first)
+        _assign_plan(plan, i, team[i], first)
         active += team[i].active
     total = mission.initial + mission.arrived
     rate = mission.arrival_rate
     present = total - mission.collected - mission.lost
     arriving = rate * mission.nodes
-    wait = _revival(mission)
+    wait = _slots_until_data(mission)
     t = first * STRIDE
     while t < slots:
         if t % STRIDE == 0:
@@ -277,33 +277,33 @@ def fly(mission, rates, plan, source, first, flight, slots, lag):
             if v.active == 0:
                 continue
             if v.charging != 0:
-                _charge(mission, v)
+                _charge_for_slot(mission, v)
                 continue
             if v.next > v.last_charge and not lands(mission):
-                penalty += _unplanned(mission, v, active, data_left)
-            penalty += _act(mission, rates, waypoints, team, i, t, active)
+                penalty += _penalty_for_unplanned_charge(mission, v, active, data_left)
+            penalty += _act_for_slot(mission, rates, waypoints, team, i, t, active)
             asks = v.latch != 0 and v.action == HOVER and in_zone(rates.chart, v.x, v.y)
             if asks and _has_pad(mission, rates.chart, team, v):
                 penalty += _begin_to_charge(mission, v, active)
-            elif _stands(mission, rates.chart, v):
+            elif _stands_on_ground(mission, rates.chart, v):
                 v.battery += mission.flight_cost
         active = 0
         for i in range(mission.uavs):
             v = team[i]
             if v.active == 0:
                 continue
-            if v.charging == 0 and not _stands(mission, rates.chart, v):
+            if v.charging == 0 and not _stands_on_ground(mission, rates.chart, v):
                 left = present + arriving * t - collected
-                collected += _collect(mission, rates, sea, v, t, wait, left)
-            penalty += _settle(mission, rates.chart, v)
+                collected += _collect_data(mission, rates, sea, v, t, wait, left)
+            penalty += _end_slot(mission, rates.chart, v)
             if v.charging != 0 and v.latch == 0:
                 v.charging = 0
                 if v.next < v.waypoints and waypoints[i, v.next].stay == CHARGE:
-                    _go_on(waypoints, i, v, t + 1)
+                    _begin_next_leg(waypoints, i, v, t + 1)
             active += v.active
         t += 1
     if t == mission.max_slots - mission.slot:
-        penalty += _not_landed(mission, rates.chart, team)
+        penalty += _penalty_for_not_landing(mission, rates.chart, team)
     s = (t + STRIDE - 1) // STRIDE
     copy_snapshot(mission, flight, -1, flight, s)
     flight.last[0] = s
@@ -313,7 +313,7 @@ def fly(mission, rates, plan, source, first, flight, slots, lag):
 
 
 @inlined
-def _take(plan, i, v, first):
+def _assign_plan(plan, i, v, first):
     """Let a UAV follow a plan from a snapshot on."""
     v.waypoints = plan.lengths[i]
     v.last_charge = last_charge(plan, i)
@@ -326,7 +326,7 @@ def _take(plan, i, v, first):
 
 
 @inlined
-def _go_on(waypoints, i, v, t):
+def _begin_next_leg(waypoints, i, v, t):
     """Let a UAV begin the leg to its next waypoint."""
     v.next += 1
     v.stayed = 0
@@ -334,7 +334,7 @@ def _go_on(waypoints, i, v, t):
 
 
 @inlined
-def _act(mission, rates, waypoints, team, i, t, active):
+def _act_for_slot(mission, rates, waypoints, team, i, t, active):
     """Let UAV ``i`` fly or hover for a slot, and return the penalty for teammates in its way."""
     v = team[i]
     v.battery -= mission.flight_cost
@@ -355,7 +355,7 @@ def _act(mission, rates, waypoints, team, i, t, active):
         v.stayed += 1
         if v.stayed <= w.stay:
             break
-        _go_on(waypoints, i, v, t)
+        _begin_next_leg(waypoints, i, v, t)
     if lands(mission) and (v.next == v.waypoints or _must_return(mission, rates, v, t, active)):
         x, y = _free_cell(mission, rates.chart, team, i)
         flies_on = v.x != x or v.y != y
@@ -363,10 +363,10 @@ def _act(mission, rates, waypoints, team, i, t, active):
     is_blocked = False
     for attempt in range(2):
         if flies_on:
-            v.action = _towards(rates.chart, v, x, y, turned != attempt)
+            v.action = _action_towards(rates.chart, v, x, y, turned != attempt)
         is_blocked = False
         for j in range(mission.uavs):
-            is_blocked = is_blocked or (j != i and _blocks(rates.chart, v, team[j], j < i))
+            is_blocked = is_blocked or (j != i and _blocks_way(rates.chart, v, team[j], j < i))
         if not is_blocked:
             break
         penalty += _BLOCKED
@@ -382,7 +382,7 @@ def _act(mission, rates, waypoints, team, i, t, active):
 
 
 @inlined
-def _collect(mission, rates, sea, v, t, wait, data_left):
+def _collect_data(mission, rates, sea, v, t, wait, data_left):
     """Let a UAV serve one node after another for a slot, and return what it collects."""
     candidates = rates.candidates
     rows, columns = rates.chart.zones.shape
@@ -418,7 +418,7 @@ def _collect(mission, rates, sea, v, t, wait, data_left):
 
 
 @inlined
-def _unplanned(mission, v, active, data_left):
+def _penalty_for_unplanned_charge(mission, v, active, data_left):
     """The penalty if the guard would send a UAV home for a charge that is not in its plan."""
     m = mission.communication_slots
     lacking = v.quota - v.counted
@@ -429,7 +429,7 @@ def _unplanned(mission, v, active, data_left):
 
 
 @inlined
-def _towards(chart, v, x, y, turned):
+def _action_towards(chart, v, x, y, turned):
     """The action of a shortest way to a cell, along y first if ``turned``; or Hover."""
     along_x = 1 if x > v.x else 3 if x < v.x else HOVER
     along_y = 2 if y > v.y else 0 if y < v.y else HOVER
@@ -455,7 +455,7 @@ def _is_nearer(chart, v, x, y, action):
 
 
 @inlined
-def _blocks(chart, v, other, has_moved):
+def _blocks_way(chart, v, other, has_moved):
     """Whether a teammate, which will move away unless it charges, is where an action leads."""
     x = v.x + STEP_X[v.action]
     y = v.y + STEP_Y[v.action]
@@ -475,7 +475,7 @@ def _has_pad(mission, chart, team, v):
 
 
 @inlined
-def _charge(mission, v):
+def _charge_for_slot(mission, v):
     """Let a UAV charge for a slot."""
     v.charge_slots += 1
     v.battery = min(v.battery + gain(mission, v.charge_slots), mission.charge_complete)
@@ -488,15 +488,15 @@ def _begin_to_charge(mission, v, active):
     v.charging = 1
     v.charge_slots = 0
     v.battery = before
-    _charge(mission, v)
-    return _LATE * max(1 + _reserve(mission, v, active) - before, 0)
+    _charge_for_slot(mission, v)
+    return _LATE * max(1 + _reserve_for_detours(mission, v, active) - before, 0)
 
 
 @inlined
-def _settle(mission, chart, v):
+def _end_slot(mission, chart, v):
     """End the slot of a UAV, and return the penalty if its battery is depleted."""
     penalty = 0.0
-    has_landed = _has_filled(v) and _stands(mission, chart, v)
+    has_landed = _has_filled(v) and _stands_on_ground(mission, chart, v)
     if has_landed or (v.counted >= v.quota and not lands(mission)):
         v.active = v.charging = 0
     elif v.battery <= 0:
@@ -514,7 +514,7 @@ def _settle(mission, chart, v):
 
 
 @inlined
-def _stands(mission, chart, v):
+def _stands_on_ground(mission, chart, v):
     """Whether a UAV stands on the ground (``dess.physics.landing``)."""
     return lands(mission) and v.charging == 0 and v.action == HOVER and in_zone(chart, v.x, v.y)
 
@@ -532,11 +532,11 @@ def _must_return(mission, rates, v, t, active):
     left = mission.max_slots - mission.slot - t
     if mission.flight_cost > 0:
         left = min(left, v.battery + mission.flight_cost)
-    return way + v.slots_per_cell + 2 + _reserve(mission, v, active) > left
+    return way + v.slots_per_cell + 2 + _reserve_for_detours(mission, v, active) > left
 
 
 @inlined
-def _reserve(mission, v, active):
+def _reserve_for_detours(mission, v, active):
     """The margin of the return guard for the detours around teammates [%]."""
     return (active - 1) * (MARGIN_PER_TEAMMATE * v.slots_per_cell + mission.wind_most)
 
@@ -563,12 +563,12 @@ def _free_cell(mission, chart, team, i):
 
 
 @for_sections
-def _not_landed(mission, chart, team):
+def _penalty_for_not_landing(mission, chart, team):
     """The penalty for UAVs in the air in the last slot, if missions end on the ground."""
     penalty = 0.0
     if mission.landing:
         for i in range(mission.uavs):
             v = team[i]
-            if v.active != 0 and v.charging == 0 and not _stands(mission, chart, v):
+            if v.active != 0 and v.charging == 0 and not _stands_on_ground(mission, chart, v):
                 penalty += _DEPLETED
     return penalty

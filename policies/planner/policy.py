@@ -23,8 +23,8 @@ from dess.model.view import View
 from dess.physics.landing import lands
 from dess.policies.heuristics import step_towards
 from dess.policies.planner import fluid
-from dess.policies.planner.rates import rates_of
-from dess.policies.planner.search import TRIED, empty_workspace, improve
+from dess.policies.planner.rates import load_rates
+from dess.policies.planner.search import TRIED, empty_workspace, improve_plan
 
 # The temperature of the first step of a search [data units]: for a new plan, and for one that is
 # improved.
@@ -92,9 +92,9 @@ class Planner:
         """Choose the (R,) actions for the rows of the view."""
         state = view.state
         slots = int(state.missions["max_slots"].max())
-        rates = rates_of(view)
+        rates = load_rates(view)
         safe = guard(view)
-        memory = memory_of(state, self.budget)
+        memory = recall_plans(state, self.budget)
         fleet = state.uavs.shape[1]
         m = int(state.missions["communication_slots"][0])
         edits = max(_WORK // (min(slots, fluid.MOST_SLOTS) * fleet * (fleet + m)), 1)
@@ -102,7 +102,7 @@ class Planner:
         actions = np.empty(len(view), np.int64)
         decided = 0
         while decided < len(view):
-            decided = _decide(
+            decided = _choose_actions(
                 state.missions, state.uavs, state.residual, view.world.nodes, rates,
                 memory, workspace, view.mission, view.uav, safe, self.budget, actions, decided,
                 edits,
@@ -124,7 +124,7 @@ class LongPlanner(Planner):
     budget = Budget(480_000, 36_000)
 
 
-def memory_of(state: State, budget: Budget) -> Memory:
+def recall_plans(state: State, budget: Budget) -> Memory:
     """The plans of the missions in a state by a planner with this budget."""
     missions = state.missions
     shape = state.uavs.shape
@@ -144,7 +144,7 @@ def memory_of(state: State, budget: Budget) -> Memory:
 
 
 @kernel
-def _decide(
+def _choose_actions(
     missions, uavs, residual, nodes, rates, memory, workspace,
     rows_mission, rows_uav, safe, budget, actions, decided, most,
 ):  # fmt: skip
@@ -166,24 +166,24 @@ def _decide(
             steps = (steps + mission.uavs - 1) // mission.uavs
             if workspace.course[TRIED] == 0:
                 if is_new:
-                    _start(mission, team, residual[b].sum(), rates.chart, plan)
+                    _write_first_plan(mission, team, residual[b].sum(), rates.chart, plan)
                     memory.surplus[b] = 0.0
-                elif _departs(mission, team, residual[b], memory, b, slot - made[2]):
+                elif _departs_from_plan(mission, team, residual[b], memory, b, slot - made[2]):
                     memory.surplus[b] = 0.0
                 else:
                     steps = 0
                 if not is_new:
-                    _take_up(mission, team, plan, memory.first[b])
+                    _drop_done_waypoints(mission, team, plan, memory.first[b])
             if steps > 0:
-                most -= improve(
+                most -= improve_plan(
                     mission, team, residual[b], nodes, rates, plan, workspace, steps, hottest, most
                 )
                 if workspace.course[TRIED] > 0:
                     return row
             else:
-                fluid.begin(mission, team, residual[b], workspace.flight)
+                fluid.begin_flight(mission, team, residual[b], workspace.flight)
             ahead = workspace.ahead
-            fluid.fly(mission, rates, plan, workspace.flight, 0, ahead, 1, np.inf)
+            fluid.simulate_flight(mission, rates, plan, workspace.flight, 0, ahead, 1, np.inf)
             for k in range(mission.nodes):
                 memory.sea[b, k] = ahead.sea[ahead.last[0], k].base
             for j in range(mission.uavs):
@@ -212,7 +212,7 @@ def _decide(
 
 
 @kernel
-def _departs(mission, uavs, residual, memory, b, slots):
+def _departs_from_plan(mission, uavs, residual, memory, b, slots):
     """Whether a mission is no longer what its plan, made that many slots ago, was made for."""
     departs = False
     arrived = mission.arrival_rate * slots
@@ -243,17 +243,17 @@ def _must_charge_here(mission, u, data, waypoints, length):
 
 
 @kernel
-def _start(mission, uavs, data, chart, plan):
+def _write_first_plan(mission, uavs, data, chart, plan):
     """A plan in which the UAVs that must charge do so, each in its own cell of the zone."""
     for i in range(mission.uavs):
         plan.lengths[i] = 0
         if not lands(mission) and uavs[i].active and must_charge(mission, uavs[i], data):
             cell = chart.parking[i % len(chart.parking)]
-            fluid.insert(plan, i, 0, cell[0], cell[1], fluid.CHARGE, 0)
+            fluid.insert_waypoint(plan, i, 0, cell[0], cell[1], fluid.CHARGE, 0)
 
 
 @kernel
-def _take_up(mission, uavs, plan, planned):
+def _drop_done_waypoints(mission, uavs, plan, planned):
     """Take out of a plan what has been done in the slot that it was made for.
 
     If UAVs have begun to charge, or have been charged since, their plans follow.
@@ -265,7 +265,7 @@ def _take_up(mission, uavs, plan, planned):
             plan.lengths[i] = 0
             continue
         for _ in range(v.next):
-            fluid.remove(plan, i, 0)
+            fluid.remove_waypoint(plan, i, 0)
         if plan.lengths[i] > 0 and plan.waypoints[i, 0].stay != fluid.CHARGE:
             plan.waypoints[i, 0].stay -= v.stayed
         charge = 0
@@ -274,7 +274,7 @@ def _take_up(mission, uavs, plan, planned):
         if charge == plan.lengths[i]:
             continue
         if u.charging and charge > 0:
-            fluid.remove(plan, i, charge)
-            fluid.insert(plan, i, 0, u.x, u.y, fluid.CHARGE, 0)
+            fluid.remove_waypoint(plan, i, charge)
+            fluid.insert_waypoint(plan, i, 0, u.x, u.y, fluid.CHARGE, 0)
         elif v.charging != 0 and charge == 0 and not u.charging and not u.latch:
-            fluid.remove(plan, i, 0)
+            fluid.remove_waypoint(plan, i, 0)

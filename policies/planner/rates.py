@@ -45,13 +45,13 @@ class Rates(NamedTuple):
     chart: Chart
 
 
-def rates_of(view: View) -> Rates:
+def load_rates(view: View) -> Rates:
     """The tables of the sea that a view is about."""
     mission = view.state.missions[0]
     snr = view.world.mean_snr
     chart = view.world.chart
     rows, columns = chart.zones.shape
-    candidates = _candidates(
+    candidates = _rank_nodes(
         view.world.nodes.tobytes(),
         snr.tobytes(),
         (columns, rows),
@@ -69,7 +69,7 @@ def rates_of(view: View) -> Rates:
 
 
 @lru_cache(maxsize=8)
-def _candidates(
+def _rank_nodes(
     nodes: bytes, mean_snr: bytes, size: tuple[int, int], m: int, slowest: int, length: float,
     deviation: float, most: float,
 ) -> np.ndarray:  # fmt: skip
@@ -92,7 +92,7 @@ def _candidates(
         for stage, action, y in product(range(s), range(5), range(rows)):
             # how far it still has to fly in the communication slots of this part of its move
             ahead = part * (m * (s - stage) - 1 - np.arange(m))
-            mean = _of_steps(rates, parts, cells, action, y, ahead, columns)
+            mean = _mean_rates_of_steps(rates, parts, cells, action, y, ahead, columns)
             best = np.argsort(-mean, axis=1, kind="stable")[:, :kept]
             row = table[s * (s - 1) // 2 + stage, action, y]
             row["node"] = best
@@ -100,7 +100,7 @@ def _candidates(
     return table.reshape(-1, kept)
 
 
-def _of_steps(
+def _mean_rates_of_steps(
     rates: np.ndarray, parts: int, cells: np.ndarray, action: int, y: int, ahead: np.ndarray,
     columns: int,
 ) -> np.ndarray:  # fmt: skip

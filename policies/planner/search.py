@@ -66,7 +66,7 @@ def empty_workspace(slots: int, uavs: int, nodes: int) -> Workspace:
 
 
 @kernel
-def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hottest, most):
+def improve_plan(mission, uavs, residual, nodes, rates, plan, workspace, steps, hottest, most):
     """Improve a plan in place; its value in the fluid model is never worse.
 
     A long search takes several calls, so that a signal can end it in between.
@@ -91,8 +91,8 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
     slots = fluid.planned_slots(mission)
     first = int(course[TRIED])
     if first == 0:
-        fluid.begin(mission, uavs, residual, flight)
-        course[VALUE] = course[BEST] = fluid.fly(
+        fluid.begin_flight(mission, uavs, residual, flight)
+        course[VALUE] = course[BEST] = fluid.simulate_flight(
             mission, rates, plan, flight, 0, flight, slots, np.inf
         )
         course[HEAT] = hottest
@@ -108,7 +108,7 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         words[0], words[1], words[2], words[3] = streams.block(
             mission.seed, mission.replication, streams.PLAN, 0, mission.slot, step
         )
-        slot = _edit(mission, uavs, nodes, rates.chart, flight, trial, words)
+        slot = _edit_plan(mission, uavs, nodes, rates.chart, flight, trial, words)
         if slot == _NO_EDIT:
             continue
         if slot != fluid.NEVER:
@@ -120,10 +120,10 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         least = heat * math.log(luck)
         snapshot = slot // fluid.STRIDE
         behind = lag - least
-        new = fluid.fly(mission, rates, trial, flight, snapshot, ahead, slots, behind)
+        new = fluid.simulate_flight(mission, rates, trial, flight, snapshot, ahead, slots, behind)
         if new >= value or new - value > least:
             value = new
-            _keep(mission, ahead, flight, slot // fluid.STRIDE)
+            _keep_flight(mission, ahead, flight, slot // fluid.STRIDE)
             for i in range(mission.uavs):  # waypoints that are not reached are of no use
                 v = flight.team[flight.last[0], i]  # but for charges, which count as planned
                 trial.lengths[i] = min(trial.lengths[i], max(v.next, v.last_charge) + 1)
@@ -153,7 +153,7 @@ def _first_unplanned(mission, present, trial):
 
 
 @kernel
-def _keep(mission, ahead, flight, first):
+def _keep_flight(mission, ahead, flight, first):
     """Make a flight that of a trial, which was simulated from a snapshot on."""
     for s in range(first, ahead.last[0] + 1):
         fluid.copy_snapshot(mission, ahead, s, flight, s)
@@ -162,26 +162,26 @@ def _keep(mission, ahead, flight, first):
 
 
 @inlined
-def _pick(word, count):
+def _pick_number(word, count):
     """A number below ``count``, of the upper half of a random word."""
     return np.int64((word >> _HIGH) * np.uint64(count) >> _HIGH)
 
 
 @inlined
-def _pick_low(word, count):
+def _pick_other_number(word, count):
     """A number below ``count``, of the lower half of a random word."""
     return np.int64((word & _LOW) * np.uint64(count) >> _HIGH)
 
 
 @kernel
-def _edit(mission, uavs, nodes, chart, flight, plan, words):
+def _edit_plan(mission, uavs, nodes, chart, flight, plan, words):
     """Edit a plan at random; return the first slot that this may change, or ``_NO_EDIT``."""
-    kind = _KINDS[_pick(words[0], len(_KINDS))]
-    i = _pick(words[1], mission.uavs)
+    kind = _KINDS[_pick_number(words[0], len(_KINDS))]
+    i = _pick_number(words[1], mission.uavs)
     if not uavs[i].active:
         return _NO_EDIT
     length = plan.lengths[i]
-    p = _pick_low(words[1], length + (kind in (_INSERT, _CHARGE, _CROSS)))
+    p = _pick_other_number(words[1], length + (kind in (_INSERT, _CHARGE, _CROSS)))
     if kind == _INSERT:
         return _insert_node(mission, nodes, chart, flight, plan, i, p, words)
     if kind == _CHARGE:
@@ -191,15 +191,15 @@ def _edit(mission, uavs, nodes, chart, flight, plan, words):
     w = plan.waypoints[i, p]
     slot = w.begun
     if kind == _REMOVE:
-        fluid.remove(plan, i, p)
+        fluid.remove_waypoint(plan, i, p)
     elif kind == _TURN:
         w.turned = 1 - w.turned
     elif kind == _STAY:
         if w.stay == fluid.CHARGE:
             return _NO_EDIT
-        w.stay += 1 if w.stay == 0 or _pick(words[2], 2) == 0 else -1
+        w.stay += 1 if w.stay == 0 or _pick_number(words[2], 2) == 0 else -1
     elif kind == _NUDGE:
-        action = _pick(words[2], 4)
+        action = _pick_number(words[2], 4)
         x = w.x + STEP_X[action]
         y = w.y + STEP_Y[action]
         if not is_open(chart, x, y) or (w.stay == fluid.CHARGE and not in_zone(chart, x, y)):
@@ -209,39 +209,39 @@ def _edit(mission, uavs, nodes, chart, flight, plan, words):
     elif kind == _REPLACE:
         if w.stay == fluid.CHARGE:
             return _NO_EDIT
-        k = _pick(words[2], mission.nodes)
-        other = _pick_low(words[2], mission.nodes)
-        w.x, w.y = _nearer(w, nodes[k], nodes[other])
+        k = _pick_number(words[2], mission.nodes)
+        other = _pick_other_number(words[2], mission.nodes)
+        w.x, w.y = _nearer_cell(w, nodes[k], nodes[other])
     elif kind == _REVERSE:
-        q = min(p + 1 + _pick(words[2], 5), length - 1)
+        q = min(p + 1 + _pick_number(words[2], 5), length - 1)
         while p < q:
-            _swap(plan.waypoints[i, p], plan.waypoints[i, q])
+            _swap_waypoints(plan.waypoints[i, p], plan.waypoints[i, q])
             p += 1
             q -= 1
     else:
-        j = _pick(words[2], mission.uavs)
+        j = _pick_number(words[2], mission.uavs)
         if not uavs[j].active:
             slot = _NO_EDIT
         elif kind == _MOVE:
-            slot = _move(chart, flight, plan, i, p, j, words)
+            slot = _move_waypoints(chart, flight, plan, i, p, j, words)
         elif kind == _SWAP:
-            slot = _swap_with(plan, i, p, j, _pick(words[3], plan.lengths[j]))
+            slot = _swap_between_uavs(plan, i, p, j, _pick_number(words[3], plan.lengths[j]))
         else:
-            slot = _cross(plan, i, p, j, _pick(words[3], plan.lengths[j] + 1))
+            slot = _swap_tails(plan, i, p, j, _pick_number(words[3], plan.lengths[j] + 1))
     return slot
 
 
 @inlined
-def _nearer(w, one, other):
+def _nearer_cell(w, one, other):
     """The nearer one of two cells to a waypoint."""
     is_first = abs(one[0] - w.x) + abs(one[1] - w.y) <= abs(other[0] - w.x) + abs(other[1] - w.y)
     return (one[0], one[1]) if is_first else (other[0], other[1])
 
 
 @kernel
-def _move(chart, flight, plan, i, p, j, words):
+def _move_waypoints(chart, flight, plan, i, p, j, words):
     """Move some waypoints of UAV ``i``, from ``p`` on, to UAV ``j``, in this order or reversed."""
-    count = min(1 + _pick_low(words[3], _MOST_MOVED), plan.lengths[i] - p)
+    count = min(1 + _pick_other_number(words[3], _MOST_MOVED), plan.lengths[i] - p)
     if plan.lengths[j] + count > fluid.MOST_WAYPOINTS:
         return _NO_EDIT
     moved = np.empty((_MOST_MOVED, 4), np.int64)
@@ -255,9 +255,9 @@ def _move(chart, flight, plan, i, p, j, words):
     if has_charge and j != i:
         return _NO_EDIT
     for _ in range(count):
-        fluid.remove(plan, i, p)
-    q = _pick(words[3], plan.lengths[j] + 1)
-    if not has_charge and _pick_low(words[2], 1 << 16) < _SHORTEST:
+        fluid.remove_waypoint(plan, i, p)
+    q = _pick_number(words[3], plan.lengths[j] + 1)
+    if not has_charge and _pick_other_number(words[2], 1 << 16) < _SHORTEST:
         q = _shortest_detour(chart, flight, plan, j, moved[0, 0], moved[0, 1])
     if j == i and q == p:
         return fluid.NEVER
@@ -265,12 +265,12 @@ def _move(chart, flight, plan, i, p, j, words):
     is_reversed = words[0] & np.uint64(1) == np.uint64(1)
     for number in range(count):
         x, y, stay, turned = moved[number]
-        fluid.insert(plan, j, q if is_reversed else q + number, x, y, stay, turned)
+        fluid.insert_waypoint(plan, j, q if is_reversed else q + number, x, y, stay, turned)
     return slot
 
 
 @kernel
-def _swap_with(plan, i, p, j, q):
+def _swap_between_uavs(plan, i, p, j, q):
     """Swap waypoint ``p`` of UAV ``i`` with ``q`` of UAV ``j``."""
     if q == plan.lengths[j] or (i == j and p == q):
         return _NO_EDIT
@@ -278,12 +278,12 @@ def _swap_with(plan, i, p, j, q):
     if j != i and (w.stay == fluid.CHARGE or other.stay == fluid.CHARGE):
         return _NO_EDIT
     slot = min(w.begun, other.begun)
-    _swap(w, other)
+    _swap_waypoints(w, other)
     return slot
 
 
 @kernel
-def _cross(plan, i, p, j, q):
+def _swap_tails(plan, i, p, j, q):
     """Swap all waypoints of UAV ``i`` from ``p`` on with those of UAV ``j`` from ``q`` on."""
     slot = min(plan.waypoints[i, p].begun, plan.waypoints[j, q].begun)
     own = plan.lengths[i] - p
@@ -299,7 +299,7 @@ def _cross(plan, i, p, j, q):
     if charges != 0:
         return _NO_EDIT
     for number in range(count):
-        _swap(plan.waypoints[i, p + number], plan.waypoints[j, q + number])
+        _swap_waypoints(plan.waypoints[i, p + number], plan.waypoints[j, q + number])
     plan.lengths[i] = p + other
     plan.lengths[j] = q + own
     return slot
@@ -310,23 +310,25 @@ def _insert_node(mission, nodes, chart, flight, plan, i, p, words):
     """Insert a node into the plan of UAV ``i``: of two random ones, that which keeps more data."""
     if plan.lengths[i] == fluid.MOST_WAYPOINTS:
         return _NO_EDIT
-    k = _pick(words[2], mission.nodes)
-    other = _pick_low(words[2], mission.nodes)
+    k = _pick_number(words[2], mission.nodes)
+    other = _pick_other_number(words[2], mission.nodes)
     end = flight.last[0]
     if flight.sea[end, other].base > flight.sea[end, k].base:
         k = other
     x, y = nodes[k, 0], nodes[k, 1]
-    if _pick_low(words[0], 1 << 16) < _SHORTEST:
+    if _pick_other_number(words[0], 1 << 16) < _SHORTEST:
         p = _shortest_detour(chart, flight, plan, i, x, y)
     slot = plan.waypoints[i, p].begun
-    fluid.insert(plan, i, p, x, y, _pick(words[3], 3), np.int64(words[3] & np.uint64(1)))
+    fluid.insert_waypoint(
+        plan, i, p, x, y, _pick_number(words[3], 3), np.int64(words[3] & np.uint64(1))
+    )
     return slot
 
 
 @kernel
 def _edit_charge(mission, chart, plan, i, p, words):
     """Let UAV ``i`` charge before waypoint ``p``, or in another cell if it charges there."""
-    cell = _pick(words[2], len(chart.parking))
+    cell = _pick_number(words[2], len(chart.parking))
     x, y = chart.parking[cell, 0], chart.parking[cell, 1]
     w = plan.waypoints[i, p]
     slot = w.begun
@@ -336,7 +338,7 @@ def _edit_charge(mission, chart, plan, i, p, words):
     elif plan.lengths[i] == fluid.MOST_WAYPOINTS or mission.flight_cost == 0:
         slot = _NO_EDIT
     else:
-        fluid.insert(plan, i, p, x, y, fluid.CHARGE, np.int64(words[3] & np.uint64(1)))
+        fluid.insert_waypoint(plan, i, p, x, y, fluid.CHARGE, np.int64(words[3] & np.uint64(1)))
     return slot
 
 
@@ -359,7 +361,7 @@ def _shortest_detour(chart, flight, plan, i, x, y):
 
 
 @inlined
-def _swap(one, other):
+def _swap_waypoints(one, other):
     """Swap two waypoints, but for when their legs begin."""
     x, y, stay, turned = one.x, one.y, one.stay, one.turned
     fluid.set_waypoint(one, other.x, other.y, other.stay, other.turned)

@@ -28,7 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from dess.reports.cli import console
             from dess.reports.cli.commands import app
 
-            console.prepare()
+            console.prepare_streams()
             _check_text(words)
             code = app(words, prog_name="dess", standalone_mode=False) or 0
             sys.stdout.flush()  # an error of the output is an error of the command
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 return code
             raise KeyboardInterrupt
         except BaseException as error:
-            return _failed(error, words, interrupts.received)
+            return _report_error(error, words, interrupts.received)
 
 
 def _check_text(words: Sequence[str]) -> None:
@@ -49,7 +49,7 @@ def _check_text(words: Sequence[str]) -> None:
             raise InputError(f"{shown(word)}: is not text in UTF-8; allowed: another name")
 
 
-def _failed(error: BaseException, words: Sequence[str], is_interrupted: bool) -> int:
+def _report_error(error: BaseException, words: Sequence[str], is_interrupted: bool) -> int:
     """Print the line for an error that ended a command, and return the exit code.
 
     Args:
@@ -64,23 +64,25 @@ def _failed(error: BaseException, words: Sequence[str], is_interrupted: bool) ->
     from dess.reports.cli import console
 
     if isinstance(error, console.Interruption):
-        return console.fail(str(error), EXIT_CODE)
+        return console.print_failure(str(error), EXIT_CODE)
     if is_interrupted or isinstance(error, KeyboardInterrupt):
-        return console.fail(LINE, EXIT_CODE)
+        return console.print_failure(LINE, EXIT_CODE)
     if isinstance(error, TyperException):
         context = getattr(error, "ctx", None)
         hint = f" (see {context.command_path} --help)" if context else ""
-        return console.fail(f"dess: error: {error.format_message()}{hint}", error.exit_code)
+        return console.print_failure(
+            f"dess: error: {error.format_message()}{hint}", error.exit_code
+        )
     if isinstance(error, InputError):
-        return console.fail(f"dess: error: {error}", 2)
+        return console.print_failure(f"dess: error: {error}", 2)
     if isinstance(error, ModuleNotFoundError):
         absent = absence(error, " ".join(["dess", *words[:1]]))
         if absent is not None:
-            return console.fail(f"dess: error: {absent}", 2)
+            return console.print_failure(f"dess: error: {absent}", 2)
     if isinstance(error, OSError | SystemExit):
-        return console.refused(error)
+        return console.print_system_error(error)
     if isinstance(error, MemoryError):
-        return console.fail("dess: error: there is not enough memory", 1)
+        return console.print_failure("dess: error: there is not enough memory", 1)
     if isinstance(error, RecursionError):
-        return console.fail("dess: error: the input is nested too deeply", 1)
+        return console.print_failure("dess: error: the input is nested too deeply", 1)
     raise error

@@ -13,8 +13,8 @@ import typer
 from dess.base.errors import InputError, one_of, shown
 from dess.base.libraries import missing
 from dess.reports.cli import console, options
-from dess.reports.cli.console import YesOption, complete
-from dess.reports.cli.report import WHAT_IF, rendering
+from dess.reports.cli.console import YesOption, run_or_exit
+from dess.reports.cli.report import WHAT_IF, rendering_bar
 from dess.reports.cli.studies import print_plan
 from dess.reports.pages import PREFIX, check_pages
 
@@ -34,14 +34,14 @@ SHARE = "a metric and its least mean, e.g. success=0.99"
 app = typer.Typer()
 
 
-@options.command(app)
+@options.add_command(app)
 def sweep(
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUES", autocompletion=options.fields),
+        typer.Option("--set", metavar="KEY=VALUES", autocompletion=options.complete_fields),
     ] = None,
     policy: Annotated[
-        list[str] | None, typer.Option(metavar="P,P,...", autocompletion=options.policies)
+        list[str] | None, typer.Option(metavar="P,P,...", autocompletion=options.complete_policies)
     ] = None,
     metric: str | None = None,
     missions: Annotated[int, typer.Option(min=1)] = 300,
@@ -85,13 +85,13 @@ def sweep(
     from dess.analysis.metrics import ALIASES, PRODUCT, SUCCESS, column_as_told
 
     question = sweep_question(
-        options.all_values(settings or []),
+        options.parse_all_values(settings or []),
         scenario,
         [name for text in policy for name in text.split(",")] if policy else None,
         missions,
         seed,
-        options.all_settings(map(_with_quotes, price or []), "--price", PRICE),
-        options.all_settings(map(_with_quotes, require or []), "--require", SHARE),
+        options.parse_all_settings(map(_with_quotes, price or []), "--price", PRICE),
+        options.parse_all_settings(map(_with_quotes, require or []), "--require", SHARE),
         name,
         results,
     )
@@ -101,14 +101,14 @@ def sweep(
         allowed = one_of(metric, [*ALIASES, *measured])
         raise InputError(f"--metric: {shown(metric)} is not measured{allowed}")
     page = f"{PREFIX}{question.study.name}"
-    found = _run(question, page, out, workers, dry_run, yes)
+    found = _run_question(question, page, out, workers, dry_run, yes)
     answer = Sweep(question, found)
     parameters = {"metric": ranking} if metric else {}
     changes = (
         around.question_around(found, question.study.scenario) if question.study.selection else None
     )
     if changes:
-        _run(changes, page, out, workers, dry_run, yes)
+        _run_question(changes, page, out, workers, dry_run, yes)
 
     def render(progress: "Progress") -> Path:
         from dess.reports.pages.render import render_study
@@ -121,19 +121,20 @@ def sweep(
         show = partial(_print_fleets, answer, ranking if metric else SUCCESS)
     else:
         show = partial(_print_settings, answer, ranking)
-    _tell(answer, answer.answers(ranking), tables, show, render, as_json, "sweep")
+    _print_answer(answer, answer.answers(ranking), tables, show, render, as_json, "sweep")
 
 
-@options.command(app, WHAT_IF)
+@options.add_command(app, WHAT_IF)
 def what_if(
     settings: Annotated[
-        list[str], typer.Option(options.SET, metavar="KEY=VALUE", autocompletion=options.fields)
+        list[str],
+        typer.Option(options.SET, metavar="KEY=VALUE", autocompletion=options.complete_fields),
     ],
     baseline: Annotated[
-        list[str] | None, typer.Option(metavar="KEY=VALUE", autocompletion=options.fields)
+        list[str] | None, typer.Option(metavar="KEY=VALUE", autocompletion=options.complete_fields)
     ] = None,
     policy: Annotated[
-        list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.policies)
+        list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.complete_policies)
     ] = None,
     missions: Annotated[int, typer.Option(min=2)] = 500,
     scenario: options.ScenarioOption = "paper",
@@ -164,11 +165,11 @@ def what_if(
     from dess.analysis.ask.question import what_if_question
     from dess.analysis.ask.what_if import VARIATION, WhatIf, best_policy, check_shown
 
-    changes = options.all_settings(settings, options.SET)
-    fixed = options.all_settings(baseline or [], "--baseline")
+    changes = options.parse_all_settings(settings, options.SET)
+    fixed = options.parse_all_settings(baseline or [], "--baseline")
     question = what_if_question(changes, fixed, scenario, policy, missions, seed, results)
     check_shown(question, shown)
-    found = _run(question, WHAT_IF, out, workers, dry_run, yes)
+    found = _run_question(question, WHAT_IF, out, workers, dry_run, yes)
     parameters = {
         "settings": changes,
         "baseline": fixed,
@@ -188,10 +189,10 @@ def what_if(
     answer = WhatIf(question, found, shown or best_policy(found, VARIATION))
     show = partial(_print_measures, answer)
     tables = {"table": answer.table()}
-    _tell(answer, answer.answers(), tables, show, render, as_json, "what-if question")
+    _print_answer(answer, answer.answers(), tables, show, render, as_json, "what-if question")
 
 
-def _run(
+def _run_question(
     question: "Question", page: str, out: Path, workers: int, dry_run: bool, yes: bool
 ) -> "Results":
     """Run a question after all checks; with --dry-run, print its plan and end the command."""
@@ -200,7 +201,7 @@ def _run(
         print_plan(question.plan(workers), study, folder, workers)
         raise typer.Exit
     check_pages(out, page)
-    results = complete(
+    results = run_or_exit(
         study.name,
         lambda progress, announce: question.ask(workers, progress, announce, yes),
         shlex.join(["dess", "study", "run", str(question.file), "--out", str(folder)]),
@@ -209,7 +210,7 @@ def _run(
     return results
 
 
-def _tell(
+def _print_answer(
     answer: "Sweep | WhatIf",
     sentences: list[str],
     tables: "dict[str, pd.DataFrame]",
@@ -223,13 +224,13 @@ def _tell(
     if not as_json:
         show()
         for line in sentences:
-            console.say(line)
-        console.say(f"study: {question.file}")
+            console.print_text(line)
+        console.print_text(f"study: {question.file}")
     page = None
     if absent := missing("reports", f"the page of a {asked}"):
-        console.say(f"no page: {absent}", sys.stderr)
+        console.print_text(f"no page: {absent}", sys.stderr)
     else:
-        with rendering() as progress:
+        with rendering_bar() as progress:
             page = render(progress)
     if as_json:
         places = {"results": str(question.out), "study_file": str(question.file)}
@@ -237,7 +238,7 @@ def _tell(
         rows = {name: json.loads(table.to_json(orient="records")) for name, table in tables.items()}
         print(json.dumps({**about, "answers": sentences, **rows}, indent=2))
     elif page:
-        console.say(f"page: {page}")
+        console.print_text(f"page: {page}")
 
 
 def _print_settings(answer: "Sweep", ranking: str) -> None:
@@ -267,7 +268,7 @@ def _print_settings(answer: "Sweep", ranking: str) -> None:
     console.print_table([*map(str, cells)], cells.astype(str).to_numpy().tolist())
     first = f", the first {SHOWN} are shown" if len(table) > SHOWN else ""
     what = metric_of(ranking).within
-    console.say(
+    console.print_text(
         f"{len(table):,} settings{first}; ≈: the {what} may be as good as that of the first"
     )
 
@@ -289,7 +290,7 @@ def _print_fleets(answer: "Sweep", further: str) -> None:
     cells = cheapest.fleet_cells(results, cheapest.shown_rows(rows, SHOWN), further)
     print_frame("Fleet", cells.set_index("Fleet"))
     shown = f", {SHOWN} of them shown" if len(rows) > SHOWN else ""
-    console.say(
+    console.print_text(
         f"{len(rows):,} pairs of a fleet and a policy{shown}, the cheapest first; required: "
         f"{requirements_in_words(requirements_of(results))}; {cheapest.VERDICTS_EXPLAINED}"
     )

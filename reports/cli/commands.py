@@ -10,7 +10,7 @@ from dess.reports.cli import ask, console, evaluate, lists, report, simulate, st
 
 def _print_version(is_wanted: bool) -> None:
     if is_wanted:
-        console.say(f"dess {dess.__version__}")
+        console.print_text(f"dess {dess.__version__}")
         raise typer.Exit
 
 
@@ -23,7 +23,7 @@ app = typer.Typer(
 
 
 @app.callback()
-def options(
+def take_common_options(
     version: Annotated[
         bool,
         typer.Option(

@@ -31,13 +31,13 @@ class _Line(logging.Formatter):
     """A message of a log as one line of printable characters."""
 
     def format(self, record: logging.LogRecord) -> str:
-        return _line(record.getMessage())
+        return _in_one_line(record.getMessage())
 
 
 WIDTH = 100  # of a table in the terminal [characters]
 
 
-def prepare() -> None:
+def prepare_streams() -> None:
     """Let stdout and stderr take any text, even if they are closed, and logs print lines."""
     for name in _STREAMS:
         if getattr(sys, name) is None:  # closed, as by >&-
@@ -48,7 +48,7 @@ def prepare() -> None:
         logging.lastResort.setFormatter(_Line())
 
 
-def refused(error: OSError | SystemExit) -> int:
+def print_system_error(error: OSError | SystemExit) -> int:
     """Print what the system refused to a command, and return the exit code.
 
     A broken pipe, for which typer raises ``SystemExit``, is no error to tell: the program that
@@ -61,34 +61,34 @@ def refused(error: OSError | SystemExit) -> int:
             (stream := getattr(sys, name)).flush()
         except OSError:
             broken.append(_STREAMS[name])
-            _give_up(stream)
+            _silence_stream(stream)
     if isinstance(error, BrokenPipeError | SystemExit):
         return 1
     place = error.filename or " and ".join(broken)
     reason = error.strerror or str(error)
     line = f"dess: error: {place}: {reason}" if place else f"dess: error: {reason}"
     is_long = error.errno == errno.ENAMETOOLONG  # such a name is bad input
-    return fail(f"{line}; allowed: another path" if is_long else line, 2 if is_long else 1)
+    return print_failure(f"{line}; allowed: another path" if is_long else line, 2 if is_long else 1)
 
 
-def fail(message: str, code: int) -> int:
+def print_failure(message: str, code: int) -> int:
     """Print one line on stderr that says why the command fails, and return the exit code.
 
     The line has no control characters, and of a long one the beginning and the end.
     """
     try:
-        print(_line(message), file=sys.stderr)
+        print(_in_one_line(message), file=sys.stderr)
     except OSError:  # there is no stream left for the line
-        _give_up(sys.stderr)
+        _silence_stream(sys.stderr)
     return code
 
 
-def _give_up(stream: TextIO) -> None:
+def _silence_stream(stream: TextIO) -> None:
     """Let nothing more be written to a stream that cannot be written, not even at the end."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _line(message: str) -> str:
+def _in_one_line(message: str) -> str:
     """The message in one line; one that is too long still says what is allowed."""
     line = printable(" ".join(message.split()))
     what, allowed, values = line.rpartition("; allowed: ")
@@ -98,13 +98,13 @@ def _line(message: str) -> str:
     return cut(what, MESSAGE - len(end)) + end
 
 
-def say(text: object, stream: TextIO | None = None) -> None:
+def print_text(text: object, stream: TextIO | None = None) -> None:
     """Print text on stdout or another stream, with escapes for all control characters."""
     lines = str(text).expandtabs().split("\n")
     print("\n".join(map(printable, lines)), file=stream or sys.stdout, flush=True)
 
 
-def answers(
+def ask_questions(
     given: Mapping[str, str],
     questions: Mapping[str, tuple[str, str | None]],
     check: Callable[[str, str], None],
@@ -135,12 +135,12 @@ def answers(
             check(name, answer or default or "")
             found[asked.pop(0)] = answer or default or ""
         except InputError as error:
-            say(error, sys.stderr)
+            print_text(error, sys.stderr)
     return found
 
 
 @contextmanager
-def outputs(paths: Sequence[Path]) -> Iterator[list[Path]]:
+def open_outputs(paths: Sequence[Path]) -> Iterator[list[Path]]:
     """Yield a temporary path for each file that a command writes; they are replaced together.
 
     ``-`` and ``/dev/stdout`` mean standard output, where the content is written at the end.
@@ -208,7 +208,7 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int 
         for line in lines
     ]
     aligned.insert(1, ["─" * width for width in widths])
-    for columns in _blocks(widths):
+    for columns in _group_columns(widths):
         shown = ("  ".join(line[number] for number in columns).rstrip() for line in aligned)
         print("", *shown, "", sep="\n")
     if any("nan" in cell for line in lines for cell in line):
@@ -217,7 +217,7 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int 
         print("".join(f" {why}\n" for why in [why_nan(sum(lines, []))] if why), end="")
 
 
-def _blocks(widths: Sequence[int]) -> Iterator[list[int]]:
+def _group_columns(widths: Sequence[int]) -> Iterator[list[int]]:
     """The numbers of the columns that are printed side by side; the first one is in all."""
     block = [0]
     for number in range(1, len(widths)):
@@ -229,7 +229,7 @@ def _blocks(widths: Sequence[int]) -> Iterator[list[int]]:
 
 
 @contextmanager
-def bar(unit: str, total: int = 0) -> Iterator[Any]:
+def progress_bar(unit: str, total: int = 0) -> Iterator[Any]:
     """A progress bar on stderr (``tqdm``), if the work takes longer than a second.
 
     Outside a terminal it prints a line every ten seconds. While something is compiled it says so;
@@ -251,14 +251,14 @@ def bar(unit: str, total: int = 0) -> Iterator[Any]:
             progress.unpause()
             progress.set_description_str(before, refresh=False)
 
-        with _compiling(begin, end):
+        with _watch_compiling(begin, end):
             yield progress
 
 
 @contextmanager
 def counted_bar(unit: str) -> Iterator[Callable[..., None]]:
     """A progress bar whose callback gets the count and the total, and the name of the work."""
-    with bar(unit) as progress:
+    with progress_bar(unit) as progress:
 
         def show(done: int, total: int, name: str = "") -> None:
             progress.total = total
@@ -271,7 +271,7 @@ def counted_bar(unit: str) -> Iterator[Callable[..., None]]:
 @contextmanager
 def compile_notice() -> Iterator[None]:
     """Print a line, once in a process, if numba compiles something that is not in its cache."""
-    with _compiling(announce_compiling, lambda: None):
+    with _watch_compiling(announce_compiling, lambda: None):
         yield
 
 
@@ -289,7 +289,7 @@ def announce_compiling() -> None:
 
 
 @contextmanager
-def _compiling(begin: Callable[[], object], end: Callable[[], object]) -> Iterator[None]:
+def _watch_compiling(begin: Callable[[], object], end: Callable[[], object]) -> Iterator[None]:
     """Call functions before and after numba compiles a function with all that it calls."""
     from numba.core.event import Event, Listener, install_listener
 
@@ -322,7 +322,7 @@ YesOption = Annotated[
 ]
 
 
-def complete(
+def run_or_exit(
     name: str, run: "Callable[[Progress, Announce], Results]", again: str = "the same command again"
 ) -> "Results":
     """Run a study; an interruption (exit code 130) or a failure (1) ends the command with a line.
@@ -340,26 +340,26 @@ def complete(
     from dess.analysis.execution.workers import SchedulerError
 
     try:
-        with compile_notice(), _bar() as (progress, announce):
+        with compile_notice(), _mission_bar() as (progress, announce):
             return run(progress, announce)
     except KeyboardInterrupt:
         line = f"interrupted: run {again} to complete it"
         raise Interruption(line) from None
     except SchedulerError as error:
         line = f"dess: error: {error}; run {again} to complete it"
-        raise typer.Exit(fail(line, 1)) from None
+        raise typer.Exit(print_failure(line, 1)) from None
     except ChunkError as error:
         for path, failure in error.failures.items():
-            fail(f"failed: {failure.error} ({path}); command: {failure.command}", 1)
+            print_failure(f"failed: {failure.error} ({path}); command: {failure.command}", 1)
         count = len(error.failures)
         line = f"dess: error: {count} of the chunks of study {name} failed, all others are complete"
-        raise typer.Exit(fail(line, 1)) from None
+        raise typer.Exit(print_failure(line, 1)) from None
 
 
 @contextmanager
-def _bar() -> "Iterator[tuple[Progress, Announce]]":
+def _mission_bar() -> "Iterator[tuple[Progress, Announce]]":
     """Progress in missions: callbacks for missions done, and for rounds, which add missions."""
-    with bar("mission") as shown:
+    with progress_bar("mission") as shown:
 
         def begin(started: "Round") -> None:
             if started.work:
@@ -368,7 +368,7 @@ def _bar() -> "Iterator[tuple[Progress, Announce]]":
                 shown.set_description(f"round {started.number + 1}", refresh=False)
             else:
                 present = f", {started.present:,} of them present" if started.present else ""
-                say(f"{started.missions:,} missions{present}", sys.stderr)
+                print_text(f"{started.missions:,} missions{present}", sys.stderr)
             shown.total = started.missions
             shown.initial += started.present  # took no time
 

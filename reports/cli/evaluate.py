@@ -18,9 +18,11 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 
-@options.command(app)
+@options.add_command(app)
 def evaluate(
-    policy: Annotated[list[str], typer.Option(metavar="P[,P...]", autocompletion=options.policies)],
+    policy: Annotated[
+        list[str], typer.Option(metavar="P[,P...]", autocompletion=options.complete_policies)
+    ],
     scenario: options.ScenarioOption = "paper",
     settings: options.SetOption = None,
     missions: Annotated[int, typer.Option(min=1)] = 1000,
@@ -52,13 +54,20 @@ def evaluate(
     engine = engine_of([space], engine)
     if out:
         study: dict[str, Any] = {"scenario": scenario, "policies": policy, "missions": missions}
-        study |= {"set": dict(map(options.setting, settings or [])), "seed": seed, "engine": engine}
-        evaluations = _kept(study, out, workers, yes)
+        study |= {
+            "set": dict(map(options.parse_setting, settings or [])),
+            "seed": seed,
+            "engine": engine,
+        }
+        evaluations = _evaluate_as_study(study, out, workers, yes)
     else:
         asked = [Asked(space, team, missions, seed, engine, workers) for team in policy]
         with console.compile_notice():
             check_evaluation(asked, yes)
-        with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
+        with (
+            console.compile_notice(),
+            console.progress_bar("mission", missions * len(policy)) as bar,
+        ):
             evaluations = [estimate_means(of_team, bar.update) for of_team in asked]
         options.note_departures(policy, [space])
     unknown = dict.fromkeys(("mean", "low", "high"), nan)
@@ -79,14 +88,16 @@ def evaluate(
         for evaluation in evaluations
     ]
     if as_json:
-        print(json.dumps([_without_nan(row) for row in rows], indent=2, allow_nan=False))
+        print(json.dumps([_replace_nan(row) for row in rows], indent=2, allow_nan=False))
     else:
         _print_rows(rows)
         if out:
-            console.say(f"more: {shlex.join(['dess', 'study', 'show', str(out)])}")
+            console.print_text(f"more: {shlex.join(['dess', 'study', 'show', str(out)])}")
 
 
-def _kept(data: dict[str, Any], out: Path, workers: int, yes: bool) -> "list[Evaluation]":
+def _evaluate_as_study(
+    data: dict[str, Any], out: Path, workers: int, yes: bool
+) -> "list[Evaluation]":
     """Run the scenario as a study, which is named after its folder."""
     from dess.analysis.execution.effort import check_run
     from dess.analysis.execution.evaluation import of_results
@@ -100,17 +111,17 @@ def _kept(data: dict[str, Any], out: Path, workers: int, yes: bool) -> "list[Eva
         check_run(study, out, workers, yes=yes)
     options.note_departures(study.policies, study.scenarios)
     return of_results(
-        console.complete(
+        console.run_or_exit(
             study.name,
             lambda progress, announce: run_study(study, out, workers, None, progress, announce),
         )
     )
 
 
-def _without_nan(row: Any) -> Any:
+def _replace_nan(row: Any) -> Any:
     """A row in which null stands for nan, which JSON does not have."""
     if isinstance(row, dict):
-        return {name: _without_nan(value) for name, value in row.items()}
+        return {name: _replace_nan(value) for name, value in row.items()}
     return None if row != row else row
 
 
@@ -127,4 +138,6 @@ def _print_rows(rows: list[dict[str, Any]]) -> None:
         engine = ", SimPy engine" if row["engine"] == "events" else ""
         speed = f" in {row['seconds']:.2f} s: {row['uav_slots'] / row['seconds']:,.0f} UAV-slots/s"
         took = "" if row["seconds"] != row["seconds"] else speed
-        console.say(f" {row['missions']} missions, {row['uav_slots']} UAV-slots{took}{engine}")
+        console.print_text(
+            f" {row['missions']} missions, {row['uav_slots']} UAV-slots{took}{engine}"
+        )

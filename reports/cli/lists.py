@@ -11,7 +11,7 @@ import typer
 from dess.base.errors import InputError, cut
 from dess.base.files.writing import fill
 from dess.reports.cli import console, options
-from dess.reports.cli.options import JsonOption, SetOption, command, load_space
+from dess.reports.cli.options import JsonOption, SetOption, add_command, load_space
 from dess.reports.cli.simulate import FIGURES, save_figure
 
 policies = typer.Typer(invoke_without_command=True, help="List the policies, or show one.")
@@ -25,16 +25,17 @@ studies = typer.Typer(invoke_without_command=True, help="List the shipped studie
 @policies.callback()
 def list_policies(context: typer.Context) -> None:
     """Print the list, unless one is shown."""
-    from dess.policies.registry import descriptions
+    from dess.policies.registry import describe_policies
 
     if context.invoked_subcommand is None:
-        console.print_list(descriptions().items())
+        console.print_list(describe_policies().items())
 
 
-@command(policies, "show")
+@add_command(policies, "show")
 def show_policy(
     name: Annotated[
-        str, typer.Argument(metavar="NAME|DIR|FILE.py:CLASS", autocompletion=options.policies)
+        str,
+        typer.Argument(metavar="NAME|DIR|FILE.py:CLASS", autocompletion=options.complete_policies),
     ],
     as_json: JsonOption = False,
 ) -> None:
@@ -43,20 +44,20 @@ def show_policy(
     Args:
         name: A policy, by name, folder of a training or file.
     """
-    from dess.policies.registry import about
+    from dess.policies.registry import describe_policy
 
-    found = about(name)
+    found = describe_policy(name)
     if as_json:
         print(json.dumps(found._asdict(), indent=2))
         return
-    any_place = "any scenario" if not found.requires else f"only {_settings(found.requires)}"
-    console.say(f"{found.name}: {found.origin} ({found.code})")
-    console.say(
+    any_place = "any scenario" if not found.requires else f"only {_print_settings(found.requires)}"
+    console.print_text(f"{found.name}: {found.origin} ({found.code})")
+    console.print_text(
         f"scenarios: {any_place}; of the shipped ones {', '.join(found.scenarios) or 'none'}"
     )
     if found.trained_on:
-        console.say(f"trained on: {_settings(found.trained_on)}")
-    console.say(f"\n{found.card.strip()}")
+        console.print_text(f"trained on: {_print_settings(found.trained_on)}")
+    console.print_text(f"\n{found.card.strip()}")
 
 
 @scenarios.callback()
@@ -69,9 +70,11 @@ def list_scenarios(context: typer.Context) -> None:
         console.print_list([*shipped, *scenario_families().items()])
 
 
-@command(scenarios, "show")
+@add_command(scenarios, "show")
 def show_scenario(
-    name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=options.scenarios)],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME|FILE", autocompletion=options.complete_scenarios)
+    ],
     settings: SetOption = None,
     everything: Annotated[bool, typer.Option("--all")] = False,
     figure: Annotated[Path | None, typer.Option(metavar="FILE.png")] = None,
@@ -91,8 +94,8 @@ def show_scenario(
     if figure:
         from dess.analysis.figures.missions import sea_figure
 
-        with console.outputs([figure]) as [temporary]:
-            sea = draft_scenario(name, **dict(map(options.setting, settings or [])))
+        with console.open_outputs([figure]) as [temporary]:
+            sea = draft_scenario(name, **dict(map(options.parse_setting, settings or [])))
             save_figure(sea_figure(sea), temporary, figure.suffix[1:])
     space = load_space(name, settings)
     description = scenario_description(name)
@@ -104,15 +107,19 @@ def show_scenario(
         return
     for text in (description, space.units):
         if text:
-            console.say(text)
+            console.print_text(text)
     if everything:
         for f in declared_fields(space):
-            default = f"default {_value(f.default)}" if f.default is not None else "no default"
-            console.say(f"{f.name} = {_value(f.value)} {f.unit}".rstrip())
-            console.say(f"    {f.meaning}; {default}; allowed: {f.allowed}")
+            default = (
+                f"default {_format_value(f.default)}" if f.default is not None else "no default"
+            )
+            console.print_text(f"{f.name} = {_format_value(f.value)} {f.unit}".rstrip())
+            console.print_text(f"    {f.meaning}; {default}; allowed: {f.allowed}")
         return
     heads = ["field", "value", "unit", "meaning"]
-    rows_ = [[f.name, cut(_value(f.value), 20), f.unit, f.meaning] for f in declared_fields(space)]
+    rows_ = [
+        [f.name, cut(_format_value(f.value), 20), f.unit, f.meaning] for f in declared_fields(space)
+    ]
     columns = [*zip(*rows_, strict=True)][:-1]
     rest = console.WIDTH - sum(max(map(len, column)) + 2 for column in columns)
     lines = [
@@ -123,7 +130,7 @@ def show_scenario(
     console.print_table(heads, lines, left=len(heads))
 
 
-@command(scenarios, "new")
+@add_command(scenarios, "new")
 def new_scenario(
     path: Annotated[Path, typer.Argument(metavar="FILE.toml")],
     nodes: Annotated[Path, typer.Option(metavar="FILE")],
@@ -149,7 +156,7 @@ def new_scenario(
     parts = (answer.partition("=") for answer in answers or [])
     given = {key.strip(): value.strip() for key, _, value in parts}
     new = NewScenario(nodes)
-    console.answers(given, new.questions(given), new.check)
+    console.ask_questions(given, new.questions(given), new.check)
     text = new.text()
     draft = parsed_scenario(text, path, DRAFT)
     on_land = len({*draft.nodes} & {*draft.no_fly})
@@ -157,16 +164,18 @@ def new_scenario(
         text = new.text(place="nearest")
         draft = parsed_scenario(text, path, DRAFT)
     picture = path.with_suffix(".png")
-    with console.outputs([path, picture]) as [file, drawing]:
+    with console.open_outputs([path, picture]) as [file, drawing]:
         fill(file, text)
         save_figure(sea_figure(draft), drawing, "png")
     if on_land:
-        console.say(f"note: no-fly cells have nodes.{node_placing_sentence(draft)}", sys.stderr)
+        console.print_text(
+            f"note: no-fly cells have nodes.{node_placing_sentence(draft)}", sys.stderr
+        )
     try:
         space = parsed_scenario(text, path)
     except InputError as error:
         raise InputError(f"{path} is written, but cannot be simulated: {error}") from None
-    console.say(f"{path}, {picture}: {space.units}")
+    console.print_text(f"{path}, {picture}: {space.units}")
 
 
 @studies.callback()
@@ -178,9 +187,11 @@ def list_studies(context: typer.Context) -> None:
         console.print_list(study_descriptions().items())
 
 
-@command(studies, "show")
+@add_command(studies, "show")
 def show_study(
-    name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=options.studies)],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME|FILE", autocompletion=options.complete_studies)
+    ],
     as_json: JsonOption = False,
 ) -> None:
     """Show a study: every field, as its file would set it.
@@ -196,11 +207,11 @@ def show_study(
     print(json.dumps(data, indent=2) if as_json else tomli_w.dumps(data).strip())
 
 
-def _settings(values: dict[str, Any]) -> str:
-    return ", ".join(f"{field}={_value(value)}" for field, value in values.items())
+def _print_settings(values: dict[str, Any]) -> str:
+    return ", ".join(f"{field}={_format_value(value)}" for field, value in values.items())
 
 
-def _value(value: Any) -> str:
+def _format_value(value: Any) -> str:
     """A value as TOML has it; of a long list its length."""
     if isinstance(value, list) and len(value) > 4:
         return f"{len(value)} of them"

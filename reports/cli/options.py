@@ -17,48 +17,48 @@ import typer
 
 from dess.base.errors import InputError, one_of, shown
 from dess.base.files.reading import parse_toml
-from dess.reports.cli.console import say
+from dess.reports.cli.console import print_text
 
 
-def policies(start: str) -> list[str]:
+def complete_policies(start: str) -> list[str]:
     """Names of policies; of a team ``P,P,...`` the last one."""
     from dess.policies import names
 
     before, comma, last = start.rpartition(",")
-    return [f"{before}{comma}{name}" for name in _beginning(names(), last)]
+    return [f"{before}{comma}{name}" for name in _names_beginning_with(names(), last)]
 
 
-def scenarios(start: str) -> list[str]:
+def complete_scenarios(start: str) -> list[str]:
     """Names of shipped scenarios, and of families of generated ones up to the seed."""
     from dess.scenario.scenario import scenario_families, scenario_names
 
     families = [name.removesuffix("SEED") for name in scenario_families()]
-    return _beginning([*scenario_names(), *families], start)
+    return _names_beginning_with([*scenario_names(), *families], start)
 
 
-def studies(start: str) -> list[str]:
+def complete_studies(start: str) -> list[str]:
     """Names of shipped studies."""
     from dess.analysis import study_names
 
-    return _beginning(study_names(), start)
+    return _names_beginning_with(study_names(), start)
 
 
-def configs(start: str) -> list[str]:
+def complete_configs(start: str) -> list[str]:
     """Names of shipped configs of trainings."""
     from dess.policies.learner.config import config_names
 
-    return _beginning(config_names(), start)
+    return _names_beginning_with(config_names(), start)
 
 
-def fields(start: str) -> list[str]:
+def complete_fields(start: str) -> list[str]:
     """Fields of a scenario, as ``--set`` takes them."""
     from dess.scenario.fields import fields_of
     from dess.scenario.scenario import ScenarioSpace
 
-    return [f"{name}=" for name in _beginning(fields_of(ScenarioSpace), start)]
+    return [f"{name}=" for name in _names_beginning_with(fields_of(ScenarioSpace), start)]
 
 
-def _beginning(names: Iterable[str], start: str) -> list[str]:
+def _names_beginning_with(names: Iterable[str], start: str) -> list[str]:
     return [name for name in names if name.startswith(start)]
 
 
@@ -81,7 +81,7 @@ ScenarioOption = Annotated[
     typer.Option(
         "--scenario",
         metavar="NAME|FILE",
-        autocompletion=scenarios,
+        autocompletion=complete_scenarios,
         help="A shipped scenario, a generated one such as coast:7, or a TOML file.",
     ),
 ]
@@ -90,7 +90,7 @@ SetOption = Annotated[
     typer.Option(
         SET,
         metavar="KEY=VALUE",
-        autocompletion=fields,
+        autocompletion=complete_fields,
         help="Set a field of the scenario to a value in TOML syntax; repeatable.",
     ),
 ]
@@ -99,11 +99,11 @@ WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="Number of 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
 
 
-def command(app: typer.Typer, name: str | None = None) -> Callable[[Callable], Callable]:
+def add_command(app: typer.Typer, name: str | None = None) -> Callable[[Callable], Callable]:
     """Make a command of a function; the part ``Args`` of its docstring describes the options."""
 
     def register(function: Callable) -> Callable:
-        summary, _, described = docstring(function).partition("\n\nArgs:\n")
+        summary, _, described = read_docstring(function).partition("\n\nArgs:\n")
         hints = get_type_hints(function, include_extras=True)
         for parameter, text in re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", described, re.M):
             if not hasattr(hints[parameter], "__metadata__"):
@@ -115,7 +115,7 @@ def command(app: typer.Typer, name: str | None = None) -> Callable[[Callable], C
     return register
 
 
-def docstring(function: Callable) -> str:
+def read_docstring(function: Callable) -> str:
     """The docstring of a function, also under ``python -OO``, which leaves it out."""
     if sys.flags.optimize < 2:
         return getdoc(function) or ""
@@ -126,10 +126,10 @@ def docstring(function: Callable) -> str:
 
 def note_departures(policies: Iterable[str], spaces: "Iterable[ScenarioSpace]") -> None:
     """Say on stderr which trained policies act outside of what they were trained on."""
-    from dess.policies.registry import departures
+    from dess.policies.registry import list_departures
 
-    for line in departures(policies, spaces):
-        say(f"note: {line}", sys.stderr)
+    for line in list_departures(policies, spaces):
+        print_text(f"note: {line}", sys.stderr)
 
 
 def load_space(name: str, settings: list[str] | None) -> "ScenarioSpace":
@@ -140,10 +140,10 @@ def load_space(name: str, settings: list[str] | None) -> "ScenarioSpace":
     """
     from dess import load_scenario
 
-    return load_scenario(name, **dict(setting(text) for text in settings or []))
+    return load_scenario(name, **dict(parse_setting(text) for text in settings or []))
 
 
-def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, Any]:
+def parse_setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, Any]:
     """Parse ``KEY=VALUE``.
 
     Args:
@@ -155,8 +155,8 @@ def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, An
         InputError: If the text has another form.
     """
     key, equals, value = (part.strip() for part in text.partition("="))
-    if allowed == FIELD and is_quantity(key) and value:
-        value = _quoted(value)
+    if allowed == FIELD and takes_quantities(key) and value:
+        value = _quote_quantities(value)
     with suppress(InputError):
         parsed = parse_toml(f"value = {value}", option)
         if equals and parsed.keys() == {"value"} and _is_plain(parsed["value"]):
@@ -170,7 +170,7 @@ def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, An
     raise InputError(f"{option}: {shown(text)} is not KEY=VALUE; allowed: {allowed}")
 
 
-def is_quantity(field: str) -> bool:
+def takes_quantities(field: str) -> bool:
     """Whether a field of a scenario has quantities, such as ``35 min``."""
     from dess.scenario.data_sheet import DataSheet
 
@@ -184,7 +184,7 @@ _PARTING = re.compile(r",(?![0-9])|(?<![0-9]),")
 _QUANTITY = re.compile(r"""("(?:[^"\\]|\\.)*"|'[^']*')|[^\[\],"']+""")
 
 
-def _quoted(value: str, is_single: bool = True) -> str:
+def _quote_quantities(value: str, is_single: bool = True) -> str:
     """A value of quantities in TOML syntax: ``20 kB/h`` and ``[1 kB, 2 kB]`` get their quotes.
 
     Args:
@@ -200,7 +200,7 @@ def _with_quotes(text: str) -> str:
     return json.dumps(text.strip()) if text.strip() else text
 
 
-def _field(name: str, option: str = SET) -> "FieldInfo":
+def _find_field(name: str, option: str = SET) -> "FieldInfo":
     """The field of a scenario; ``InputError`` if there is none."""
     from dess.scenario.fields import fields_of
     from dess.scenario.scenario import ScenarioSpace
@@ -220,7 +220,7 @@ def _check_word(name: str, word: str, option: str = SET) -> None:
     """
     from dess.base.errors import choices_of, form_of, kind_of
 
-    field = _field(name, option)
+    field = _find_field(name, option)
     words = choices_of(field)
     kind = kind_of(field)
     if word in words or kind == "text in quotes":
@@ -245,25 +245,27 @@ ALLOWED = (
 _RANGE = re.compile(r"(?P<low>[^\[\]'\",]*?)\.\.(?P<high>[^\[\]'\",:]*)(:(?P<count>.*))?")
 
 
-def all_values(texts: Iterable[str]) -> dict[str, tuple[Any, ...]]:
+def parse_all_values(texts: Iterable[str]) -> dict[str, tuple[Any, ...]]:
     """The values of all fields.
 
     Raises:
         InputError: If a text has another form, or a field is set twice.
     """
-    return _once("--set", map(values_of, texts))
+    return _refuse_repetition("--set", map(parse_values, texts))
 
 
-def all_settings(texts: Iterable[str], option: str = SET, allowed: str = FIELD) -> dict[str, Any]:
+def parse_all_settings(
+    texts: Iterable[str], option: str = SET, allowed: str = FIELD
+) -> dict[str, Any]:
     """The keys and values of an option such as ``--price uav=20000``.
 
     Raises:
         InputError: If a text has another form, or a key is set twice.
     """
-    return _once(option, (setting(text, option, allowed) for text in texts))
+    return _refuse_repetition(option, (parse_setting(text, option, allowed) for text in texts))
 
 
-def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
+def parse_values(text: str) -> tuple[str, tuple[Any, ...]]:
     """A field and its values: one is fixed, several are swept.
 
     Raises:
@@ -273,53 +275,55 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
 
     field, equals, values = (part.strip() for part in text.partition("="))
     if equals:
-        _field(field)
-    if is_quantity(field):
-        values = _quoted(values, is_single=False)
+        _find_field(field)
+    if takes_quantities(field):
+        values = _quote_quantities(values, is_single=False)
     elif found := _RANGE.fullmatch(values):
-        return field, list_values(field, _range(field, text, **found.groupdict()))
+        return field, list_values(field, _parse_range(field, text, **found.groupdict()))
     try:
-        given = setting(f"{field}=[{values}]" if equals else text, allowed="")[1]
+        given = parse_setting(f"{field}=[{values}]" if equals else text, allowed="")[1]
     except InputError:
         given = [word.strip() for word in values.split(",")]
         named = [word for word in given if word.replace("-", "_").isidentifier()]
         for word in named:
             _check_word(field, word)
         if not equals or len(named) < len(given):
-            raise _refused(text, "is not KEY=VALUES", ALLOWED) from None
+            raise _range_error(text, "is not KEY=VALUES", ALLOWED) from None
     return field, list_values(field, given)
 
 
-def _range(field: str, text: str, low: str, high: str, count: str | None) -> Any:
+def _parse_range(field: str, text: str, low: str, high: str, count: str | None) -> Any:
     """The values of ``low..high`` or ``low..high:count``."""
     from dess.analysis.study.design import INTEGERS
 
-    first = _number(text, low)
-    last = _number(text, high)
+    first = _parse_number(text, low)
+    last = _parse_number(text, high)
     if first > last:
         number = "" if count is None else f":{count}"
         turned = f"{field}={high.strip()}..{low.strip()}{number}"
-        raise _refused(text, "begins with the larger number", turned)
+        raise _range_error(text, "begins with the larger number", turned)
     if count is not None:
-        return _spaced(text, first, last, count, field in INTEGERS)
+        return _space_evenly(text, first, last, count, field in INTEGERS)
     if field not in INTEGERS:
-        raise _refused(text, "has no number of values", f"{text}:5, for five of them")
+        raise _range_error(text, "has no number of values", f"{text}:5, for five of them")
     if not _is_whole(first) or not _is_whole(last):
-        raise _refused(text, "has an end that is not an integer", f"integers, as {field} has")
+        raise _range_error(text, "has an end that is not an integer", f"integers, as {field} has")
     return range(int(first), int(last) + 1)
 
 
-def _spaced(text: str, first: Decimal, last: Decimal, count: str, is_integer: bool) -> list[Any]:
+def _space_evenly(
+    text: str, first: Decimal, last: Decimal, count: str, is_integer: bool
+) -> list[Any]:
     """Evenly spaced numbers, both ends included."""
     from dess.analysis.study.design import MAX_SIZE
 
     number = int(count) if count.strip().isdecimal() else 0
     if not 2 <= number <= MAX_SIZE:
-        raise _refused(text, "has no number of values", f"2 to {MAX_SIZE:,} after the colon")
+        raise _range_error(text, "has no number of values", f"2 to {MAX_SIZE:,} after the colon")
     values = [first + (last - first) * place / (number - 1) for place in range(number)]
     if is_integer:
         if not all(map(_is_whole, values)):
-            raise _refused(text, f"has {number} values that are not integers", "another number")
+            raise _range_error(text, f"has {number} values that are not integers", "another number")
         return [int(value) for value in values]
     return [float(value) for value in values]
 
@@ -328,19 +332,19 @@ def _is_whole(number: Decimal) -> bool:
     return number == number.to_integral_value()  # unlike %, also where it has very many digits
 
 
-def _number(text: str, end: str) -> Decimal:
+def _parse_number(text: str, end: str) -> Decimal:
     with suppress(InvalidOperation):
         number = Decimal(end.strip())
         if abs(number) <= Decimal("1e300"):
             return number
-    raise _refused(text, f"has an end {end.strip()!r} that is not a number", ALLOWED)
+    raise _range_error(text, f"has an end {end.strip()!r} that is not a number", ALLOWED)
 
 
-def _refused(text: str, problem: str, allowed: str) -> InputError:
+def _range_error(text: str, problem: str, allowed: str) -> InputError:
     return InputError(f"--set: {text!r} {problem}; allowed: {allowed}")
 
 
-def _once(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+def _refuse_repetition(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in pairs:
         if key in found:

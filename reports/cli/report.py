@@ -13,7 +13,14 @@ import typer
 from dess.base.errors import InputError, one_of, shown
 from dess.reports.cli import console
 from dess.reports.cli.console import YesOption
-from dess.reports.cli.options import PAGES, PARAMETER, RESULTS, JsonOption, command, setting
+from dess.reports.cli.options import (
+    PAGES,
+    PARAMETER,
+    RESULTS,
+    JsonOption,
+    add_command,
+    parse_setting,
+)
 from dess.reports.pages import PICTURES
 
 if TYPE_CHECKING:
@@ -25,7 +32,7 @@ WHAT_IF = "what-if"  # the only report that has --set
 app = typer.Typer()
 
 
-@command(app)
+@add_command(app)
 def report(
     names: Annotated[list[str] | None, typer.Argument(metavar="[NAME|DIR]...")] = None,
     results: Annotated[Path, typer.Option(metavar="DIR")] = RESULTS,
@@ -58,11 +65,11 @@ def report(
             raise InputError(f"--figures: {shown(kind)} is unknown{one_of(kind, PICTURES)}")
     if results != RESULTS and not os.path.lexists(results):
         raise InputError(f"--results: {results}: no such folder; allowed: one with results")
-    values = dict(setting(text, "--parameter", PARAMETER) for text in parameters or [])
+    values = dict(parse_setting(text, "--parameter", PARAMETER) for text in parameters or [])
     if settings:
         if names and WHAT_IF not in names:
             raise InputError(f"--set: {' '.join(names)} takes no --set; allowed: {WHAT_IF}")
-        values["settings"] = dict(setting(text) for text in settings)
+        values["settings"] = dict(parse_setting(text) for text in settings)
         values.setdefault("baseline", {})  # the scenario itself, not that of the default question
     if yes:  # a parameter of the notebooks that simulate missions
         values["yes"] = True
@@ -71,17 +78,17 @@ def report(
 
     folders = [n for n in names or [] if os.sep in n or (n not in NAMES and os.path.isdir(n))]
     reports = [name for name in names or [] if name not in folders]
-    with rendering() as progress:
+    with rendering_bar() as progress:
         if reports or not folders:
-            console.say(render(reports, results, out, progress, values, formats=formats))
+            console.print_text(render(reports, results, out, progress, values, formats=formats))
         for folder in folders:
-            console.say(render_study(folder, out, progress, values, formats))
+            console.print_text(render_study(folder, out, progress, values, formats))
     if formats:
-        console.say(f"figures: {out / '*-figures'}")
+        console.print_text(f"figures: {out / '*-figures'}")
 
 
 @contextmanager
-def rendering() -> "Iterator[Progress]":
+def rendering_bar() -> "Iterator[Progress]":
     """A bar for the progress of pages; a notebook that fails is one line and exit code 1."""
     from dess.reports.pages.render import ReportError
 
@@ -89,10 +96,10 @@ def rendering() -> "Iterator[Progress]":
         with console.compile_notice(), console.counted_bar("step") as progress:
             yield progress
     except ReportError as error:
-        raise typer.Exit(console.fail(f"dess: error: {error}", 1)) from error
+        raise typer.Exit(console.print_failure(f"dess: error: {error}", 1)) from error
 
 
-@command(app)
+@add_command(app)
 def verify(
     path: Annotated[Path, typer.Argument(metavar="PAGE|DIR")],
     missions: Annotated[int, typer.Option(min=1, max=10000)] = 20,
@@ -125,14 +132,14 @@ def verify(
         _print_verdicts(path, verdicts)
     if differing := [line for verdict in verdicts for line in verdict.differing]:
         for line in differing:
-            console.fail(f"differs: {line}", 1)
+            console.print_failure(f"differs: {line}", 1)
         compared = sum(verdict.compared for verdict in verdicts)
         line = f"{path}: {len(differing)} of {compared} differ (--seed {seed})"
-        raise typer.Exit(console.fail(f"dess: error: {line}", 1))
+        raise typer.Exit(console.print_failure(f"dess: error: {line}", 1))
 
 
 def _print_verdicts(path: Path, verdicts: "list[Check]") -> None:
     rows = [[v.what, str(v.compared), str(len(v.differing))] for v in verdicts]
     console.print_table([str(path), "compared", "differing"], rows)
     for note in dict.fromkeys(f"{v.what}: {note}" for v in verdicts for note in v.notes):
-        console.say(f"note: {note}")
+        console.print_text(f"note: {note}")

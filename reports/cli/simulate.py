@@ -35,13 +35,13 @@ T = TypeVar("T")
 app = typer.Typer()
 
 
-@options.command(app)
+@options.add_command(app)
 def simulate(
     context: typer.Context,
     scenario: options.ScenarioOption = "paper",
     settings: options.SetOption = None,
     policy: Annotated[
-        str | None, typer.Option(metavar="P[,P...]", autocompletion=options.policies)
+        str | None, typer.Option(metavar="P[,P...]", autocompletion=options.complete_policies)
     ] = None,
     seed: options.SeedOption = 0,
     replication: int | None = None,
@@ -79,7 +79,7 @@ def simulate(
 
     if of:
         _refuse_given(context, "scenario", "settings", "seed")
-        asked = _of_study(of, point, policy, replication)
+        asked = _read_study(of, point, policy, replication)
     elif point is not None:
         raise InputError("--point: belongs to a study; allowed: with --of DIR")
     else:
@@ -91,7 +91,12 @@ def simulate(
     check_seed(asked.seed, asked.replication)
     if path and path.suffix.lower() == ".kml" and asked.space.centre is None:
         raise InputError(f"--path: {path}: the sea has no degrees; allowed: .geojson, .csv")
-    writers = {events: _write_log, figure: _draw, animation: _animate, path: _write_path}
+    writers = {
+        events: _write_log,
+        figure: _write_map,
+        animation: _write_animation,
+        path: _write_path,
+    }
     paths = [file for file in (events, figure, animation, path) if file]
     if len({file.absolute() for file in paths}) < len(paths):
         raise InputError("--events, --figure: the same file; allowed: a file for each")
@@ -106,7 +111,7 @@ def simulate(
     is_binary = events is not None and console.is_stdout(events)
     if is_binary and as_json:
         raise InputError("--json: standard output has the event log; allowed: --events FILE")
-    with console.outputs(paths) as temporaries:
+    with console.open_outputs(paths) as temporaries:
         with console.compile_notice():
             which = asked.seed, asked.replication
             record = simulate(asked.space, asked.team, *which, events=bool(paths) or not as_json)
@@ -117,8 +122,8 @@ def simulate(
     options.note_departures([asked.policy], [asked.space])
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
-        others = _metrics(mission).items()
-        told = _told(record.measured, mission)
+        others = _metric_values(mission).items()
+        told = _values_in_units(record.measured, mission)
         metrics |= {k: value for k, value in others if k not in (*asked.names, *metrics, "uavs")}
         measured = {"operations": told} if record.operations is not None else {}
         print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
@@ -153,7 +158,7 @@ class _Asked:
         return {name: getattr(self, name) for name in shown}
 
 
-def _of_study(
+def _read_study(
     folder: Path, point: int | None, policy: str | None, replication: int | None
 ) -> _Asked:
     """What a results folder says of a mission; a line on stderr if it may be another one now."""
@@ -165,21 +170,21 @@ def _of_study(
     policies = [team.policy for team in manifest.policies]
     named = [policy] if policy else []
     typed = TypedByUser(policy) if policy else None
-    policy = _chosen("policy", typed, policies, ", ".join(policies))
+    policy = _choose_of_study("policy", typed, policies, ", ".join(policies))
     points = range(len(manifest.points))
-    point = _chosen("point", point, points, f"0..{len(points) - 1}")
+    point = _choose_of_study("point", point, points, f"0..{len(points) - 1}")
     space = manifest.scenarios[point]
     team = load_team(policy, space.uavs[1])
     if changes := manifest.changes_here(named):
         line = f"note: {folder}: {'; '.join(changes)}: the mission may be another one now"
-        console.say(line, sys.stderr)
+        console.print_text(line, sys.stderr)
     if replication is None:
         replication = manifest.points[point].replication
     names = manifest.study.scenario, manifest.study.name
     return _Asked(space, policy, team, manifest.seed, replication, *names, point)
 
 
-def _chosen(option: str, given: T | None, there: Sequence[T], allowed: str) -> T:
+def _choose_of_study(option: str, given: T | None, there: Sequence[T], allowed: str) -> T:
     """What is given of the study, or the only one that it has."""
     if given is None and len(there) == 1:
         return there[0]
@@ -247,7 +252,7 @@ def _write_log(mission: _Mission, path: Path, kind: str) -> None:
         fill(path, parquet_of(table))
 
 
-def _draw(mission: _Mission, path: Path, kind: str) -> None:
+def _write_map(mission: _Mission, path: Path, kind: str) -> None:
     from dess.analysis.figures.missions import mission_figure
 
     save_figure(mission_figure(mission.log, mission.scenario), path, kind)
@@ -258,7 +263,7 @@ def save_figure(figure: "Figure", path: Path, kind: str) -> None:
     figure.savefig(path, format=kind)
 
 
-def _animate(mission: _Mission, path: Path, kind: str) -> None:
+def _write_animation(mission: _Mission, path: Path, kind: str) -> None:
     from dess.reports.player import write_animation
 
     if kind == "html":
@@ -278,24 +283,26 @@ def _write_page(mission: _Mission, path: Path) -> None:
     """Write a page with the player of the mission; the same mission gives the same bytes."""
     from dess.base.files import writing
     from dess.reports import player
-    from dess.reports.pages.html import fill
+    from dess.reports.pages.html import fill_page
 
-    caption = player.reading(mission.scenario)
+    caption = player.explain_player(mission.scenario)
     shown = player.Shown(mission.log, mission.scenario)
-    played = player.player([shown], "mission", caption)
-    parts = {"library": player.library().data, "player": played.data}
+    played = player.make_player([shown], "mission", caption)
+    parts = {"library": player.player_script().data, "player": played.data}
     title, outcome = mission.title, mission.outcome
-    page = fill("mission.html", scripts=True, title=title, outcome=outcome, **parts)
+    page = fill_page("mission.html", scripts=True, title=title, outcome=outcome, **parts)
     writing.fill(path, page)
 
 
-def _metrics(mission: _Mission) -> dict[str, float]:
+def _metric_values(mission: _Mission) -> dict[str, float]:
     """The metrics of every mission."""
     metrics = mission.record.metrics
-    return _told({name: metrics[name].item() for name in metrics.dtype.names or ()}, mission)
+    return _values_in_units(
+        {name: metrics[name].item() for name in metrics.dtype.names or ()}, mission
+    )
 
 
-def _told(values: dict[str, Any], mission: _Mission) -> dict[str, Any]:
+def _values_in_units(values: dict[str, Any], mission: _Mission) -> dict[str, Any]:
     """Values of the mission; with a data sheet, in units as well."""
     from dess.analysis.metrics import columns_in_units
 
@@ -307,13 +314,13 @@ def _print_mission(mission: _Mission) -> None:
     from dess.analysis.metrics import column_as_told, measured_in, metric_of
     from dess.analysis.results.event_log import causes_of_failure, residual_data
 
-    metrics = _metrics(mission)
+    metrics = _metric_values(mission)
     rows = [
         [name, f"{metrics[name]:g}"]
         for name in dict.fromkeys(column_as_told(n, metrics) for n in metrics)
     ]
     console.print_table(["", "mission"], rows)
-    if measured := _told(mission.record.measured, mission):
+    if measured := _values_in_units(mission.record.measured, mission):
         labelled = [(metric_of(name).label, measured[name]) for name in measured_in(measured)]
         rows = [[label, f"{value:g}"] for label, value in labelled]
         console.print_table(["", "beyond the paper"], rows)
@@ -326,4 +333,4 @@ def _print_mission(mission: _Mission) -> None:
         rows = [[name, str([*cell]), f"{had:g}", f"{left:g}"] for name, cell, had, left in of_nodes]
         console.print_table(["node", "cell", "data at the start", "at the end"], rows)
     for cause in causes_of_failure(mission.log, mission.scenario, first=0):  # as in the table
-        console.say(f"{cause}.")
+        console.print_text(f"{cause}.")

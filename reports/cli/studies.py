@@ -13,8 +13,8 @@ import typer
 from dess.base.errors import InputError, one_of
 from dess.base.libraries import needs
 from dess.reports.cli import console, options
-from dess.reports.cli.console import YesOption, complete
-from dess.reports.cli.report import rendering
+from dess.reports.cli.console import YesOption, run_or_exit
+from dess.reports.cli.report import rendering_bar
 from dess.reports.pages import PREFIX, check_pages
 
 if TYPE_CHECKING:
@@ -32,10 +32,10 @@ app = typer.Typer(
 )
 
 
-@options.command(app)
+@options.add_command(app)
 def run(
     names: Annotated[
-        list[str], typer.Argument(metavar="NAME|FILE...", autocompletion=options.studies)
+        list[str], typer.Argument(metavar="NAME|FILE...", autocompletion=options.complete_studies)
     ],
     out: Annotated[
         Path | None,
@@ -49,7 +49,7 @@ def run(
     scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS")] = None,
     missions: Annotated[int | None, typer.Option(min=1)] = None,
     policy: Annotated[
-        list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.policies)
+        list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.complete_policies)
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run")] = False,
     accept_code: Annotated[bool, typer.Option("--accept-code")] = False,
@@ -92,28 +92,30 @@ def run(
         for study, folder in runs:
             check_run(study, folder, workers, accept_code=accept_code, yes=yes)
     for study, folder in runs:
-        _run(study, folder, workers, scheduler, accept_code)
+        _run_and_summarize(study, folder, workers, scheduler, accept_code)
     if page:
         from dess.reports.pages.render import render_study
 
-        with rendering() as progress:
+        with rendering_bar() as progress:
             for folder in folders:
-                console.say(render_study(folder, options.PAGES, progress))
+                console.print_text(render_study(folder, options.PAGES, progress))
 
 
-def _run(study: "Study", out: Path, workers: int, scheduler: str | None, accept: bool) -> None:
+def _run_and_summarize(
+    study: "Study", out: Path, workers: int, scheduler: str | None, accept: bool
+) -> None:
     """Run a study, and print its summary."""
     from dess.analysis.execution.runner import run_study
     from dess.reports.cli.tables import print_summary
 
-    results = complete(
+    results = run_or_exit(
         study.name,
         lambda progress, announce: run_study(
             study, out, workers, scheduler, progress, announce, accept
         ),
     )
     print_summary(results, out, short=True)
-    console.say(f"more: {shlex.join(['dess', 'study', 'show', str(out)])}")
+    console.print_text(f"more: {shlex.join(['dess', 'study', 'show', str(out)])}")
 
 
 def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
@@ -127,17 +129,17 @@ def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -
         rule = "selection" if study.selection else "precision"
         per_cell += f" and more, up to {largest_budget(study):,} missions, as {rule} asks"
     missions = sum(p.missions for p in plan[: len(study.policies)])
-    console.say(
+    console.print_text(
         f"{out}: {missions:,} missions of study {study.name} ({len(study.policies)} policies "
         f"x {study.size:,} design points x {per_cell})"
     )
-    console.say(
+    console.print_text(
         f"{total_time(plan, workers)} with {workers} at work, by the usual speed of such missions; "
         "compiling, on the first run, takes a few minutes more"
     )
 
 
-@options.command(app)
+@options.add_command(app)
 def show(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
     policy: Annotated[str | None, typer.Option(metavar="P[,P...]")] = None,
@@ -165,8 +167,8 @@ def show(
 
     if as_csv and as_json:
         raise InputError("--csv: not with --json; allowed: one of them")
-    targets = _targets(target or [])
-    results = _results(folder)
+    targets = _parse_targets(target or [])
+    results = _load_folder(folder)
     if policy is not None and policy not in results.policies:
         raise InputError(
             f"--policy: {policy!r} is not in the study{one_of(policy, results.policies)}"
@@ -175,20 +177,20 @@ def show(
     means = summary.settings_meeting(summary.means_of_points(results), targets)
     means = summary.add_verdicts(results, means)
     if as_csv:
-        console.say(numbers.write_csv(_with_values(results, means)).rstrip())
+        console.print_text(numbers.write_csv(_add_field_values(results, means)).rstrip())
     elif as_json:
-        tables = _tables(results, means, policy, worst, folder)
-        print(json.dumps(_document(results, tables, targets), indent=2))
+        tables = _make_tables(results, means, policy, worst, folder)
+        print(json.dumps(_make_document(results, tables, targets), indent=2))
     else:
         if targets:
             printed.print_meeting(results, means, targets)
             return
         printed.print_summary(results, folder, short=False)
-        shown = _tables(results, means, policy, worst, folder)
+        shown = _make_tables(results, means, policy, worst, folder)
         printed.print_details(results, shown, everything)
 
 
-def _results(folder: Path) -> "Results":
+def _load_folder(folder: Path) -> "Results":
     """The results in a folder; a study that is kept elsewhere is named with its folder."""
     from dess.analysis.results.tables import load_results
 
@@ -199,12 +201,12 @@ def _results(folder: Path) -> "Results":
     return load_results(folder)
 
 
-def _targets(texts: Iterable[str]) -> dict[str, float]:
+def _parse_targets(texts: Iterable[str]) -> dict[str, float]:
     """Metric -> the least mean, or the largest of a metric of which less is better."""
     from dess.analysis.metrics import ALIASES, MEASURES, METRICS
 
     targets = {}
-    for name, share in options.all_settings(texts, "--target", TARGET).items():
+    for name, share in options.parse_all_settings(texts, "--target", TARGET).items():
         if (metric := ALIASES.get(name, name)) not in METRICS | MEASURES:
             known = one_of(name, [*METRICS, *ALIASES, *MEASURES])
             raise InputError(f"--target: {name!r} is unknown{known}")
@@ -219,7 +221,7 @@ def _targets(texts: Iterable[str]) -> dict[str, float]:
     return targets
 
 
-def _tables(
+def _make_tables(
     results: "Results", means: "pd.DataFrame", policy: str | None, worst: int, folder: Path
 ) -> "dict[str, pd.DataFrame]":
     """All tables, by their names in the JSON."""
@@ -245,7 +247,7 @@ def _tables(
     }
 
 
-def _document(
+def _make_document(
     results: "Results", tables: "dict[str, pd.DataFrame]", targets: dict[str, float]
 ) -> dict[str, Any]:
     """All tables as plain data; rows on a design point have the values of its fields as well."""
@@ -261,7 +263,7 @@ def _document(
     return about | ({"targets": targets} if targets else {}) | rows
 
 
-def _with_values(results: "Results", means: "pd.DataFrame") -> "pd.DataFrame":
+def _add_field_values(results: "Results", means: "pd.DataFrame") -> "pd.DataFrame":
     """Means with a column per field that the design sets; a list of values is JSON."""
     table = means.copy()
     values = results.store.manifest.values
@@ -272,7 +274,7 @@ def _with_values(results: "Results", means: "pd.DataFrame") -> "pd.DataFrame":
     return table
 
 
-@options.command(app)
+@options.add_command(app)
 def diff(
     a: Annotated[Path, typer.Argument(metavar="A")],
     b: Annotated[Path, typer.Argument(metavar="B")],
@@ -289,7 +291,7 @@ def diff(
     from dess.analysis.answers import diff
     from dess.reports.cli.tables import print_diff
 
-    found = diff.diff_results(_results(a), _results(b))
+    found = diff.diff_results(_load_folder(a), _load_folder(b))
     if as_json:
         print(json.dumps(_diff_document(found, most), indent=2))
     else:
@@ -320,7 +322,7 @@ def _diff_document(found: "Diff", most: int) -> dict:
     }
 
 
-@options.command(app)
+@options.add_command(app)
 def export(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
     crate: Annotated[Path, typer.Option(metavar="FILE.zip")],
@@ -335,19 +337,19 @@ def export(
         page: The page of the results.  [default: it is rendered for the crate]
         licence: Licence of the results, by its SPDX identifier.
     """
-    from dess.reports.crate import check_page, licence_of, write_crate
+    from dess.reports.crate import check_page, find_licence, write_crate
     from dess.reports.pages.render import render_study
 
     console.check_ending("--crate", crate, (".zip",), "a zip file", is_stream=True)
-    results = _results(folder)
-    licence = licence_of(licence)
+    results = _load_folder(folder)
+    licence = find_licence(licence)
     if page:
         check_page(page, results)
-    with console.outputs([crate]) as (temporary,), TemporaryDirectory() as pages:
+    with console.open_outputs([crate]) as (temporary,), TemporaryDirectory() as pages:
         if page is None:
-            with rendering() as progress:
+            with rendering_bar() as progress:
                 page = render_study(folder, pages, progress)
         write_crate(results, page, temporary, date.today(), licence)
     if not console.is_stdout(crate):
         missions = f"{len(results.missions):,} missions"
-        console.say(f"{crate}: {missions} with {page.name}, licence {licence}")
+        console.print_text(f"{crate}: {missions} with {page.name}, licence {licence}")

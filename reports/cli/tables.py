@@ -26,9 +26,9 @@ MANY_POINTS = 40  # more design points are not listed
 def print_summary(results: Results, folder: Path, short: bool) -> None:
     """Print the means at the only design point, or the selected points and their check."""
     study = results.study
-    console.say(f"{folder}: {len(results.missions):,} missions of study {study.name}")
+    console.print_text(f"{folder}: {len(results.missions):,} missions of study {study.name}")
     for change in results.store.manifest.accepted:
-        console.say(f" accepted: {change.text}")
+        console.print_text(f" accepted: {change.text}")
     printed = values.PRINTED.get(study.name, {})
     if study.selection:
         selected = summary.selected_settings(results)
@@ -36,7 +36,7 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         is_search = "condition" in selected
         if is_search and study.costs:
             for text in cheapest.cheapest_sentences(results):
-                console.say(f" {text.translate(str.maketrans('', '', '*`'))}")
+                console.print_text(f" {text.translate(str.maketrans('', '', '*`'))}")
         if len(results.checks):
             means = summary.means_of_check(results)
             checks = study.selection.check
@@ -94,7 +94,7 @@ def print_frame(title: str, cells: pd.DataFrame) -> None:
 
 def _print_titled(title: str, cells: pd.DataFrame) -> None:
     """Print a table of text below its title."""
-    console.say(title)
+    console.print_text(title)
     print_frame(str(cells.columns[0]), cells.set_index(cells.columns[0]))
 
 
@@ -105,13 +105,15 @@ def _print_selections(selected: pd.DataFrame) -> None:
     cells["missions"] = format_counts(cells["missions"])
     print_frame("selected for", cells)
     for guarantee in dict.fromkeys(selected["guarantee"]):
-        console.say(f" {guarantee}")
+        console.print_text(f" {guarantee}")
 
 
 def _print_costs(table: pd.DataFrame, currency: str) -> None:
     """The settings, the cheapest first, with success, and the probability to be on the front."""
     if len(table) > MANY_POINTS:
-        console.say(f"the costs of {len(table)} settings are too many to list; --json has them")
+        console.print_text(
+            f"the costs of {len(table)} settings are too many to list; --json has them"
+        )
         return
     cells = setting_cells(table, [SUCCESS])
     cells["On the front"] = table["probability"].map(numbers.format_percent)
@@ -146,7 +148,7 @@ def _print_by_point(results: Results, means: pd.DataFrame, metrics: list[str]) -
     if len(points) == 1:
         return
     if len(points) > MANY_POINTS:
-        console.say(f"{len(points)} design points are too many to list; --json has them")
+        console.print_text(f"{len(points)} design points are too many to list; --json has them")
         return
     for metric in metrics:
         rows = means[means["metric"] == metric]
@@ -154,16 +156,16 @@ def _print_by_point(results: Results, means: pd.DataFrame, metrics: list[str]) -
             rows, "point", "policy", metric_of(metric).written
         ).fillna("")
         if metric == PRODUCT and "verdict" in rows and len(cells.columns) > 1:
-            cells["best"] = _best(rows)
+            cells["best"] = _best_policies(rows)
         print_frame(metric_of(metric).head, cells.rename(index=dict(enumerate(points))))
         if "best" in cells:
-            console.say(
+            console.print_text(
                 " best: significantly better than the others on common replications (95 %, at "
                 "each design point by itself); ≈: these may all be the best"
             )
 
 
-def _best(rows: pd.DataFrame) -> pd.Series:
+def _best_policies(rows: pd.DataFrame) -> pd.Series:
     """The policy that is the best at each design point, or those that may be, the first first."""
     may_be = rows[rows["verdict"] != summary.WORSE].sort_values("mean", ascending=False)
     return may_be.groupby("point")["policy"].agg(" ≈ ".join)
@@ -185,7 +187,9 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
     product = means[means["metric"] == PRODUCT].set_index(["policy", "point"])
     count = f"{len(product):,} of {len(results.store.manifest.points) * len(results.policies):,}"
     meet = "meets" if len(product) == 1 else "meet"
-    console.say(f"{count} settings {meet} {numbers.join_words(asked)}, by the whole interval")
+    console.print_text(
+        f"{count} settings {meet} {numbers.join_words(asked)}, by the whole interval"
+    )
     if product.empty:
         return
     cells = numbers.estimates_as_text(means[means["metric"].isin(METRICS)], ["policy", "point"])
@@ -193,7 +197,7 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
     names = [setting_in_words(results, *setting) for setting in cells.index]
     print_frame("setting", cells.set_axis(names, axis="index")[:MANY_POINTS])
     if len(cells) > MANY_POINTS:
-        console.say(f" {len(cells) - MANY_POINTS:,} more settings; --csv has them")
+        console.print_text(f" {len(cells) - MANY_POINTS:,} more settings; --csv has them")
 
 
 def _print_distributions(table: pd.DataFrame) -> None:
@@ -206,24 +210,24 @@ def _print_distributions(table: pd.DataFrame) -> None:
 
 def _print_comparisons(results: Results, table: pd.DataFrame) -> None:
     """Differences of the other policies from the best one."""
-    cells, product = differences(table, "policy")
+    cells, product = choose_product_differences(table, "policy")
     # How many times as many missions the comparison needs without common random numbers.
     gains = product["variance_reduction"].map(lambda v: f"{1 / (1 - v):.1f} x" if v < 1 else "")
     cells["pairing saves"] = gains
     print_frame(f"against {table['baseline'].iloc[0]} [points]", cells)
-    console.say(f" {summary.correction_in_words(results)}")
+    console.print_text(f" {summary.correction_in_words(results)}")
     if why := summary.allowance_for_difference(table, "policy"):
-        console.say(f" {why}")
+        console.print_text(f" {why}")
 
 
 def _print_learners(table: pd.DataFrame) -> None:
     """Differences of the learners from the best heuristic."""
-    cells, product = differences(table, "learner")
+    cells, product = choose_product_differences(table, "learner")
     cells = cells.assign(about=product["about"])
     print_frame(f"learned against {table['baseline'].iloc[0]} [points]", cells)
 
 
-def differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+def choose_product_differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFrame]:
     """``comparison_cells`` by what is compared, and the rows of the product."""
     cells = comparison_cells(table, who).set_index(who.capitalize())
     return cells, table[table["metric"] == PRODUCT].set_index(who)
@@ -232,11 +236,11 @@ def differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFra
 def _print_worst(table: pd.DataFrame) -> None:
     """The worst missions of a policy, with the commands that simulate them again."""
     policy = table["policy"].iloc[0]
-    console.say(f" worst missions of {policy}, by product:")
+    console.print_text(f" worst missions of {policy}, by product:")
     for row in table.itertuples():
         outcome = "" if row.success else ", no success"
-        console.say(f"   {numbers.format_percent(row.collection_ratio)} collected{outcome}:")
-        console.say(f"     {row.command}")
+        console.print_text(f"   {numbers.format_percent(row.collection_ratio)} collected{outcome}:")
+        console.print_text(f"     {row.command}")
 
 
 MANY, FIELDS = 10, 4  # rows on differences, and fields of a mission, that are printed
@@ -247,15 +251,15 @@ def print_diff(found: diff.Diff, most: int) -> None:
     missions = len(found.missions)
     differ = len(found.changed)
     if found.unpaired is not None:
-        console.say(f"{len(found.unpaired):,} missions of both, with different random draws")
+        console.print_text(f"{len(found.unpaired):,} missions of both, with different random draws")
     elif found.identical:
-        console.say(f"identical: {missions:,} missions")
+        console.print_text(f"identical: {missions:,} missions")
     elif not differ:
-        console.say(f"identical: the {missions:,} missions that both have")
+        console.print_text(f"identical: the {missions:,} missions that both have")
     else:
-        console.say(f"{differ:,} of {missions:,} missions differ")
+        console.print_text(f"{differ:,} of {missions:,} missions differ")
     for origin in diff.differing_origins(found):
-        console.say(f" {origin}")
+        console.print_text(f" {origin}")
     _print_alone(found.alone)
     if differ or found.unpaired is not None:
         _print_effects(found)
@@ -267,9 +271,9 @@ def _print_alone(alone: pd.DataFrame) -> None:
     """What only one of the folders has."""
     for side, rows in alone.groupby("only_in"):
         for row in rows[:MANY].itertuples():
-            console.say(f" only in {side}: {row.what} ({row.missions:,} missions)")
+            console.print_text(f" only in {side}: {row.what} ({row.missions:,} missions)")
         if len(rows) > MANY:
-            console.say(
+            console.print_text(
                 f" only in {side}: {len(rows) - MANY:,} more groups of missions; --json has them"
             )
 
@@ -288,30 +292,30 @@ def _print_differences(table: pd.DataFrame) -> None:
     """A row for everything whose missions differ: how many do, and B - A in every metric."""
     rows = table[table["differ"] > 0]
     names = rows["who"].drop_duplicates()
-    cells, product = differences(rows[rows["who"].isin(names[:MANY])], "who")
+    cells, product = choose_product_differences(rows[rows["who"].isin(names[:MANY])], "who")
     counts = product["differ"].map("{:,}".format) + " of " + product["missions"].map("{:,}".format)
     cells.insert(0, "missions that differ", counts)
     print_frame("B - A [points]", cells)
     if (more := len(names) - MANY) > 0:
-        console.say(f" {more:,} more rows; --json has them")
+        console.print_text(f" {more:,} more rows; --json has them")
     if same := table["who"].nunique() - len(names):
-        console.say(f" {same:,} more without any difference")
+        console.print_text(f" {same:,} more without any difference")
 
 
 def _print_most_changed(found: diff.Diff, most: int) -> None:
     """The most changed missions, with the commands that simulate them again."""
     for side, results in (("A", found.a), ("B", found.b)):
-        console.say(f" {side}, {results.store.folder}: {diff.at_hand(results)}")
-    console.say(" most changed missions:")
+        console.print_text(f" {side}, {results.store.folder}: {diff.at_hand(results)}")
+    console.print_text(" most changed missions:")
     for row in diff.most_changed(found, most).itertuples():
         where = setting_in_words(found.a, row.policy_a, row.point_a)
-        console.say(
-            f"   {where}, replication {row.replication}: {_shortened(row.fields.split(', '))}"
+        console.print_text(
+            f"   {where}, replication {row.replication}: {_shorten_fields(row.fields.split(', '))}"
         )
-        console.say(f"     A: {row.command_a}\n     B: {row.command_b}")
+        console.print_text(f"     A: {row.command_a}\n     B: {row.command_b}")
 
 
-def _shortened(fields: list[str]) -> str:
+def _shorten_fields(fields: list[str]) -> str:
     """The first of the fields that differ, and how many more there are."""
     more = f", and {len(fields) - FIELDS} more" if len(fields) > FIELDS else ""
     return ", ".join(fields[:FIELDS]) + more

@@ -12,7 +12,7 @@ import typer
 from dess.base.errors import InputError, shown
 from dess.base.libraries import missing, needs
 from dess.reports.cli import console, options
-from dess.reports.cli.options import SetOption, command, setting
+from dess.reports.cli.options import SetOption, add_command, parse_setting
 
 if TYPE_CHECKING:
     from dess.policies.learner.training import Training
@@ -21,16 +21,18 @@ app = typer.Typer()
 MEASURED = 5.0  # seconds of training after which it is said how long it will take
 
 
-@command(app)
+@add_command(app)
 def train(
-    name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=options.configs)],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME|FILE", autocompletion=options.complete_configs)
+    ],
     out: Annotated[Path, typer.Option(metavar="DIR")],
     resume: Annotated[bool, typer.Option("--resume")] = False,
     device: Literal["auto", "cpu", "cuda"] = "auto",
     seed: int | None = None,
     settings: SetOption = None,
     scenario: Annotated[
-        str | None, typer.Option(metavar="NAME|FILE", autocompletion=options.scenarios)
+        str | None, typer.Option(metavar="NAME|FILE", autocompletion=options.complete_scenarios)
     ] = None,
     start: Annotated[str | None, typer.Option("--from", metavar="POLICY|DIR")] = None,
     yes: Annotated[bool, typer.Option("--yes")] = False,
@@ -53,7 +55,7 @@ def train(
     from dess.policies.learner.config import CHECKPOINT, load_config, resume_command
     from dess.policies.registry import folder_of
 
-    fields = dict(setting(text) for text in settings or [])
+    fields = dict(parse_setting(text) for text in settings or [])
     changes: dict[str, Any] = {} if seed is None else {"seed": seed}
     if scenario is not None:
         changes |= {"scenario": scenario, "seas": (), "evaluation_seas": ()}
@@ -70,14 +72,14 @@ def train(
         """Print how much memory [bytes] the missions take, and how to see the curves."""
         view = missing("tensorboard", "a live view of the curves")
         what = "replay memory" if config.algorithm == "dqn" else "missions of a tick"
-        console.say(f"{what}: {memory / 2**20:,.0f} MiB", sys.stderr)
-        console.say(
+        console.print_text(f"{what}: {memory / 2**20:,.0f} MiB", sys.stderr)
+        console.print_text(
             view or f"curves: tensorboard --logdir {shlex.quote(str(out / EVENTS))}", sys.stderr
         )
 
     command = resume_command(config, name, out, device)
     try:
-        with console.compile_notice(), _bar(config.ticks) as progress:
+        with console.compile_notice(), _training_bar(config.ticks) as progress:
             training = train(
                 config,
                 out,
@@ -94,26 +96,26 @@ def train(
         line = f"interrupted: the last checkpoint is kept; continue with {command}"
         raise console.Interruption(line) from None
     except DivergenceError as error:
-        raise typer.Exit(console.fail(f"dess: error: {error}", 1)) from None
+        raise typer.Exit(console.print_failure(f"dess: error: {error}", 1)) from None
     if not training.done:
         raise console.Interruption(
             f"interrupted at tick {training.tick:,} of {config.ticks:,}: the policy so far is "
             f"--policy {shlex.quote(str(out))}; continue with {command}"
         )
-    console.say(
+    console.print_text(
         f"{out}: {training.updates} updates, {training.uav_slots} UAV-slots in "
         f"{training.seconds:.0f} s; best product {training.best_score:.3f} in selection"
     )
     evaluated = shlex.join(["dess", "evaluate", "--policy", str(out), "--policy", "greedy"])
-    console.say(f"compare: {evaluated}")
+    console.print_text(f"compare: {evaluated}")
 
 
 @contextmanager
-def _bar(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
+def _training_bar(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
     """Progress of a training, with the metrics of its last evaluation and how long it will take."""
     from dess.analysis import numbers
 
-    with console.bar("tick", ticks) as bar:
+    with console.progress_bar("tick", ticks) as bar:
         first: tuple[int, float] | None = None  # without the first tick, which compiles
         is_said = False
 

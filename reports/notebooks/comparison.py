@@ -37,10 +37,10 @@ worst = answers.worst_pair_missions(missions, 5)
 lost = answers.most_lost(missions.drop(worst.index), 5)
 
 # %%
-html.answer(answers.pair_sentence(comparison, missions, pair))
+html.make_answer(answers.pair_sentence(comparison, missions, pair))
 
 # %%
-html.lead(*answers.draw_difference_distribution(missions, pair))
+html.lead_figure(*answers.draw_difference_distribution(missions, pair))
 
 # %% [markdown]
 # ## Why: where it is better
@@ -49,11 +49,13 @@ html.lead(*answers.draw_difference_distribution(missions, pair))
 
 # %%
 lead = answers.differences_along_parameters(missions, pair.candidates)
-html.say("{colours}", colours=answers.colours_in_words(lead, pair))
+html.write_markdown("{colours}", colours=answers.colours_in_words(lead, pair))
 
 # %%
-too_few = html.say("Too few missions for bins of n = {least} or more.", least=answers.LEAST)
-html.show(
+too_few = html.write_markdown(
+    "Too few missions for bins of n = {least} or more.", least=answers.LEAST
+)
+html.show_parts(
     answers.draw_differences_along_parameters(
         missions, lead, pair, f"{pair.title}, 95 % intervals, "
     )
@@ -67,7 +69,7 @@ html.show(
 
 # %%
 kept = logged.kept_missions(study, answers.missions_to_draw(missions, pair), results)
-html.gallery(
+html.make_gallery(
     logged.draw_mission(
         mission, f"Map of mission {mission.replication} by {mission.policy}", mission.caption
     )
@@ -91,8 +93,8 @@ for caption, rows in found.items():
     if len(rows):
         shown = tables.comparison_cells(rows, rows.columns[0])
         of = f"Points ahead of {rows['baseline'].iloc[0]} in n = {len(missions):,} missions"
-        display(html.table(shown, f"{of}; {caption}. {tables.MARKED}, by p", data=rows))
-html.say(
+        display(html.make_table(shown, f"{of}; {caption}. {tables.MARKED}, by p", data=rows))
+html.write_markdown(
     "{correction} {why} {weights}",
     correction=summary.correction_in_words(study),
     why=summary.allowance_for_difference(comparison, "policy"),
@@ -104,37 +106,37 @@ html.say(
 
 # %%
 depleted = answers.count_depleted_uavs(study, pair.policy, worst["replication"])
-html.table(answers.pair_outcome_table(missions, pair), "Outcomes of the missions")
+html.make_table(answers.pair_outcome_table(missions, pair), "Outcomes of the missions")
 
 # %%
-html.table(
+html.make_table(
     answers.dependence_table(lead, answers.dependence_on_parameters(missions)),
     "Lowest and highest mean difference [points] by parameter, the share of the variance that "
     "its bins explain, and the test of equal means (Alexander and Govern, Holm)",
 )
 
 # %%
-html.table(
+html.make_table(
     answers.outcome_table(worst, study, pair),
     f"The worst missions of {pair.policy}; {depleted} of its UAVs run out of battery in these",
 )
 
 # %%
-html.table(answers.outcome_table(lost, study, pair), f"The greatest losses to {pair.baseline}")
+html.make_table(answers.outcome_table(lost, study, pair), f"The greatest losses to {pair.baseline}")
 
 # %%
-html.table(answers.time_table(times), "Time of a decision for the UAVs of a mission")
+html.make_table(answers.time_table(times), "Time of a decision for the UAVs of a mission")
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
 lines = answers.mission_commands(study, pair.policy, [*worst["replication"], *lost["replication"]])
-html.say(
+html.write_markdown(
     "{times} These commands simulate missions of the tables again:\n\n{lines}",
     times=answers.decision_time_sentences(times, study, pair),
-    lines=html.commands(lines),
+    lines=html.command_block(lines),
 )
 
 # %%
-html.provenance([study])
+html.provenance_table([study])

@@ -23,7 +23,7 @@ from pathlib import Path
 from dess.analysis import load_results, metrics, numbers
 from dess.analysis.answers.settings.home import way_home_range_sentence
 from dess.analysis.answers.settings.points import points_in_words
-from dess.reports.explorer import Grid, explorer
+from dess.reports.explorer import Grid, make_explorer
 from dess.reports.pages import html
 
 # %%
@@ -32,16 +32,16 @@ grid = Grid(study)
 start = grid.at_start()
 
 # %%
-html.answer(grid.answer())
+html.make_answer(grid.describe_start())
 
 # %%
-explorer(study)
+make_explorer(study)
 
 # %% [markdown]
 # ## How far to trust it
 
 # %%
-html.say(
+html.write_markdown(
     "A dot is a mean over n = {missions} missions, its bar the 95 % interval. All settings have "
     "the same random draws, so two settings may differ although their intervals overlap; a "
     "[what-if question](what-if.html) compares them mission by mission.",
@@ -49,7 +49,7 @@ html.say(
 )
 
 # %%
-html.say("{sentence}", sentence=way_home_range_sentence(study))
+html.write_markdown("{sentence}", sentence=way_home_range_sentence(study))
 
 # %% [markdown]
 # ## The setting at which the sliders start
@@ -60,17 +60,17 @@ table = (
     .rename(columns=metrics.METRICS)
     .reset_index(names="Policy")
 )
-html.table(
+html.make_table(
     table,
     f"With {points_in_words(study)[grid.start]}; the CSV file has all settings",
-    data=grid.table(),
+    data=grid.means_table(),
 )
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.say(
+html.write_markdown(
     "All other fields are those of the scenario {name}, such as {nodes} sensor nodes, {grid} x "
     "{grid} cells and a quota of {quota:,} communication slots.",
     name=study.manifest["study"]["scenario"],
@@ -80,4 +80,4 @@ html.say(
 )
 
 # %%
-html.provenance([study])
+html.provenance_table([study])

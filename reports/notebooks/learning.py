@@ -34,10 +34,10 @@ rungs = answers.rows_of_ladder(last)
 equal = answers.of_equal_budget(last, baseline)
 
 # %%
-html.answer(answers.methods_sentence(rungs))
+html.make_answer(answers.methods_sentence(rungs))
 
 # %%
-html.lead(*answers.draw_method_ladder(rungs))
+html.lead_figure(*answers.draw_method_ladder(rungs))
 
 # %% [markdown]
 # ## Why: the effect of each method
@@ -50,7 +50,7 @@ html.lead(*answers.draw_method_ladder(rungs))
 
 # %%
 table = answers.compare_variants(equal, baseline)
-html.figure(
+html.make_figure(
     *answers.draw_variants(table, equal, baseline, "The product that every variant reaches")
 )
 
@@ -58,7 +58,7 @@ html.figure(
 # What a method adds depends on the methods that are there before it.
 
 # %%
-html.say("{text}", text=answers.without_each(last))
+html.write_markdown("{text}", text=answers.without_each(last))
 
 # %% [markdown]
 # ## <a id="fig-3"></a>Transfer learning: the paper's Fig. 3
@@ -72,17 +72,19 @@ lines = [
     f"{answers.learning_to_charge(last, without)} without"
     for name, (using, without) in answers.pairs_in(trainings).items()
 ]
-html.say("Trainings that learn to charge:\n\n{lines}", lines=html.composed("\n".join(lines)))
+html.write_markdown(
+    "Trainings that learn to charge:\n\n{lines}", lines=html.escape_sentences("\n".join(lines))
+)
 
 # %%
-html.gallery(answers.transfer_drawings(trainings), answers.TRAININGS)
+html.make_gallery(answers.transfer_drawings(trainings), answers.TRAININGS)
 
 # %% [markdown]
 # ## The shipped policies
 
 # %%
 shipped = answers.trained_policies(folder)
-html.gallery(answers.shipped_drawings(shipped), answers.TRAININGS)
+html.make_gallery(answers.shipped_drawings(shipped), answers.TRAININGS)
 
 # %% [markdown]
 # ## How far to trust it
@@ -100,7 +102,7 @@ best = last.groupby("variant")[answers.FINAL].max().map(numbers.format_percent)
 pair, variants = [*answers.pairs_in(trainings).items()][-1]
 
 # %%
-html.say(
+html.write_markdown(
     "The longest of these pairs have {steps:,} steps; in the paper the curves cross at {paper:,}, "
     "and shorter trainings are inconclusive. With {name}, the best training with transfer reaches "
     "a product of {ends[0]}, the best without {ends[1]}.",
@@ -114,7 +116,7 @@ html.say(
 # ## Tables
 
 # %%
-html.table(
+html.make_table(
     answers.ablation_table(table, equal, baseline),
     "Means over n trainings with 95 % intervals, the prediction interval of one new training, "
     "and differences with Welch's t interval. ▲ better, ▼ worse, ≈ inconclusive",
@@ -123,7 +125,7 @@ html.table(
 
 # %%
 compared = answers.transfer_table(transfers, verdicts)
-html.table(
+html.make_table(
     compared,
     "With transfer against without: the last difference with its 99 % interval (of the product "
     "in points)",
@@ -134,9 +136,9 @@ html.table(
 # ## How this page was made
 
 # %%
-html.say(
+html.write_markdown(
     "Where the moving average of the product ends, and from when on it is near:\n\n{courses}",
-    courses=html.composed(
+    courses=html.escape_sentences(
         "\n".join(answers.course_in_words(policy, measures.MARGIN) for policy in shipped)
     ),
 )
@@ -146,7 +148,9 @@ html.say(
 
 # %%
 again = "python -m benchmarks.learning_curves --out runs/learning"
-html.say("{lines}", lines=html.commands([again, *answers.training_commands(shipped)]))
+html.write_markdown(
+    "{lines}", lines=html.command_block([again, *answers.training_commands(shipped)])
+)
 
 # %%
-html.weights(folder)
+html.weights_table(folder)

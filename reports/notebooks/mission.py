@@ -28,7 +28,7 @@ from dess.analysis.metrics import RATIO
 from dess.analysis.paper import values
 from dess.analysis.results.resimulate import Mission
 from dess.reports.pages import html
-from dess.reports.player import READING, Shown, library, player, together
+from dess.reports.player import READING, Shown, join_players, make_player, player_script
 
 # %%
 CHOICES = 5  # missions that the first player offers at most; each is 35 kB of the page
@@ -43,10 +43,10 @@ shown = [Mission.of(fig4, shown_policy, point, replication) for point in points]
 example = Mission.of(fig1, best, 0, replication)
 
 # %%
-html.answer(missions.shared_collection_sentence(shown))
+html.make_answer(missions.shared_collection_sentence(shown))
 
 # %%
-library()
+player_script()
 
 
 # %%
@@ -62,7 +62,7 @@ def played(mission: Mission, name: str) -> html.Part:
         f"n = 1 mission of {mission.policy}, replication {replication} of seed {seed}, "
         f"{mission.record.slots} mission slots. {mission.causes}"
     )
-    return player([told(mission)], name, caption)
+    return make_player([told(mission)], name, caption)
 
 
 # %%
@@ -73,13 +73,13 @@ caption = (
     f"n = 1 mission of {shown_policy}: replication {replication} of seed {seed} or, by choice, "
     f"another of {len(choices) + 1}. {shown[-1].causes}"
 )
-player([told(shown[-1]), *map(told, choices)], "player", caption)
+make_player([told(shown[-1]), *map(told, choices)], "player", caption)
 
 # %% [markdown]
 # ## How to read it
 
 # %%
-html.say("{reading}", reading=READING)
+html.write_markdown("{reading}", reading=READING)
 
 # %% [markdown]
 # On the maps, an arrow is a move in one slot, in the colour of the node that was served most, or
@@ -93,7 +93,7 @@ html.say("{reading}", reading=READING)
 # %%
 second = next((other for other in ranked if other != shown_policy), shown_policy)
 other = Mission.of(fig4, second, points[-1], replication)
-together([played(shown[-1], "player-first"), played(other, "player-second")])
+join_players([played(shown[-1], "player-first"), played(other, "player-second")])
 
 # %% [markdown]
 # ## With fewer UAVs
@@ -107,7 +107,7 @@ display(*(played(mission, f"player-{mission.scenario.uavs}") for mission in show
 # The missions have the same initial data, arrivals and shadowing; only the number of UAVs differs.
 
 # %%
-html.gallery(
+html.make_gallery(
     missions.beside_paper(fig4, mission, values.FIG_4[mission.scenario.uavs][RATIO])
     for mission in shown
 )
@@ -124,7 +124,7 @@ caption = (
     f"{example.record.slots} mission slots, {example.collected}. {example.causes}"
 )
 alt = "Map of the mission; battery, residual data and charging"
-html.gallery([missions.draw_mission(example, alt, caption)])
+html.make_gallery([missions.draw_mission(example, alt, caption)])
 
 # %% [markdown]
 # ## How far to trust it
@@ -135,7 +135,7 @@ html.gallery([missions.draw_mission(example, alt, caption)])
 # ## Tables
 
 # %%
-html.table(missions.outcome_table(shown), "The missions; data in data units")
+html.make_table(missions.outcome_table(shown), "The missions; data in data units")
 
 # %% [markdown]
 # ## How this page was made
@@ -147,7 +147,9 @@ command = (
     f"dess simulate --scenario {fig4.manifest['study']['scenario']} --set uavs={{}} "
     f"--policy {shown_policy} --seed {seed} --replication {replication}"
 )
-html.say("{commands}", commands=html.commands(command.format(m.scenario.uavs) for m in shown))
+html.write_markdown(
+    "{commands}", commands=html.command_block(command.format(m.scenario.uavs) for m in shown)
+)
 
 # %%
-html.provenance([fig1, fig4])
+html.provenance_table([fig1, fig4])

@@ -49,19 +49,21 @@ answer = sweep(*about, yes=yes, **fields)
 
 # %%
 found = answer.results
-html.answer(cheapest.cheapest_sentence(found), cheapest.cheapest_fleet(found))
+html.make_answer(cheapest.cheapest_sentence(found), cheapest.cheapest_fleet(found))
 
 # %%
-html.lead(*draw_cheapest(found))
+html.lead_figure(*draw_cheapest(found))
 
 # %%
-html.rendered("assumptions.html", lines=assumption_sentences(found)) if sea.units else None
+html.render_part("assumptions.html", lines=assumption_sentences(found)) if sea.units else None
 
 # %% [markdown]
 # ## Why
 
 # %%
-html.show(cheapest.fleet_table(found), html.say("{reasons}", reasons=study.reasons(found)))
+html.show_parts(
+    cheapest.fleet_table(found), html.write_markdown("{reasons}", reasons=study.list_reasons(found))
+)
 
 # %%
 policy = cheapest.best_policy(found)
@@ -72,7 +74,7 @@ about_mission = map_caption(mission, fleets_in_words(found)[point])
 
 # %%
 about_sea = f"The n = {len(sea.nodes)} nodes and the zone.{node_placing_sentence(sea)}"
-html.gallery(
+html.make_gallery(
     [
         (sea_figure(sea), "Map of the sea", about_sea),
         (map_of_mission, "Map of a mission of the answer", about_mission),
@@ -82,7 +84,7 @@ html.gallery(
 # %%
 if asked := around.question_around(found, scenario):
     asked.ask(workers, yes=yes)
-    html.show(around.table_around(found))
+    html.show_parts(around.table_around(found))
 
 # %% [markdown]
 # ## How far to trust it
@@ -90,19 +92,21 @@ if asked := around.question_around(found, scenario):
 # The check had no part in the search, so its means are unbiased.
 
 # %%
-no_check = html.say("No fleet was checked.")
-html.show(no_check if found.checks.empty else cheapest.check_table(found))
+no_check = html.write_markdown("No fleet was checked.")
+html.show_parts(no_check if found.checks.empty else cheapest.check_table(found))
 
 # %% [markdown]
 # ## Tables
 
 # %%
 if cheapest.has_conditions(found):
-    html.show(cheapest.condition_table(found))
-html.show(cost_parts_table(found))
+    html.show_parts(cheapest.condition_table(found))
+html.show_parts(cost_parts_table(found))
 
 # %%
-html.show(summary.worst_missions_table(found, summary.worst_missions(found, policy, point=point)))
+html.show_parts(
+    summary.worst_missions_table(found, summary.worst_missions(found, policy, point=point))
+)
 
 # %% [markdown]
 # ## With your own sea
@@ -121,16 +125,16 @@ html.show(summary.worst_missions_table(found, summary.worst_missions(found, poli
 # This command runs the same sweep and makes a page with more details:
 
 # %%
-html.say("{lines}", lines=html.commands([answer.question.command]))
+html.write_markdown("{lines}", lines=html.command_block([answer.question.command]))
 
 # %%
-html.rendered("left_out.html") if sea.units else None
+html.render_part("left_out.html") if sea.units else None
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.say(
+html.write_markdown(
     "The sea has {nodes} sensor nodes on {columns} x {rows} cells of {size:g} m. The sweep has "
     "{settings} settings and simulated {n:,} missions. Costs are means for {planned:,} missions.",
     nodes=len(sea.nodes),
@@ -143,4 +147,4 @@ html.say(
 )
 
 # %%
-html.provenance([found])
+html.provenance_table([found])

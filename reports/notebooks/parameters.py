@@ -48,11 +48,11 @@ level = numbers.format_level(LEVEL)
 checks = summary.means_of_check(sweet)
 
 # %%
-html.answer(main_effects.strongest_fields_sentence(effects, policies))
+html.make_answer(main_effects.strongest_fields_sentence(effects, policies))
 
 # %%
 most = effects[effects["field"].isin(main_effects.strongest_fields(effects, leading))]
-html.lead(
+html.lead_figure(
     plot_one_by_one(effects, fig5.policies),
     "The product against every parameter",
     f"n = {numbers.format_span(effects['n'])} missions per dot, with all other parameters drawn "
@@ -68,7 +68,7 @@ html.lead(
 # They have an axis of their own.
 
 # %%
-html.gallery(
+html.make_gallery(
     [
         (
             plot_effect(effects, field, pairs, fig5.policies),
@@ -86,7 +86,7 @@ html.gallery(
 
 # %%
 rule = sweet.manifest["study"]["selection"]
-html.say(
+html.write_markdown(
     "Of {n:,} settings, the best by product was selected for every policy by "
     "<code>{rule[procedure]}</code>, with an indifference of {margin}, and simulated in "
     "{rule[check]:,} further missions. Only these are compared with the paper's means over "
@@ -98,7 +98,7 @@ html.say(
 )
 
 # %%
-html.gallery(
+html.make_gallery(
     [
         (
             plot_performance(checks, metric, values.SWEET_SPOT[metric]),
@@ -122,7 +122,7 @@ html.gallery(
 indices = sobol_indices_of(sobol)
 of_ratio = indices[indices["metric"] == metrics.RATIO].dropna()
 caption = f"n = {indices['n'].min():,} missions; bars are {level} intervals, bootstrap over blocks."
-html.gallery(
+html.make_gallery(
     [
         (plot_indices(rows, policy), f"Sobol indices of {policy}", f"{policy}: {caption}")
         for policy, rows in of_ratio.groupby("policy", sort=False)
@@ -140,14 +140,14 @@ html.gallery(
 # ## Tables
 
 # %%
-html.table(
+html.make_table(
     main_effects.main_effects_table(effects, changes, ratios),
     f"Product; differences in points with {level} intervals, also of the collection ratio",
     effects,
 )
 
 # %%
-html.table(
+html.make_table(
     values.best_settings_table(sweet),
     f"The selected settings and their checks: means with {level} intervals, the difference "
     "from the paper in points (▲ above, ▼ below, ≈ contains it), missions, settings not ruled "
@@ -157,7 +157,7 @@ html.table(
 )
 
 # %%
-html.table(
+html.make_table(
     index_table(of_ratio).cells,
     f"Sobol indices of the collection ratio, with {level} intervals (bootstrap over blocks)",
     data=indices,
@@ -171,11 +171,11 @@ html.table(
 
 # %%
 ranges = ranges_in_words(sobol.manifest["study"]["design"]["ranges"])
-html.say(
+html.write_markdown(
     "The policies are the best learned one and the best heuristic of the study. For the Sobol "
     "indices all parameters are drawn together: {ranges}.",
     ranges=ranges,
 )
 
 # %%
-html.provenance([fig5, sweet, sobol])
+html.provenance_table([fig5, sweet, sobol])

@@ -41,13 +41,13 @@ bounded = optimality.results_in(Path(results) / "gap")
 caption = f"n = {numbers.format_span(overall['n'])} missions per policy; bars are 95 % intervals."
 
 # %%
-html.answer(
+html.make_answer(
     questions.paper_sentence(overall, policies[0], values.TABLE_IV),
     questions.metrics_of_policy(overall, policies[0])[PRODUCT].partition(" [")[0],
 )
 
 # %%
-html.lead(
+html.lead_figure(
     plot_performance(overall, PRODUCT, values.TABLE_IV[PRODUCT]),
     "The product of every policy, and the paper's number",
     f"{caption} Dashed: the paper's number.",
@@ -58,10 +58,10 @@ html.lead(
 # ## Why
 
 # %%
-html.say("{text}", text=html.composed(questions.guard_sentences(overall)))
+html.write_markdown("{text}", text=html.escape_sentences(questions.guard_sentences(overall)))
 
 # %%
-html.gallery(
+html.make_gallery(
     [
         (
             plot_performance(overall, metric, values.TABLE_IV[metric]),
@@ -78,7 +78,7 @@ html.gallery(
 # The same missions, grouped by the number of UAVs that each drew.
 
 # %%
-html.gallery(
+html.make_gallery(
     [
         (plot_by_fleet(fleets, metric), f"{name} against the number of UAVs")
         for metric, name in METRICS.items()
@@ -90,7 +90,7 @@ html.gallery(
 # ## <a id="fig-4"></a>One setting: the paper's Fig. 4
 
 # %%
-html.gallery(
+html.make_gallery(
     [
         (
             plot_by_fleet(fig4_fleets, m, {i: p[m] for i, p in values.FIG_4.items()}),
@@ -111,10 +111,10 @@ html.gallery(
 # does not give all constants, such as the place of the charging zone or the transmit power.
 
 # %%
-html.say(
+html.write_markdown(
     "{weights} {text}",
     weights=questions.weights_in_words(table4),
-    text=html.composed(optimality.in_words(bounded) if bounded else optimality.NOT_RUN),
+    text=html.escape_sentences(optimality.in_words(bounded) if bounded else optimality.NOT_RUN),
 )
 
 # %%
@@ -123,10 +123,10 @@ if bounded and len(gaps := optimality.fleets_with_useful_bound(optimality.by_fle
         f"n = {numbers.format_span(gaps['n'])} missions of the study gap, with 95 % intervals."
     )
     display(
-        html.figure(
+        html.make_figure(
             comparison.plot_gaps(gaps), "The product of every policy, and the bound", caption
         ),
-        html.table(
+        html.make_table(
             optimality.fleet_bound_table(gaps), "Means, the upper bound, and the gap", data=gaps
         ),
     )
@@ -136,24 +136,24 @@ if bounded and len(gaps := optimality.fleets_with_useful_bound(optimality.by_fle
 
 # %%
 marks = "▲ our interval is above the paper's number, ▼ below, ≈ contains it"
-html.table(
+html.make_table(
     questions.compare_with_paper(overall, {None: values.TABLE_IV}),
     f"Table IV: means with 95 % intervals, and the difference in points; {marks}",
     overall,
 )
 
 # %%
-html.say("{text}", text=html.composed(questions.way_home_in_words(overall)))
+html.write_markdown("{text}", text=html.escape_sentences(questions.way_home_in_words(overall)))
 
 # %%
-html.table(
+html.make_table(
     questions.compare_with_paper(fig4_fleets, values.FIG_4),
     f"Fig. 4: means with 95 % intervals, and the difference in points; {marks}",
     fig4_fleets,
 )
 
 # %%
-html.table(
+html.make_table(
     tables.estimate_cells(fleets[fleets["metric"].isin(METRICS)], ["policy", "uavs", "n"]),
     "Means with 95 % intervals, by number of UAVs",
     fleets,
@@ -163,7 +163,7 @@ html.table(
 # ## How this page was made
 
 # %%
-html.say(
+html.write_markdown(
     "Every mission of Table IV draws its parameters from Table II. Those of Fig. 4 have C_S "
     "{charge_start[0]} %, C_C {charge_complete[0]} %, {initial_data[0]:g} data units per node and "
     "a flying time of {flying_time[0]}.",
@@ -171,4 +171,4 @@ html.say(
 )
 
 # %%
-html.provenance([table4, fig4, *([bounded] if bounded else [])])
+html.provenance_table([table4, fig4, *([bounded] if bounded else [])])

@@ -42,10 +42,10 @@ rows = scorecard.scorecard(studies, read_curves(folder / "curves.parquet"))
 against = scorecard.against_paper(rows)
 
 # %%
-html.answer(scorecard.scorecard_sentence(rows))
+html.make_answer(scorecard.scorecard_sentence(rows))
 
 # %%
-html.lead(
+html.lead_figure(
     plot_claims(against),
     "Our results minus the numbers that the paper prints, by policy",
     f"n = {numbers.format_span(against['n'])} missions per dot. Bars are 95 % intervals, with that "
@@ -67,7 +67,7 @@ html.lead(
 def table(kind: str) -> None:
     if claims_of_kind := scorecard.of_kind(rows, kind):
         values = {"columns": scorecard.policy_names(rows), "caption": scorecard.KINDS[kind]}
-        display(html.rendered("scorecard.html", rows=claims_of_kind, **values))
+        display(html.render_part("scorecard.html", rows=claims_of_kind, **values))
 
 
 table(scorecard.DIAGNOSTIC)
@@ -81,7 +81,7 @@ table(scorecard.DIAGNOSTIC)
 # not say over how many missions a number is a mean, the number counts as exact.
 
 # %%
-html.table(scorecard.count_verdicts(rows), "Verdicts by policy")
+html.make_table(scorecard.count_verdicts(rows), "Verdicts by policy")
 
 # %% [markdown]
 # ## Tables
@@ -98,10 +98,10 @@ for config in paths_in(folder, f"{scorecard.PAPERS_NETWORK}/config.json"):
     departures = scorecard.departures_in_words(read_description(config.parent).training)
     line = "`{name}` has the paper's observation, network and Algorithm 1, but for {all}."
     shown = numbers.join_words(departures) if departures else "nothing"
-    display(html.say(line, name=scorecard.PAPERS_NETWORK, all=shown))
+    display(html.write_markdown(line, name=scorecard.PAPERS_NETWORK, all=shown))
 
 # %%
-html.weights(folder)
+html.weights_table(folder)
 
 # %%
-html.provenance(studies.values())
+html.provenance_table(studies.values())

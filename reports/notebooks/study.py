@@ -68,25 +68,25 @@ metrics = page.shown_metrics(study, by)
 called = metric_of(by).within
 
 # %% tags=["if-cheapest"]
-html.answer(cheapest.cheapest_sentence(study))
+html.make_answer(cheapest.cheapest_sentence(study))
 
 # %% tags=["if-answer"]
 ranked = rank_settings(study, by)
 best = ranked.iloc[0]
 
 # %% tags=["if-answer"]
-html.answer(best_settings_sentence(study, ranked, by))
+html.make_answer(best_settings_sentence(study, ranked, by))
 
 # %% tags=["if-sensitivity"]
-html.answer(variance_sentence(study, by))
+html.make_answer(variance_sentence(study, by))
 
 # %%
-html.lead(*draw_main_figure(study, by))
+html.lead_figure(*draw_main_figure(study, by))
 
 # %% tags=["if-sheet"]
 from dess.analysis.ask.assumptions import assumption_sentences
 
-html.rendered("assumptions.html", lines=assumption_sentences(study, by))
+html.render_part("assumptions.html", lines=assumption_sentences(study, by))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## Why
@@ -95,13 +95,13 @@ html.rendered("assumptions.html", lines=assumption_sentences(study, by))
 # fleet gets no further missions once a cheaper one is known to meet the requirements.
 
 # %% tags=["if-cheapest"]
-html.show(
+html.show_parts(
     cheapest.fleet_table(study, by if metric else SUCCESS),
-    html.say("{answers}", answers=page.reasons(study)),
+    html.write_markdown("{answers}", answers=page.list_reasons(study)),
 )
 
 # %% tags=["if-conditions"]
-html.show(cheapest.condition_table(study))
+html.show_parts(cheapest.condition_table(study))
 
 # %% [markdown] tags=["if-around"]
 # ## What if
@@ -112,7 +112,7 @@ html.show(cheapest.condition_table(study))
 # %% tags=["if-around"]
 from dess.analysis.ask import around
 
-html.show(around.table_around(study))
+html.show_parts(around.table_around(study))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## How far to trust it
@@ -120,8 +120,8 @@ html.show(around.table_around(study))
 # The check had no part in the selection, so its means are unbiased.
 
 # %% tags=["if-cheapest"]
-no_check = html.say("No setting was checked.")
-html.show(no_check if study.checks.empty else cheapest.check_table(study))
+no_check = html.write_markdown("No setting was checked.")
+html.show_parts(no_check if study.checks.empty else cheapest.check_table(study))
 
 # %% [markdown] tags=["if-settings"]
 # ## The best settings
@@ -133,24 +133,24 @@ html.show(no_check if study.checks.empty else cheapest.check_table(study))
 # The mean of the first tends to be too high, since it was ranked first for it.
 
 # %% tags=["if-settings"]
-html.show(
+html.show_parts(
     best_settings_table(study, ranked, by),
     best_of_policies_table(study, by),
-    html.say("{why}", why=allowance_for_setting(study, ranked, by)),
+    html.write_markdown("{why}", why=allowance_for_setting(study, ranked, by)),
 )
 
 # %% tags=["if-one-setting"]
-html.show(
+html.show_parts(
     (draw_performance(study, of) for of in METRICS),
     tables.means_table(summary.means_of_points(study), metrics=with_way_home(study, METRICS)),
-    html.say("{weights}", weights=summary.weights_in_words(study)),
+    html.write_markdown("{weights}", weights=summary.weights_in_words(study)),
 )
 
 # %% [markdown] tags=["if-priced-search"]
 # ## Costs
 
 # %% tags=["if-priced-search"]
-html.show(cost_parts_table(study))
+html.show_parts(cost_parts_table(study))
 
 # %% [markdown] tags=["if-costs"]
 # ## Costs
@@ -159,8 +159,8 @@ html.show(cost_parts_table(study))
 # The probability of being on it comes from a Bayesian bootstrap over common replications.
 
 # %% tags=["if-costs"]
-html.show(
-    html.say("{prices}", prices=prices_in_words(study)),
+html.show_parts(
+    html.write_markdown("{prices}", prices=prices_in_words(study)),
     draw_cost_fronts(study),
     cost_front_table(study),
     cost_parts_table(study),
@@ -173,9 +173,9 @@ html.show(
 # missions were ruled out early. The check had no part in the selection.
 
 # %% tags=["if-selection"]
-html.show(
+html.show_parts(
     summary.selection_table(study),
-    html.say("{guarantees}", guarantees=page.guarantees(study)),
+    html.write_markdown("{guarantees}", guarantees=page.list_guarantees(study)),
     tables.means_table(
         summary.means_of_check(study), tables.CHECKED, metrics=with_way_home(study, METRICS)
     ),
@@ -187,42 +187,42 @@ html.show(
 # Missions were simulated until the estimates were precise enough, or the budget was spent.
 
 # %% tags=["if-precision"]
-html.show(summary.precision_table(summary.reached_precisions(study)))
+html.show_parts(summary.precision_table(summary.reached_precisions(study)))
 
 # %% [markdown] tags=["if-fields"]
 # ## Effects of the fields
 
 # %% tags=["if-one-field"]
 (field,) = varied_values(study)
-html.gallery(draw_curves(study, field, metric=of) for of in metrics)
+html.make_gallery(draw_curves(study, field, metric=of) for of in metrics)
 
 # %% tags=["if-two-fields"]
-html.gallery(draw_heat_maps(study, metrics))
+html.make_gallery(draw_heat_maps(study, metrics))
 
 # %% tags=["if-many-fields"]
-html.gallery(draw_small_multiples(study, by))
+html.make_gallery(draw_small_multiples(study, by))
 
 # %% tags=["if-one-at-a-time"]
-html.gallery(draw_one_at_a_time(study))
+html.make_gallery(draw_one_at_a_time(study))
 
 # %% tags=["if-sampled"]
-html.gallery(draw_scatter(study, of) for of in metrics)
+html.make_gallery(draw_scatter(study, of) for of in metrics)
 
 # %% tags=["if-sensitivity"]
-html.show(draw_indices(study, by), index_table(sobol_indices_of(study)))
+html.show_parts(draw_indices(study, by), index_table(sobol_indices_of(study)))
 
 # %% [markdown] tags=["if-sensitivity"]
 # A Sobol index is the share of a metric's variance that a field explains: *alone*, or *with all
 # interactions*. The replication counts as a field: its share is noise that no setting removes.
 
 # %% tags=["if-effects"]
-html.show((draw_main_effects(study, of) for of in metrics), effect_table(study, by))
+html.show_parts((draw_main_effects(study, of) for of in metrics), effect_table(study, by))
 
 # %% [markdown] tags=["if-settings"]
 # ## Comparison with a baseline
 
 # %% tags=["if-settings"]
-html.say(
+html.write_markdown(
     "Every policy is compared with itself at design point "
     "{point}: {words}. The parameter `baseline` names another point.",
     point=baseline,
@@ -230,7 +230,7 @@ html.say(
 )
 
 # %% tags=["if-settings"]
-html.show(baseline_table(study, baseline, by))
+html.show_parts(baseline_table(study, baseline, by))
 
 # %% [markdown] tags=["if-policies"]
 # ## Comparison of the policies
@@ -239,12 +239,13 @@ html.show(baseline_table(study, baseline, by))
 
 # %% tags=["if-policies"]
 compared = summary.comparison_table(study)
-html.show(
-    compared, html.say("{why}", why=summary.allowance_for_difference(compared.data, "policy"))
+html.show_parts(
+    compared,
+    html.write_markdown("{why}", why=summary.allowance_for_difference(compared.data, "policy")),
 )
 
 # %% tags=["if-learned"]
-html.show(summary.learner_table(study))
+html.show_parts(summary.learner_table(study))
 
 # %% [markdown]
 # ## Single missions
@@ -263,8 +264,8 @@ worst = summary.worst_missions(
 
 # %% tags=["if-ranked"]
 spread = distribution(missions, by, np.random.default_rng(study.store.manifest.seed))
-html.show(
-    html.say("These figures show {whose}:", whose=whose),
+html.show_parts(
+    html.write_markdown("These figures show {whose}:", whose=whose),
     [plot_distribution(missions, by)],
     summary.quantile_table(spread, by),
 )
@@ -273,19 +274,19 @@ html.show(
 worst = summary.worst_missions(study, summary.best_policy(study.missions))
 
 # %%
-html.show(
+html.show_parts(
     summary.worst_missions_table(study, worst),
-    html.say("{commands}", commands=page.commands(study, worst)),
+    html.write_markdown("{commands}", commands=page.list_commands(study, worst)),
 )
 
 # %% tags=["if-sheet"]
-html.rendered("left_out.html")
+html.render_part("left_out.html")
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.say("{simulated}", simulated=page.simulated(study))
+html.write_markdown("{simulated}", simulated=page.list_simulated(study))
 
 # %%
-html.provenance([study])
+html.provenance_table([study])

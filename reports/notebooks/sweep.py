@@ -46,16 +46,16 @@ drawn = {
 }
 
 # %%
-html.answer(best_settings_sentence(answer.results, ranked, PRODUCT))
+html.make_answer(best_settings_sentence(answer.results, ranked, PRODUCT))
 
 # %%
-html.lead(*drawn[PRODUCT])
+html.lead_figure(*drawn[PRODUCT])
 
 # %% [markdown]
 # ## Why
 
 # %%
-html.gallery([drawn[SUCCESS], drawn[RATIO]])
+html.make_gallery([drawn[SUCCESS], drawn[RATIO]])
 
 # %% [markdown]
 # ## How far to trust it
@@ -65,13 +65,13 @@ html.gallery([drawn[SUCCESS], drawn[RATIO]])
 # `charging.plan_waits` is false.
 
 # %%
-html.show(best_settings_table(answer.results, ranked, PRODUCT))
+html.show_parts(best_settings_table(answer.results, ranked, PRODUCT))
 
 # %% [markdown]
 # ## Tables
 
 # %%
-html.show(best_of_policies_table(answer.results, PRODUCT))
+html.show_parts(best_of_policies_table(answer.results, PRODUCT))
 
 # %% [markdown]
 # ## Change the question
@@ -81,13 +81,13 @@ html.show(best_of_policies_table(answer.results, PRODUCT))
 # cheapest fleet ([own sea](own-sea.html)).
 
 # %%
-html.say("{lines}", lines=html.commands([answer.question.command]))
+html.write_markdown("{lines}", lines=html.command_block([answer.question.command]))
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.say("{simulated}", simulated=study.simulated(answer.results))
+html.write_markdown("{simulated}", simulated=study.list_simulated(answer.results))
 
 # %%
-html.provenance([answer.results])
+html.provenance_table([answer.results])

@@ -37,10 +37,10 @@ judged = checks.judge_checks(suite.checks(block))
 band = f"the band below, which contains all dots in {level} of such figures."
 
 # %%
-html.answer(checks.checks_sentence(judged))
+html.make_answer(checks.checks_sentence(judged))
 
 # %%
-html.lead(
+html.lead_figure(
     drawings.plot_rates(suite.rates, space),
     "Mean rate of a lone UAV against its distance from the node",
     f"One of the checks: dots should lie on the curve of theory, and inside {band} "
@@ -51,7 +51,7 @@ html.lead(
 # ## How far to trust it
 
 # %%
-html.say("{text}", text=html.composed(checks.checks_summary(judged)))
+html.write_markdown("{text}", text=html.escape_sentences(checks.checks_summary(judged)))
 
 # %% [markdown]
 # ## Arrivals
@@ -60,9 +60,9 @@ html.say("{text}", text=html.composed(checks.checks_summary(judged)))
 # nodes and slots.
 
 # %%
-html.say(
+html.write_markdown(
     "{verdicts} There are {n:,} logs; the mean is {rate:g} data units per node and slot.",
-    verdicts=html.composed(checks.on_topics(judged, checks.ARRIVALS)),
+    verdicts=html.escape_sentences(checks.on_topics(judged, checks.ARRIVALS)),
     rate=space.arrival_rate,
     n=len(suite.realisations),
 )
@@ -77,7 +77,7 @@ figures = [
     for name, fit, mean in draws.arrival_fits(suite.arrivals, space.arrival_rate)
     if len(fit.table) > 1
 ]
-html.gallery(figures, f"Dots should lie on the bars, and inside {band}")
+html.make_gallery(figures, f"Dots should lie on the bars, and inside {band}")
 
 # %% [markdown]
 # ## The channel
@@ -86,9 +86,9 @@ html.gallery(figures, f"Dots should lie on the bars, and inside {band}")
 # SNR) over the shadowing (Figure 1). Every communication in the logs is computed again.
 
 # %%
-verdicts = html.composed(checks.on_topics(judged, checks.CHANNEL))
+verdicts = html.escape_sentences(checks.on_topics(judged, checks.CHANNEL))
 n = sum((log.events["event"] == "communication").sum() for log in suite.logs)
-html.say("{verdicts} The logs have {n:,} communications.", verdicts=verdicts, n=n)
+html.write_markdown("{verdicts} The logs have {n:,} communications.", verdicts=verdicts, n=n)
 
 # %% [markdown]
 # ## Conservation, batteries and engines
@@ -98,8 +98,8 @@ html.say("{verdicts} The logs have {n:,} communications.", verdicts=verdicts, n=
 
 # %%
 kept = checks.on_topics(judged, *checks.BOOKKEEPING)
-verdicts, names = map(html.composed, (kept, suite.names))
-html.say("{verdicts} The missions are those of {names}.", verdicts=verdicts, names=names)
+verdicts, names = map(html.escape_sentences, (kept, suite.names))
+html.write_markdown("{verdicts} The missions are those of {names}.", verdicts=verdicts, names=names)
 
 # %% [markdown]
 # ## The draws of a mission
@@ -107,7 +107,11 @@ html.say("{verdicts} The missions are those of {names}.", verdicts=verdicts, nam
 # Every value is drawn from a uniform distribution.
 
 # %%
-display(html.say("{text}", text=html.composed(checks.on_topics(judged, checks.DRAWS))))
+display(
+    html.write_markdown(
+        "{text}", text=html.escape_sentences(checks.on_topics(judged, checks.DRAWS))
+    )
+)
 figures = [
     (
         drawings.plot_fit(fit, field_named(field).label, "value"),
@@ -116,7 +120,9 @@ figures = [
     )
     for field, fit in draws.parameter_fits(suite.missions, space).items()
 ]
-html.gallery(figures, f"All values should be drawn equally often: dots should lie inside {band}")
+html.make_gallery(
+    figures, f"All values should be drawn equally often: dots should lie inside {band}"
+)
 
 # %% [markdown]
 # ## Coverage of the confidence intervals
@@ -126,15 +132,17 @@ html.gallery(figures, f"All values should be drawn equally often: dots should li
 # known value in the table.
 
 # %%
-verdicts = html.composed(checks.on_topics(judged, checks.COVERAGE))
-html.say("{verdicts} The blocks have missions of {best}.", verdicts=verdicts, best=suite.best)
+verdicts = html.escape_sentences(checks.on_topics(judged, checks.COVERAGE))
+html.write_markdown(
+    "{verdicts} The blocks have missions of {best}.", verdicts=verdicts, best=suite.best
+)
 
 # %% [markdown]
 # ## Tables
 
 # %%
 caption = "Every check: the value known from theory, the value observed, and the verdict"
-html.table(checks.as_text(judged), caption, wrap=True)
+html.make_table(checks.as_text(judged), caption, wrap=True)
 
 # %% [markdown]
 # ## How this page was made
@@ -143,11 +151,11 @@ html.table(checks.as_text(judged), caption, wrap=True)
 # Every number is read from the scenario and the manifests of the studies.
 
 # %%
-model = stress_des.describe(suite.study.manifest, [s.manifest for s in suite.others.values()])
+model = stress_des.describe_model(suite.study.manifest, [s.manifest for s in suite.others.values()])
 display(Markdown(model.sections["1"]))
-display(html.table(model.studies, "The studies of these pages (1.3)", wrap=True))
+display(html.make_table(model.studies, "The studies of these pages (1.3)", wrap=True))
 display(Markdown(model.sections["2"]))
-html.figure(
+html.make_figure(
     drawings.plot_slot(*model.overview),
     "Boxes, one below the other: what happens before the first mission slot and in each",
     "The base model (2.1): a mission slot from top to bottom; the arrow back is the next one. "
@@ -156,8 +164,8 @@ html.figure(
 
 # %%
 display(Markdown(model.sections["3"]))
-display(html.table(model.parameters, "All input parameters (3.3)", wrap=True))
+display(html.make_table(model.parameters, "All input parameters (3.3)", wrap=True))
 Markdown("\n\n".join(model.sections[number] for number in "456"))
 
 # %%
-html.provenance(suite.studies.values())
+html.provenance_table(suite.studies.values())

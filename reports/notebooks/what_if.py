@@ -42,20 +42,22 @@ asked = what_if(
 found = asked.results
 
 # %%
-html.answer(asked.sentence())
+html.make_answer(asked.sentence())
 
 # %%
 pairs = f"n = {missions:,} pairs per policy"
-html.lead(asked.plot(), "Paired differences of the metrics", f"{pairs}; bars are 95 % intervals.")
+html.lead_figure(
+    asked.plot(), "Paired differences of the metrics", f"{pairs}; bars are 95 % intervals."
+)
 
 # %% [markdown]
 # ## Why
 
 # %%
-html.say("Of the pairs, {better}.", better=html.composed(asked.winners()))
+html.write_markdown("Of the pairs, {better}.", better=html.escape_sentences(asked.winners()))
 
 # %%
-html.say("{contrasts}", contrasts=html.composed(asked.contrasts()))
+html.write_markdown("{contrasts}", contrasts=html.escape_sentences(asked.contrasts()))
 
 # %%
 extended = [metric for metric in measured_columns(found) if found.missions[metric].any()]
@@ -63,7 +65,7 @@ caption = f"n = {missions:,} missions per dot; bars are 95 % intervals of the me
 
 # %%
 spread = f"{pairs}. The lower panel ends at the 5 % and 95 % quantiles."
-html.gallery(
+html.make_gallery(
     [
         (asked.plot_spread(), "Distribution of the paired differences of the product", spread),
         *(
@@ -82,23 +84,23 @@ html.gallery(
 
 # %%
 examples = asked.typical(), asked.worst()
-html.gallery([drawing for example in examples for drawing in example.drawings()])
+html.make_gallery([drawing for example in examples for drawing in example.drawings()])
 
 # %% [markdown]
 # ## How far to trust it
 
 # %%
-html.say(
+html.write_markdown(
     "{answer}\n\n{reading}\n\n{why} {weights}\n\n{notes}",
-    answer=html.composed(asked.answer()),
-    reading=html.composed(asked.reading()),
+    answer=html.escape_sentences(asked.answer()),
+    reading=html.escape_sentences(asked.reading()),
     why=summary.allowance_for_difference(asked.table(), "policy"),
     weights=summary.weights_in_words(found),
-    notes=page.notes(found),
+    notes=page.list_notes(found),
 )
 
 # %%
-html.table(
+html.make_table(
     asked.pairing(),
     f"What common random numbers gain in the differences of n = {missions:,} pairs: the variance "
     "that is left of that of independent missions, and how many of these would be as precise",
@@ -110,7 +112,7 @@ html.table(
 # %%
 for policy in found.policies:
     marks = "▲ higher in the variation, ▼ lower, ≈ inconclusive"
-    display(html.table(asked.measures(policy), f"{policy}, n = {missions:,}; {marks}"))
+    display(html.make_table(asked.measures(policy), f"{policy}, n = {missions:,}; {marks}"))
 
 # %% [markdown]
 # ## Change the question
@@ -119,21 +121,25 @@ for policy in found.policies:
 # lines are the same question as a study: every further row is another variation.
 
 # %%
-command = html.commands([asked.question.command])
-study = html.block("toml", asked.as_toml().rstrip("\n"))
-html.say("{command}\n\n{study}", command=command, study=study)
+command = html.command_block([asked.question.command])
+study = html.code_block("toml", asked.as_toml().rstrip("\n"))
+html.write_markdown("{command}\n\n{study}", command=command, study=study)
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
 name = found.manifest["study"]["scenario"]
-html.table(asked.field_table(), f"Scenario {name}, {missions:,} missions of each policy")
+html.make_table(asked.field_table(), f"Scenario {name}, {missions:,} missions of each policy")
 
 # %%
 for example in examples:
-    lines = html.commands(example.commands())
-    display(html.say("{effect}\n\n{lines}", effect=html.composed(example.effect()), lines=lines))
+    lines = html.command_block(example.commands())
+    display(
+        html.write_markdown(
+            "{effect}\n\n{lines}", effect=html.escape_sentences(example.effect()), lines=lines
+        )
+    )
 
 # %%
-html.provenance([found])
+html.provenance_table([found])

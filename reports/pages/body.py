@@ -17,9 +17,9 @@ from nbformat import NotebookNode
 from pygments.formatters import HtmlFormatter
 
 import dess
-from dess.reports.pages.html import JINJA, PART, indexed
+from dess.reports.pages.html import JINJA, PART, set_indices
 from dess.reports.pages.notebook import SCORECARD, Report
-from dess.reports.pages.page import CARD, Card, Page, Picture, hidden
+from dess.reports.pages.page import CARD, Card, Page, Picture, hidden_element
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 FOLDED = "How this page was made"  # the heading of the section with method and provenance
@@ -48,7 +48,7 @@ class _Writer(IPythonRenderer):
         super().__init__(escape=False, exclude_anchor_links=True)
         self.explained_terms: dict[str, str] = {}
 
-    def explained(self, text: object) -> Markup:
+    def explain_terms(self, text: object) -> Markup:
         return Markup(_TERM.sub(self._with_meaning, str(Markup.escape(text))))
 
     def _with_meaning(self, found: re.Match[str]) -> str:
@@ -66,27 +66,31 @@ class _Writer(IPythonRenderer):
             del self.explained_terms[term]
         return super().link(text, url, title)
 
-    def markdown(self, source: str) -> Markup:
+    def write_markdown(self, source: str) -> Markup:
         return Markup(MarkdownWithMath(self).render(source))
 
     def text(self, text: str) -> str:
-        return self.explained(indexed(Markup(super().text(text))))
+        return self.explain_terms(set_indices(Markup(super().text(text))))
 
     def block_code(self, code: str, info: str | None = None) -> str:
         return super().block_code(code, info).replace("<pre>", '<pre tabindex="0">')  # it scrolls
 
 
-def page_of(report: Report) -> Page:
+def make_page(report: Report) -> Page:
     """The page of a report that has been run."""
     writer = _Writer()
-    card = _card(report)
-    filters = {"explained": writer.explained, "indexed": indexed, "markdown": writer.markdown}
+    card = _make_card(report)
+    filters = {
+        "explained": writer.explain_terms,
+        "indexed": set_indices,
+        "markdown": writer.write_markdown,
+    }
     exporter = TemplateExporter(
         template_file="report.html",
         template_paths=[str(TEMPLATES)],
         filters=filters
-        | {"anchor": anchor, "is_beside": is_beside}
-        | {"sections": sections, "term_anchor": term_anchor},
+        | {"anchor": section_anchor, "is_beside": is_beside_figure}
+        | {"sections": split_sections, "term_anchor": term_anchor},
     )
     for option, value in JINJA.items():
         setattr(exporter.environment, option, value)
@@ -95,7 +99,7 @@ def page_of(report: Report) -> Page:
         "scripts": report.scripts,
         "version": dess.__version__,
         "answer": card.finding,
-        "card": hidden(CARD, card.model_dump_json()),
+        "card": hidden_element(CARD, card.model_dump_json()),
         "code_style": Markup(HtmlFormatter().get_style_defs(".highlight")),
         "code": Markup(writer.block_code("\n\n\n".join(report.code), "python")),
         "folded": FOLDED,
@@ -105,9 +109,9 @@ def page_of(report: Report) -> Page:
     return Page(exporter.from_notebook_node(report.notebook)[0]).sealed
 
 
-def _card(report: Report) -> Card:
+def _make_card(report: Report) -> Card:
     """The card of a report, whose figures get their numbers."""
-    parts = parts_of(report.notebook.cells)
+    parts = find_parts(report.notebook.cells)
     figures = [figure for part in parts for figure in part.get("figures", [])]
     for number, figure in enumerate(figures, 1):
         figure |= {"number": number, "name": figure["name"] or f"figure-{number}"}
@@ -121,13 +125,13 @@ def _card(report: Report) -> Card:
     return Card(title=report.title, finding=finding, number=number, picture=picture, key=key)
 
 
-def parts_of(cells: Iterable[NotebookNode]) -> list[dict[str, Any]]:
+def find_parts(cells: Iterable[NotebookNode]) -> list[dict[str, Any]]:
     """The parts that cells show, in the order of the page."""
     outputs = [output.get("data", {}) for cell in cells for output in cell.get("outputs", [])]
     return [data[PART] for data in outputs if PART in data]
 
 
-def sections(cells: Iterable[NotebookNode]) -> list[tuple[Markup, list[NotebookNode]]]:
+def split_sections(cells: Iterable[NotebookNode]) -> list[tuple[Markup, list[NotebookNode]]]:
     """Headings as HTML, each taken out of its cell, with the cells below; the first has none."""
     found: list[tuple[Markup, list[NotebookNode]]] = [(Markup(), [])]
     for cell in cells:
@@ -138,17 +142,17 @@ def sections(cells: Iterable[NotebookNode]) -> list[tuple[Markup, list[NotebookN
     return found
 
 
-def anchor(heading: Markup) -> str:
+def section_anchor(heading: Markup) -> str:
     """The anchor of a section."""
     return re.sub(r"\W+", "-", heading.striptags()).strip("-")
 
 
 def term_anchor(term: str) -> str:
     """The anchor of the meaning of a term."""
-    return f"term-{anchor(Markup(term)).lower()}"
+    return f"term-{section_anchor(Markup(term)).lower()}"
 
 
-def is_beside(cells: Sequence[NotebookNode]) -> bool:
+def is_beside_figure(cells: Sequence[NotebookNode]) -> bool:
     """Whether the text of a section stands beside its figure: there is text, and one figure."""
-    single = [part for part in parts_of(cells) if not part.get("look", "none")]
+    single = [part for part in find_parts(cells) if not part.get("look", "none")]
     return len(single) == 1 and any(c.cell_type == "markdown" and c.source for c in cells)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:  # the process that only starts this one needs no shell
 AT_ONCE = 2
 
 
-def _serve() -> None:
+def _serve_notebooks() -> None:
     """Run the notebooks that a line of standard input has; print what becomes of every cell.
 
     The line has a list of notebooks, each a list of cells, and the results folders that several of
@@ -65,7 +65,7 @@ def _serve() -> None:
                 running.remove(child)
 
 
-def kill(group: int) -> None:
+def kill_group(group: int) -> None:
     """Kill a group of processes, where the system has groups."""
     if hasattr(os, "killpg"):
         with suppress(ProcessLookupError):
@@ -75,7 +75,7 @@ def kill(group: int) -> None:
 def _end_with_parent() -> NoReturn:
     """Wait for the end of standard input, which the parent keeps open, then end the children."""
     os.read(0, 1)
-    kill(0)
+    kill_group(0)
     os._exit(1)
 
 
@@ -125,4 +125,4 @@ def _run_cell(shell: "InteractiveShell", cell: str) -> tuple[list[dict], list[st
 
 
 if __name__ == "__main__":
-    _serve()
+    _serve_notebooks()

@@ -3,9 +3,9 @@
 Results may come from anybody, so no name in them is ever markup: whatever is inserted into HTML or
 Markdown is escaped here.
 
-html.say("{n:,} missions of {policy}.", n=300, policy="greedy")
-html.table(frame, "Means with 95 % intervals")
-html.gallery([(drawing, "Success of every policy", "n = 300 missions")])
+html.write_markdown("{n:,} missions of {policy}.", n=300, policy="greedy")
+html.make_table(frame, "Means with 95 % intervals")
+html.make_gallery([(drawing, "Success of every policy", "n = 300 missions")])
 """
 
 import io
@@ -35,7 +35,7 @@ from dess.analysis.study.study import budget_of
 from dess.analysis.tables import Table
 from dess.base.errors import printable
 from dess.reports.pages import ASKED
-from dess.reports.pages.page import FILES, STUDY, Learned, Page, hidden
+from dess.reports.pages.page import FILES, STUDY, Learned, Page, hidden_element
 
 STUDIES_BESIDE = 6  # studies with a column in one table of what they were made with
 FEW_WORDS = 18  # characters of a cell that is not broken
@@ -86,13 +86,13 @@ class Marked(str):
     """Markdown in which every name is escaped."""
 
 
-def indexed(text: object) -> Markup:
+def set_indices(text: object) -> Markup:
     """Text, or HTML without such a name in an attribute, in which the S of ``C_S`` is an index."""
     return Markup(_INDEX.sub(r"C<sub>\1</sub>", str(Markup.escape(text))))
 
 
 @cache
-def template(name: str, **filters: Callable[..., str]) -> Template:
+def load_template(name: str, **filters: Callable[..., str]) -> Template:
     """Load a template.
 
     Args:
@@ -100,29 +100,29 @@ def template(name: str, **filters: Callable[..., str]) -> Template:
         **filters: Filters in addition to ``indexed`` and those of Jinja. Only a page explains
             terms; elsewhere ``explained`` text is the same text.
     """
-    finalize = _in_markdown if name.endswith(".md") else None
+    finalize = _escape_unless_marked if name.endswith(".md") else None
     loader = PackageLoader("dess.reports", "templates")
     environment = Environment(loader=loader, finalize=finalize, trim_blocks=True, **JINJA)
-    environment.filters |= {"indexed": indexed, "explained": Markup.escape, **filters}
+    environment.filters |= {"indexed": set_indices, "explained": Markup.escape, **filters}
     return environment.get_template(name)
 
 
-def rendered(name: str, **values: Any) -> HTML:
+def render_part(name: str, **values: Any) -> HTML:
     """A part of a page that a template makes of values, which it escapes."""
-    return HTML(template(name).render(**values))
+    return HTML(load_template(name).render(**values))
 
 
-def fill(name: str, scripts: bool = False, **values: Any) -> str:
+def fill_page(name: str, scripts: bool = False, **values: Any) -> str:
     """Fill a template with values, and seal the page.
 
     A browser makes no request for the page, and runs a script only if ``scripts`` is set.
     """
-    page = template(name).render(scripts=scripts, version=dess.__version__, **values)
+    page = load_template(name).render(scripts=scripts, version=dess.__version__, **values)
     return Page(page).sealed.text
 
 
-def _in_markdown(value: object) -> object:
-    return value if isinstance(value, int | float | Marked) else text(value)
+def _escape_unless_marked(value: object) -> object:
+    return value if isinstance(value, int | float | Marked) else escape_text(value)
 
 
 class Part(HTML):
@@ -134,7 +134,7 @@ class Part(HTML):
 
     def __init__(self, **values: Any):
         """Make the HTML of the values."""
-        super().__init__(template("part.html").render(part=values))
+        super().__init__(load_template("part.html").render(part=values))
         self.values = values
 
     def _repr_mimebundle_(self, **_: object) -> dict[str, object]:
@@ -146,78 +146,81 @@ class _Escaping(Formatter):
 
     def format_field(self, value: Any, form: str) -> str:
         shown = super().format_field(value, form)
-        return shown if isinstance(value, Marked | Number) else text(shown)
+        return shown if isinstance(value, Marked | Number) else escape_text(shown)
 
 
-def say(template: str, **values: object) -> Markdown:
-    """Markdown with values in it, as ``say("{n:,} missions of {policy}", n=300, policy=name)``."""
-    shown = marked(template, **values)
+def write_markdown(template: str, **values: object) -> Markdown:
+    """Markdown with values in it.
+
+    ``write_markdown("{n:,} missions of {policy}", n=300, policy=name)`` is a sentence.
+    """
+    shown = fill_markdown(template, **values)
     return Markdown(f"\n{shown}" if shown.startswith("http") else shown)  # it would be requested
 
 
-def marked(template: str, **values: object) -> Marked:
-    """The text of ``say``, which is a value for another ``say``."""
+def fill_markdown(template: str, **values: object) -> Marked:
+    """The text of ``write_markdown``, which is a value for another ``write_markdown``."""
     return Marked(_Escaping().vformat(template, (), values))
 
 
-def text(name: object) -> Marked:
+def escape_text(name: object) -> Marked:
     """Any text, such as a name, in Markdown: on the page it is the same text, and nothing else."""
     line = printable(re.sub(r"\s+", " ", str(name)))
-    return Marked(_MARKUP.sub(_entity, line))
+    return Marked(_MARKUP.sub(_escape_character, line))
 
 
-def code(name: object) -> Marked:
+def format_code(name: object) -> Marked:
     """Any text in Markdown, set as code."""
-    return Marked(f"<code>{text(name)}</code>")
+    return Marked(f"<code>{escape_text(name)}</code>")
 
 
-def composed(sentences: str) -> Marked:
+def escape_sentences(sentences: str) -> Marked:
     """Markdown that ``analysis`` made of its own words and of names.
 
     Emphasis, code and lists stay; HTML, links, images and formulas become plain text.
     """
-    return Marked(_HARMFUL.sub(_entity, sentences))
+    return Marked(_HARMFUL.sub(_escape_character, sentences))
 
 
-def _entity(found: re.Match[str]) -> str:
+def _escape_character(found: re.Match[str]) -> str:
     return f"&#{ord(found[0][0])};{found[0][1:]}"
 
 
-def block(kind: str, content: str) -> Marked:
+def code_block(kind: str, content: str) -> Marked:
     """A block of code in Markdown; the content cannot end it."""
     fence = "`" * max(3, 1 + max(map(len, re.findall("`+", content)), default=0))
     return Marked(f"{fence}{kind}\n{content}\n{fence}")
 
 
-def commands(lines: Iterable[str]) -> Marked:
+def command_block(lines: Iterable[str]) -> Marked:
     """A block of shell commands in Markdown, to be copied at once."""
-    return block("sh", "\n".join(lines))
+    return code_block("sh", "\n".join(lines))
 
 
-def provenance(studies: Iterable[Results]) -> HTML:
+def provenance_table(studies: Iterable[Results]) -> HTML:
     """A table of what the studies of a page were made with, with the evidence to verify them."""
-    return carrying([Evidence.of(results) for results in studies])
+    return evidence_tables([Evidence.of(results) for results in studies])
 
 
-def carrying(evidence: Sequence[Evidence]) -> HTML:
+def evidence_tables(evidence: Sequence[Evidence]) -> HTML:
     """Tables of what studies were made with, a column for each, and hidden elements with it all.
 
     Args:
         evidence: The evidence of the studies.
     """
     starts = range(0, len(evidence), STUDIES_BESIDE)
-    tables = [_origins(evidence[start : start + STUDIES_BESIDE]).data for start in starts]
-    inside = [hidden(STUDY, json.dumps(of_study.data)) for of_study in evidence]
+    tables = [_origin_table(evidence[start : start + STUDIES_BESIDE]).data for start in starts]
+    inside = [hidden_element(STUDY, json.dumps(of_study.data)) for of_study in evidence]
     return HTML("".join([*tables, *inside]))
 
 
-def _origins(evidence: Sequence[Evidence]) -> HTML:
+def _origin_table(evidence: Sequence[Evidence]) -> HTML:
     names = [of_study.study.name for of_study in evidence]
     columns = {
         name if names.count(name) == 1 else f"{name} {e.key}": {
             "Scenario": e.study.scenario,
             "Policies": ", ".join(team.policy for team in e.policies),
-            "Weights": ", ".join(_weights(e)) or "none",
+            "Weights": ", ".join(_name_weights(e)) or "none",
             "Design points": f"{e.points:,}",
             "Missions per policy and point": format_span(e.missions),
             "Budget": budget_of(e.study),
@@ -235,18 +238,18 @@ def _origins(evidence: Sequence[Evidence]) -> HTML:
     frame = pd.DataFrame(columns).rename_axis("Study")
     if not any(e.accepted for e in evidence):
         frame = frame.drop("Accepted")
-    return table(frame.reset_index(), wrap=True)
+    return make_table(frame.reset_index(), wrap=True)
 
 
-def weights(folder: Path) -> HTML:
+def weights_table(folder: Path) -> HTML:
     """A table of the files of the learned policies in a folder, and the evidence to verify it."""
     files = learned_files(folder)
     rows = [(name, digest[:SHORT]) for name, digest in files.items()]
-    shown = table(pd.DataFrame(rows, columns=["File", "SHA-256"]), "The learned policies")
-    return HTML(f"{shown.data}{hidden(FILES, Learned(files=files).model_dump_json())}")
+    shown = make_table(pd.DataFrame(rows, columns=["File", "SHA-256"]), "The learned policies")
+    return HTML(f"{shown.data}{hidden_element(FILES, Learned(files=files).model_dump_json())}")
 
 
-def _weights(evidence: Evidence) -> Iterator[str]:
+def _name_weights(evidence: Evidence) -> Iterator[str]:
     """The names of the learned policies of a study with the hashes of their weights."""
     for name, digest in dict.fromkeys(
         (team.policy if len(team.members) == 1 else member.name, member.weights)
@@ -257,7 +260,7 @@ def _weights(evidence: Evidence) -> Iterator[str]:
             yield f"{name} {digest[:SHORT]}"
 
 
-def table(
+def make_table(
     frame: pd.DataFrame, caption: str = "", data: pd.DataFrame | None = None, wrap: bool = False
 ) -> HTML:
     """A table below its caption, without its index; a wide table scrolls.
@@ -271,21 +274,21 @@ def table(
     """
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
-    html = _CELL.sub(_wrapped, html) if wrap else _aligned(html, len(frame.columns))
-    html = str(indexed(Markup(_EMPTY_HEADER.sub(r"<td\1></td>", html))))
+    html = _CELL.sub(_wrap_cell, html) if wrap else _align_numbers(html, len(frame.columns))
+    html = str(set_indices(Markup(_EMPTY_HEADER.sub(r"<td\1></td>", html))))
     caption = ". ".join(
         filter(None, [caption, numbers.why_nan(frame.astype(object).fillna("").to_numpy().flat)])
     )
     if caption:
-        html = html.replace(">", f"><caption>{indexed(caption)}</caption>", 1)
-    below = "" if data is None else _downloads(caption, data, frame)
+        html = html.replace(">", f"><caption>{set_indices(caption)}</caption>", 1)
+    below = "" if data is None else _download_links(caption, data, frame)
     label = escape(caption or "Table")
     return HTML(
         f'<div class="scroll" role="region" tabindex="0" aria-label="{label}">{html}</div>{below}'
     )
 
 
-def _aligned(table: str, columns: int) -> str:
+def _align_numbers(table: str, columns: int) -> str:
     """A table in HTML with the numbers that begin its cells aligned at their decimal points.
 
     A cell breaks between an estimate and its interval, but within neither.
@@ -295,31 +298,33 @@ def _aligned(table: str, columns: int) -> str:
     for column in range(columns):
         places = range(column, len(cells), columns)
         widths = {
-            place: _width(found[0]) for place in places if (found := _NUMBER.match(cells[place]))
+            place: _measure_digits(found[0])
+            for place in places
+            if (found := _NUMBER.match(cells[place]))
         }
         for place, width in widths.items():
             indents[place] = max(widths.values()) - width
     aligned = (
-        f'<td style="--indent:{indent:g}">{_kept_together(cell)}</td>'
+        f'<td style="--indent:{indent:g}">{_keep_together(cell)}</td>'
         if indent
-        else f"<td>{_kept_together(cell)}</td>"
+        else f"<td>{_keep_together(cell)}</td>"
         for cell, indent in zip(cells, indents, strict=True)
     )
     return _CELL.sub(lambda _: next(aligned), table)
 
 
-def _wrapped(cell: re.Match[str]) -> str:
+def _wrap_cell(cell: re.Match[str]) -> str:
     """A cell that is broken into several lines; sentences get a column that is wide enough."""
     look = ' class="long"' if len(cell[1]) > SENTENCES else ""
-    return f"<td{look}>{_kept_together(cell[1])}</td>"
+    return f"<td{look}>{_keep_together(cell[1])}</td>"
 
 
-def _width(digits: str) -> float:
+def _measure_digits(digits: str) -> float:
     """The width of a number before its decimal point, in digits; a comma is half as wide."""
     return len(digits) - 0.5 * digits.count(",")
 
 
-def _kept_together(cell: str) -> str:
+def _keep_together(cell: str) -> str:
     """The text of a cell without breaks in a few words, before a unit and within an interval."""
     if len(cell) <= FEW_WORDS and "[" not in cell:
         return cell.replace(" ", "\N{NO-BREAK SPACE}")
@@ -327,7 +332,7 @@ def _kept_together(cell: str) -> str:
     return _BRACKETS.sub(lambda found: found[0].replace(" ", "\N{NO-BREAK SPACE}"), together)
 
 
-def answer(sentence: str, number: str = "") -> Part:
+def make_answer(sentence: str, number: str = "") -> Part:
     """The answer to the question of a page: it stands below the title, and on the page's card.
 
     Args:
@@ -337,7 +342,9 @@ def answer(sentence: str, number: str = "") -> Part:
     return Part(sentence=printable(re.sub(r"[*`]", "", sentence)), number=number)
 
 
-def figure(drawing: "Figure", alt: str, caption: str, data: pd.DataFrame | None = None) -> Part:
+def make_figure(
+    drawing: "Figure", alt: str, caption: str, data: pd.DataFrame | None = None
+) -> Part:
     """A figure with its alternative text and its caption.
 
     Args:
@@ -346,44 +353,46 @@ def figure(drawing: "Figure", alt: str, caption: str, data: pd.DataFrame | None 
         caption: The text below the figure.
         data: The data of the figure. If given, links in the caption save them as CSV and as LaTeX.
     """
-    return figures([_figure(drawing, alt, caption, data)])
+    return make_figures([_describe_figure(drawing, alt, caption, data)])
 
 
-def lead(
+def lead_figure(
     drawing: "Figure",
     alt: str,
     caption: str,
     data: pd.DataFrame | None = None,
     narrow: "Figure | None" = None,
 ) -> Part:
-    """The figure that shows the answer, as wide as the page; with the arguments of ``figure``.
+    """The figure that shows the answer, as wide as the page; with the arguments of ``make_figure``.
 
     Narrow windows show ``narrow`` in its place, or the same figure drawn for their width.
     """
     on_phone = narrow or drawing
-    _resize(on_phone, LEAD_ON_PHONE[0], max(LEAD_ON_PHONE[1], on_phone.get_figheight()))
-    source = _source(on_phone)
-    _resize(drawing, *LEAD)
-    return figures([_figure(drawing, alt, caption, data) | {"narrow": source}], "lead")
+    _resize_figure(on_phone, LEAD_ON_PHONE[0], max(LEAD_ON_PHONE[1], on_phone.get_figheight()))
+    source = _figure_address(on_phone)
+    _resize_figure(drawing, *LEAD)
+    return make_figures(
+        [_describe_figure(drawing, alt, caption, data) | {"narrow": source}], "lead"
+    )
 
 
-def _resize(drawing: "Figure", width: float, height: float) -> None:
+def _resize_figure(drawing: "Figure", width: float, height: float) -> None:
     """Give a figure another size [inches]; one of ours fits its legend to it."""
     resize = getattr(drawing, "resize", drawing.set_size_inches)
     resize(width, height)
 
 
-def gallery(drawings: Iterable[tuple[Any, ...]], note: str = "") -> Part:
+def make_gallery(drawings: Iterable[tuple[Any, ...]], note: str = "") -> Part:
     """Several figures side by side where there is room.
 
     Args:
         drawings: Each a ``Drawing``, or the first two or more of its values.
         note: What holds for all of them, in a paragraph below.
     """
-    return figures([_figure(*parts) for parts in drawings], "gallery", note)
+    return make_figures([_describe_figure(*parts) for parts in drawings], "gallery", note)
 
 
-def figures(values: Sequence[Mapping[str, Any]], look: str = "", note: str = "") -> Part:
+def make_figures(values: Sequence[Mapping[str, Any]], look: str = "", note: str = "") -> Part:
     """Figures as data, in one of the looks of ``style.css``.
 
     Args:
@@ -396,16 +405,16 @@ def figures(values: Sequence[Mapping[str, Any]], look: str = "", note: str = "")
     return Part(figures=[{**_BARE, **value} for value in values], look=look, note=note)
 
 
-def show(*parts: Table | HTML | Markdown | Iterable[tuple[Any, ...]]) -> None:
+def show_parts(*parts: Table | HTML | Markdown | Iterable[tuple[Any, ...]]) -> None:
     """Show tables, galleries of figures, and what else there is, one below the other."""
     for part in parts:
         if isinstance(part, HTML | Markdown):
             display(part)
         else:
-            display(table(*part) if isinstance(part, Table) else gallery(part))
+            display(make_table(*part) if isinstance(part, Table) else make_gallery(part))
 
 
-def picture(drawing: "Figure", kind: str) -> bytes:
+def encode_figure(drawing: "Figure", kind: str) -> bytes:
     """A figure in one of ``PICTURES``; the same figure gives the same bytes."""
     import matplotlib as mpl
 
@@ -416,35 +425,35 @@ def picture(drawing: "Figure", kind: str) -> bytes:
         mpl.rcParams |= {"pdf.fonttype": 42, "savefig.dpi": 200}  # journals refuse Type 3
         drawing.savefig(buffer, format=kind, metadata=_NO_METADATA[kind])
     content = buffer.getvalue()
-    return _PLACES.sub(_shorter, content) if kind == "svg" else content
+    return _PLACES.sub(_shorten_coordinates, content) if kind == "svg" else content
 
 
-def _shorter(coordinates: re.Match[bytes]) -> bytes:
+def _shorten_coordinates(coordinates: re.Match[bytes]) -> bytes:
     """The coordinates without digits that are finer than any screen, and without line breaks."""
     return _BREAKS.sub(rb"\1", _DIGITS.sub(rb"\1", coordinates[0]))
 
 
-def _figure(
+def _describe_figure(
     drawing: "Figure", alt: str, caption: str = "", data: pd.DataFrame | None = None
 ) -> dict[str, Any]:
-    links = "" if data is None else _downloads(alt, data, data)
+    links = "" if data is None else _download_links(alt, data, data)
     kinds = filter(None, os.environ.get(ASKED, "").split(","))
-    files = {kind: b64encode(picture(drawing, kind)).decode() for kind in kinds}
-    shown = {"alt": alt, "source": _source(drawing), "caption": caption, "links": links}
+    files = {kind: b64encode(encode_figure(drawing, kind)).decode() for kind in kinds}
+    shown = {"alt": alt, "source": _figure_address(drawing), "caption": caption, "links": links}
     return shown | ({"files": files} if files else {})
 
 
-def _source(drawing: "Figure") -> str:
+def _figure_address(drawing: "Figure") -> str:
     """The address of a figure, which contains it."""
-    return f"data:image/svg+xml;base64,{b64encode(picture(drawing, 'svg')).decode()}"
+    return f"data:image/svg+xml;base64,{b64encode(encode_figure(drawing, 'svg')).decode()}"
 
 
-def _downloads(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:
+def _download_links(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:
     """Links that save data as CSV and a table as LaTeX; the links contain the files."""
     name = re.sub(r"[^a-z0-9]+", "-", title.partition(":")[0].lower())[:80].strip("-")
     files = {
         "CSV": ("csv", "text/csv", numbers.write_csv(data, DIGITS)),
-        "LaTeX": ("tex", "application/x-tex", latex(shown)),
+        "LaTeX": ("tex", "application/x-tex", format_latex(shown)),
     }
     links = [
         f'<a download="{name}.{suffix}" aria-label="{escape(f"{title}: {kind}")}" '
@@ -454,7 +463,7 @@ def _downloads(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:
     return f'<span class="data">Data: {" ".join(links)}</span>'
 
 
-def latex(frame: pd.DataFrame) -> str:
+def format_latex(frame: pd.DataFrame) -> str:
     """A table in LaTeX; it needs the package booktabs."""
     text = frame.to_latex(index=False, escape=True, float_format=DIGITS.__mod__, na_rep="")
     return re.sub(r"\bC\\_([SC])\b", r"$C_\1$", text).translate(_IN_LATEX)

@@ -18,7 +18,7 @@ from dess import InputError
 from dess.analysis.results.tables import load_results
 from dess.base.files.writing import temporary_folder
 from dess.reports.pages import ASKED, cells
-from dess.reports.pages.cells import kill
+from dess.reports.pages.cells import kill_group
 from dess.reports.pages.notebook import Report
 
 log = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ HOME = "dess-pages-"  # beginning of the name of the folder in which the noteboo
 PACKAGES = Path(dess.__file__).parents[1]  # the folder from which this package was imported
 
 
-def run(
+def run_reports(
     reports: Sequence[Report], progress: Progress | None = None, shared: Sequence[Path] = ()
 ) -> None:
     """Run reports. If one fails, the error is stored in it and the others are still run.
@@ -50,7 +50,7 @@ def run(
     work = {"cells": codes, "folders": [str(folder.absolute()) for folder in shared]}
     with temporary_folder(Path(gettempdir()), HOME) as home, TemporaryFile() as errors:
         formats = dict.fromkeys(kind for report in reports for kind in report.formats)
-        with _process(home, errors, formats) as (asked, answers):
+        with _start_process(home, errors, formats) as (asked, answers):
             with suppress(BrokenPipeError):
                 asked.write(json.dumps(work).encode() + b"\n")
                 asked.flush()
@@ -60,7 +60,7 @@ def run(
                 for warning in (output for output in outputs if output.get("name") == "stderr"):
                     log.warning(warning["text"].rstrip())
                 if error:
-                    _fail(report, *error)
+                    _store_error(report, *error)
                     continue
                 report.done += 1
                 if progress:
@@ -69,25 +69,25 @@ def run(
             if report.done < len(report.cells) and not report.failure:
                 errors.seek(0)
                 last = errors.read().decode("utf-8", "replace").strip().splitlines()[-1:]
-                report.failure = ": ".join([_cell(report), "its process ended", *last])
+                report.failure = ": ".join([_describe_cell(report), "its process ended", *last])
 
 
-def _fail(report: Report, kind: str, error: str, traceback: str) -> None:
+def _store_error(report: Report, kind: str, error: str, traceback: str) -> None:
     """Store the error of a cell in its report, or raise it if the notebook refuses its input."""
     if kind == InputError.__name__:
         raise InputError(f"report {report.name}: {error}")
-    report.failure = f"{_cell(report)}: {kind}: {error}"
+    report.failure = f"{_describe_cell(report)}: {kind}: {error}"
     report.traceback = traceback
 
 
-def _cell(report: Report) -> str:
+def _describe_cell(report: Report) -> str:
     """The cell that was begun last: its number among the cells with code, and its first line."""
     first_line = report.cells[report.done].source.strip().partition("\n")[0]
     return f"report {report.name}: cell {report.done + 1} of {len(report.cells)} ({first_line})"
 
 
 @contextmanager
-def _process(
+def _start_process(
     home: Path, errors: IO[bytes], formats: Iterable[str]
 ) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
     """Input and output of the process that runs notebooks in a folder; it is killed at the end.
@@ -99,7 +99,7 @@ def _process(
     process = subprocess.Popen(
         [sys.executable, "-m", cells.__name__],
         cwd=home,
-        env=_environment(home) | {ASKED: ",".join(formats)},
+        env=_process_environment(home) | {ASKED: ",".join(formats)},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=errors,
@@ -110,7 +110,7 @@ def _process(
     try:
         yield process.stdin, process.stdout
     finally:
-        kill(process.pid)
+        kill_group(process.pid)
         process.kill()
         process.wait()
         for stream in (process.stdin, process.stdout):
@@ -118,7 +118,7 @@ def _process(
                 stream.close()
 
 
-def _environment(home: Path) -> dict[str, str]:
+def _process_environment(home: Path) -> dict[str, str]:
     """The environment of a process that writes to ``home`` only.
 
     An empty entry of the path means the working directory of this process, where anything may lie.
@@ -143,7 +143,7 @@ COMPARISON, VERIFICATION = "comparison", "verification"  # names of the pages an
 TIMED = {COMPARISON: COMPARISON, "planner": "planning", "seas": "seas"}
 
 
-def make(
+def simulate_missing(
     pages: Collection[str],
     results: Path,
     parameters: Mapping[str, Any],

@@ -107,19 +107,19 @@ class Report:
     @property
     def parameters(self) -> dict[str, Any]:
         """The names that the cell tagged ``parameters`` assigns, with their values."""
-        return values_of(_parameters_cell(self.notebook).source)
+        return assigned_values(_parameters_cell(self.notebook).source)
 
     @property
     def code(self) -> list[str]:
         """The code of every cell; absolute paths are shortened, since they are of this machine."""
-        names = {name: with_paths(v, os.path.basename) for name, v in self.parameters.items()}
+        names = {name: replace_paths(v, os.path.basename) for name, v in self.parameters.items()}
         names |= {"results": "."}
         changed = _parameters_cell(self.notebook)
-        return [with_values(c.source, names) if c is changed else c.source for c in self.cells]
+        return [replace_values(c.source, names) if c is changed else c.source for c in self.cells]
 
-    def set(self, values: Mapping[str, Any]) -> None:
+    def set_parameters(self, values: Mapping[str, Any]) -> None:
         """Set parameters to other values; parameters of other notebooks are ignored."""
-        _set(self.notebook, values)
+        _write_parameters(self.notebook, values)
 
     def for_jupyter(self, results: Path, out: Path, values: Mapping[str, Any]) -> str:
         """The notebook, after its cells have been run, as a file that Jupyter opens in ``out``.
@@ -129,13 +129,14 @@ class Report:
         """
         notebook = deepcopy(self.original)
         moved = {
-            name: with_paths(v, lambda path: _relative(path, out)) for name, v in values.items()
+            name: replace_paths(v, lambda path: _relative_path(path, out))
+            for name, v in values.items()
         }
-        _set(notebook, {**moved, "results": _relative(str(results), out)})
+        _write_parameters(notebook, {**moved, "results": _relative_path(str(results), out)})
         outputs = {cell.id: cell.outputs for cell in self.cells}
         for cell in notebook.cells:
             if cell.cell_type == "code":
-                cell.outputs = [*filter(None, map(_for_jupyter, outputs.get(cell.id, [])))]
+                cell.outputs = [*filter(None, map(_output_for_jupyter, outputs.get(cell.id, [])))]
         notebook.cells[0].source += _HINT
         notebook.metadata = {"kernelspec": _KERNEL}
         return nbformat.writes(notebook) + "\n"
@@ -147,17 +148,17 @@ class Report:
         except InputError:
             return False
         cell = _parameters_cell(self.original).source
-        expected = with_values(cell, {"results": _relative(str(results), out)})
+        expected = replace_values(cell, {"results": _relative_path(str(results), out)})
         line = next(line for line in expected.splitlines() if line.startswith("results"))
         return json.dumps(line, ensure_ascii=False)[1:-1] in text
 
 
-def _relative(path: str, out: Path) -> str:
+def _relative_path(path: str, out: Path) -> str:
     """A path as a notebook in the folder ``out`` names it."""
     return Path(os.path.relpath(path, out)).as_posix()
 
 
-def _for_jupyter(output: NotebookNode) -> NotebookNode | None:
+def _output_for_jupyter(output: NotebookNode) -> NotebookNode | None:
     """An output of a cell as Jupyter shows it; none for a warning."""
     if output.get("name") == "stderr":
         return None
@@ -167,31 +168,31 @@ def _for_jupyter(output: NotebookNode) -> NotebookNode | None:
     return shown
 
 
-def names_in(folder: Path = SHIPPED) -> list[str]:
+def report_names(folder: Path = SHIPPED) -> list[str]:
     """The names of the reports whose notebooks are in a folder, in the order of the index."""
-    return [name for name in NAMES if _file(folder, name).exists()]
+    return [name for name in NAMES if _find_notebook(folder, name).exists()]
 
 
-def read(name: str, folder: Path = SHIPPED) -> Report:
+def read_report(name: str, folder: Path = SHIPPED) -> Report:
     """Read the notebook of a report.
 
     Raises:
         InputError: If the folder has no report of that name.
     """
-    if name not in (names := names_in(folder)):
+    if name not in (names := report_names(folder)):
         raise InputError(f"report: {shown(name)} is unknown{one_of(name, names)}")
-    return report_of(name, parsed(name, folder))
+    return make_report(name, parse_notebook(name, folder))
 
 
-def parsed(name: str, folder: Path = SHIPPED) -> NotebookNode:
+def parse_notebook(name: str, folder: Path = SHIPPED) -> NotebookNode:
     """The notebook of a report, all of it."""
-    notebook = jupytext.reads(read_text(_file(folder, name)), fmt="py:percent")
+    notebook = jupytext.reads(read_text(_find_notebook(folder, name)), fmt="py:percent")
     for number, cell in enumerate(notebook.cells):
         cell.id = f"cell-{number}"
     return notebook
 
 
-def report_of(name: str, original: NotebookNode) -> Report:
+def make_report(name: str, original: NotebookNode) -> Report:
     """The report of a notebook, which begins with its heading."""
     title, description = original.cells[0].source.removeprefix("# ").split("\n\n", 1)
     notebook = deepcopy(original)
@@ -231,42 +232,42 @@ def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:
             )
 
 
-def _file(folder: Path, name: str) -> Path:
+def _find_notebook(folder: Path, name: str) -> Path:
     """The file of a notebook, in the folder or in one of its folders."""
     file = f"{name.replace('-', '_')}.py"
     return next(iter(paths_in(folder, f"*/{file}")), folder / file)
 
 
-def tags_of(cell: NotebookNode) -> list[str]:
+def cell_tags(cell: NotebookNode) -> list[str]:
     """The tags of a cell."""
     return cell.metadata.get("tags", [])
 
 
 def _parameters_cell(notebook: NotebookNode) -> NotebookNode:
-    return next(cell for cell in notebook.cells if PARAMETERS in tags_of(cell))
+    return next(cell for cell in notebook.cells if PARAMETERS in cell_tags(cell))
 
 
-def _set(notebook: NotebookNode, values: Mapping[str, Any]) -> None:
+def _write_parameters(notebook: NotebookNode, values: Mapping[str, Any]) -> None:
     """Write values into the cell tagged ``parameters``."""
     cell = _parameters_cell(notebook)
-    cell.source = with_values(cell.source, values)
+    cell.source = replace_values(cell.source, values)
 
 
-def values_of(source: str) -> dict[str, Any]:
+def assigned_values(source: str) -> dict[str, Any]:
     """The parameters that a cell assigns, with their values."""
-    return {name: ast.literal_eval(value) for name, value in _assignments(source)}
+    return {name: ast.literal_eval(value) for name, value in _find_assignments(source)}
 
 
-def with_values(source: str, values: Mapping[str, Any]) -> str:
+def replace_values(source: str, values: Mapping[str, Any]) -> str:
     """The source of a cell with other values for its parameters; comments and layout are kept.
 
     Args:
         source: The source of the cell.
         values: Values by name; names that the cell does not assign are ignored.
     """
-    before = values_of(source)
+    before = assigned_values(source)
     lines = source.encode().split(b"\n")  # columns of a syntax tree count bytes
-    for name, node in reversed([*_assignments(source)]):
+    for name, node in reversed([*_find_assignments(source)]):
         if name in values and values[name] != before[name]:
             first = node.lineno - 1
             last = (node.end_lineno or node.lineno) - 1
@@ -276,7 +277,7 @@ def with_values(source: str, values: Mapping[str, Any]) -> str:
     return b"\n".join(lines).decode()
 
 
-def with_paths(value: Any, write: Callable[[str], str]) -> Any:
+def replace_paths(value: Any, write: Callable[[str], str]) -> Any:
     """The value of a parameter with its paths replaced, such as relative by absolute ones.
 
     A path is a word with a path separator, one that ends with ``.toml``, or a policy of a folder or
@@ -284,7 +285,7 @@ def with_paths(value: Any, write: Callable[[str], str]) -> Any:
     ``greedy,/home/me/mine``.
     """
     if isinstance(value, list):
-        return [with_paths(item, write) for item in value]
+        return [replace_paths(item, write) for item in value]
     if not isinstance(value, str):
         return value
     return ",".join(
@@ -293,7 +294,7 @@ def with_paths(value: Any, write: Callable[[str], str]) -> Any:
     )
 
 
-def _assignments(source: str) -> Iterator[tuple[str, ast.expr]]:
+def _find_assignments(source: str) -> Iterator[tuple[str, ast.expr]]:
     """The name and the value of every assignment, in the order of the source."""
     for node in ast.parse(source).body:
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):

@@ -52,7 +52,7 @@ class Card(Document):
     key: str = ""
 
 
-def hidden(kind: str, text: str) -> Markup:
+def hidden_element(kind: str, text: str) -> Markup:
     """An element with a JSON text that a page contains and does not show."""
     inert = text.replace("<", "\\u003c")  # so that the text cannot end the element
     return Markup(f'<script class="{kind}" type="application/json">{inert}</script>')
@@ -96,24 +96,24 @@ class Page:
     @property
     def card(self) -> Card:
         """Its card, or an ``InputError`` if it has none."""
-        return Card.parse("".join(self.hidden(CARD)[:1]), self.where, self.allowed)
+        return Card.parse("".join(self.find_hidden(CARD)[:1]), self.where, self.allowed)
 
     @property
     def evidence(self) -> list[Evidence]:
         """The evidence of its studies, or an ``InputError`` if it is not valid."""
-        return [Evidence.parse(text, self.where, self.allowed) for text in self.hidden(STUDY)]
+        return [Evidence.parse(text, self.where, self.allowed) for text in self.find_hidden(STUDY)]
 
     @property
     def learned(self) -> list[Learned]:
         """Its lists of files of learned policies, or an ``InputError`` if one is not valid."""
-        return [Learned.parse(text, self.where, self.allowed) for text in self.hidden(FILES)]
+        return [Learned.parse(text, self.where, self.allowed) for text in self.find_hidden(FILES)]
 
-    def hidden(self, kind: str) -> list[str]:
+    def find_hidden(self, kind: str) -> list[str]:
         """The distinct JSON texts of a kind, such as ``STUDY``, that are hidden in the page."""
         texts = re.findall(f'<script class="{kind}" [^>]*>(.*?)</script>', self.text, re.S)
         return list(dict.fromkeys(texts))
 
-    def with_bar(self, bar: str) -> "Page":
+    def replace_bar(self, bar: str) -> "Page":
         """The page with links to all pages of its folder, sealed again."""
         before, begin, rest = self.text.partition(_BAR)
         return Page(f"{before}{begin}{bar}{_END}{rest.partition(_END)[2]}").sealed

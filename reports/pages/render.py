@@ -31,10 +31,10 @@ from dess.base.files.documents import LIMIT
 from dess.base.files.reading import Missing, paths_in, read_bytes
 from dess.base.files.writing import delete, locked, write_files
 from dess.reports.pages import INDEX, LOCK, PREFIX, check_pages, kernels, notebook
-from dess.reports.pages.html import fill, template
+from dess.reports.pages.html import fill_page, load_template
 from dess.reports.pages.kernels import Progress
 from dess.reports.pages.page import Page
-from dess.reports.pages.study import report_of
+from dess.reports.pages.study import make_study_report
 
 TILES = {  # pages whose number has a tile, and what it is
     "performance.html": "Against the paper's policy",
@@ -44,7 +44,7 @@ TILES = {  # pages whose number has a tile, and what it is
 _OF_STUDY = re.compile(rf"{PREFIX}.+(?<!\.partial)\.html")
 
 
-def index_of(
+def make_index(
     pages: Mapping[str, Page], left_out: Mapping[str, Sequence[str]] = MappingProxyType({})
 ) -> str:
     """The index of pages.
@@ -53,21 +53,21 @@ def index_of(
         pages: The pages, by file name.
         left_out: Titles of reports whose results are missing, with the commands that make these.
     """
-    cards = {name: pages[name].card for name in in_order(pages)}
+    cards = {name: pages[name].card for name in sort_pages(pages)}
     scorecard = cards.get(f"{notebook.SCORECARD}.html")
-    return fill(
+    return fill_page(
         INDEX,
         cards=cards,
         tiles=[
             (text, page) for page, text in TILES.items() if page in cards and cards[page].number
         ],
         picture=scorecard and scorecard.picture,
-        groups=groups_of(pages),
+        groups=group_pages(pages),
         left_out=left_out,
     )
 
 
-def in_order(pages: Iterable[str], group: str | None = None) -> list[str]:
+def sort_pages(pages: Iterable[str], group: str | None = None) -> list[str]:
     """File names of pages in the order of the index: those of a group, or all."""
     known = {*pages}
     studies = sorted(name for name in known if _OF_STUDY.fullmatch(name))
@@ -80,25 +80,25 @@ def in_order(pages: Iterable[str], group: str | None = None) -> list[str]:
     return [name for name in order if name in known]
 
 
-def groups_of(pages: Iterable[str]) -> list[tuple[str, list[str]]]:
+def group_pages(pages: Iterable[str]) -> list[tuple[str, list[str]]]:
     """The headings of the groups that have a page, each with the file names of its pages."""
-    names = {heading: in_order(pages, heading) for heading in notebook.GROUPS}
+    names = {heading: sort_pages(pages, heading) for heading in notebook.GROUPS}
     return [(heading, of_group) for heading, of_group in names.items() if of_group]
 
 
-def with_bars(pages: Mapping[str, Page]) -> dict[str, Page]:
+def add_bars(pages: Mapping[str, Page]) -> dict[str, Page]:
     """The pages of a folder, with the links to all of them, by group, in their bars."""
     labels = {}
-    for name in in_order(pages):
+    for name in sort_pages(pages):
         labels[name] = name.removesuffix(".html").replace("-", " ").capitalize()
         if _OF_STUDY.fullmatch(name):
             labels[name] = pages[name].card.title
-    shown = {"groups": groups_of(pages), "labels": labels}
-    bar = template("bar.html")
-    return {n: page.with_bar(bar.render(page=n, **shown)) for n, page in pages.items()}
+    shown = {"groups": group_pages(pages), "labels": labels}
+    bar = load_template("bar.html")
+    return {n: page.replace_bar(bar.render(page=n, **shown)) for n, page in pages.items()}
 
 
-def pages_in(out: Path, but: Container[str] = ()) -> dict[str, Page]:
+def find_pages(out: Path, but: Container[str] = ()) -> dict[str, Page]:
     """The pages in a folder, by file name; pages that were altered are left out, with a warning.
 
     Args:
@@ -106,7 +106,7 @@ def pages_in(out: Path, but: Container[str] = ()) -> dict[str, Page]:
         but: File names that are left out without a warning.
     """
     pages = {}
-    names = in_order(path.name for path in paths_in(out, "*.html"))
+    names = sort_pages(path.name for path in paths_in(out, "*.html"))
     for path in (out / name for name in names if name not in but):
         try:
             page = Page.read(path)
@@ -124,17 +124,21 @@ log = logging.getLogger(__name__)
 PACKAGE = Path(dess.__file__).parent
 
 
-def key_of(report: notebook.Report, studies: Mapping[str, Path]) -> str:
+def page_key(report: notebook.Report, studies: Mapping[str, Path]) -> str:
     """The key of a page whose notebook has its default parameters.
 
     Args:
         report: The report.
         studies: The results folders that it reads, by the names that the page has for them.
     """
-    parts = [_software(), nbformat.writes(report.original)]
+    parts = [_hash_software(), nbformat.writes(report.original)]
     for name, folder in studies.items():
         files = [path.relative_to(folder).as_posix() for path in paths_in(folder, "**/*.parquet")]
-        parts += [name, _hash(folder / MANIFEST), *files]  # the names of files have their hashes
+        parts += [
+            name,
+            _hash_file(folder / MANIFEST),
+            *files,
+        ]  # the names of files have their hashes
     return sha256(repr(parts).encode()).hexdigest()
 
 
@@ -148,7 +152,7 @@ def has_key(page: Path, key: str) -> bool:
 
 
 @lru_cache
-def _software() -> str:
+def _hash_software() -> str:
     """A hash of the files of this package and of the versions of all libraries."""
     # In a checkout, folders of the package lie beside it, and ``**`` does not follow links to them.
     folders = [PACKAGE]
@@ -156,7 +160,7 @@ def _software() -> str:
         if (PACKAGE / name).is_symlink() or not (PACKAGE / name).is_dir():
             folders.append(PACKAGE.parent / name)
     files = sorted(
-        (path.relative_to(folder).as_posix(), _hash(path))
+        (path.relative_to(folder).as_posix(), _hash_file(path))
         for folder in folders
         for path in paths_in(folder, "**/*.*")
         if path.is_file() and path.parent.name != "__pycache__"
@@ -165,7 +169,7 @@ def _software() -> str:
     return repr([sys.version, versions, files])
 
 
-def _hash(path: Path) -> str:
+def _hash_file(path: Path) -> str:
     return sha256(read_bytes(path, LIMIT)).hexdigest()
 
 
@@ -214,14 +218,16 @@ def render(
     results = Path(results)
     out = Path(out)
     given = parameters or {}
-    values = {name: notebook.with_paths(value, os.path.abspath) for name, value in given.items()}
+    values = {name: notebook.replace_paths(value, os.path.abspath) for name, value in given.items()}
     asked = [*dict.fromkeys(names)]
-    reports = [notebook.read(name, notebooks) for name in asked or notebook.names_in(notebooks)]
+    reports = [
+        notebook.read_report(name, notebooks) for name in asked or notebook.report_names(notebooks)
+    ]
     notebook.check_parameters(reports, values)
     for report in reports:
         report.formats = (*formats,)
-        _look_up(report, results, out, values)
-    lacking = {r.name: {} if r.is_current else _lacking(r, results) for r in reports}
+        _find_finished_page(report, results, out, values)
+    lacking = {r.name: {} if r.is_current else _list_lacking(r, results) for r in reports}
     commands = {c: error for errors in lacking.values() for c, error in errors.items()}
     if asked and len(commands) > 1 and all(isinstance(e, Missing) for e in commands.values()):
         names = " ".join(command.rpartition(" ")[2] for command in commands)
@@ -237,8 +243,8 @@ def render(
     left_out = {report.title: [*lacking[report.name]] for report in reports if lacking[report.name]}
     reports = [report for report in reports if not lacking[report.name]]
     for report in reports:
-        report.set({"results": str(results.absolute()), **values})
-    _write(reports, results, out, progress, values, left_out)
+        report.set_parameters({"results": str(results.absolute()), **values})
+    _write_pages(reports, results, out, progress, values, left_out)
     return out / INDEX
 
 
@@ -269,16 +275,16 @@ def render_study(
     folder = Path(folder)
     out = Path(out)
     values = parameters or {}
-    report = report_of(folder, values)
+    report = make_study_report(folder, values)
     notebook.check_parameters([report], values)
-    report.set({"results": str(folder.absolute()), **values})
+    report.set_parameters({"results": str(folder.absolute()), **values})
     report.formats = (*formats,)
-    _look_up(report, folder, out, values)
-    _write([report], folder, out, progress, values)
+    _find_finished_page(report, folder, out, values)
+    _write_pages([report], folder, out, progress, values)
     return out / report.page
 
 
-def _write(
+def _write_pages(
     reports: Sequence[notebook.Report],
     results: Path,
     out: Path,
@@ -289,25 +295,27 @@ def _write(
     """Run reports in the folder of their results, and write the pages and the index."""
     check_pages(out, *(report.name for report in reports))
     changed = [report for report in reports if not report.is_current]
-    kernels.make([report.name for report in changed], results, values, progress)
-    read_by = Counter(f for report in changed for f in _folders(report, results).values())
-    kernels.run(changed, progress, [folder for folder, count in read_by.items() if count > 1])
+    kernels.simulate_missing([report.name for report in changed], results, values, progress)
+    read_by = Counter(f for report in changed for f in _find_results(report, results).values())
+    kernels.run_reports(
+        changed, progress, [folder for folder, count in read_by.items() if count > 1]
+    )
     made = {}
     if changed:
-        from dess.reports.pages.body import page_of  # imports nbconvert
+        from dess.reports.pages.body import make_page  # imports nbconvert
 
-        made = {report.page: page_of(report) for report in changed}
+        made = {report.page: make_page(report) for report in changed}
     complete = [report for report in reports if not report.failure]
     files: dict[str, str | bytes] = {
         f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete if not r.is_current
     }
     for report in complete:
-        files |= {f"{report.folder}/{name}": picture for name, picture in _pictures(report)}
+        files |= {f"{report.folder}/{name}": picture for name, picture in _decode_figures(report)}
     with locked(out / LOCK, _BUSY, PATIENCE):
-        others = pages_in(out, but=made)
-        pages = with_bars(others | made)
+        others = find_pages(out, but=made)
+        pages = add_bars(others | made)
         files |= {name: page.text for name, page in pages.items() if page != others.get(name)}
-        files[INDEX] = index_of(pages, left_out)
+        files[INDEX] = make_index(pages, left_out)
         write_files({out / name: text for name, text in files.items()})
         for report in complete:
             delete(out / f"{report.name}.partial.html")
@@ -316,33 +324,37 @@ def _write(
         raise ReportError("; ".join(lines))
 
 
-def _pictures(report: notebook.Report) -> Iterator[tuple[str, bytes]]:
+def _decode_figures(report: notebook.Report) -> Iterator[tuple[str, bytes]]:
     """The files with the figures of a report that has been run, by the numbers on its page."""
-    from dess.reports.pages.body import parts_of
+    from dess.reports.pages.body import find_parts
 
-    for figure in (figure for part in parts_of(report.cells) for figure in part.get("figures", [])):
+    for figure in (
+        figure for part in find_parts(report.cells) for figure in part.get("figures", [])
+    ):
         for kind, content in figure.get("files", {}).items():
             yield f"{figure['name']}.{kind}", b64decode(content)
 
 
-def _look_up(report: notebook.Report, results: Path, out: Path, values: Mapping[str, Any]) -> None:
+def _find_finished_page(
+    report: notebook.Report, results: Path, out: Path, values: Mapping[str, Any]
+) -> None:
     """Find out whether the page of a report is there and of these results, which are sound then."""
     if values:
         return
     with suppress(InputError):  # there are none, or ``_lacking`` finds out what is wrong with them
-        report.key = key_of(report, _folders(report, results))
+        report.key = page_key(report, _find_results(report, results))
         kept = not report.formats and has_key(out / report.page, report.key)
         report.is_current = kept and report.is_in(out, results)
 
 
-def _folders(report: notebook.Report, results: Path) -> dict[str, Path]:
+def _find_results(report: notebook.Report, results: Path) -> dict[str, Path]:
     """The results folders that a report reads, by name."""
     found = (paths_in(results, f"{name}/{MANIFEST}") for name in report.optional)
     others = [path.parent.name for paths in found for path in paths]
     return {name: results / name for name in (*report.studies, *others)}
 
 
-def _lacking(report: notebook.Report, results: Path) -> dict[str, InputError]:
+def _list_lacking(report: notebook.Report, results: Path) -> dict[str, InputError]:
     """The results that a report lacks: the command that makes them, and what is wrong."""
     errors = {}
     for study in report.studies:

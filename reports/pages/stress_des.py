@@ -21,7 +21,7 @@ from dess.analysis import numbers
 from dess.analysis.numbers import format_level
 from dess.analysis.stats.intervals import LEVEL
 from dess.model.record import EVENT_NAMES
-from dess.reports.pages.html import Marked, code, marked, template, text
+from dess.reports.pages.html import Marked, escape_text, fill_markdown, format_code, load_template
 from dess.scenario.fields import SAMPLED, fields_of
 from dess.scenario.scenario import Scenario, ScenarioSpace
 
@@ -47,7 +47,7 @@ class Description(NamedTuple):
     parameters: pd.DataFrame
 
 
-def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description:
+def describe_model(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description:
     """Describe the model that studies were run with.
 
     Args:
@@ -67,49 +67,56 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
         "zone_x": (x, x + width - 1),
         "zone_y": (y, y + height - 1),
         "drawn": [
-            marked("{field} {span}", field=code(field), span=_span(ends))
+            fill_markdown("{field} {span}", field=format_code(field), span=_format_span(ends))
             for field, ends in ranges.items()
             if ends[0] < ends[1]
         ],
-        "swept": [code(field) for field in _swept([manifest, *others])],
-        "policies": [code(name) for name in _policies([manifest, *others])],
-        "events": [code(name) for name in EVENT_NAMES],
+        "swept": [format_code(field) for field in _find_swept_fields([manifest, *others])],
+        "policies": [format_code(name) for name in _find_policies([manifest, *others])],
+        "events": [format_code(name) for name in EVENT_NAMES],
         "level": format_level(LEVEL),
         "python": libraries.pop("python"),
         "libraries": [f"{library} {version}" for library, version in libraries.items()],
         "licence": about["License-Expression"] or about["License"],
     }
-    page = template(
-        "stress_des.md", words=_words, code=code, number=_number, span=_span, counted=_counted
+    page = load_template(
+        "stress_des.md",
+        words=_join_names,
+        code=format_code,
+        number=_format_number,
+        span=_format_span,
+        counted=_format_count,
     )
     module: Any = page.make_module(values)
     sections = {part[4]: part.strip() for part in _HEADING.split(str(module)) if part.strip()}
     overview = module.steps, module.repeated, module.end
-    studies = pd.DataFrame(_study(each) for each in (manifest, *others))
-    return Description(sections, studies, overview, _parameters(space))
+    studies = pd.DataFrame(_describe_study(each) for each in (manifest, *others))
+    return Description(sections, studies, overview, _list_parameters(space))
 
 
-def _words(names: Iterable[str]) -> Marked:
+def _join_names(names: Iterable[str]) -> Marked:
     """A list of names as ``a, b and c`` in Markdown."""
-    return Marked(numbers.join_words([n if isinstance(n, Marked) else text(n) for n in names]))
+    return Marked(
+        numbers.join_words([n if isinstance(n, Marked) else escape_text(n) for n in names])
+    )
 
 
-def _study(manifest: Manifest) -> dict[str, str]:
+def _describe_study(manifest: Manifest) -> dict[str, str]:
     """A study as a row of the table of item 1.3."""
     study = manifest["study"]
     rules = {"by a stopping rule": study["precision"], "by a selection": study["selection"]}
-    missions = [_span([n for counts in manifest["missions"] for n in counts])]
+    missions = [_format_span([n for counts in manifest["missions"] for n in counts])]
     return {
         "Study": study["name"],
         "Aim": study["description"] or "",
         "Design": f"{study['design']['kind'] if study['design'] else 'one point'}",
-        "Design points": _number(len(manifest["points"])),
+        "Design points": _format_number(len(manifest["points"])),
         "Missions per policy and point": ", ".join(missions + [r for r, on in rules.items() if on]),
         "Policies": numbers.join_words(study["policies"]),
     }
 
 
-def _swept(manifests: Iterable[Manifest]) -> dict[str, None]:
+def _find_swept_fields(manifests: Iterable[Manifest]) -> dict[str, None]:
     """The fields that studies set, for all of their missions or by design point."""
     return dict.fromkeys(
         field
@@ -119,44 +126,44 @@ def _swept(manifests: Iterable[Manifest]) -> dict[str, None]:
     )
 
 
-def _policies(manifests: Iterable[Manifest]) -> dict[str, None]:
+def _find_policies(manifests: Iterable[Manifest]) -> dict[str, None]:
     """The policies of all teams of studies."""
     teams = [team for manifest in manifests for team in manifest["study"]["policies"]]
     return dict.fromkeys(name.strip() for team in teams for name in team.split(","))
 
 
-def _parameters(space: ScenarioSpace) -> pd.DataFrame:
+def _list_parameters(space: ScenarioSpace) -> pd.DataFrame:
     fields = {**fields_of(ScenarioSpace), **fields_of(Scenario)}
     stored = space.model_dump()  # without the sections that are off
     rows = [
-        (f"{field}: {known.description}", _value(space, field))
+        (f"{field}: {known.description}", _format_value(space, field))
         for field, known in fields.items()
         if field.partition(".")[0] in stored
     ]
     return pd.DataFrame(rows, columns=["Input parameter [unit]", "Value"])
 
 
-def _value(space: ScenarioSpace, field: str) -> str:
+def _format_value(space: ScenarioSpace, field: str) -> str:
     """The value of a field as text."""
     value: Any = space.zone_pads[0] if field == "pads" else space.value(field)
     if field == "nodes":
-        return _cells(value)
+        return _format_cells(value)
     if field == "no_fly":
-        return _counted(len(value), "cell")
+        return _format_count(len(value), "cell")
     if field == "zones":
         value = [
-            f"{[*zone.cells]}, {_counted(n, 'pad')}"
+            f"{[*zone.cells]}, {_format_count(n, 'pad')}"
             for zone, n in zip(value, space.zone_pads[1:], strict=True)
         ]
         return "; ".join(value)
     if field in SAMPLED or field == "initial_data":
-        return _span(value)
+        return _format_span(value)
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return ", ".join(map(str, value)) if isinstance(value, tuple) else _number(value)
+    return ", ".join(map(str, value)) if isinstance(value, tuple) else _format_number(value)
 
 
-def _cells(nodes: Sequence[tuple[int, int]]) -> str:
+def _format_cells(nodes: Sequence[tuple[int, int]]) -> str:
     """Cells as text; short if they are all combinations of some columns and rows."""
     columns, rows = (sorted({node[axis] for node in nodes}) for axis in (0, 1))
     if len(columns) * len(rows) == len(nodes):
@@ -164,14 +171,14 @@ def _cells(nodes: Sequence[tuple[int, int]]) -> str:
     return ", ".join(f"({x}, {y})" for x, y in nodes)
 
 
-def _number(value: float) -> str:
+def _format_number(value: float) -> str:
     return f"{value:,.12g}".replace("-", "−")
 
 
-def _span(values: Sequence[float]) -> str:
+def _format_span(values: Sequence[float]) -> str:
     """The smallest and the largest value as text: ``70 to 80``, or ``80`` if they are equal."""
-    return " to ".join(dict.fromkeys(map(_number, (min(values), max(values)))))
+    return " to ".join(dict.fromkeys(map(_format_number, (min(values), max(values)))))
 
 
-def _counted(number: int, name: str) -> str:
-    return f"{_number(number)} {name}{'' if number == 1 else 's'}"
+def _format_count(number: int, name: str) -> str:
+    return f"{_format_number(number)} {name}{'' if number == 1 else 's'}"

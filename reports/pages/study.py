@@ -21,41 +21,44 @@ from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results, load_results
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.selection import Selection
-from dess.policies.registry import departures
+from dess.policies.registry import list_departures
 from dess.reports.pages import PREFIX, html, notebook
-from dess.reports.pages.notebook import Report, tags_of
+from dess.reports.pages.notebook import Report, cell_tags
 
 _MOST_FIELDS = 3  # the largest number of fields that a title names
 _MOST_VALUES = 12  # the largest number of values of a field in a list
 
 
-def simulated(results: Results) -> html.Marked:
+def list_simulated(results: Results) -> html.Marked:
     """What was simulated: scenario, policies, design and missions, as a list."""
     manifest = results.store.manifest
     study = manifest.study
     points = len(manifest.points)
-    fixed = [f"{field_named(field).within} {_set(value)}" for field, value in study.set.items()]
-    policies = numbers.join_words([html.code(policy) for policy in results.policies])
+    fixed = [
+        f"{field_named(field).within} {_format_set_value(value)}"
+        for field, value in study.set.items()
+    ]
+    policies = numbers.join_words([html.format_code(policy) for policy in results.policies])
     missions = numbers.format_span(n for of_policy in manifest.missions for n in of_policy)
     each = f" per policy{' and design point' * (points > 1)}"
     lines = [
-        html.marked(
+        html.fill_markdown(
             "- **Scenario:** {scenario}{fixed}.",
-            scenario=html.code(study.scenario),
+            scenario=html.format_code(study.scenario),
             fixed=", with " * bool(fixed) + numbers.join_words(fixed),
         ),
         f"- **Policies:** {policies}.",
-        *_design(results),
+        *_describe_design(results),
         f"- **Missions:** {missions}{each}, {len(results.missions):,} in all.",
-        notes(results),
+        list_notes(results),
     ]
     return html.Marked("\n".join(filter(None, lines)))
 
 
-def notes(results: Results) -> html.Marked:
+def list_notes(results: Results) -> html.Marked:
     """Which trained policies act outside of their training, as a list."""
-    found = departures(results.policies, results.store.manifest.scenarios)
-    lines = [html.marked("- **Note:** {line}.", line=line) for line in found]
+    found = list_departures(results.policies, results.store.manifest.scenarios)
+    lines = [html.fill_markdown("- **Note:** {line}.", line=line) for line in found]
     return html.Marked("\n".join(lines))
 
 
@@ -73,10 +76,10 @@ def page_title(results: Results) -> str:
         question = "Which setting is the best on {}?"
     else:
         question = "Which policy is the best on {}?"
-    return question.format(_sea(results.study.scenario))
+    return question.format(_describe_sea(results.study.scenario))
 
 
-def _sea(scenario: str) -> str:
+def _describe_sea(scenario: str) -> str:
     """A scenario in words: the paper's sea, or that of its name or file."""
     return "the paper's sea" if scenario == "paper" else f"the sea {Path(scenario).stem}"
 
@@ -107,29 +110,32 @@ def shown_metrics(results: Results, by: str) -> list[str]:
     return [*dict.fromkeys([by, *asked])] if asked else metrics_of_page(by)
 
 
-def guarantees(results: Results) -> html.Marked:
+def list_guarantees(results: Results) -> html.Marked:
     """What is guaranteed about the selections, as a list."""
     rows = summary.selected_settings(results).itertuples()
-    lines = [html.marked("- {name}: {known}", name=row.policy, known=row.guarantee) for row in rows]
+    lines = [
+        html.fill_markdown("- {name}: {known}", name=row.policy, known=row.guarantee)
+        for row in rows
+    ]
     return html.Marked("\n".join(lines))
 
 
-def commands(results: Results, missions: pd.DataFrame) -> html.Marked:
+def list_commands(results: Results, missions: pd.DataFrame) -> html.Marked:
     """The commands that simulate missions again, and the folder that they name.
 
     Args:
         results: The study.
         missions: Rows of ``summary.worst_missions``.
     """
-    return html.marked(
+    return html.fill_markdown(
         "These commands simulate them again. {folder} stands for the results folder of the study, "
         "wherever it is:\n\n{lines}",
-        folder=html.code(results.usual_folder),
-        lines=html.commands(missions["command"]),
+        folder=html.format_code(results.usual_folder),
+        lines=html.command_block(missions["command"]),
     )
 
 
-def reasons(results: Results) -> html.Marked:
+def list_reasons(results: Results) -> html.Marked:
     """The prices, how sure the answer of a search is, the other answers, and the guarantee."""
     lines = [
         f"- {text}" for text in (prices_in_words(results), *cheapest.reason_sentences(results))
@@ -137,22 +143,24 @@ def reasons(results: Results) -> html.Marked:
     sure = "\n\n".join(
         f"Guarantee: {text}." for text in sorted(cheapest.guarantee_sentences(results))
     )
-    return html.composed("\n".join(lines) + f"\n\n{sure}")
+    return html.escape_sentences("\n".join(lines) + f"\n\n{sure}")
 
 
-def _design(results: Results) -> Iterator[html.Marked]:
+def _describe_design(results: Results) -> Iterator[html.Marked]:
     """The fields that the design varies, as items of the list."""
     points = len(results.store.manifest.points)
     if fields := varied_values(results):
         line = "- **Design:** {kind}, {points:,} design points. It varies:"
-        yield html.marked(line, kind=html.code(results.design), points=points)
+        yield html.fill_markdown(line, kind=html.format_code(results.design), points=points)
     for field, values in fields.items():
         unit = f" [{field_named(field).unit}]".removesuffix(" []")
         line = "    - {field}{unit}: {values}"
-        yield html.marked(line, field=field_named(field).within, unit=unit, values=_values(values))
+        yield html.fill_markdown(
+            line, field=field_named(field).within, unit=unit, values=_format_values(values)
+        )
 
 
-def _values(values: Sequence[Any]) -> str:
+def _format_values(values: Sequence[Any]) -> str:
     """The values of a field as text; only the first and the last if there are many."""
     texts = [value_text(value) for value in values]
     if len(texts) <= _MOST_VALUES:
@@ -160,7 +168,7 @@ def _values(values: Sequence[Any]) -> str:
     return f"{len(texts):,} values, {texts[0]} to {texts[-1]}"
 
 
-def _set(value: Any) -> str:
+def _format_set_value(value: Any) -> str:
     """A value of the study's table ``set`` as text; of a list of cells, only their number."""
     if isinstance(value, list | tuple) and any(isinstance(item, list | tuple) for item in value):
         return f"of {len(value)} cells"
@@ -170,7 +178,7 @@ def _set(value: Any) -> str:
 NOTEBOOK = "study"
 
 
-def report_of(folder: Path, values: Mapping[str, Any] = MappingProxyType({})) -> Report:
+def make_study_report(folder: Path, values: Mapping[str, Any] = MappingProxyType({})) -> Report:
     """The report of a results folder, with the sections and the title of its study.
 
     Args:
@@ -185,21 +193,21 @@ def report_of(folder: Path, values: Mapping[str, Any] = MappingProxyType({})) ->
     ranking_metric(results, values.get("metric"))
     baseline_in_words(results, values.get("baseline", 0))
     study = results.study
-    original = notebook.parsed(NOTEBOOK)
-    kept = parts(results)
+    original = notebook.parse_notebook(NOTEBOOK)
+    kept = find_shown_parts(results)
     original.cells = [
-        cell for cell in original.cells if all(kept.get(tag, True) for tag in tags_of(cell))
+        cell for cell in original.cells if all(kept.get(tag, True) for tag in cell_tags(cell))
     ]
     points = len(results.store.manifest.points)
     where = f"{points:,} design points" if points > 1 else f"the scenario {study.scenario}"
     description = study.description or f"{numbers.join_words(results.policies)} at {where}."
     title = page_title(results)
-    original.cells[0].source = f"# {html.text(title)}\n\n{html.text(description)}"
-    report = notebook.report_of(f"{PREFIX}{study.name}", original)
+    original.cells[0].source = f"# {html.escape_text(title)}\n\n{html.escape_text(description)}"
+    report = notebook.make_report(f"{PREFIX}{study.name}", original)
     return replace(report, title=title, description=" ".join(description.split()))
 
 
-def parts(results: Results) -> dict[str, bool]:
+def find_shown_parts(results: Results) -> dict[str, bool]:
     """For each tag, whether the page of a study has the cells of the notebook with this tag."""
     manifest = results.store.manifest
     study = results.study

@@ -79,13 +79,13 @@ class _Sampling:
     yes: bool = False
     seconds: float = 0.0
 
-    def drawn(self, missions: Sequence[_Item]) -> list[_Item]:
+    def draw_missions(self, missions: Sequence[_Item]) -> list[_Item]:
         """Those of some missions that are simulated again."""
         return [
             missions[number] for number in draw_numbers(len(missions), self.missions, self.seed)
         ]
 
-    def admit(self, what: str, spaces: Sequence[ScenarioSpace]) -> None:
+    def refuse_long_checks(self, what: str, spaces: Sequence[ScenarioSpace]) -> None:
         """Refuse missions that take too much, before the first of them is simulated.
 
         Raises:
@@ -119,8 +119,10 @@ def verify_page(
     studies = page.evidence
     notes = [] if studies else ["contains no missions to simulate again"]
     sampling = _Sampling(missions, seed, named, yes)
-    drawn = [_drawn(evidence, sampling) for evidence in studies]  # all, before any is simulated
-    records = [_compared(*pair, named) for pair in zip(studies, drawn, strict=True)]
+    drawn = [
+        _draw_missions(evidence, sampling) for evidence in studies
+    ]  # all, before any is simulated
+    records = [_compare_missions(*pair, named) for pair in zip(studies, drawn, strict=True)]
     return [Check("page", 1, altered, notes), *files, *records]
 
 
@@ -166,7 +168,7 @@ def _check_study(store: Store, sampling: _Sampling) -> list[Check]:
         return [Check(f"{store.manifest.study.name}, files", len(store.files), lines)]
     results = results_of(store)
     evidence = Evidence.of(results, sampling.missions, sampling.seed)
-    checks = [_compared(evidence, _drawn(evidence, sampling), sampling.named)]
+    checks = [_compare_missions(evidence, _draw_missions(evidence, sampling), sampling.named)]
     if store.logged:
         checks.append(_check_logs(store, sampling))
     if results.bounds:
@@ -174,21 +176,21 @@ def _check_study(store: Store, sampling: _Sampling) -> list[Check]:
     return checks
 
 
-def _drawn(evidence: Evidence, sampling: _Sampling) -> _Drawn:
+def _draw_missions(evidence: Evidence, sampling: _Sampling) -> _Drawn:
     """The missions of a study that are simulated again, with their scenarios and teams."""
     study = f"study {evidence.study.name}"
     names = (team.policy for team in evidence.policies)
     teams = {name: load_team(confirmed(name, sampling.named)) for name in names}
-    sample = sampling.drawn(evidence.sample)
+    sample = sampling.draw_missions(evidence.sample)
     spaces = [evidence.space(mission.values) for mission in sample]
-    sampling.admit(study, spaces)
+    sampling.refuse_long_checks(study, spaces)
     return [
         (mission, space, teams[mission.policy][: space.uavs[1]])
         for mission, space in zip(sample, spaces, strict=True)
     ]
 
 
-def _compared(evidence: Evidence, drawn: _Drawn, named: Collection[str] = ()) -> Check:
+def _compare_missions(evidence: Evidence, drawn: _Drawn, named: Collection[str] = ()) -> Check:
     """Simulate missions again, and compare their records."""
     lines = []
     for mission, space, team in drawn:
@@ -204,9 +206,9 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
     """Simulate some missions with a stored event log again, and compare the logs."""
     manifest = store.manifest
     lines = []
-    logged = sampling.drawn(store.logged)
+    logged = sampling.draw_missions(store.logged)
     what = f"study {manifest.study.name}"
-    sampling.admit(what, [manifest.scenarios[cell.point] for cell, _ in logged])
+    sampling.refuse_long_checks(what, [manifest.scenarios[cell.point] for cell, _ in logged])
     for cell, replication in logged:
         space = manifest.scenarios[cell.point]
         policy = confirmed(manifest.policies[cell.team].policy, sampling.named)
@@ -214,7 +216,9 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
         log = simulate(space, team, manifest.seed, replication, events=True).events
         stored = store.load_log(cell, replication)
         assert log is not None and stored is not None
-        if not stored.to_pandas().equals(_as_stored(pd.DataFrame(log.columns()), stored)):
+        if not stored.to_pandas().equals(
+            _match_stored_columns(pd.DataFrame(log.columns()), stored)
+        ):
             command = tables.of_folder(store.folder, manifest, cell, replication)
             lines.append(f"the event log differs when simulated again; command: {command}")
     return Check(f"{manifest.study.name}, event logs", len(logged), lines)
@@ -222,7 +226,7 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
 
 def _check_bounds(results: Results, sampling: _Sampling) -> Check:
     """Compute a few upper bounds again, and compare them bit for bit."""
-    drawn = sampling.drawn([*results.bounds])[:BOUNDS_CHECKED]
+    drawn = sampling.draw_missions([*results.bounds])[:BOUNDS_CHECKED]
     lines = []
     for point, replication in drawn:
         stored = results.bounds[point, replication]
@@ -236,7 +240,7 @@ def _check_bounds(results: Results, sampling: _Sampling) -> Check:
     return Check(f"{results.study.name}, bounds", len(drawn), lines)
 
 
-def _as_stored(log: pd.DataFrame, stored: pa.Table) -> pd.DataFrame:
+def _match_stored_columns(log: pd.DataFrame, stored: pa.Table) -> pd.DataFrame:
     """An event log as it was stored: logs of before lack columns and the parameters."""
     if stored.schema.equals(EVENTS):
         return log

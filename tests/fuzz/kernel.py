@@ -25,8 +25,8 @@ HTML = "text/html"
 
 def run_here() -> None:
     """Let the commands of this process run notebooks in it."""
-    kernels.run = _run
-    html.picture = lambda drawing, kind: b""
+    kernels.run_reports = _run
+    html.encode_figure = lambda drawing, kind: b""
 
 
 def _run(

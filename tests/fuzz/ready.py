@@ -80,7 +80,7 @@ def _make_reports(folder: Path) -> None:
             study = run_study(load_study(name, **changes | fewer), folder / name)
             if name == measurements.STUDY:
                 measurements.write(measurements.simulate_missions(study, 2), folder)
-        kernels.make(NAMES, folder, {})
+        kernels.simulate_missing(NAMES, folder, {})
 
 
 def write_texts(ready: Path) -> None:

@@ -13,9 +13,9 @@ from dess import InputError, policies
 from dess.model.mission import simulate
 from dess.policies import registry
 from dess.policies.heuristics import Greedy
-from dess.policies.learner.config import config_of
-from dess.policies.learner.trained import forms_of, observed, save_policy
-from dess.policies.registry import SHIPPED, Policy, TypedByUser, about
+from dess.policies.learner.config import validate_config
+from dess.policies.learner.trained import expected_weights, make_observation, save_policy
+from dess.policies.registry import SHIPPED, Policy, TypedByUser, describe_policy
 from dess.scenario.scenario import Scenario, load_scenario, scenario_names
 from tests.outside import install_package
 from tests.policies.learner.tiny import refusal_of
@@ -59,8 +59,8 @@ def test_unknown_names_are_refused(text):
 def _trained(folder: Path) -> Path:
     """The folder of a policy that is called ``novice`` and has learned nothing."""
     settings = {"name": "novice", "hidden": [8], "phases": [{"name": "none", "ticks": 1}]}
-    config, space = config_of(settings, "here"), load_scenario("paper")
-    weights = forms_of(config, observed(config, space)[1])
+    config, space = validate_config(settings, "here"), load_scenario("paper")
+    weights = expected_weights(config, make_observation(config, space)[1])
     save_policy(folder, weights, config, space)
     return folder
 
@@ -85,15 +85,15 @@ def test_what_is_shipped_loads_by_its_own_name_and_says_what_it_is_for(name):
     assert policy.name == name
     first, _, seed = name.rpartition("-")
     if seed.isdigit():  # a repetition differs in its seed alone
-        assert registry.descriptions()[name] == f"{first} trained once more, with seed {seed}"
+        assert registry.describe_policies()[name] == f"{first} trained once more, with seed {seed}"
         original = policies.load(first)
         assert (policy.learner, policy.weights != original.weights) == (original.learner, True)  # type: ignore[attr-defined]
-    assert registry.descriptions()[name]
+    assert registry.describe_policies()[name]
 
 
 @pytest.mark.usefixtures("outside")
 def test_the_list_says_which_outside_policies_cannot_be_loaded():
-    described = registry.descriptions()
+    described = registry.describe_policies()
     assert [*described] == policies.names()
     assert described["still"] == "of the package outside-policies 1"
     problem = "cannot be loaded: RuntimeError: no weights (of the package outside-policies 1)"
@@ -178,14 +178,14 @@ def test_an_edited_file_has_another_fingerprint(file):
 
 
 def test_what_a_policy_is_and_can_simulate(file):
-    ddqn, greedy = about("ddqn"), about("greedy")
+    ddqn, greedy = describe_policy("ddqn"), describe_policy("greedy")
     assert (ddqn.scenarios, greedy.scenarios) == (["fig4", "paper"], scenario_names())
     assert (ddqn.requires["grid"], ddqn.trained_on["uavs"]) == (32, [1, 3])
     assert (greedy.requires, greedy.trained_on) == ({}, {})
     assert ddqn.card.startswith("# ddqn")
     assert greedy.code == "dess.policies.heuristics:Greedy"
     assert greedy.origin == f"shipped with dess {dess.__version__}"
-    assert about(f"{file}:Eager").origin == f"the file {file}"
+    assert describe_policy(f"{file}:Eager").origin == f"the file {file}"
 
 
 def test_which_policies_are_python_files_is_known_without_running_them(tmp_path, monkeypatch):
@@ -193,11 +193,11 @@ def test_which_policies_are_python_files_is_known_without_running_them(tmp_path,
     (tmp_path / "trap.py").write_text("raise SystemExit('this code ran')")
     _trained(tmp_path / "data.py:Trap")  # a folder, whatever its name: it holds only data
     for team in ("trap.py:Trap", "greedy, trap.py:Trap", "no_such_file.py:X"):
-        assert registry.files_of(team) == [team.rpartition(" ")[2]]
+        assert registry.python_files_in(team) == [team.rpartition(" ")[2]]
         for named in (["another.py:X", "greedy"], []):
             with pytest.raises(InputError, match=r"is a Python file.*; allowed: --policy"):
                 registry.load_team(registry.confirmed(team, named))
         assert isinstance(registry.confirmed(team, [f"greedy, {team}"]), TypedByUser)
     for team in ("greedy", "ddqn,tour", "data.py:Trap", "greedy, ./data.py:Trap", "unknown", ""):
-        assert registry.files_of(team) == []
+        assert registry.python_files_in(team) == []
     assert "trap" not in sys.modules

@@ -19,8 +19,8 @@ from dess.analysis.execution import jobs
 from dess.analysis.verification import measurements
 from dess.policies.planner import Budget, Planner
 from dess.reports.pages import html
-from dess.reports.pages.notebook import Report, read
-from dess.reports.player import library
+from dess.reports.pages.notebook import Report, read_report
+from dess.reports.player import player_script
 from dess.scenario.scenario import ScenarioSpace
 from tests.analysis.small import grid
 
@@ -113,7 +113,7 @@ class Links(HTMLParser):
         self.found: list[str] = []
         self.tags: set[str] = set()
         bare = re.sub(
-            r"<script[^>]*>.*?</script>", "", html.replace(library().data, ""), flags=re.S
+            r"<script[^>]*>.*?</script>", "", html.replace(player_script().data, ""), flags=re.S
         )
         self.outside_scripts = EMBEDDED.sub("", bare)
         self.feed(html)
@@ -143,12 +143,12 @@ def shown_by(source: str | Report, **parameters: Any) -> str:
 
     A kernel of its own and the drawings take most of the time that a page takes.
     """
-    report, shown, scope = read(source) if isinstance(source, str) else source, [], {}
-    report.set(parameters)
+    report, shown, scope = read_report(source) if isinstance(source, str) else source, [], {}
+    report.set_parameters(parameters)
     with pytest.MonkeyPatch.context() as patch:
         for module in (IPython.display, html):
             patch.setattr(module, "display", lambda *pieces: shown.extend(pieces))
-        patch.setattr(html, "picture", lambda drawing, kind: b"")
+        patch.setattr(html, "encode_figure", lambda drawing, kind: b"")
         for cell in report.cells:
             tree = ast.parse(cell.source)
             last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None

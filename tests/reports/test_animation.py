@@ -34,7 +34,7 @@ def test_a_film_draws_what_the_player_shows():
         film = Film(log, scenario)
         for slot in range(film.end + 1):
             now = slots[slots["slot"] == slot - 1]
-            artists: Any = [*film.moving(slot)]
+            artists: Any = [*film.moving_artists(slot)]
             nodes, waiting, charging, uavs = (a for a in artists if isinstance(a, PathCollection))
             assert np.array_equal(uavs.get_offsets()[now["uav"]], now[["x", "y"]])
             for spots, state in ((waiting, "waiting"), (charging, "charging")):
@@ -43,7 +43,7 @@ def test_a_film_draws_what_the_player_shows():
             assert np.allclose(areas / areas.max(), data / data.max(), atol=1e-3)
             for artist in artists:
                 artist.remove()
-    pictures = [film.frame(slot) for slot in (0, film.end, 0)]
+    pictures = [film.draw_frame(slot) for slot in (0, film.end, 0)]
     assert np.array_equal(pictures[0], pictures[2])
     assert not np.array_equal(pictures[0], pictures[1])
 

@@ -8,7 +8,7 @@ from dess import InputError
 from dess.analysis.metrics import METRICS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.intervals import interval_of
-from dess.reports.explorer import Grid, explorer
+from dess.reports.explorer import Grid, make_explorer
 from tests.analysis.small import grid
 
 DESIGN = {"uavs": [1, 2, 3], "charge_complete": [40, 60], "initial_data": [[1, 2], 5]}
@@ -30,7 +30,7 @@ def document(results, tmp_path_factory):
     head = (
         '<!DOCTYPE html><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
     )
-    path.write_text(head + explorer(results).data, "utf-8")
+    path.write_text(head + make_explorer(results).data, "utf-8")
     return path
 
 
@@ -110,7 +110,7 @@ def test_moving_a_slider_shows_the_figures_of_the_grid(visit, results, document)
 
 def test_the_answer_names_the_setting_at_which_the_sliders_start(results):
     """Two of them start at an end of their values, not in the middle of a range."""
-    said = Grid(results).answer()
+    said = Grid(results).describe_start()
     assert said.startswith("With ") and "middle" not in said
     assert "2 UAVs" in said.partition(", the product is ")[0]
     assert "60" in said.partition(", the product is ")[0]
@@ -141,4 +141,4 @@ def test_what_is_no_grid_is_refused(studied):
     for changes in ({}, {"design": grid(uavs=[1, 2])}, {"design": {"kind": "table", "rows": rows}}):
         results = studied(policies=["random"], missions=2, **changes)
         with pytest.raises(InputError, match="is not a full grid of two fields or more"):
-            explorer(results)
+            make_explorer(results)

@@ -24,7 +24,7 @@ from dess.analysis.results.event_log import (
 )
 from dess.model.state import sample_scenario
 from dess.reports.pages.html import Part
-from dess.reports.player import AGE_READING, Shown, library, player, reading
+from dess.reports.player import AGE_READING, Shown, explain_player, make_player, player_script
 
 # One UAV; three in a queue for one pad, of which one has its battery depleted long before the
 # others end; quotas that are filled at once; nothing to serve, in a mission that is truncated.
@@ -77,7 +77,7 @@ def data_in(html: str) -> dict[str, Any]:
 
 def played(mission: Logged, name: str, title: str = "", caption: str = "") -> Part:
     """A player of one mission."""
-    return player([Shown(*mission, title)], name, caption)
+    return make_player([Shown(*mission, title)], name, caption)
 
 
 def test_discs_are_the_residual_data(mission, shown):
@@ -126,7 +126,7 @@ AGED: dict[str, dict[str, Any]] = {
 def test_ages_are_shown_where_the_scenario_measures_them(case):
     log, scenario = simulated(**AGED[case])
     shown = data_in(played(Logged(log, scenario), "aged").data)
-    assert (AGE_READING in reading(scenario)) == scenario.age.measured
+    assert (AGE_READING in explain_player(scenario)) == scenario.age.measured
     if not scenario.age.measured:
         assert shown["ages"] is shown["meanAge"] is None
         return
@@ -192,7 +192,7 @@ def document(queue, tmp_path_factory):
     """A page with two players, of which the first offers two missions."""
     alone = simulated(**CASES["alone"])
     both = [Shown(*queue, "I = 3", "queue"), Shown(*alone, "I = 1", "alone")]
-    parts = [library(), player(both, "first"), played(alone, "second", "I = 1")]
+    parts = [player_script(), make_player(both, "first"), played(alone, "second", "I = 1")]
     path = tmp_path_factory.mktemp("page") / "page.html"
     head = '<!DOCTYPE html><meta charset="utf-8">'
     head += '<meta name="viewport" content="width=device-width">'

@@ -29,10 +29,10 @@ against = "the number of UAVs, by arrival rate"
 lead, *others = operations.draw_means(means, "uavs", "arrival_rate", "policy", against).values()
 
 # %%
-html.answer(operations.age_sentence(study))
+html.make_answer(operations.age_sentence(study))
 
 # %%
-html.lead(*lead)
+html.lead_figure(*lead)
 
 # %% [markdown]
 # ## Why
@@ -41,7 +41,7 @@ html.lead(*lead)
 # grows until data arrive and are collected.
 
 # %%
-html.gallery(others)
+html.make_gallery(others)
 
 # %% [markdown]
 # ## How far to trust it
@@ -49,17 +49,17 @@ html.gallery(others)
 # Another model differs in scenario, channel and trajectories: only the size of the effect compares.
 
 # %%
-html.say(
+html.write_markdown(
     "Mathematics 13(21) 3564 reports, for another model, {published}.",
     published=operations.published_age_in_words(),
 )
 
 # %%
 change = operations.age_changes(study)
-html.say("{why}", why=operations.allowance_in_words(change, "the age"))
+html.write_markdown("{why}", why=operations.allowance_in_words(change, "the age"))
 
 # %%
-html.table(
+html.make_table(
     tables.estimate_cells(
         change, ["policy", "uavs", "n"], "arrival_rate", operations.format_relative_change
     ),
@@ -72,7 +72,7 @@ html.table(
 
 # %%
 of_age = means[means["metric"] == AGE]
-html.table(
+html.make_table(
     tables.estimate_cells(
         of_age, ["policy", "uavs", "n"], "arrival_rate", numbers.format_quantities
     ),
@@ -89,7 +89,7 @@ html.table(
 # `age` their age.
 
 # %%
-html.say("{lengths}", lengths=operations.mission_lengths_sentence(study))
+html.write_markdown("{lengths}", lengths=operations.mission_lengths_sentence(study))
 
 # %%
-html.provenance([study])
+html.provenance_table([study])

@@ -37,10 +37,10 @@ against = "the failure rate, by number of UAVs"
 lead, *others = operations.draw_means(means, rate, "uavs", repair, against).values()
 
 # %%
-html.answer(operations.failures_sentence(study))
+html.make_answer(operations.failures_sentence(study))
 
 # %%
-html.lead(*lead)
+html.lead_figure(*lead)
 
 # %% [markdown]
 # ## Why
@@ -50,10 +50,10 @@ html.lead(*lead)
 # for it.
 
 # %%
-html.say("{sentence}", sentence=way_home_range_sentence(study))
+html.write_markdown("{sentence}", sentence=way_home_range_sentence(study))
 
 # %%
-html.gallery(others)
+html.make_gallery(others)
 
 # %% [markdown]
 # ## How far to trust it
@@ -63,7 +63,7 @@ html.gallery(others)
 # %%
 display(
     *(
-        html.table(
+        html.make_table(
             tables.estimate_cells(
                 change, ["policy", "uavs", repair, "n"], rate, numbers.format_points
             ),
@@ -81,7 +81,7 @@ display(
 # %%
 display(
     *(
-        html.table(
+        html.make_table(
             tables.estimate_cells(
                 rows, ["policy", "uavs", repair, "n"], rate, numbers.format_quantities
             ),
@@ -99,4 +99,4 @@ display(
 # is lost, or grounded and repaired after a random time.
 
 # %%
-html.provenance([study])
+html.provenance_table([study])

@@ -34,10 +34,10 @@ against = "the number of pads, by number of UAVs"
 drawn = operations.draw_means(means, "pads", "uavs", "policy", against, linked=True)
 
 # %%
-html.answer(operations.enough_pads_sentence(study, margin))
+html.make_answer(operations.enough_pads_sentence(study, margin))
 
 # %%
-html.lead(*drawn[PRODUCT])
+html.lead_figure(*drawn[PRODUCT])
 
 # %% [markdown]
 # ## Why
@@ -46,22 +46,22 @@ html.lead(*drawn[PRODUCT])
 # return guard plans for waits and sends UAVs home earlier. What the fewest pads cost:
 
 # %%
-html.say("{lines}", lines=html.composed(operations.few_pads_sentence(study)))
+html.write_markdown("{lines}", lines=html.escape_sentences(operations.few_pads_sentence(study)))
 
 # %%
-html.say("{sentence}", sentence=way_home_range_sentence(study))
+html.write_markdown("{sentence}", sentence=way_home_range_sentence(study))
 
 # %%
-html.figure(*operations.draw_queues(study, margin))
+html.make_figure(*operations.draw_queues(study, margin))
 
 # %%
-html.gallery([drawn[metric] for metric in (*uses, SUCCESS)])
+html.make_gallery([drawn[metric] for metric in (*uses, SUCCESS)])
 
 # %% [markdown]
 # ## How far to trust it
 
 # %%
-html.say(
+html.write_markdown(
     "Pads are enough if the interval of the loss against a pad for every UAV is above −{margin}, "
     "here and with more pads. They are too few if it is below −{margin}. Between the two, more "
     "missions or other numbers of pads would decide.",
@@ -70,10 +70,10 @@ html.say(
 
 # %%
 lost = operations.changes_from_reference(study, "pads", study.missions["pads"].max(), PRODUCT)
-html.say("{why}", why=operations.allowance_in_words(lost, "the product"))
+html.write_markdown("{why}", why=operations.allowance_in_words(lost, "the product"))
 
 # %%
-html.table(
+html.make_table(
     tables.estimate_cells(lost, ["policy", "pads", "n"], "uavs", numbers.format_points),
     "Product minus that with the most pads: paired differences in points, by number of UAVs",
     data=lost,
@@ -85,7 +85,7 @@ html.table(
 # %%
 display(
     *(
-        html.table(
+        html.make_table(
             tables.estimate_cells(rows, ["policy", "pads", "n"], "uavs", metric_of(metric).written),
             f"{metric_of(metric).label}, by number of UAVs",
         )
@@ -101,4 +101,4 @@ display(
 # given a pad or gives up. Queue and utilisation are means over the time of the mission.
 
 # %%
-html.provenance([study])
+html.provenance_table([study])

@@ -37,30 +37,32 @@ missions = comparison.pair_missions(study, pair)
 logged = study.manifest["study"]["logged"]
 
 # %%
-html.answer(*answers.planner_sentences(differences, planner))
+html.make_answer(*answers.planner_sentences(differences, planner))
 
 # %%
-html.lead(*answers.by_fleet(differences))
+html.lead_figure(*answers.by_fleet(differences))
 
 # %% [markdown]
 # ## Why: where each of them is ahead
 
 # %%
 lead = comparison.differences_along_parameters(missions, pair.candidates)
-html.say("{colours}", colours=comparison.colours_in_words(lead, pair))
+html.write_markdown("{colours}", colours=comparison.colours_in_words(lead, pair))
 
 # %%
-too_few = html.say("Too few missions for bins of n = {least} or more.", least=comparison.LEAST)
-html.show(
+too_few = html.write_markdown(
+    "Too few missions for bins of n = {least} or more.", least=comparison.LEAST
+)
+html.show_parts(
     comparison.draw_differences_along_parameters(missions, lead, pair, f"{pair.title}, ") or too_few
 )
 
 # %%
-html.gallery(answers.draw_coverage(study, planner, learner))
+html.make_gallery(answers.draw_coverage(study, planner, learner))
 
 # %%
 mission = answers.first_logged_mission(study, planner)
-html.gallery(
+html.make_gallery(
     [
         answers.at_home(study, [planner, learner]),
         answers.draw_plan(study, mission),
@@ -75,9 +77,9 @@ html.gallery(
 # possible policy is between the best one here and this bound.
 
 # %%
-html.say(
+html.write_markdown(
     "{gap} {weights} {why}",
-    gap=html.composed(optimality.in_words(bounded, planners[-1])),
+    gap=html.escape_sentences(optimality.in_words(bounded, planners[-1])),
     weights=summary.weights_in_words(study),
     why=summary.allowance_for_difference(
         differences[differences["uavs"] == optimality.ALL], "policy"
@@ -95,14 +97,14 @@ if len(useful := optimality.fleets_with_useful_bound(bounds)):
         f"n = {numbers.format_span(useful['n'])} missions. The band is the interval of the bound."
     )
     drawn.append(Drawing(plot_gaps(useful), alt, counted))
-html.gallery(drawn, "Bars are 95 % intervals.")
+html.make_gallery(drawn, "Bars are 95 % intervals.")
 
 # %% [markdown]
 # ## Tables
 
 # %%
 means = differences.assign(mean=differences["difference"])
-html.table(
+html.make_table(
     tables.estimate_cells(means, ["policy", "uavs", "n"], write=numbers.format_points),
     f"Paired differences from {learner} in points, with 95 % intervals",
     data=differences,
@@ -110,22 +112,22 @@ html.table(
 
 # %%
 caption = "Means, the upper bound, and the gap in points"
-html.table(optimality.fleet_bound_table(bounds), caption, data=bounds)
+html.make_table(optimality.fleet_bound_table(bounds), caption, data=bounds)
 
 # %%
-html.table(
+html.make_table(
     answers.return_table(study, [planner, learner]),
     f"Means over charging sessions of the same {logged} missions",
 )
 
 # %%
-html.table(comparison.time_table(times), "Time of a decision for the UAVs of a mission")
+html.make_table(comparison.time_table(times), "Time of a decision for the UAVs of a mission")
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.say("{remarks}", remarks=comparison.decision_time_sentences(times, study, pair))
+html.write_markdown("{remarks}", remarks=comparison.decision_time_sentences(times, study, pair))
 
 # %%
-html.provenance([study, bounded])
+html.provenance_table([study, bounded])

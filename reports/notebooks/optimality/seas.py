@@ -35,16 +35,16 @@ for name in (policy, reference, heuristic):
 times = comparison.read_decision_times(results, study)
 
 # %%
-html.answer(seas.unseen_seas_sentence(study, times, policy, reference, heuristic))
+html.make_answer(seas.unseen_seas_sentence(study, times, policy, reference, heuristic))
 
 # %%
-html.lead(*seas.draw_decision_time_front(study, times))
+html.lead_figure(*seas.draw_decision_time_front(study, times))
 
 # %% [markdown]
 # ## Why: what each family asks for
 
 # %%
-html.gallery(seas.by_group(study, reference))
+html.make_gallery(seas.by_group(study, reference))
 
 # %% [markdown]
 # ## How far to trust it
@@ -53,7 +53,7 @@ html.gallery(seas.by_group(study, reference))
 # seas are drawn with seeds that no training and no selection of weights has used.
 
 # %%
-html.table(
+html.make_table(
     seas.worst_seas_table(study, policy, reference),
     f"The seas on which {policy} is the farthest behind {reference}",
 )
@@ -62,7 +62,7 @@ html.table(
 # ## Tables
 
 # %%
-html.table(
+html.make_table(
     seas.policies_table(study, times),
     f"Every policy over all seas, and the time of a decision in batches on one core; "
     f"{seas.count_seas_in_words(study)}",
@@ -76,19 +76,19 @@ html.table(
 
 # %%
 counted = seas.count_seas_in_words(landing)
-html.table(
+html.make_table(
     seas.policies_table(landing, times), f"Missions with a quota that end on the ground; {counted}"
 )
 
 # %%
-html.table(
+html.make_table(
     seas.policies_table(horizon, times),
     f"Eight hours without a quota; {seas.count_seas_in_words(horizon)}",
 )
 
 # %%
 rows = seas.means_over_seas(study, "family", SUCCESS)
-html.table(
+html.make_table(
     tables.estimate_cells(rows, ["family"], "policy"),
     f"{METRICS[SUCCESS]} by family: means over seas with 95 % intervals",
     data=rows,
@@ -97,7 +97,7 @@ html.table(
 # %%
 gains = seas.differences_from_baseline(study, heuristic, "family")
 gains = gains.assign(mean=gains["difference"])
-html.table(
+html.make_table(
     tables.estimate_cells(gains, ["family"], "policy", tables.numbers.format_points),
     f"Points of the product more than {heuristic}, paired, with 95 % intervals",
     data=gains,
@@ -107,4 +107,4 @@ html.table(
 # ## How this page was made
 
 # %%
-html.provenance([study, landing, horizon])
+html.provenance_table([study, landing, horizon])

@@ -112,13 +112,13 @@ def test_the_command_of_a_question_can_be_pasted(tmp_path):
     made = what_if_question(VALUES, {"uavs": 2}, scenario, ["greedy"], folder=tmp_path)
     words = shlex.split(made.command)
     given = [words[n + 1] for n, word in enumerate(words) if word == "--set"]
-    assert options.all_settings(given) == VALUES
+    assert options.parse_all_settings(given) == VALUES
     sheet = write_scenario(tmp_path, **SHEET)
     fields = {"data_sheet.data_rate": ["20 kB/h", "3 MB/h"], "data_sheet.wind": ["2 m/s from W"]}
     swept = sweep_question(fields, sheet, ["greedy"], folder=tmp_path)
     words = shlex.split(swept.command)
     given = [words[n + 1] for n, word in enumerate(words) if word == "--set"]
-    assert options.all_values(given) == {name: tuple(of) for name, of in fields.items()}
+    assert options.parse_all_values(given) == {name: tuple(of) for name, of in fields.items()}
 
 
 def test_a_search_has_a_policy_for_the_missions_that_it_will_take():

@@ -2,7 +2,7 @@
 
 from hypothesis import strategies as st
 
-from dess.reports.pages.notebook import read
+from dess.reports.pages.notebook import read_report
 from tests.fuzz import ready
 from tests.fuzz.case import Case, Step
 from tests.fuzz.steps import copy
@@ -26,14 +26,14 @@ _TRAINED = "in/trained"
 @st.composite
 def reports(draw: st.DrawFn, name: str, special: Changes | None = None) -> Case:
     """A shipped report, one of whose folders is changed, in a special way or any."""
-    studies, beside = read(name).studies, _BESIDE.get(name, ())
+    studies, beside = read_report(name).studies, _BESIDE.get(name, ())
     folders = [*studies, *beside]
     steps: list[Step] = [copy(f"{ready.REPORTS}/{one}", f"{_RESULTS}/{one}") for one in folders]
     changes = [
         (json_changes if one == ready.KEPT else results_changes)(f"{_RESULTS}/{one}")
         for one in folders
     ]
-    known = read(name).parameters
+    known = read_report(name).parameters
     parameters = {key: text for key, text in ready.ASKED_WITH.items() if key in known}
     if name in _ASKING:
         steps += [copy(ready.ASKED, _RESULTS), copy(ready.SCENARIO, f"in/{ready.SCENARIO}")]

@@ -14,5 +14,5 @@ def _one_thread():
 def training():
     """A training that has just begun."""
     training = DQNTraining(tiny(learning_starts=5, phases=[PHASES[1] | {"ticks": 3}]), CPU)
-    training.run(2)
+    training.run_ticks(2)
     return training

@@ -71,7 +71,7 @@ def _forged(file: Path, tensors: dict[str, np.ndarray | None] | None = None, **h
     with safe_open(file, "np") as opened:
         new = json.loads(opened.metadata()["dess"]) | header
     del new["sha256"]
-    new["sha256"] = trained.digest(new, kept)
+    new["sha256"] = trained.hash_arrays(new, kept)
     save_file(kept, file, {"dess": json.dumps(new)})
 
 
@@ -123,7 +123,7 @@ def _forgeries(file: Path) -> Iterator[tuple[str, np.ndarray | None]]:
         for field, value in fields.items():
             records = whole[name].copy().view(dtype)
             records[:1][field] = value
-            yield name, trained.bytes_of(records)
+            yield name, trained.to_bytes(records)
 
 
 def test_a_checkpoint_has_no_bytes_of_undefined_memory(training):
@@ -132,7 +132,7 @@ def test_a_checkpoint_has_no_bytes_of_undefined_memory(training):
     for name in padded.names:
         records[name] = 0
     assert records.tobytes().strip(b"\0")  # what lies between the fields
-    assert not trained.bytes_of(records).any()
+    assert not trained.to_bytes(records).any()
 
 
 def test_an_index_that_the_scenario_has_not_is_refused(training, file):
@@ -174,7 +174,7 @@ def test_damage_changes_nothing_that_is_used(training, file):
 def test_the_checkpoint_of_a_scenario_that_has_changed_is_refused(tmp_path):
     scenario = write_scenario(tmp_path)
     training = DQNTraining(tiny(scenario=str(scenario), learning_starts=5), CPU)
-    training.run(1)
+    training.run_ticks(1)
     save_training(tmp_path / CHECKPOINT, training)
     write_scenario(tmp_path, nodes=[[1, 1], [2, 2]])
     refusal_of(load_training, tmp_path / CHECKPOINT, training.config, CPU)

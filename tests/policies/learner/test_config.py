@@ -6,7 +6,12 @@ from typing import Any
 import pytest
 
 from dess import InputError, policies
-from dess.policies.learner.config import config_names, learner_of, load_config, resume_command
+from dess.policies.learner.config import (
+    config_names,
+    learner_identifier,
+    load_config,
+    resume_command,
+)
 from dess.scenario.scenario import load_scenario
 from tests.policies.learner.tiny import PHASES, TINY, tiny, tiny_on_seas, write_config
 
@@ -66,13 +71,19 @@ def test_fields_of_the_scenario_are_set(tmp_path):
     assert config.space == load_scenario("paper", uavs=1, quota=400)
     command = f"dess train {path} --out out --set uavs=1 --resume"
     assert resume_command(config, str(path), Path("out")) == command
-    assert learner_of(config) != learner_of(load_config(path)) != learner_of(tiny())
+    assert (
+        learner_identifier(config)
+        != learner_identifier(load_config(path))
+        != learner_identifier(tiny())
+    )
 
 
 def test_the_shipped_policies_keep_the_identity_of_their_learner():
-    assert learner_of(load_config("ddqn")) == "ddqn 99eea6f9"
+    assert learner_identifier(load_config("ddqn")) == "ddqn 99eea6f9"
     names = ["ddqn", "ddqn-2", "ddqn-3"]
-    assert {policies.load(name).learner for name in names} == {learner_of(load_config("ddqn"))}
+    assert {policies.load(name).learner for name in names} == {
+        learner_identifier(load_config("ddqn"))
+    }
 
 
 def test_the_shipped_configs_load():

@@ -17,8 +17,8 @@ def _learner(**changes: Any) -> tuple[DQNLearner, Batch]:
     """A new learner, and a batch of what a tiny training has seen."""
     flown = tiny(learning_starts=300, replay=300, phases=PHASES[1:])  # some missions end
     training = DQNTraining(flown, CPU)
-    training.run(1)
-    batch = training.replay.sample(1000, flown.n_step, flown.discount, training.generator)
+    training.run_ticks(1)
+    batch = training.replay.draw_batch(1000, flown.n_step, flown.discount, training.generator)
     config = tiny(**changes)
     network = DQNTraining(config, CPU).learner.online
     return DQNLearner(network, training.observation, config, CPU), batch
@@ -34,9 +34,9 @@ def test_the_loss_is_that_of_the_differences_to_the_target(loss):
     assert 0 < (batch.discount == 0).mean() < 0.5
     learner.target.load_state_dict(DQNTraining(tiny(seed=9), CPU).learner.online.state_dict())
     with torch.no_grad():
-        values = learner.values(learner.online, batch.state, batch.rows, batch.uav)
-        later = learner.values(learner.online, batch.state, batch.later, batch.uav)
-        judged = learner.values(learner.target, batch.state, batch.later, batch.uav)
+        values = learner.action_values(learner.online, batch.state, batch.rows, batch.uav)
+        later = learner.action_values(learner.online, batch.state, batch.later, batch.uav)
+        judged = learner.action_values(learner.target, batch.state, batch.later, batch.uav)
     allowed = masks(batch.state, batch.later, batch.uav)
     expected, chosen = 0.0, 0.0
     for b, action in enumerate(batch.action):
@@ -46,7 +46,7 @@ def test_the_loss_is_that_of_the_differences_to_the_target(loss):
         error = abs(value - goal)
         expected += LOSSES[loss](error)
         chosen += value
-    update = learner.update(batch, 1e-3)
+    update = learner.update_networks(batch, 1e-3)
     assert float(update["loss"]) == pytest.approx(expected / len(batch.action), rel=1e-4)
     assert float(update["value"]) == pytest.approx(chosen / len(batch.action), rel=1e-4)
 
@@ -58,7 +58,7 @@ def test_after_a_step_the_copies_have_moved_by_their_rates():
     for copy in (learner.target, learner.average):
         assert not any(parameter.requires_grad for parameter in copy.parameters())
     before = _values(learner.online)
-    learner.update(batch, 1e-2)
+    learner.update_networks(batch, 1e-2)
     after = _values(learner.online)
     assert any((a != b).any() for a, b in zip(after, before, strict=True))
     for copy, rate in ((learner.target, 0.25), (learner.average, 0.5)):
@@ -74,7 +74,7 @@ def test_without_a_slow_copy_the_online_network_is_evaluated():
 
 def test_gradients_are_clipped():
     learner, batch = _learner(gradient_norm=0.01, reward_scale=1.0)
-    norm = float(learner.update(batch, 1e-3)["gradient_norm"])
+    norm = float(learner.update_networks(batch, 1e-3)["gradient_norm"])
     gradients = [p.grad for p in learner.online.parameters() if p.grad is not None]
     clipped = float(torch.cat([gradient.flatten() for gradient in gradients]).norm())
     assert norm > 0.01

@@ -7,7 +7,7 @@ from torch import Tensor, nn
 
 from dess.envs.observations.sets import ACTION, MATE, MOVES, NODE, OWN, ZONE, Sets
 from dess.policies import network as acting
-from dess.policies.learner.network import DuelingNetwork, PaperNetwork, SetNetwork, arrays_of
+from dess.policies.learner.network import DuelingNetwork, PaperNetwork, SetNetwork, to_arrays
 
 SHAPES = ((4, 17, 17), (4, 21, 21), (1,))
 
@@ -62,9 +62,9 @@ KINDS = [
 def test_a_policy_acts_with_the_values_of_the_network_that_is_trained(
     trained, kind, shapes, hidden, rows
 ):
-    generator, weights = np.random.default_rng(rows), arrays_of(trained.state_dict())
+    generator, weights = np.random.default_rng(rows), to_arrays(trained.state_dict())
     forms = {name: value.shape for name, value in weights.items()}
-    assert acting.forms_of(kind.layers(shapes, hidden)) == forms
+    assert acting.weight_shapes(kind.layer_sizes(shapes, hidden)) == forms
     inputs = [generator.uniform(-1, 1, (rows, *shape)) for shape in shapes]
     inputs[0][generator.random(inputs[0].shape) < 0.5] = 0  # as most cells of a map are
     for dtype, off in ((np.float32, 1e-5), (np.float64, 1e-12)):

@@ -17,7 +17,7 @@ from dess.model.guard import guard
 from dess.model.mission import simulate
 from dess.model.state import constants_of
 from dess.policies.learner.policy import LearnedPolicy
-from dess.policies.network import DuelingNetwork, SetNetwork, Sizes, forms_of
+from dess.policies.network import DuelingNetwork, SetNetwork, Sizes, weight_shapes
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 from tests.dess.model.flights import assert_same_alone, cells_of
 from tests.drawn import PLAIN_SEA, Checked, Recorder, Wanderer, replications, seeds, spaces
@@ -31,14 +31,14 @@ def _weights(layers: Sizes, seed: int = 1) -> dict[str, np.ndarray]:
     generator = np.random.default_rng(seed)
     return {
         name: (generator.uniform(-1, 1, form) / np.sqrt(form[-1])).astype(np.float32)
-        for name, form in forms_of(layers).items()
+        for name, form in weight_shapes(layers).items()
     }
 
 
 def _random(layout: Layout, guarded: bool = True, seed: int = 1) -> LearnedPolicy:
     """A policy of random weights."""
     vector = Vector(layout)
-    weights = _weights(DuelingNetwork.layers(vector.shapes, [32, 32]), seed)
+    weights = _weights(DuelingNetwork.layer_sizes(vector.shapes, [32, 32]), seed)
     return LearnedPolicy("random weights", vector, DuelingNetwork, weights, guarded, layout)
 
 
@@ -122,7 +122,7 @@ def test_away_from_home_it_refuses(fly):
 # --- on any sea ---
 
 
-LAYERS = SetNetwork.layers(Sets.shapes, [16, 8, 16])
+LAYERS = SetNetwork.layer_sizes(Sets.shapes, [16, 8, 16])
 
 
 def _any(seed: int = 1) -> LearnedPolicy:

@@ -6,7 +6,14 @@ import torch
 
 from dess.envs.observations.states import layout_of, masks
 from dess.policies.learner.checkpoint import new_training
-from dess.policies.learner.ppo import CLIP, TRACE, WORTH, ProximalTraining, _advantages, _with_range
+from dess.policies.learner.ppo import (
+    CLIP,
+    TRACE,
+    WORTH,
+    ProximalTraining,
+    _compute_advantages,
+    _shorten_range,
+)
 from dess.scenario.scenario import load_scenario
 from tests.policies.learner.tiny import CPU, tiny_on_seas, weights_of
 
@@ -14,7 +21,7 @@ from tests.policies.learner.tiny import CPU, tiny_on_seas, weights_of
 def _training(ticks: int = 0, **changes: object) -> ProximalTraining:
     training = new_training(tiny_on_seas(**changes), CPU)
     assert isinstance(training, ProximalTraining)
-    training.run(ticks)
+    training.run_ticks(ticks)
     return training
 
 
@@ -24,7 +31,7 @@ def test_advantages_are_sums_of_what_the_critic_did_not_expect():
     earned = np.array([0.0, 0.0, 0.0, 0.3, 0.5, 0.6])
     values = np.array([0.9, 0.7, 0.2, 0.6, 0.1, 0.4])
     products = np.array([1.1, 0.0])  # the second mission fails: all is lost
-    found = _advantages(missions, uavs, earned, values, products, 2)
+    found = _compute_advantages(missions, uavs, earned, values, products, 2)
     last = 1.1 - 0.6 - 0.4
     middle = 0.6 - 0.3 + 0.4 - 0.6 + TRACE * last
     first = 0.3 - 0.0 + 0.6 - 0.9 + TRACE * middle
@@ -39,7 +46,7 @@ def test_returns_are_what_missions_still_bring():
     with torch.no_grad():
         for weight in training.learner.critic.value.parameters():
             weight.zero_()
-    decisions, records = training._simulated(0, 1)
+    decisions, records = training._simulate_missions(0, 1)
     products = WORTH * records["collection_ratio_and_communication"]
     of_mission = decisions.missions % len(records)
     uavs = zip(of_mission, decisions.uavs, strict=True)
@@ -56,7 +63,7 @@ def test_at_first_only_the_critic_learns():
         (1, {"online", "critic", "average"}),
     ):
         before = weights_of(training)
-        training.run(ticks)
+        training.run_ticks(ticks)
         after = weights_of(training)
         moved = {name.partition(".")[0] for name in before if (before[name] != after[name]).any()}
         assert moved - {"best"} == learning
@@ -64,7 +71,7 @@ def test_at_first_only_the_critic_learns():
 
 def test_what_brought_more_becomes_likelier_but_not_by_much_more():
     training = _training()
-    decisions, _ = training._simulated(0, 0)
+    decisions, _ = training._simulate_missions(0, 0)
     temperature = training.phase.temperature
     signs = np.where(np.arange(len(decisions.actions)) % 2, 1.0, -1.0).astype(np.float32)
     shown = decisions._replace(advantages=signs)
@@ -73,16 +80,16 @@ def test_what_brought_more_becomes_likelier_but_not_by_much_more():
         seen = shown.encoder.encode(shown.states, shown.missions, shown.uavs)
         allowed = masks(shown.states, shown.missions, shown.uavs)
         with torch.no_grad():
-            logs, _ = training.learner.judged(seen, allowed, temperature)
+            logs, _ = training.learner.judge_actions(seen, allowed, temperature)
         return logs.numpy()[np.arange(len(signs)), shown.actions] - shown.likelihoods
 
     assert np.abs(chances()).max() < 1e-4
-    training.learner.update([shown], temperature, 1e-4, True)
+    training.learner.update_networks([shown], temperature, 1e-4, True)
     assert (signs * chances()).mean() > 0
     # Beyond the clip there is no gradient: one decision alone stops soon after it.
-    alone = shown.picked(np.array([1]))
+    alone = shown.select_rows(np.array([1]))
     for _ in range(100):
-        training.learner.update([alone], temperature, 1e-3, True)
+        training.learner.update_networks([alone], temperature, 1e-3, True)
     assert np.log(1 + CLIP) < chances()[1] < np.log(1 + CLIP) + 0.5
 
 
@@ -93,13 +100,13 @@ def _gradients(training: ProximalTraining) -> list[torch.Tensor | None]:
 
 def test_parts_of_a_minibatch_count_as_one():
     training, other = _training(), _training()
-    decisions, _ = training._simulated(0, 0)
+    decisions, _ = training._simulate_missions(0, 0)
     rows = np.arange(40)
     for learner, parts in (
-        (training.learner, [decisions.picked(rows)]),
-        (other.learner, [decisions.picked(rows[:13]), decisions.picked(rows[13:])]),
+        (training.learner, [decisions.select_rows(rows)]),
+        (other.learner, [decisions.select_rows(rows[:13]), decisions.select_rows(rows[13:])]),
     ):
-        learner.update(parts, 0.1, 1e-3, True)
+        learner.update_networks(parts, 0.1, 1e-3, True)
     for ours, theirs in zip(_gradients(training), _gradients(other), strict=True):
         torch.testing.assert_close(ours, theirs, rtol=1e-3, atol=1e-6)
 
@@ -107,9 +114,9 @@ def test_parts_of_a_minibatch_count_as_one():
 def test_a_range_is_a_number_of_ways_to_the_farthest_node():
     space = load_scenario("paper")
     farthest = layout_of(space).zone_slots(np.array(space.nodes)).max()
-    near = _with_range(space, 1.5)
+    near = _shorten_range(space, 1.5)
     assert np.mean(near.charge_complete) == pytest.approx(1.5 * farthest, abs=1)
     share = near.quota / space.quota
     assert np.array(near.flying_time) == pytest.approx(share * np.array(space.flying_time), abs=1)
     assert near.charge_start[0] == space.charge_start[0]
-    assert _with_range(space, 2.0) == space  # its batteries are smaller already
+    assert _shorten_range(space, 2.0) == space  # its batteries are smaller already

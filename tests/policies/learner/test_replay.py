@@ -29,7 +29,7 @@ class Log(NamedTuple):
         for slot in range(slots):
             states = empty_states(num_envs, uavs, 1)
             states.missions[:, SLOT], states.missions[:, ENVIRONMENT] = slot, np.arange(num_envs)
-            memory.add(states, *(part[slot] for part in self))
+            memory.add_slot(states, *(part[slot] for part in self))
         return memory
 
     def transition(
@@ -55,7 +55,7 @@ def _lone(slots: int, **changed: bool) -> Log:
 
 
 def _drawn(memory: ReplayMemory, size: int, n_step: int, discount: float = 0.5) -> Batch:
-    return memory.sample(size, n_step, discount, np.random.default_rng(1))
+    return memory.draw_batch(size, n_step, discount, np.random.default_rng(1))
 
 
 # --- against plain Python ---
@@ -122,4 +122,4 @@ def test_too_few_slots_are_refused():
 def test_its_size_is_known_before_it_is_made(capacity, num_envs, uavs, nodes):
     memory = ReplayMemory(capacity, num_envs, uavs, nodes)
     taken = sum(array.nbytes for array in memory.arrays.values())
-    assert ReplayMemory.bytes_for(capacity, num_envs, uavs, nodes) == taken
+    assert ReplayMemory.count_bytes(capacity, num_envs, uavs, nodes) == taken

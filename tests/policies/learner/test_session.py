@@ -17,9 +17,9 @@ from dess.policies.learner import session
 from dess.policies.learner.checkpoint import load_training
 from dess.policies.learner.config import CHECKPOINT, CONFIG, MODEL, load_config
 from dess.policies.learner.dqn import DQNTraining
-from dess.policies.learner.network import arrays_of, network_of
-from dess.policies.learner.session import CURVE, LOCK, SIGNALS, device_of, train
-from dess.policies.learner.trained import digest, observed, weights_of
+from dess.policies.learner.network import make_network, to_arrays
+from dess.policies.learner.session import CURVE, LOCK, SIGNALS, choose_device, train
+from dess.policies.learner.trained import hash_arrays, make_observation, read_weights
 from dess.policies.learner.training import DivergenceError, Training
 from tests.analysis.small import files_of
 from tests.policies.learner.tiny import (
@@ -49,7 +49,7 @@ def _no_tensorboard(monkeypatch):
 def whole():
     """The short training in one go."""
     training = DQNTraining(SHORT, CPU)
-    training.run(1000)
+    training.run_ticks(1000)
     return training
 
 
@@ -74,8 +74,8 @@ def test_the_folder_of_a_training(whole, tmp_path):
     names = pq.read_schema(out / CURVE).names
     rows = [{name: row.get(name) for name in names} for row in training.curve]
     assert pq.read_table(out / CURVE).to_pylist() == rows
-    written, best = weights_of(out), arrays_of(training.best)
-    assert digest("", written) == digest("", best)
+    written, best = read_weights(out), to_arrays(training.best)
+    assert hash_arrays("", written) == hash_arrays("", best)
     assert json.loads((out / CONFIG).read_text("utf-8"))["name"] == "tiny"
 
 
@@ -108,8 +108,8 @@ def test_a_small_network_takes_one_thread(tmp_path, monkeypatch, variable, small
 def test_which_networks_are_small():
     def rows(name: str) -> int:
         config = load_config(name)
-        shapes = observed(config, config.spaces()[0])[1].shapes
-        weights = network_of(config, shapes).parameters()
+        shapes = make_observation(config, config.mission_spaces()[0])[1].shapes
+        weights = make_network(config, shapes).parameters()
         return sum(weight.numel() for weight in weights) * config.batch
 
     is_small = {name: rows(name) <= session.SMALL for name in ("quick", "ddqn", "ddqn-paper")}
@@ -265,7 +265,7 @@ def test_a_training_that_diverges_ends_and_keeps_the_best_policy(tmp_path):
 
 def test_without_cuda_there_is_the_cpu(monkeypatch):
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
-    assert device_of("auto") == CPU
+    assert choose_device("auto") == CPU
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
-    assert device_of("auto").type == device_of("cuda").type == "cuda"
-    assert device_of("cpu") == CPU
+    assert choose_device("auto").type == choose_device("cuda").type == "cuda"
+    assert choose_device("cpu") == CPU

@@ -62,7 +62,7 @@ def test_a_policy_comes_back_as_it_was(changes, tmp_path):
     weights = training.learner.online.state_dict()
     save_policy(tmp_path / "new" / "policy", weights, training.config, training.space)
     assert sorted(files_of(tmp_path / "new" / "policy")) == [CONFIG, MODEL]
-    loaded, saved = load_policy(tmp_path / "new" / "policy"), training.policy(weights)
+    loaded, saved = load_policy(tmp_path / "new" / "policy"), training.make_policy(weights)
     assert (loaded.name, loaded.guarded) == ("tiny", training.config.guard)
     for part in loaded.layout._fields:
         assert np.array_equal(getattr(loaded.layout, part), getattr(saved.layout, part))
@@ -138,7 +138,7 @@ def test_a_network_takes_no_memory_before_its_weights_are_there(folder, monkeypa
     content = json.loads((folder / CONFIG).read_text("utf-8"))
     content["training"]["hidden"] = [4096, 4096]
     (folder / CONFIG).write_text(json.dumps(content), "utf-8")
-    monkeypatch.setattr(trained, "policy_of", lambda *_: pytest.fail("memory is taken"))
+    monkeypatch.setattr(trained, "make_policy", lambda *_: pytest.fail("memory is taken"))
     assert "hidden.0.weight is float32 [16, 242]; allowed: float32 [4096, 242]" in _refusal(folder)
 
 

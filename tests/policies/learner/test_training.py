@@ -28,7 +28,7 @@ def _stopped(training: Training, path: Path) -> Training:
 
 
 def _trained(training: Training, ticks: int) -> Training:
-    training.run(ticks)
+    training.run_ticks(ticks)
     return training
 
 
@@ -45,7 +45,7 @@ def whole():
 def test_a_stopped_training_goes_on_as_if_nothing_had_been(stops, whole, tmp_path):
     training = DQNTraining(tiny(), CPU)
     for stop in stops:
-        training.run(stop - training.tick)
+        training.run_ticks(stop - training.tick)
         training = _stopped(training, tmp_path / "checkpoint")
         assert training.tick == stop
     assert_same(_trained(training, 1000), whole)
@@ -76,7 +76,7 @@ def test_without_its_memory_a_stopped_training_fills_a_new_one(whole, tmp_path):
     ours, theirs = weights_of(resumed), weights_of(training)
     assert all(torch.equal(value, theirs[name]) for name, value in ours.items())
     assert resumed.replay.count == 0
-    resumed.run(1)
+    resumed.run_ticks(1)
     assert resumed.replay.count == config.learning_starts + 1
     assert _trained(resumed, 1000).done
 
@@ -91,7 +91,7 @@ def test_the_first_phase_spends_no_battery():
     start = np.broadcast_to(state.missions["flying_time"][:, None], active.shape)
     assert state.uavs["slots_flying"][active].min() > 50
     assert (state.uavs["battery"] == start)[active].all()
-    training.run(41)  # one in the second phase, after the random slots
+    training.run_ticks(41)  # one in the second phase, after the random slots
     state = training.stepper.state
     flown = state.uavs["active"] & (state.uavs["slots_charging"] == 0)
     spent = state.missions["flying_time"][:, None] - state.uavs["battery"]
@@ -105,14 +105,14 @@ def test_a_phase_begins_with_missions_and_a_memory_of_its_own():
     assert training.phase.name == "harvest"
     assert training.replay.count == training.config.learning_starts + 79
     assert training.learner.optimizer.state_dict()["state"]
-    training.run(1)
+    training.run_ticks(1)
     assert training.phase.name == "battery"
     assert training.replay.count == 0
     assert not training.learner.optimizer.state_dict()["state"]
     missions = training.stepper.state.missions
     assert (missions["seed"] == MISSION_SEED + training.config.seed).all()
     assert missions["replication"].min() >= flown
-    training.run(1)
+    training.run_ticks(1)
     assert training.replay.count == training.config.learning_starts + 1
 
 
@@ -163,7 +163,7 @@ def test_the_second_phase_begins_with_the_best_weights_of_the_first(
             assert torch.equal(now[f"{name}.{key}"], value)
     # What was best of the first phase has no say in the second.
     assert training.best_score is None
-    training.run(4)
+    training.run_ticks(4)
     assert training.curve[-1]["is_best"]
     assert training.best_score == 0.0
 
@@ -189,9 +189,9 @@ def test_rates_move_over_their_phase(monkeypatch):
         PHASES[1] | {"epsilon": [0.5, 0.01], "epsilon_decay": 0.5, "learning_rate": [1e-4, 1e-4]},
     ]
     training = DQNTraining(tiny(phases=phases, evaluate_every=20), CPU)
-    epsilons_used = _noted(monkeypatch, training, "_collect")
+    epsilons_used = _noted(monkeypatch, training, "_collect_slot")
     learned = _noted(monkeypatch, training.learner, "update")
-    training.run(1000)
+    training.run_ticks(1000)
     # The first phase starts at random, the second as it begins.
     falling = [0.5 - 0.49 * min(tick / 40, 1) for tick in range(80)]
     assert epsilons_used == pytest.approx([1.0] * 60 + [0.1] * 80 + [0.5] * 60 + falling)
@@ -220,7 +220,7 @@ def _explorer(monkeypatch: pytest.MonkeyPatch, values: list[float], **phase: Any
     def give(_: Any, __: Any, rows: np.ndarray, ___: Any) -> torch.Tensor:
         return torch.tensor(values).expand(len(rows), 5)
 
-    monkeypatch.setattr(training.learner, "values", give)
+    monkeypatch.setattr(training.learner, "action_values", give)
     return training
 
 
@@ -233,7 +233,7 @@ def test_actions_are_explored_as_told(epsilon, temperature, monkeypatch):
     training = _explorer(monkeypatch, VALUES, temperature=temperature)
     states, missions, uavs = _acting(training)
     allowed = masks(states, missions, uavs)
-    actions = training._explore(states, missions, uavs, epsilon)
+    actions = training._choose_exploring(states, missions, uavs, epsilon)
     assert allowed[np.arange(len(actions)), actions].all()
     values = np.where(allowed, VALUES, -np.inf)
     weights = np.exp(values / temperature) if temperature else np.eye(5)[values.argmax(1)]
@@ -258,7 +258,7 @@ def _reserves(early_returns: float) -> np.ndarray:
     for _ in range(74):
         before = uavs["battery"] - missions["charge_start"][:, None]
         flying = uavs["active"] & ~uavs["charging"]
-        training.run(1)
+        training.run_ticks(1)
         begun += before[flying & uavs["charging"]].tolist()
     return np.array(begun)
 

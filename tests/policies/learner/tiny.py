@@ -11,7 +11,7 @@ import tomli_w
 import torch
 
 from dess import InputError
-from dess.policies.learner.config import TrainingConfig, config_of
+from dess.policies.learner.config import TrainingConfig, validate_config
 from dess.policies.learner.training import Training
 
 CPU = torch.device("cpu")
@@ -43,12 +43,12 @@ ON_SEAS: dict[str, Any] = BRIEF | {
 
 def tiny(**changes: Any) -> TrainingConfig:
     """The config of the tiny training, with other values."""
-    return config_of(TINY | changes, "tiny")
+    return validate_config(TINY | changes, "tiny")
 
 
 def tiny_on_seas(**changes: Any) -> TrainingConfig:
     """The config of the tiny training for any sea, with other values."""
-    return config_of(ON_SEAS | changes, "tiny")
+    return validate_config(ON_SEAS | changes, "tiny")
 
 
 def write_config(folder: Path, **changes: Any) -> Path:

@@ -10,14 +10,14 @@ from dess.policies.planner.fluid import (
     MOST_SLOTS,
     NEVER,
     Plan,
-    begin,
+    begin_flight,
     empty_flight,
     empty_plan,
-    fly,
-    insert,
+    insert_waypoint,
+    simulate_flight,
 )
-from dess.policies.planner.rates import rates_of
-from dess.policies.planner.search import BEST, TRIED, empty_workspace, improve
+from dess.policies.planner.rates import load_rates
+from dess.policies.planner.search import BEST, TRIED, empty_workspace, improve_plan
 from tests.dess.model.flights import first_view
 
 CALM = {"shadowing_variance": 0.0, "arrival_rate": 0.0}
@@ -28,7 +28,7 @@ def _plan(uavs: int, *routes: list[tuple[int, int, int]]) -> Plan:
     plan = empty_plan(uavs)
     for i, route in enumerate(routes):
         for number, (x, y, stay) in enumerate(route):
-            insert(plan, i, number, x, y, stay, 0)
+            insert_waypoint(plan, i, number, x, y, stay, 0)
     return plan
 
 
@@ -52,11 +52,11 @@ class _Follow:
 def _flown(view: View, plan: Plan, slots: int) -> tuple[list[np.ndarray], float, float]:
     """The UAVs at the start of each slot of a flight, its value, and the data it collects."""
     (mission,), uavs, residual = view.state.missions, view.state.uavs[0], view.state.residual[0]
-    flight, rates = empty_flight(MOST_SLOTS, len(uavs), len(residual)), rates_of(view)
-    begin(mission, uavs, residual, flight)
+    flight, rates = empty_flight(MOST_SLOTS, len(uavs), len(residual)), load_rates(view)
+    begin_flight(mission, uavs, residual, flight)
     crafts, value = [flight.team[0].copy()], 0.0
     for slot in range(1, slots + 1):
-        value = fly(mission, rates, plan, flight, 0, flight, slot, np.inf)
+        value = simulate_flight(mission, rates, plan, flight, 0, flight, slot, np.inf)
         crafts.append(flight.team[flight.last[0]].copy())
     return crafts, value, float(residual.sum() - flight.sea["base"][flight.last[0]].sum())
 
@@ -65,11 +65,11 @@ def _improved(view: View, plan: Plan, steps: int, most: int = 10_000) -> float:
     state = view.state
     (mission,), uavs, residual = state.missions, state.uavs[0], state.residual[0]
     workspace = empty_workspace(int(mission["max_slots"]), len(uavs), len(residual))
-    nodes, rates = view.world.nodes, rates_of(view)
+    nodes, rates = view.world.nodes, load_rates(view)
     arguments = mission, uavs, residual, nodes, rates, plan, workspace, steps, 1.0
-    improve(*arguments, most)
+    improve_plan(*arguments, most)
     while workspace.course[TRIED]:
-        improve(*arguments, most)
+        improve_plan(*arguments, most)
     return workspace.course[BEST]
 
 
@@ -79,7 +79,7 @@ def test_a_flight_is_the_engines_where_nothing_is_random(uavs, quota):
     scenario = ScenarioSpace.of(load_scenario("fig4"), uavs=uavs, quota=quota, **CALM)
     view, plan = first_view(scenario, 5), empty_plan(uavs)
     for i in range(uavs):
-        insert(plan, i, 0, 26 + i % 4, 2 + i // 4, CHARGE, 0)
+        insert_waypoint(plan, i, 0, 26 + i % 4, 2 + i // 4, CHARGE, 0)
     _improved(view, plan, 3000)
     policy = _Follow(plan, 160)
     record = simulate(scenario, policy, 5, 0, events=True)
@@ -115,7 +115,7 @@ def test_more_search_is_never_worse(replication):
     view = first_view(load_scenario("paper"), 777001, replication)
     plan, values = empty_plan(view.state.uavs.shape[1]), []
     for i in range(int(view.state.missions[0]["uavs"])):
-        insert(plan, i, 0, 26 + i, 5, CHARGE, 0)
+        insert_waypoint(plan, i, 0, 26 + i, 5, CHARGE, 0)
     for steps in (0, 1, 10, 100, 1000, 1000):
         values.append(_improved(view, plan, steps))
         assert values[-1] == _flown(view, plan, 400)[1]
@@ -155,7 +155,7 @@ def test_where_next_to_nothing_arrives_an_empty_node_stays_empty(rate):
     view = first_view(Scenario.of(**ALONE, arrival_rate=rate))
     (mission,), uavs = view.state.missions, view.state.uavs[0]
     flight = empty_flight(MOST_SLOTS, 1, 1)
-    begin(mission, uavs, np.zeros(1), flight)
+    begin_flight(mission, uavs, np.zeros(1), flight)
     assert flight.sea["since"][0].tolist() == [NEVER]
 
 

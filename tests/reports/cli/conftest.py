@@ -66,7 +66,7 @@ def unrendered(monkeypatch):
         return Path(out, f"study-{Path(folder).name}.html")
 
     def note(names, results, out, progress=None, parameters=None, formats=()):
-        notebook.check_parameters([notebook.read(name) for name in names], parameters)
+        notebook.check_parameters([notebook.read_report(name) for name in names], parameters)
         pages.append((*names, str(results), str(out), parameters))
         return Path(out, f"{names[0]}.html" if len(names) == 1 else "index.html")
 

@@ -36,7 +36,7 @@ def test_code_that_cannot_be_kept_says_how(capsys, monkeypatch):
 
 
 def test_a_bar_says_that_something_is_compiled():
-    with console.bar("mission", 10) as progress:
+    with console.progress_bar("mission", 10) as progress:
         progress.set_description("round 2", refresh=False)
         # What it calls.
         with trigger_event("numba:compile"), trigger_event("numba:compile"):
@@ -51,8 +51,8 @@ def is_printable(text: str) -> bool:
 @pytest.mark.parametrize(
     "tell",
     [
-        lambda: console.fail(RAW, 2),
-        lambda: console.say(f"{RAW}\n{RAW}"),
+        lambda: console.print_failure(RAW, 2),
+        lambda: console.print_text(f"{RAW}\n{RAW}"),
         lambda: console.print_list([(RAW, RAW)]),
         lambda: console.print_table([RAW, "head"], [[RAW, RAW]]),
     ],
@@ -78,7 +78,7 @@ def test_a_warning_is_a_line_of_printable_characters(monkeypatch, capsys):
 
 @pytest.mark.parametrize("values", ["a list of " + "names, " * 30, "a, b"])
 def test_a_long_error_says_what_is_allowed(values, capsys):
-    console.fail(f"config.json: phases: {'x' * 290} is wrong; allowed: {values}", 2)
+    console.print_failure(f"config.json: phases: {'x' * 290} is wrong; allowed: {values}", 2)
     line = capsys.readouterr().err
     assert len(line) <= console.MESSAGE + 1
     assert line.startswith("config.json: phases: x") and "; allowed: a" in line

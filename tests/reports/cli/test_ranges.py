@@ -5,7 +5,7 @@ import shlex
 import pytest
 
 from dess import InputError
-from dess.reports.cli.options import setting, values_of
+from dess.reports.cli.options import parse_setting, parse_values
 
 VALUES = {
     "uavs=2..5": (2, 3, 4, 5),
@@ -28,7 +28,7 @@ VALUES = {
 
 @pytest.mark.parametrize("text", VALUES)
 def test_values(text):
-    field, values = values_of(text)
+    field, values = parse_values(text)
     assert field == text.split("=")[0].strip()
     assert values == VALUES[text]
     assert [type(value) for value in values] == [type(value) for value in VALUES[text]]
@@ -44,7 +44,7 @@ QUANTITIES = {
 
 @pytest.mark.parametrize("text", QUANTITIES)
 def test_a_quantity_needs_no_quotes_of_its_own(text):
-    assert setting(text) == (text.partition("=")[0], QUANTITIES[text])
+    assert parse_setting(text) == (text.partition("=")[0], QUANTITIES[text])
 
 
 @pytest.mark.parametrize("text", ["uavs=2, 3", "data_sheet.data_rate=1 MB/h, 2 MB/h"])
@@ -52,9 +52,9 @@ def test_the_command_for_several_values_can_be_pasted(text):
     with pytest.raises(
         InputError, match="has several values; allowed: one, or dess sweep"
     ) as error:
-        setting(text)
+        parse_setting(text)
     *_, option, pasted = shlex.split(str(error.value).partition("or dess sweep ")[2])
-    assert (option, pasted) == ("--set", text) and len(values_of(pasted)[1]) == 2
+    assert (option, pasted) == ("--set", text) and len(parse_values(pasted)[1]) == 2
 
 
 REFUSED = {
@@ -75,5 +75,5 @@ REFUSED = {
 @pytest.mark.parametrize("text", REFUSED)
 def test_what_is_no_value(text):
     with pytest.raises(InputError) as error:
-        values_of(text)
+        parse_values(text)
     assert REFUSED[text] in str(error.value)

@@ -50,7 +50,7 @@ def test_yes_is_for_the_notebooks_that_simulate(dess, unrendered):
     assert dess("report", "what-if", "--yes")[0] == dess("report", "sweep")[0] == 0
     assert [page[-1] for page in unrendered] == [{"yes": True}, {}]
     for name in ("what-if", "sweep", "own-sea"):
-        assert notebook.read(name).parameters["yes"] is False
+        assert notebook.read_report(name).parameters["yes"] is False
 
 
 def test_formats_of_figures_are_named(dess, unrendered, refusal):
@@ -64,7 +64,7 @@ def test_a_parameter_that_the_study_refuses_is_refused_before_any_cell(dess, ref
     def fail(*_):
         raise AssertionError("a cell runs")
 
-    monkeypatch.setattr("dess.reports.pages.kernels.run", fail)
+    monkeypatch.setattr("dess.reports.pages.kernels.run_reports", fail)
     assert dess("study", "run", "trial.toml", "--missions", 2, "--out", "out")[0] == 0
     for value, words in {
         "baseline=99": "baseline: 99 is not a design point; allowed: 0..0",

@@ -48,7 +48,7 @@ def stranger(sound, tmp_path, monkeypatch):
 def page_of(*evidence: Evidence) -> str:
     """A page with nothing but evidence, whose checksum is right."""
     seal = '<meta name="dess-checksum" content="">'
-    return Page(seal + html.carrying(evidence).data).sealed.text
+    return Page(seal + html.evidence_tables(evidence).data).sealed.text
 
 
 def printed(capsys: pytest.CaptureFixture[str]) -> str:

@@ -136,7 +136,7 @@ def test_ctrl_c_keeps_all_ticks_or_all_before_a_long_one(
     if "--from" in arguments:
         assert dess("train", "tiny.toml", "--device", "cpu", "--seed", 7, "--out", "begun")[0] == 0
     assert dess(*arguments, "undisturbed")[0] == 0
-    learn = DQNTraining._learn if kind == "double DQN" else ProximalTraining._learn
+    learn = DQNTraining._learn_in_tick if kind == "double DQN" else ProximalTraining._learn_in_tick
 
     def interrupted(training, share):
         learn(training, share)
@@ -148,8 +148,8 @@ def test_ctrl_c_keeps_all_ticks_or_all_before_a_long_one(
     with monkeypatch.context() as patch:
         if is_long:
             patch.setattr(session, "TICK_END", 0.0)
-        patch.setattr(DQNTraining, "_learn", interrupted)
-        patch.setattr(ProximalTraining, "_learn", interrupted)
+        patch.setattr(DQNTraining, "_learn_in_tick", interrupted)
+        patch.setattr(ProximalTraining, "_learn_in_tick", interrupted)
         code, out, err = dess(*arguments, "out")
     assert (code, out) == (130, "")
     config = load_config("tiny.toml")

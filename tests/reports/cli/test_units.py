@@ -37,10 +37,10 @@ def test_single_missions_and_their_player_are_told_in_units(tmp_path, capsys):
     record = simulate(load_scenario(file), "greedy", events=True)
     playback = Playback(record.events.columns(), scenario)
     left = playback.residual[-1].sum() * UNIT / 8e6
-    assert playback.status(playback.end).startswith(
+    assert playback.describe_slot(playback.end).startswith(
         f"{format_length(record.slots, scenario.units)} of"
     )
-    assert f" · {left:,.3g} MB left · " in playback.status(playback.end)
+    assert f" · {left:,.3g} MB left · " in playback.describe_slot(playback.end)
     assert playback.data["units"]["length"] == ("km", pytest.approx(0.315))
     table, features, tracks = (
         path_text(record.events.columns(), scenario, kind) for kind in ("csv", "geojson", "kml")

@@ -13,9 +13,9 @@ from nbconvert.filters import markdown2html
 from dess.analysis import numbers
 from dess.analysis.figures import style
 from dess.reports.pages import html
-from dess.reports.pages.notebook import values_of, with_values
+from dess.reports.pages.notebook import assigned_values, replace_values
 from dess.reports.pages.page import CARD, Page
-from dess.reports.pages.render import index_of, pages_in, render_study, with_bars
+from dess.reports.pages.render import add_bars, find_pages, make_index, render_study
 from tests.analysis.hostile import hostile_folder
 from tests.reports.small import Links
 
@@ -80,16 +80,16 @@ def test_the_index_takes_no_markup_from_a_forged_page(page, tmp_path):
     """Not even if its seal is right."""
     out = tmp_path / "out"
     shutil.copytree(page.parent, out)
-    (card,) = Page.read(page).hidden(CARD)
+    (card,) = Page.read(page).find_hidden(CARD)
     picture = dict.fromkeys(("alt", "source", "narrow"), ATTACK)
     fields = dict.fromkeys(("title", "finding", "number"), ATTACK) | {"picture": picture}
     inert = json.dumps(fields).replace("<", "\\u003c")
     forged = Page(page.read_text("utf-8").replace(card, inert)).sealed
     for name in ("study-forged.html", "scorecard.html", "performance.html"):
         (out / name).write_text(forged.text, "utf-8")
-    pages = with_bars(pages_in(out))
+    pages = add_bars(find_pages(out))
     assert all(unescape(shown.text).count(ATTACK) >= 4 for shown in pages.values())
-    index = index_of(pages)
+    index = make_index(pages)
     assert unescape(index).count(ATTACK) >= 9 and "<script>" not in index
     images = re.findall("<img[^>]*>", index)
     assert images and all(re.fullmatch('<img alt="[^"<>]*" src="[^"<>]*">', i) for i in images)
@@ -98,22 +98,29 @@ def test_the_index_takes_no_markup_from_a_forged_page(page, tmp_path):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_name_in_markdown_is_text(name):
     line = " ".join(name.split())
-    shown = markdown2html(html.say("A {name} and {code}.", name=name, code=html.code(name)).data)
+    shown = markdown2html(
+        html.write_markdown("A {name} and {code}.", name=name, code=html.format_code(name)).data
+    )
     assert {*re.findall("<[^>]*>", shown)} == {"<p>", "</p>", "<code>", "</code>"}
     assert unescape(re.sub("<[^>]*>", "", shown)).strip() == f"A {line} and {line}."
-    assert unescape(markdown2html(html.say("{name}", name=name).data)).strip() == f"<p>{line}</p>"
+    assert (
+        unescape(markdown2html(html.write_markdown("{name}", name=name).data)).strip()
+        == f"<p>{line}</p>"
+    )
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_composed_markdown_has_neither_html_nor_links(name):
     line = " ".join(name.split())
-    shown = markdown2html(html.say("{text}", text=html.composed(f"- **{line}**: `{line}`")).data)
+    shown = markdown2html(
+        html.write_markdown("{text}", text=html.escape_sentences(f"- **{line}**: `{line}`")).data
+    )
     assert "<" not in re.sub(HARMLESS, "", shown)
 
 
 def test_a_block_of_commands_cannot_be_left():
     lines = ["a", "```", "<b>", "`````"]
-    shown = markdown2html(html.say("{lines}", lines=html.commands(lines)).data)
+    shown = markdown2html(html.write_markdown("{lines}", lines=html.command_block(lines)).data)
     assert shown.count("<pre>") == 1
     assert unescape(re.sub("<[^>]*>", "", shown)).split() == lines
 
@@ -123,7 +130,7 @@ def test_a_name_is_no_formula_in_a_figure(name):
     with style.new_panels(3) as (drawing, axes):
         axes.plot([1, 2], label=name)
         axes.set_title(name)
-    assert html.picture(drawing, "svg")
+    assert html.encode_figure(drawing, "svg")
     assert mpl.rcParams["text.parse_math"]
 
 
@@ -136,6 +143,6 @@ def test_a_name_is_no_formula_in_a_spreadsheet():
 
 @pytest.mark.parametrize("name", [*NAMES, "'''\nimport os\n'''", '"\\', "\ud800", "a\0b"])
 def test_a_parameter_cannot_become_code(name):
-    source = with_values("policy = 'greedy'  # the policy\nseed = 0", {"policy": name})
-    assert values_of(source) == {"policy": name, "seed": 0}
+    source = replace_values("policy = 'greedy'  # the policy\nseed = 0", {"policy": name})
+    assert assigned_values(source) == {"policy": name, "seed": 0}
     assert source.count("\n") == 1

@@ -22,7 +22,7 @@ def rendered(monkeypatch):
     """The names of the pages that are rendered, each with a cell that shows a number."""
     names: list[str] = []
     monkeypatch.setattr(
-        kernels, "run", lambda reports, *_: names.extend(report.name for report in reports)
+        kernels, "run_reports", lambda reports, *_: names.extend(report.name for report in reports)
     )
     return names
 
@@ -70,7 +70,7 @@ def test_another_notebook_changes_its_page(folder):
 
 @pytest.mark.parametrize("what", ["code", "library"])
 def test_other_code_and_libraries_change_all_pages(folder, tmp_path, monkeypatch, what):
-    render._software.cache_clear()
+    render._hash_software.cache_clear()
     if what == "library":
         monkeypatch.setattr(render.metadata, "distributions", list)
     else:
@@ -80,7 +80,7 @@ def test_other_code_and_libraries_change_all_pages(folder, tmp_path, monkeypatch
         (tmp_path / "dess/reports").symlink_to("../reports")
         monkeypatch.setattr(render, "PACKAGE", tmp_path / "dess")
     assert folder.render() == {"mission", "scorecard"}
-    render._software.cache_clear()
+    render._hash_software.cache_clear()
 
 
 def test_code_beside_the_package_counts_without_links_to_it(tmp_path, monkeypatch):
@@ -89,10 +89,10 @@ def test_code_beside_the_package_counts_without_links_to_it(tmp_path, monkeypatc
     (tmp_path / "dess/policies").write_text("../policies")
     (tmp_path / "policies").mkdir()
     (tmp_path / "policies/planner.py").write_text("before = 1")
-    before = render._software.__wrapped__()
-    assert render._software.__wrapped__() == before
+    before = render._hash_software.__wrapped__()
+    assert render._hash_software.__wrapped__() == before
     (tmp_path / "policies/planner.py").write_text("after = 1")
-    assert render._software.__wrapped__() != before
+    assert render._hash_software.__wrapped__() != before
 
 
 def test_pages_that_are_altered_or_gone_are_rendered_again(folder):

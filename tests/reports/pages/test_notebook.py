@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dess.reports.pages.notebook import values_of, with_paths, with_values
+from dess.reports.pages.notebook import assigned_values, replace_paths, replace_values
 
 CELL = """results = "../../results"  # the folder
 settings = {
@@ -30,27 +30,27 @@ PLAIN = st.recursive(
 
 
 def test_the_values_of_a_cell_are_read():
-    assert values_of(CELL) == {
+    assert assigned_values(CELL) == {
         **{"results": "../../results", "settings": {"uavs": 5}, "missions": 500},
         **{"name": "é", "shown": None},
     }
 
 
 def test_other_values_leave_comments_and_other_lines_as_they_are():
-    written = with_values(CELL, {"settings": {"pads": 2}, "shown": "tour", "unknown": 1})
+    written = replace_values(CELL, {"settings": {"pads": 2}, "shown": "tour", "unknown": 1})
     assert written == CELL.replace(
         """{
     "uavs": 5,  # of them
 }""",
         "{'pads': 2}",
     ).replace("None", "'tour'")
-    assert with_values(CELL, values_of(CELL)) == CELL
+    assert replace_values(CELL, assigned_values(CELL)) == CELL
 
 
-@given(st.fixed_dictionaries({}, optional=dict.fromkeys(values_of(CELL), PLAIN)))
+@given(st.fixed_dictionaries({}, optional=dict.fromkeys(assigned_values(CELL), PLAIN)))
 def test_what_is_written_is_read(values):
-    written = with_values(CELL, values)
-    assert values_of(written) == values_of(CELL) | values
+    written = replace_values(CELL, values)
+    assert assigned_values(written) == assigned_values(CELL) | values
     assert written.count("#") >= 4 and "# A comment — of its own" in written
 
 
@@ -63,9 +63,9 @@ def test_what_is_written_is_read(values):
     ],
 )
 def test_paths_are_written_another_way_and_words_are_not(value, moved):
-    assert with_paths(value, os.path.abspath) == moved
+    assert replace_paths(value, os.path.abspath) == moved
     relative = partial(os.path.relpath, start=os.getcwd())
-    assert with_paths(moved, relative) == with_paths(value, os.path.normpath)
+    assert replace_paths(moved, relative) == replace_paths(value, os.path.normpath)
 
 
 def test_policies_of_the_working_folder_are_paths(tmp_path, monkeypatch):
@@ -73,7 +73,7 @@ def test_policies_of_the_working_folder_are_paths(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("mine").mkdir()
     Path("mine/config.json").write_text("{}")
-    moved = with_paths(["mine", "greedy,mine", "own.py:Own", "others"], os.path.abspath)
+    moved = replace_paths(["mine", "greedy,mine", "own.py:Own", "others"], os.path.abspath)
     assert moved == [
         f"{tmp_path}/mine",
         f"greedy,{tmp_path}/mine",

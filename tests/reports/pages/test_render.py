@@ -17,8 +17,8 @@ from dess import InputError, __version__
 from dess.analysis import run_study
 from dess.reports.cli import main
 from dess.reports.pages import kernels
-from dess.reports.pages.body import page_of
-from dess.reports.pages.notebook import PARAMETERS, Report, read
+from dess.reports.pages.body import make_page
+from dess.reports.pages.notebook import PARAMETERS, Report, read_report
 from dess.reports.pages.render import ReportError, render
 from tests.analysis.small import small_study
 from tests.reports.small import Links, words_of
@@ -60,15 +60,15 @@ if policy not in study.policies:
 
 # %%
 print("a warning", file=sys.stderr)
-html.table(study.missions.head(3))
+html.make_table(study.missions.head(3))
 
 # %%
 drawing = Figure(figsize=(4, 3))
 drawing.subplots().plot(study.missions["slots"])
-html.figure(drawing, "slots", "Slots of every mission, n = 10.")
+html.make_figure(drawing, "slots", "Slots of every mission, n = 10.")
 
 # %%
-html.provenance([study])
+html.provenance_table([study])
 """
 SCORECARD = HEAD.format("", "Scorecard", "The claims.")
 SCORECARD += """# %%
@@ -237,9 +237,9 @@ def test_a_notebook_runs_in_jupyter_and_shows_what_the_page_shows(
     assert {key for output in outputs for key in output.data} == {"text/html"}
     NotebookClient(notebook, resources={"metadata": {"path": str(folder)}}).execute()
     assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
-    report = read("mission", notebooks)
+    report = read_report("mission", notebooks)
     report.notebook = notebook
-    main = page_of(report).text.split("<main>")[1].split('<details class="code">')[0]
+    main = make_page(report).text.split("<main>")[1].split('<details class="code">')[0]
     assert "Figure 1" in main and main in (folder / "mission.html").read_text("utf-8")
 
 
@@ -308,7 +308,7 @@ def test_a_path_is_relative_in_the_notebook_and_a_name_on_the_page(
 ):
     """Values stand in the cell of the parameters; the notebook runs in another folder."""
     ran: list[Report] = []
-    monkeypatch.setattr(kernels, "run", lambda reports, *_: ran.extend(reports))
+    monkeypatch.setattr(kernels, "run_reports", lambda reports, *_: ran.extend(reports))
     monkeypatch.chdir(tmp_path)
     given = {"policy": "./sea.toml"}
     render(["mission"], results, "out", parameters=given, notebooks=notebooks)
@@ -367,6 +367,6 @@ def test_a_notebook_that_fails_or_dies_leaves_a_partial_page_and_names_the_cell(
     # The complete page stays.
     assert (tmp_path / "mission.html").read_text() == "before"
     assert "the cell after" in words_of((tmp_path / "performance.html").read_text("utf-8"))
-    monkeypatch.setattr(kernels, "run", lambda reports, *_: None)
+    monkeypatch.setattr(kernels, "run_reports", lambda reports, *_: None)
     render(["mission"], results, tmp_path, notebooks=notebooks)
     assert not (tmp_path / "mission.partial.html").exists()

@@ -15,7 +15,7 @@ from dess.analysis.answers import comparison
 from dess.analysis.answers.comparison import Cost, Times
 from dess.analysis.answers.missions import FOLDER
 from dess.analysis.results.tables import Results
-from dess.reports.pages.notebook import NAMES, read
+from dess.reports.pages.notebook import NAMES, read_report
 from dess.reports.pages.page import STUDY, Page
 from dess.reports.pages.render import render
 from tests.pins.pinned import pinned
@@ -102,8 +102,10 @@ def test_a_page_says_what_the_kept_one_says(pages, name):
 @pytest.mark.brief
 def test_every_page_carries_the_evidence_of_its_studies(pages, results):
     for name in NAMES:
-        evidence_of_page = [json.loads(text) for text in Page(pages[f"{name}.html"]).hidden(STUDY)]
-        studies = read(name).studies
+        evidence_of_page = [
+            json.loads(text) for text in Page(pages[f"{name}.html"]).find_hidden(STUDY)
+        ]
+        studies = read_report(name).studies
         shown = [evidence["study"]["name"] for evidence in evidence_of_page]
         assert shown[: len(studies)] == studies
         for evidence in evidence_of_page[: len(studies)]:
@@ -121,9 +123,9 @@ def test_every_page_carries_the_evidence_of_its_studies(pages, results):
 @pytest.mark.usefixtures("pages")
 def test_a_page_refuses_parameters_of_another_kind(odd, results):
     """Such as a policy that the study lacks, or a table in place of a number."""
-    without_missions = (name for name in NAMES if "missions" not in read(name).parameters)
+    without_missions = (name for name in NAMES if "missions" not in read_report(name).parameters)
     for name in without_missions:
-        for parameter in read(name).parameters.keys() - {"results", "longer"}:
+        for parameter in read_report(name).parameters.keys() - {"results", "longer"}:
             with pytest.raises(InputError):
                 said_by(name, results=str(results), **{parameter: odd})
 

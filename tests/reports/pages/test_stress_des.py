@@ -55,7 +55,7 @@ def manifest(**changes: Any) -> dict[str, Any]:
 
 def words(data: dict[str, Any], *others: dict[str, Any]) -> str:
     """All words of the checklist, its diagram and its table."""
-    description = stress_des.describe(data, others)
+    description = stress_des.describe_model(data, others)
     steps, *rest = description.overview
     texts = [*description.sections.values(), *rest, *(word for step in steps for word in step)]
     return in_backticks("\n".join([*texts, *description.parameters["Value"]]))
@@ -67,7 +67,7 @@ def in_backticks(text: str) -> str:
 
 
 def test_every_input_parameter_is_in_the_table():
-    table = stress_des.describe(manifest()).parameters
+    table = stress_des.describe_model(manifest()).parameters
     fields = table["Input parameter [unit]"].str.partition(":")[0]
     off = {*SECTIONS, *GEOMETRY, LANDING}
     assert set(fields) == set(Scenario.model_fields) - off == set(OTHER)

@@ -20,7 +20,9 @@ def test_the_head_of_a_group_stands_over_its_columns():
     """Also beside columns that belong to no group."""
     columns = [("", "Mission"), ("", "Points"), ("ddqn", "Success"), ("ddqn", "Collected")]
     frame = pd.DataFrame([["7", "−3", "yes", "91.0 %"]], columns=pd.MultiIndex.from_tuples(columns))
-    heads = re.findall(r"<tr[^>]*>(.*?)</tr>", html.table(frame).data.partition("<tbody>")[0], re.S)
+    heads = re.findall(
+        r"<tr[^>]*>(.*?)</tr>", html.make_table(frame).data.partition("<tbody>")[0], re.S
+    )
     assert [heads_over(row.replace("\n", "")) for row in heads] == [
         ["", "", "ddqn", "ddqn"],
         ["Mission", "Points", "Success", "Collected"],
@@ -29,6 +31,8 @@ def test_the_head_of_a_group_stands_over_its_columns():
 
 def test_nan_is_explained_only_where_it_is_shown():
     """A cell without a value is empty."""
-    without = html.table(pd.DataFrame({"p": [None, 0.5]}), "P-values").data
+    without = html.make_table(pd.DataFrame({"p": [None, 0.5]}), "P-values").data
     assert "nan" not in without
-    assert "nan: the missions are too few" in html.table(pd.DataFrame({"p": ["nan"]}), "P").data
+    assert (
+        "nan: the missions are too few" in html.make_table(pd.DataFrame({"p": ["nan"]}), "P").data
+    )

@@ -19,10 +19,10 @@ from dess.analysis.results.tables import load_results
 from dess.policies.registry import TRAINED
 from dess.reports.cli import main
 from dess.reports.pages import html, verify
-from dess.reports.pages.body import page_of
-from dess.reports.pages.notebook import read
+from dess.reports.pages.body import make_page
+from dess.reports.pages.notebook import read_report
 from dess.reports.pages.page import STUDY, Page
-from dess.reports.pages.render import index_of, pages_in
+from dess.reports.pages.render import find_pages, make_index
 from dess.reports.pages.verify import verify_page, verify_results
 from tests.analysis.hostile import forged
 from tests.analysis.small import small_study
@@ -45,12 +45,12 @@ def results(tmp_path_factory):
 def page(results, tmp_path_factory):
     """A page on both, with the index of its folder; its notebook has not been run."""
     out = tmp_path_factory.mktemp("out")
-    shown = html.table(pd.DataFrame({"Success": ["97.3 %"]}))
-    origins = html.provenance([load_results(results / name) for name in ("table4", "fig4")])
-    report, data = read("performance"), {"text/html": shown.data + origins.data}
+    shown = html.make_table(pd.DataFrame({"Success": ["97.3 %"]}))
+    origins = html.provenance_table([load_results(results / name) for name in ("table4", "fig4")])
+    report, data = read_report("performance"), {"text/html": shown.data + origins.data}
     report.cells[-1].outputs = [new_output("display_data", data)]
-    (out / "performance.html").write_text(page_of(report).text, "utf-8")
-    (out / "index.html").write_text(index_of(pages_in(out)), "utf-8")
+    (out / "performance.html").write_text(make_page(report).text, "utf-8")
+    (out / "index.html").write_text(make_index(find_pages(out)), "utf-8")
     return out / "performance.html"
 
 
@@ -79,14 +79,14 @@ def test_pages_and_results_that_nobody_altered_agree(results, page):
 def test_the_origins_of_many_studies_stand_in_several_tables(results):
     """So that no column is beyond the edge of a page."""
     evidence = Evidence.of(load_results(results / "fig4"))
-    shown = html.carrying([evidence] * (html.STUDIES_BESIDE + 1)).data
+    shown = html.evidence_tables([evidence] * (html.STUDIES_BESIDE + 1)).data
     assert shown.count("<table") == 2
     assert len(Page(shown).evidence) == 1  # of the same study
 
 
 def test_a_page_whose_missions_were_altered_is_found_by_simulating_them(page, tmp_path):
     """Even where the checksum was made anew."""
-    text = Page.read(page).hidden(STUDY)[0]
+    text = Page.read(page).find_hidden(STUDY)[0]
     evidence = json.loads(text)
     mission = evidence["sample"][3]
     mission["record"]["collected"] += 1e-9
@@ -139,18 +139,18 @@ def test_a_page_without_missions_says_so(tmp_path):
 
 def test_an_altered_page_does_not_get_into_the_index(page, tmp_path, caplog):
     folder = shutil.copytree(page.parent, tmp_path / "out")
-    assert {*pages_in(folder)} == {"performance.html"}
+    assert {*find_pages(folder)} == {"performance.html"}
     altered(page, "How good are the policies", "Perfection", folder / "performance.html")
     (folder / "comparison.html").write_bytes(b"\xff")
-    old = page.read_text("utf-8").replace(Page.read(page).hidden(STUDY)[0], "{}")
+    old = page.read_text("utf-8").replace(Page.read(page).find_hidden(STUDY)[0], "{}")
     (folder / "mission.html").write_text(Page(old).sealed.text, "utf-8")
-    assert not pages_in(folder)
+    assert not find_pages(folder)
     told = {record.args[0].name for record in caplog.records}
     assert told == {"comparison.html", "performance.html", "mission.html"}
     caplog.clear()
     # What is made anew is not missed.
-    assert not pages_in(folder, but=told) and not caplog.records
-    assert "performance.html" not in index_of(pages_in(folder))
+    assert not find_pages(folder, but=told) and not caplog.records
+    assert "performance.html" not in make_index(find_pages(folder))
 
 
 def test_an_incomplete_folder_hides_no_other(results, tmp_path):
@@ -165,7 +165,7 @@ def test_an_incomplete_folder_hides_no_other(results, tmp_path):
 
 def test_other_weights_are_found(tmp_path, capsys):
     folder = shutil.copytree(TRAINED, tmp_path / "trained")
-    content = f'<meta name="dess-checksum" content="">{html.weights(folder).data}'
+    content = f'<meta name="dess-checksum" content="">{html.weights_table(folder).data}'
     path = tmp_path / "page.html"
     path.write_text(Page(content).sealed.text, "utf-8")
     assert lines_of(path) == []

@@ -68,8 +68,8 @@ def test_there_are_a_page_a_notebook_and_an_index_with_a_card(page, out):
             in text
         )
         assert "The best setting is " in text
-    assert len(Page(page).hidden(STUDY)) == 1
-    assert Page(index).hidden(STUDY) == []  # it stands on the page
+    assert len(Page(page).find_hidden(STUDY)) == 1
+    assert Page(index).find_hidden(STUDY) == []  # it stands on the page
 
 
 def test_every_figure_and_table_has_its_data(page, downloads):
@@ -103,7 +103,7 @@ def test_it_requests_nothing_and_fits_a_phone(page, out, visit):
 
 def test_latex_has_what_the_table_has_and_no_letter_that_it_lacks():
     frame = pd.DataFrame({"C_S [%]": ["5–7", "−1 & ▲"], "a_b": [1 / 3, float("nan")]})
-    assert html.latex(frame).split("\n")[2:6] == [
+    assert html.format_latex(frame).split("\n")[2:6] == [
         r"$C_S$ [\%] & a\_b \\",
         r"\midrule",
         r"5--7 & 0.333333 \\",

@@ -3,7 +3,7 @@
 from dess.analysis.ask import around
 from dess.analysis.ask.question import sweep_question
 from dess.reports.pages.render import render_study
-from dess.reports.pages.study import report_of
+from dess.reports.pages.study import make_study_report
 from tests.analysis.small import SHEET, write_scenario
 from tests.reports.small import said_by, words_of
 
@@ -18,7 +18,7 @@ def test_a_sheet_needs_no_prices_and_prices_no_requirement(tmp_path):
         asked = {"prices": prices, "folder": tmp_path / "results"}
         question = sweep_question({"uavs": (1, 2)}, scenario, ["greedy"], 10, **asked)
         question.ask()
-        said = said_by(report_of(question.out), results=str(question.out))
+        said = said_by(make_study_report(question.out), results=str(question.out))
         assert "The best setting is greedy with " in said
         assert "Who flies: the policy greedy" in said
         assert ("Prices: 20,000 EUR for a UAV." in said) == bool(prices)
