@@ -253,17 +253,20 @@ def _choose_goal(
 @inlined
 def _score_by_age(mission, data, sensors, nodes, chart, k, slots):
     """The age per slot of distance of node ``k``, and a share of that of all nodes beyond it."""
-    here, beyond = 0.0, 0  # an integer, since a sum of floats depends on the order of the nodes
+    score_of_node, beyond = (
+        0.0,
+        0,
+    )  # an integer, since a sum of floats depends on the order of the nodes
     for other in range(len(nodes)):
         if data[other] > 0.0:
             age = mission.slot + 1 - sensors[other].newest  # at the end of this slot
             further = distance(chart, nodes[other, 0], nodes[other, 1], nodes[k, 0], nodes[k, 1])
             score = age / (slots + further + _SLOTS_AT_NODE)
             if other == k:
-                here = score
+                score_of_node = score
             else:
                 beyond += np.int64(score * _FINE)
-    return here + _BEYOND * (beyond / _FINE)
+    return score_of_node + _BEYOND * (beyond / _FINE)
 
 
 @inlined

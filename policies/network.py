@@ -70,7 +70,7 @@ class PaperNetwork:
     def __call__(self, local: np.ndarray, far: np.ndarray, own: np.ndarray) -> np.ndarray:
         """The values (R, 5) of the actions, from the arrays of ``Maps.encode``."""
         maps = zip((local, far), self._maps, strict=True)
-        seen = [_apply_convolutions(each, *layers) for each, layers in maps]
+        seen = [_apply_convolutions(inputs, *layers) for inputs, layers in maps]
         matrix, bias = self._values
         return _apply_layers(self._hidden, np.concatenate([*seen, own], 1)) @ matrix + bias
 
@@ -107,12 +107,16 @@ class SetNetwork:
     @staticmethod
     def layer_sizes(shapes: Shapes, hidden: Sequence[int]) -> Sizes:
         """The sizes of the layers, as for ``PaperNetwork``."""
-        (own,), (_, action), *sets = shapes
+        (own_inputs,), (_, action), *sets = shapes
         nodes, others, joint = hidden
-        sizes: Sizes = {"own": (joint, own), "action": (joint, action), "state": (joint, joint)}
+        sizes: Sizes = {
+            "own": (joint, own_inputs),
+            "action": (joint, action),
+            "state": (joint, joint),
+        }
         sizes |= {"hidden": (joint // 2, joint), "value": (1, joint), "advantage": (1, joint // 2)}
         for number, width in enumerate((nodes, others, others)):
-            of_set = {"context": (width, own), "inputs": (width, sets[2 * number][-1])}
+            of_set = {"context": (width, own_inputs), "inputs": (width, sets[2 * number][-1])}
             of_set |= {"layer": (width, width), "values": (2 * width, width)}
             of_set |= dict.fromkeys(("of_all", "nearer", "along"), (joint, 2 * width))
             sizes |= {f"sets.{number}.{name}": size for name, size in of_set.items()}
@@ -129,8 +133,8 @@ class SetNetwork:
 
         names = ("context", "inputs", "layer", "values")
         self._sets = [[layer(f"sets.{number}.{name}") for name in names] for number in SETS]
-        own, bias = layer("own")
-        self._own = np.concatenate([own, *of_sets("of_all")]), bias
+        own_matrix, bias = layer("own")
+        self._own = np.concatenate([own_matrix, *of_sets("of_all")]), bias
         self._action, _ = layer("action")
         self._moves = np.concatenate([self._action, *of_sets("nearer", "along")])
         self._state, self._hidden, self._value = map(layer, ("state", "hidden", "value"))
@@ -148,18 +152,19 @@ class SetNetwork:
         moves[..., : at[1]] = actions[:, :HOVER].swapaxes(0, 1)
         for layers, lines, factors in zip(self._sets, sets[::2], sets[1::2], strict=True):
             context, (inputs, _), layer, (values, shift) = layers
-            each = lines.reshape(-1, lines.shape[2]) @ inputs
-            _add_and_rectify(each, own @ context[0] + context[1], lines.shape[1])
-            each = (_apply_layers([layer], each) @ values).reshape(*lines.shape[:2], len(shift))
-            _pool_products(each, shift, factors, state, moves, at)
+            of_rows = lines.reshape(-1, lines.shape[2]) @ inputs
+            _add_and_rectify(of_rows, own @ context[0] + context[1], lines.shape[1])
+            products = _apply_layers([layer], of_rows) @ values
+            products = products.reshape(*lines.shape[:2], len(shift))
+            _pool_products(products, shift, factors, state, moves, at)
             at = at[0] + len(shift), at[1] + 2 * len(shift)
         state = _apply_layers([self._own], state)
-        each = np.empty((ACTIONS, *state.shape), own.dtype)
-        np.matmul(moves, self._moves, out=each[:HOVER])
-        np.matmul(actions[:, HOVER], self._action, out=each[HOVER])
-        each = each.reshape(-1, len(bias))
-        _add_and_rectify(each, state @ self._state[0] + self._state[1], 1)
-        advantage = (_apply_layers([self._hidden], each) @ self._advantage).reshape(ACTIONS, rows)
+        hidden = np.empty((ACTIONS, *state.shape), own.dtype)
+        np.matmul(moves, self._moves, out=hidden[:HOVER])
+        np.matmul(actions[:, HOVER], self._action, out=hidden[HOVER])
+        hidden = hidden.reshape(-1, len(bias))
+        _add_and_rectify(hidden, state @ self._state[0] + self._state[1], 1)
+        advantage = (_apply_layers([self._hidden], hidden) @ self._advantage).reshape(ACTIONS, rows)
         return state @ self._value[0] + self._value[1] + (self._centred @ advantage).T
 
 
@@ -278,12 +283,12 @@ def _pool_products(values, bias, factors, state, moves, at):
     chosen = np.empty(count, np.int64)
     for row in range(len(values)):
         for part in range(9):
-            found = 0
+            count_chosen = 0
             for number in range(count):
-                chosen[found] = number
-                found += factors[row, part, number] > zero
+                chosen[count_chosen] = number
+                count_chosen += factors[row, part, number] > zero
             best[:] = zero
-            for place in range(found):
+            for place in range(count_chosen):
                 number = chosen[place]
                 factor = factors[row, part, number]
                 for c in range(width):

@@ -119,10 +119,10 @@ def describe_policies() -> dict[str, str]:
 
     Those of other packages are loaded; if one cannot be loaded, its description says so.
     """
-    known = {name: description for name, (_, description) in SHIPPED.items()}
-    known |= {name: _describe_trained(TRAINED / name) for name in trained_names()}
+    shipped = {name: description for name, (_, description) in SHIPPED.items()}
+    shipped |= {name: _describe_trained(TRAINED / name) for name in trained_names()}
     outside = {name: _describe_registered(point) for name, point in _registered_policies().items()}
-    return {name: (outside | known)[name] for name in names()}
+    return {name: (outside | shipped)[name] for name in names()}
 
 
 def load(name: str | Path) -> Policy:
@@ -209,13 +209,13 @@ def _find_class(module: str, name: str) -> Callable[[], Any]:
     Raises:
         InputError: If the module has no such class.
     """
-    found = vars(import_module(module))
-    if name not in found:
-        classes = [n for n, value in found.items() if hasattr(value, "act")]
+    names_of_module = vars(import_module(module))
+    if name not in names_of_module:
+        classes = [n for n, value in names_of_module.items() if hasattr(value, "act")]
         raise InputError(
             f"policy: {module}: {shown(name)} is no class of it{one_of(name, classes)}"
         )
-    return found[name]
+    return names_of_module[name]
 
 
 def _import_name(path: Path) -> str:
@@ -277,8 +277,8 @@ def confirmed(team: str, named: Iterable[str]) -> str:
         team: The team.
         named: The teams that the user has typed.
     """
-    known = {file for text in named for file in python_files_in(text)}
-    return TypedByUser(team) if known.issuperset(python_files_in(team)) else team
+    confirmed_files = {file for text in named for file in python_files_in(text)}
+    return TypedByUser(team) if confirmed_files.issuperset(python_files_in(team)) else team
 
 
 def _describe_registered(point: EntryPoint) -> str:
@@ -340,7 +340,9 @@ def describe_policy(name: str) -> About:
     folder = folder_of(name)
     described = read_description(folder) if folder else None
     requires = described.layout.model_dump() if described and described.layout else {}
-    scenarios = {known: load_scenario(known).model_dump(mode="json") for known in scenario_names()}
+    scenarios = {
+        scenario: load_scenario(scenario).model_dump(mode="json") for scenario in scenario_names()
+    }
     trained_on = described.training.scenario if described and described.layout else ""
     return About(
         name=name,
@@ -363,15 +365,15 @@ def list_departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) ->
         spaces: The scenarios in which they act.
     """
     lines = []
-    here = field_ranges(spaces)
+    present = field_ranges(spaces)
     for name in dict.fromkeys(name for team in policies for name in team.split(",")):
         with suppress(InputError):  # whoever loads it says what is wrong
             folder = folder_of(name)
             trained = read_description(folder).ranges if folder else {}
             beyond = [
-                f"{field} {_format_range(here[field])} (trained on {_format_range([low, high])})"
+                f"{field} {_format_range(present[field])} (trained on {_format_range([low, high])})"
                 for field, (low, high) in trained.items()
-                if field in here and not low <= here[field][0] <= here[field][1] <= high
+                if field in present and not low <= present[field][0] <= present[field][1] <= high
             ]
             if beyond:
                 lines.append(f"{name} acts outside of its training: {', '.join(beyond)}")

@@ -123,13 +123,18 @@ def _without_none(value: Any) -> Any:
     """The data without fields that are None, which TOML cannot represent."""
     if isinstance(value, Mapping):
         return {key: _without_none(item) for key, item in value.items() if item is not None}
-    return [_without_none(item) for item in value] if isinstance(value, list) else value
+    if isinstance(value, list):
+        return [_without_none(item) for item in value]
+    return value
 
 
 def _describe_crate(results: Results) -> str:
     manifest = results.store.manifest
     asked = results.study.description
-    made = f"{len(results.missions):,} missions of {numbers.join_words(results.policies)}"
-    points = f"{len(manifest.points):,} design point{'s' if len(manifest.points) > 1 else ''}"
-    end = "." if asked and asked[-1] not in ".?!" else ""
-    return f"{asked}{end} {made} at {points}, simulated by dess {manifest.version}.".strip()
+    simulated = f"{len(results.missions):,} missions of {numbers.join_words(results.policies)}"
+    if asked and asked[-1] not in ".?!":
+        asked += "."
+    points = "1 design point"
+    if len(manifest.points) > 1:
+        points = f"{len(manifest.points):,} design points"
+    return f"{asked} {simulated} at {points}, simulated by dess {manifest.version}.".strip()

@@ -40,7 +40,10 @@ class Grid:
         self.results = results
         self.values = varied_values(results)
         table = values_of_points(results)
-        places = {field: table[field].map(of.index) for field, of in self.values.items()}
+        places = {
+            field: table[field].map(swept_values.index)
+            for field, swept_values in self.values.items()
+        }
         self._places = pd.DataFrame(places).sort_values([*places])
         settings = math.prod(map(len, self.values.values()))
         if len(places) < 2 or not len(table) == len(table.drop_duplicates()) == settings:
@@ -53,8 +56,8 @@ class Grid:
     @property
     def start(self) -> int:
         """The design point at which the sliders start: in the middle of three values or more."""
-        middle = [len(values) // 2 for values in self.values.values()]
-        return int(self._places.index[(self._places == middle).all(axis=1)][0])
+        middle_places = [len(values) // 2 for values in self.values.values()]
+        return int(self._places.index[(self._places == middle_places).all(axis=1)][0])
 
     @cached_property
     def means(self) -> pd.DataFrame:

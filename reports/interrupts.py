@@ -55,18 +55,21 @@ class Interrupts(AbstractContextManager["Interrupts"]):
                 if signal.getsignal(number) not in (signal.SIG_IGN, None):
                     self._handlers[number] = signal.signal(number, self._receive_signal)
             if self.is_last and os.name == "posix":
-                seen, told = os.pipe()
-                os.set_blocking(told, False)
-                signal.set_wakeup_fd(told, warn_on_full_buffer=False)
-                threading.Thread(target=self._watch_main_thread, args=(seen,), daemon=True).start()
+                watched, wakeup = os.pipe()
+                os.set_blocking(wakeup, False)
+                signal.set_wakeup_fd(wakeup, warn_on_full_buffer=False)
+                threading.Thread(
+                    target=self._watch_main_thread, args=(watched,), daemon=True
+                ).start()
         return self
 
     def __exit__(self, *_: object) -> None:
         if self.received and hasattr(signal, "setitimer"):
             signal.setitimer(signal.ITIMER_REAL, 0)
         for number, handler in self._handlers.items():
-            is_ignored = self.is_last and number in NUMBERS
-            signal.signal(number, signal.SIG_IGN if is_ignored else handler)
+            if self.is_last and number in NUMBERS:
+                handler = signal.SIG_IGN
+            signal.signal(number, handler)
         if threading.current_thread() is threading.main_thread():
             sys.unraisablehook = self._hook
 

@@ -32,6 +32,7 @@ from dess import InputError
 from dess.analysis.figures import missions, style
 from dess.analysis.figures.style import node_colours, uav_colours
 from dess.analysis.metrics import format_length, size_of
+from dess.analysis.numbers import format_count
 from dess.analysis.results import event_log
 from dess.reports.pages.html import Part, load_template, make_figures
 from dess.scenario.scenario import Scenario
@@ -115,8 +116,9 @@ class Playback:
         """The residual data and the pads in use after a slot, in words."""
         charging, waiting = (self.fleet[state][slot].sum() for state in ("charging", "waiting"))
         pads = self.scenario.charging_pads
-        queue = f", {waiting} waiting" if waiting else ""
-        used = f"{charging} of {pads} pad{'s' * (pads != 1)} in use{queue}"
+        used = f"{charging} of {format_count(pads, 'pad')} in use"
+        if waiting:
+            used += f", {waiting} waiting"
         left = self.residual[slot].sum()
         units = self.scenario.units
         if units:
@@ -141,7 +143,9 @@ class Playback:
         if row.uav >= 0:
             return int(row.uav) + 1
         names = self.scenario.names
-        return names[int(row.node)] if names else int(row.node)
+        if names:
+            return names[int(row.node)]
+        return int(row.node)
 
     @property
     def unit(self) -> float:
@@ -166,12 +170,20 @@ class Playback:
     def data(self) -> dict[str, Any]:
         """All that a player in a page shows, as JSON; lists of states are in the order of slots."""
         scenario, log = self.scenario, self._log
-        end = "landing" if scenario.landing else "quota_filled"
+        end = "quota_filled"
+        if scenario.landing:
+            end = "landing"
         filled = log.loc[log["event"] == end, "uav"]
-        aged = scenario.age.measured
+        ages = mean_age = None
+        if scenario.age.measured:
+            ages = event_log.ages_of_nodes(log).round(2).to_numpy().tolist()
+            mean_age = event_log.mean_age(log).round(2).to_numpy().tolist()
         return {
-            **{"size": scenario.size, "zones": scenario.rectangles},
-            **{"nodes": scenario.nodes, "names": scenario.names, "noFly": scenario.no_fly},
+            "size": scenario.size,
+            "zones": scenario.rectangles,
+            "nodes": scenario.nodes,
+            "names": scenario.names,
+            "noFly": scenario.no_fly,
             "thresholds": {"C_S": scenario.charge_start, "C_C": scenario.charge_complete},
             "colours": {"uavs": self.uav_colours, "nodes": self.node_colours},
             "pads": scenario.charging_pads,
@@ -182,8 +194,8 @@ class Playback:
             "residual": self.residual.round(2).tolist(),
             "status": [self.describe_slot(slot) for slot in range(self.end + 1)],
             "events": [*self.find_jumps()],
-            "ages": event_log.ages_of_nodes(log).round(2).to_numpy().tolist() if aged else None,
-            "meanAge": event_log.mean_age(log).round(2).to_numpy().tolist() if aged else None,
+            "ages": ages,
+            "meanAge": mean_age,
         }
 
 
@@ -193,7 +205,9 @@ def _find_corners(x: np.ndarray, y: np.ndarray) -> list[tuple[int, int]]:
     moves = np.diff(cells, axis=0)
     cells = cells[np.r_[True, moves.any(axis=1)]]
     moves = moves[moves.any(axis=1)]
-    turns = np.r_[True, (moves[1:] != moves[:-1]).any(axis=1), True] if len(moves) else [True]
+    turns = np.array([True])
+    if len(moves):
+        turns = np.r_[True, (moves[1:] != moves[:-1]).any(axis=1), True]
     return [(int(x), int(y)) for x, y in cells[turns]]
 
 
@@ -201,8 +215,8 @@ def choose_units(scenario: Scenario) -> dict[str, tuple[str, float]]:
     """The units in which a player tells lengths, times and data, and what 1 of the model is."""
     if not (units := scenario.units):
         return {"length": ("cells", 1), "time": ("mission slots", 1), "data": ("data units", 1)}
-    told = {"length": "km", "time": "h", "data": "MB"}
-    return {what: (unit, size_of(unit, units)) for what, unit in told.items()}
+    metric_units = {"length": "km", "time": "h", "data": "MB"}
+    return {what: (unit, size_of(unit, units)) for what, unit in metric_units.items()}
 
 
 def _check_log(log: pd.DataFrame, scenario: Scenario) -> None:
@@ -236,7 +250,9 @@ AGE_READING = (
 
 def explain_player(scenario: Scenario) -> str:
     """How to read the player of a mission of this scenario."""
-    return READING + (AGE_READING if scenario.age.measured else "")
+    if scenario.age.measured:
+        return READING + AGE_READING
+    return READING
 
 
 def player_script() -> HTML:
@@ -298,7 +314,10 @@ def write_animation(
         check_ffmpeg()
     with style.figure_look():
         film = Film(events, scenario, title)
-        (_write_gif if kind == GIF else _write_video)(film, file)
+        if kind == GIF:
+            _write_gif(film, file)
+        else:
+            _write_video(film, file)
 
 
 def check_ffmpeg() -> None:

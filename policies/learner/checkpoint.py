@@ -94,7 +94,9 @@ class Header(Document):
 
 def new_training(config: TrainingConfig, device: torch.device) -> Training:
     """A new training, by the algorithm of its config."""
-    return (DQNTraining if config.algorithm == "dqn" else ProximalTraining)(config, device)
+    if config.algorithm == "dqn":
+        return DQNTraining(config, device)
+    return ProximalTraining(config, device)
 
 
 def save_training(path: Path, training: Training) -> None:
@@ -109,9 +111,10 @@ def save_training(path: Path, training: Training) -> None:
             values |= to_arrays({f"{optimizer}.{index}.{key}": state[key] for key in state})
     if training.finished:
         values["finished"] = to_bytes(np.concatenate(training.finished))
-    for name in training.losses[0] if training.losses else ():
-        losses = torch.stack([loss[name] for loss in training.losses])
-        values |= to_arrays({f"losses.{name}": losses})
+    if training.losses:
+        for name in training.losses[0]:
+            losses = torch.stack([loss[name] for loss in training.losses])
+            values |= to_arrays({f"losses.{name}": losses})
     header = {
         "format": FORMAT,
         "config": training.config.model_dump(mode="json"),
@@ -125,7 +128,8 @@ def save_training(path: Path, training: Training) -> None:
     }
     if isinstance(training, DQNTraining):
         header["stepper"] = [training.stepper.seed, training.stepper.replication]
-        header["replay"] = training.replay.count if training.config.checkpoint_replay else None
+        if training.config.checkpoint_replay:
+            header["replay"] = training.replay.count
     header["sha256"] = trained.hash_arrays(header, values)
     trained.write_arrays(path, values, {"dess": json.dumps(header)})
 
@@ -146,15 +150,17 @@ def load_training(
     Raises:
         InputError: If the file is missing, damaged, of another version or of another config.
     """
-    values, metadata = trained.read_arrays(path, HEADER_LIMIT + (2**36 if limit is None else limit))
+    if limit is None:
+        limit = 2**36
+    values, metadata = trained.read_arrays(path, HEADER_LIMIT + limit)
     if "dess" not in metadata:
         raise InputError(f"{path}: no checkpoint of a training; allowed: {CHECKPOINT} of one")
     header = Header.parse(metadata["dess"], str(path), fixed={"format": FORMAT})
     raw = parse_json(metadata["dess"], str(path))
     training = new_training(config, device)
     settings = config.model_dump(mode="json") | {"scenario": training.space.model_dump(mode="json")}
-    held = header.config.model_dump(mode="json") | {"scenario": header.scenario}
-    if different := [key for key in settings if settings[key] != held[key]]:
+    saved = header.config.model_dump(mode="json") | {"scenario": header.scenario}
+    if different := [key for key in settings if settings[key] != saved[key]]:
         raise InputError(
             f"{path}: of another config ({', '.join(different)} differ); "
             "allowed: the one it began with"
@@ -198,9 +204,9 @@ def _restore_training(training: Training, values: Arrays, header: dict[str, Any]
     if isinstance(training, DQNTraining):
         training.stepper.start_at(*header["stepper"])
         for name, array in _mission_arrays(training).items():
-            held = values[name]
-            is_bytes = name.startswith("stepper.")
-            restored = from_bytes(held, array.dtype) if is_bytes else held
+            restored = values[name]
+            if name.startswith("stepper."):
+                restored = from_bytes(restored, array.dtype)
             array[...] = restored.reshape(array.shape)
         _check_state(training.stepper.state, training.stepper.space)
         if training.config.checkpoint_replay:
@@ -248,8 +254,9 @@ def _common_arrays(training: Training) -> Arrays:
     for name, network in _network_arrays(training).items():
         arrays |= to_arrays({f"{name}.{key}": value for key, value in network.items()})
     for name, array in _mission_arrays(training).items():
-        is_bytes = name.startswith("stepper.")
-        arrays[name] = to_bytes(array) if is_bytes else array
+        if name.startswith("stepper."):
+            array = to_bytes(array)
+        arrays[name] = array
     return arrays
 
 
@@ -266,7 +273,7 @@ def _mission_arrays(training: Training) -> dict[str, np.ndarray]:
 
 def _network_arrays(training: Training) -> dict[str, dict[str, torch.Tensor]]:
     """The weights of all networks of a training, by name."""
-    networks = {name: of.state_dict() for name, of in training.learner.networks.items()}
+    networks = {name: state_of.state_dict() for name, state_of in training.learner.networks.items()}
     return networks | {"best": training.best}
 
 
@@ -318,8 +325,9 @@ def _check_state(state: State, space: ScenarioSpace) -> None:
     ]
     for records, ranges in allowed:
         for name, (low, high) in ranges.items():
-            # A truth value of a file may be any byte.
-            values = records[name].view(np.uint8) if name in truths else records[name]
+            values = records[name]
+            if name in truths:  # in a file, any byte may stand for one
+                values = values.view(np.uint8)
             if not ((values >= low) & (values <= high)).all():
                 raise ValueError(f"{name} is out of range")
 

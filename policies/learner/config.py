@@ -268,8 +268,8 @@ class TrainingConfig(_Settings):
         Raises:
             InputError: If one of them does not exist or is not valid.
         """
-        given = (of_evaluations and self.evaluation_seas) or self.seas or (self.scenario,)
-        return [load_scenario(name, **self.set) for part in given for name in _names_in(part)]
+        parts = (of_evaluations and self.evaluation_seas) or self.seas or (self.scenario,)
+        return [load_scenario(name, **self.set) for part in parts for name in _names_in(part)]
 
 
 def _names_in(part: str) -> list[str]:
@@ -355,11 +355,15 @@ def resume_command(config: TrainingConfig, name: str, out: Path, device: str = "
     except InputError:  # only its path is unknown
         original = config
     words = ["dess", "train", name, "--out", str(out)]
-    words += ["--seed", str(config.seed)] if config.seed != original.seed else []
-    words += ["--scenario", config.scenario] if config.scenario != original.scenario else []
+    if config.seed != original.seed:
+        words += ["--seed", str(config.seed)]
+    if config.scenario != original.scenario:
+        words += ["--scenario", config.scenario]
     for key, value in config.set.items():
-        words += ["--set", f"{key}={toml_value(value)}"] if original.set.get(key) != value else []
-    words += [] if device == "auto" else ["--device", device]
+        if original.set.get(key) != value:
+            words += ["--set", f"{key}={toml_value(value)}"]
+    if device != "auto":
+        words += ["--device", device]
     return shlex.join([*words, "--resume"])
 
 
@@ -425,16 +429,19 @@ def field_ranges(spaces: Iterable[ScenarioSpace]) -> dict[str, list[float]]:
 
     Left out is what decides nothing, as rewards, or cannot be compared by a range, as the map.
     """
-    found: dict[str, list[float]] = {}
+    ranges: dict[str, list[float]] = {}
     for space in spaces:
         for field in space.numeric:
             if field in _PLACES or "reward" in field:
                 continue
-            value = space.charging_pads if field == "pads" else space.value(field)
-            ends = [*(value if isinstance(value, tuple) else (value, value))]
-            ends += found.get(field, [])
-            found[field] = [min(ends), max(ends)]
-    return found
+            value = space.value(field)
+            if field == "pads":
+                value = space.charging_pads
+            if not isinstance(value, tuple):
+                value = (value,)
+            values = [*value, *ranges.get(field, [])]
+            ranges[field] = [min(values), max(values)]
+    return ranges
 
 
 def read_description(folder: Path) -> Description:

@@ -69,8 +69,8 @@ class ReplayMemory:
     @staticmethod
     def count_bytes(capacity: int, num_envs: int, uavs: int, nodes: int) -> int:
         """The size of such a memory [bytes]."""
-        one = ReplayMemory(1, 1, uavs, nodes)
-        return capacity * num_envs * sum(array.nbytes for array in one.arrays.values())
+        smallest = ReplayMemory(1, 1, uavs, nodes)
+        return capacity * num_envs * sum(array.nbytes for array in smallest.arrays.values())
 
     def add_slot(self, states: CompactStates, *outcome: np.ndarray) -> None:
         """Add one slot of all environments.
@@ -81,10 +81,10 @@ class ReplayMemory:
                 truncated.
         """
         first = self.count % self.capacity * self.num_envs
-        here = slice(first, first + self.num_envs)
+        rows = slice(first, first + self.num_envs)
         with np.errstate(over="ignore"):  # an infinite reward ends the training with a message
             for ring, new in zip(self.arrays.values(), (*states, *outcome), strict=True):
-                ring[here] = new
+                ring[rows] = new
         self.count += 1
 
     def draw_batch(
@@ -135,8 +135,8 @@ class ReplayMemory:
         later = np.empty(size, np.int64)
         reward = np.empty(size, np.float32)
         factor = np.empty(size, np.float32)
-        known = (self.arrays[name] for name in ("reward", "terminated", "truncated"))
-        _compute_returns(row, uav, n_step, discount, self.num_envs, *known, later, reward, factor)
+        stored = (self.arrays[name] for name in ("reward", "terminated", "truncated"))
+        _compute_returns(row, uav, n_step, discount, self.num_envs, *stored, later, reward, factor)
         action = self.arrays["action"][row, uav].astype(np.int64)
         return Batch(self._states, row, later, uav, action, reward, factor)
 
@@ -201,7 +201,9 @@ class DQNLearner(training.Learner):
     ):
         self.observation = observation
         self.target = copy.deepcopy(network).requires_grad_(False)
-        average = copy.deepcopy(self.target) if config.average_rate < 1.0 else None
+        average = None
+        if config.average_rate < 1.0:
+            average = copy.deepcopy(self.target)
         super().__init__(config, device, online=network, target=self.target, average=average)
 
     def action_values(

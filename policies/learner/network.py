@@ -141,16 +141,17 @@ class SetNetwork(nn.Module):
             precision: Of the hidden layers, float32 or bfloat16.
         """
         super().__init__()
-        (own,), (_, action), *sets = shapes
+        (own_inputs,), (_, action_inputs), *sets = shapes
         nodes, others, joint = hidden
         self.precision = precision
         widths = (nodes, others, others)
         columns = [shape[-1] for shape in sets[::2]]
         self.sets = nn.ModuleList(
-            _Pool(own, of_row, width, joint) for of_row, width in zip(columns, widths, strict=True)
+            _Pool(own_inputs, of_row, width, joint)
+            for of_row, width in zip(columns, widths, strict=True)
         )
-        self.own = nn.Linear(own, joint)
-        self.action = nn.Linear(action, joint, bias=False)
+        self.own = nn.Linear(own_inputs, joint)
+        self.action = nn.Linear(action_inputs, joint, bias=False)
         self.state = nn.Linear(joint, joint)
         self.hidden = nn.Linear(joint, joint // 2)
         self.value = nn.Linear(joint, 1)
@@ -160,15 +161,15 @@ class SetNetwork(nn.Module):
         """The values (R, 5) of the actions, from the arrays of ``Sets.encode``."""
         with _hidden_precision(self, self.precision, own):
             state = self.own(own)
-            each = self.action(actions)
+            hidden = self.action(actions)
             for number, pool in enumerate(self.sets):
                 of_all, of_moves = pool(own, *sets[2 * number : 2 * number + 2])
                 state += of_all
-                each[:, :4] += of_moves
+                hidden[:, :4] += of_moves
             state = torch.relu_(state)
-            each = torch.relu_(each.add_(self.state(state)[:, None]))
-            each = torch.relu_(self.hidden(each))
-        advantage = self.advantage(each.to(self.value.weight.dtype)).squeeze(2)
+            hidden = torch.relu_(hidden.add_(self.state(state)[:, None]))
+            hidden = torch.relu_(self.hidden(hidden))
+        advantage = self.advantage(hidden.to(self.value.weight.dtype)).squeeze(2)
         value = self.value(state.to(self.value.weight.dtype))
         return value + advantage - advantage.mean(1, keepdim=True)
 
@@ -206,9 +207,9 @@ class _Pool(nn.Module):
 
     def value_of_rows(self, own: Tensor, rows: Tensor) -> Tensor:
         """What each of (R, N, columns) rows is worth (R, N, C), of which the highest counts."""
-        each = torch.relu_(self.inputs(rows).add_(self.context(own)[:, None]))
-        each = torch.relu_(self.layer(each))
-        return torch.relu_(self.values(each))
+        hidden = torch.relu_(self.inputs(rows).add_(self.context(own)[:, None]))
+        hidden = torch.relu_(self.layer(hidden))
+        return torch.relu_(self.values(hidden))
 
 
 def highest_products(values: Tensor, factors: Tensor) -> Tensor:

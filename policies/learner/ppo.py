@@ -119,14 +119,16 @@ class ProximalLearner(training.Learner):
                 before.
         """
         rows = sum(len(part.actions) for part in parts)
-        learns = [*self.critic.parameters(), *(self.online.parameters() if decides else ())]
+        learns = [*self.critic.parameters()]
+        if decides:
+            learns += self.online.parameters()
 
         def of_part(part: Decisions) -> tuple[torch.Tensor, ...]:
             loss, values = self._compute_loss(part, temperature, decides)
             gradients = torch.autograd.grad(loss / rows, learns, materialize_grads=True)
             return loss.detach() / rows, values.detach().sum() / rows, *gradients
 
-        sums = [torch.stack(each).sum(0) for each in zip(*map(of_part, parts), strict=True)]
+        sums = [torch.stack(of_parts).sum(0) for of_parts in zip(*map(of_part, parts), strict=True)]
         loss, mean, *gradients = sums
         for weight, gradient in zip(learns, gradients, strict=True):
             weight.grad = gradient
@@ -214,9 +216,9 @@ class ProximalTraining(training.Training):
         shown = [d._replace(advantages=d.advantages / spread) for d in shown]
         rate = training.interpolate_ends(self.phase.learning_rate, share)
         decides = self.tick - self.phase_start >= config.learning_starts
-        each = max(config.batch // len(shown), 1)
+        per_sea = max(config.batch // len(shown), 1)
         for _ in range(config.updates):
-            rows = [generator.integers(0, len(d.actions), each) for d in shown]
+            rows = [generator.integers(0, len(d.actions), per_sea) for d in shown]
             parts = [d.select_rows(chosen) for d, chosen in zip(shown, rows, strict=True)]
             self.losses.append(
                 self.learner.update_networks(parts, self.phase.temperature, rate, decides)
@@ -248,8 +250,8 @@ class ProximalTraining(training.Training):
         while missions["active"].any():
             states, at, uavs = training.find_acting_uavs(stepper, config.guard)
             actions = np.full(states.uavs.shape[:2], HOVER)
-            actions[at, uavs], *known = self._draw_actions(encoder, states, at, uavs, generator)
-            decided.append((np.full(len(at), len(seen)), at, uavs, actions[at, uavs], *known))
+            actions[at, uavs], *judged = self._draw_actions(encoder, states, at, uavs, generator)
+            decided.append((np.full(len(at), len(seen)), at, uavs, actions[at, uavs], *judged))
             seen.append(states)
             outcome = stepper.step(actions)
             collected.append(collected[-1] + outcome["team_collected"].max(1))
@@ -286,8 +288,8 @@ class ProximalTraining(training.Training):
         centred = (advantages - advantages.mean()).astype(np.float32)
         returns = (advantages + values).astype(np.float32)
         rows = slots * len(records) + missions
-        known = Decisions(encoder, states, rows, uavs, actions, likelihoods, centred, returns)
-        return known.select_rows(np.flatnonzero(masks(states, rows, uavs).sum(1) > 1))
+        decisions = Decisions(encoder, states, rows, uavs, actions, likelihoods, centred, returns)
+        return decisions.select_rows(np.flatnonzero(masks(states, rows, uavs).sum(1) > 1))
 
     @torch.inference_mode()
     def _draw_actions(
@@ -301,15 +303,15 @@ class ProximalTraining(training.Training):
         """Actions drawn from the policy, logarithms of their probabilities, and values."""
         allowed = masks(states, missions, uavs)
         noise = -np.log(-np.log(generator.random(allowed.shape)))
-        found: list[Any] = []
+        batches: list[Any] = []
         for first in range(0, len(uavs), ROWS):
             rows = slice(first, first + ROWS)
             parts = encoder.encode(states, missions[rows], uavs[rows])
             judged = self.learner.judge_actions(parts, allowed[rows], self.phase.temperature)
-            found.append([part.cpu().numpy() for part in judged])
-        if not found:
+            batches.append([part.cpu().numpy() for part in judged])
+        if not batches:
             return np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros(0, np.float32)
-        likelihoods, values = map(np.concatenate, zip(*found, strict=True))
+        likelihoods, values = map(np.concatenate, zip(*batches, strict=True))
         drawn = (likelihoods + noise).argmax(1)
         return drawn, likelihoods[np.arange(len(drawn)), drawn], values
 

@@ -92,7 +92,9 @@ def estimate_sizes(config: TrainingConfig) -> Sizes:
         # Missions with charging last about twice as long as it takes to fill the quota.
         needed = ceil(space.quota / space.communication_slots) or space.max_slots
         flown = min(2 * needed, space.max_slots)
-        slots = config.replay if has_replay else flown
+        slots = flown
+        if has_replay:
+            slots = config.replay
         missions = config.num_envs
         missions *= config.seas_per_tick
         return ReplayMemory.count_bytes(slots, missions, space.uavs[1], len(space.nodes))
@@ -109,10 +111,11 @@ def estimate_sizes(config: TrainingConfig) -> Sizes:
     state = MISSION.itemsize + fleet * UAV.itemsize + 8 * nodes
     evaluation = config.evaluation_missions * (MISSION_RECORD.itemsize + fleet * 8 * 8)
     losses = _LOSS * config.updates * min(config.evaluate_every, config.ticks)
-    held = 6 * 4 * weights + len(spaces) * config.num_envs * state
-    times = 2 if config.checkpoint_replay and has_replay else 1
-    held = 2 * held + times * missions
-    return Sizes(missions, held + 4 * weights + 4 * rows * row + evaluation + losses)
+    state_bytes = 6 * 4 * weights + len(spaces) * config.num_envs * state
+    state_bytes = 2 * state_bytes + missions
+    if config.checkpoint_replay and has_replay:
+        state_bytes += missions
+    return Sizes(missions, state_bytes + 4 * weights + 4 * rows * row + evaluation + losses)
 
 
 def train(

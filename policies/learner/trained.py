@@ -83,7 +83,9 @@ def read_arrays(path: Path, limit: int) -> tuple[Arrays, dict[str, str]]:
 
 def describe_damage(path: Path, error: Exception) -> InputError:
     """What is said about a file that cannot be read."""
-    problem = f"numbers of the type {error}" if isinstance(error, KeyError) else error
+    problem = str(error)
+    if isinstance(error, KeyError):
+        problem = f"numbers of the type {error}"
     return InputError(f"{path}: damaged: {problem}; allowed: a safetensors file")
 
 
@@ -242,9 +244,9 @@ def save_policy(
     content = save(_make_contiguous(weights), {"format": str(FORMAT)})
     sums = [_hash_content(content)]
     with suppress(Missing):
-        held = _hash_content(read_bytes(folder / MODEL, MODEL_LIMIT))
+        sum_before = _hash_content(read_bytes(folder / MODEL, MODEL_LIMIT))
         write_file(
-            folder / CONFIG, _write_description(description, [*dict.fromkeys([*sums, held])])
+            folder / CONFIG, _write_description(description, [*dict.fromkeys([*sums, sum_before])])
         )
     write_file(folder / MODEL, content)
     write_file(folder / CONFIG, _write_description(description, sums))
@@ -310,7 +312,9 @@ def _make_cached_policy(folder: Path, content: bytes, text: str) -> LearnedPolic
     policy.weights = hash_arrays([config.observation, config.guard, values], weights)
     ticks = description.run.ticks
     if ticks is not None and ticks < config.ticks:
-        name = config.name if config.name in config_names() else "CONFIG"
+        name = config.name
+        if name not in config_names():
+            name = "CONFIG"
         _log_once(
             f"{folder}: this training is not finished ({ticks:,} of {config.ticks:,} ticks); the "
             "policy acts with the weights that it has so far; continue with "

@@ -53,8 +53,8 @@ class Learner:
     def __init__(self, config: TrainingConfig, device: torch.device, **networks: nn.Module | None):
         self.config = config
         self.device = device
-        made = {name: each for name, each in networks.items() if each is not None}
-        self.networks = {name: each.to(device) for name, each in made.items()}
+        present = {name: network for name, network in networks.items() if network is not None}
+        self.networks = {name: network.to(device) for name, network in present.items()}
         self.online = self.networks["online"]
         self.average = self.networks.get("average")
         self.reset_optimizers()
@@ -231,14 +231,11 @@ class Training:
         spaces = [
             self._in_phase(space) for space in self.config.mission_spaces(of_evaluations=True)
         ]
-        return simulate_batch(
-            [spaces[mission % len(spaces)] for mission in missions]
-            if len(spaces) > 1
-            else spaces[0],
-            self.make_policy(self.learner.evaluated.state_dict()),
-            self.config.evaluation_seed,
-            missions,
-        ).missions
+        policy = self.make_policy(self.learner.evaluated.state_dict())
+        of_missions: Any = spaces[0]
+        if len(spaces) > 1:
+            of_missions = [spaces[mission % len(spaces)] for mission in missions]
+        return simulate_batch(of_missions, policy, self.config.evaluation_seed, missions).missions
 
     def _make_row(self, records: np.ndarray, average: float, is_best: bool) -> dict[str, Any]:
         """A row of the curve: progress, metrics of an evaluation, metrics and losses since."""
@@ -258,8 +255,9 @@ class Training:
         if self.finished:
             finished = np.concatenate(self.finished)
             row |= {f"training_{name}": float(finished[name].mean()) for name in METRICS}
-        for name in self.losses[-1] if self.losses else ():
-            row[name] = float(torch.stack([loss[name] for loss in self.losses]).mean())
+        if self.losses:
+            for name in self.losses[-1]:
+                row[name] = float(torch.stack([loss[name] for loss in self.losses]).mean())
         return row
 
 

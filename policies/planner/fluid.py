@@ -212,7 +212,9 @@ def planned_slots(mission):
 def _slots_until_data(mission):
     """The slots after which an emptied node has data again."""
     slots = _HALF_A_PACKET / mission.arrival_rate  # infinite at a rate of 0
-    return int(math.ceil(slots)) if slots < NEVER else NEVER
+    if slots < NEVER:
+        return int(math.ceil(slots))
+    return NEVER
 
 
 @inlined
@@ -400,15 +402,15 @@ def _collect_data(mission, rates, sea, v, t, wait, data_left):
             break
         if t < node.since:
             continue
-        held = node.base + rate * t
+        data = node.base + rate * t
         amount = c.rate * v.rate
-        if left * amount < held:
+        if left * amount < data:
             node.base -= left * amount
             collected += left * amount
             return collected
         # the communication slot in which a node is emptied has no time for another one
-        left -= int(math.ceil(held / amount))
-        collected += held
+        left -= int(math.ceil(data / amount))
+        collected += data
         node.base = -rate * t
         node.since = t + wait
     is_empty = rate * mission.nodes < _SOME_ARRIVE and data_left - collected < _NOTHING
@@ -431,10 +433,12 @@ def _penalty_for_unplanned_charge(mission, v, active, data_left):
 @inlined
 def _action_towards(chart, v, x, y, turned):
     """The action of a shortest way to a cell, along y first if ``turned``; or Hover."""
-    along_x = 1 if x > v.x else 3 if x < v.x else HOVER
-    along_y = 2 if y > v.y else 0 if y < v.y else HOVER
-    first, second = (along_y, along_x) if turned else (along_x, along_y)
-    first = second if first == HOVER else first
+    first = _action_along_x(v, x)
+    second = _action_along_y(v, y)
+    if turned:
+        first, second = second, first
+    if first == HOVER:
+        first = second
     if chart.ways.size == 0 or first == HOVER or _is_nearer(chart, v, x, y, first):
         return first
     if _is_nearer(chart, v, x, y, second):
@@ -442,6 +446,26 @@ def _action_towards(chart, v, x, y, turned):
     for action in range(HOVER):
         if _is_nearer(chart, v, x, y, action):
             return action
+    return HOVER
+
+
+@inlined
+def _action_along_x(v, x):
+    """The action towards a column; Hover in it."""
+    if x > v.x:
+        return 1
+    if x < v.x:
+        return 3
+    return HOVER
+
+
+@inlined
+def _action_along_y(v, y):
+    """The action towards a row; Hover in it."""
+    if y > v.y:
+        return 2
+    if y < v.y:
+        return 0
     return HOVER
 
 

@@ -156,19 +156,23 @@ def _choose_actions(
         i = rows_uav[row]
         mission = missions[b]
         team = uavs[b]
-        made = memory.made[b]
+        planned_for = memory.made[b]
         plan = fluid.Plan(memory.waypoints[b], memory.lengths[b])
         slot = np.uint64(mission.slot + 1)
-        is_same = made[0] == mission.seed and made[1] == np.uint64(mission.replication)
-        if not is_same or made[2] != slot:
-            is_new = not is_same or not 0 < made[2] < slot
+        is_same = planned_for[0] == mission.seed and planned_for[1] == np.uint64(
+            mission.replication
+        )
+        if not is_same or planned_for[2] != slot:
+            is_new = not is_same or not 0 < planned_for[2] < slot
             steps, hottest = (budget.new, _NEW) if is_new else (budget.again, _AGAIN)
             steps = (steps + mission.uavs - 1) // mission.uavs
             if workspace.course[TRIED] == 0:
                 if is_new:
                     _write_first_plan(mission, team, residual[b].sum(), rates.chart, plan)
                     memory.surplus[b] = 0.0
-                elif _departs_from_plan(mission, team, residual[b], memory, b, slot - made[2]):
+                elif _departs_from_plan(
+                    mission, team, residual[b], memory, b, slot - planned_for[2]
+                ):
                     memory.surplus[b] = 0.0
                 else:
                     steps = 0
@@ -188,9 +192,9 @@ def _choose_actions(
                 memory.sea[b, k] = ahead.sea[ahead.last[0], k].base
             for j in range(mission.uavs):
                 memory.first[b, j] = ahead.team[ahead.last[0], j]
-            made[0] = mission.seed
-            made[1] = np.uint64(mission.replication)
-            made[2] = slot
+            planned_for[0] = mission.seed
+            planned_for[1] = np.uint64(mission.replication)
+            planned_for[2] = slot
         action = memory.first[b, i].action
         if _must_charge_here(
             mission, team[i], residual[b].sum(), plan.waypoints[i], plan.lengths[i]

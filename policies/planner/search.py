@@ -145,10 +145,10 @@ def _first_unplanned(mission, present, trial):
     """The first slot after the last charge of a UAV in one plan, if it is another in the other."""
     slot = fluid.NEVER
     for i in range(mission.uavs):
-        one = fluid.last_charge(present, i)
-        other = fluid.last_charge(trial, i)
-        if one != other:
-            slot = min(slot, present.waypoints[i, min(one, other) + 1].begun)
+        charge = fluid.last_charge(present, i)
+        other_charge = fluid.last_charge(trial, i)
+        if charge != other_charge:
+            slot = min(slot, present.waypoints[i, min(charge, other_charge) + 1].begun)
     return slot
 
 
@@ -235,7 +235,9 @@ def _edit_plan(mission, uavs, nodes, chart, flight, plan, words):
 def _nearer_cell(w, one, other):
     """The nearer one of two cells to a waypoint."""
     is_first = abs(one[0] - w.x) + abs(one[1] - w.y) <= abs(other[0] - w.x) + abs(other[1] - w.y)
-    return (one[0], one[1]) if is_first else (other[0], other[1])
+    if is_first:
+        return one[0], one[1]
+    return other[0], other[1]
 
 
 @kernel
@@ -265,7 +267,9 @@ def _move_waypoints(chart, flight, plan, i, p, j, words):
     is_reversed = words[0] & np.uint64(1) == np.uint64(1)
     for number in range(count):
         x, y, stay, turned = moved[number]
-        fluid.insert_waypoint(plan, j, q if is_reversed else q + number, x, y, stay, turned)
+        fluid.insert_waypoint(plan, j, q, x, y, stay, turned)
+        if not is_reversed:
+            q += 1
     return slot
 
 
@@ -286,22 +290,22 @@ def _swap_between_uavs(plan, i, p, j, q):
 def _swap_tails(plan, i, p, j, q):
     """Swap all waypoints of UAV ``i`` from ``p`` on with those of UAV ``j`` from ``q`` on."""
     slot = min(plan.waypoints[i, p].begun, plan.waypoints[j, q].begun)
-    own = plan.lengths[i] - p
-    other = plan.lengths[j] - q
-    count = max(own, other)
+    tail = plan.lengths[i] - p
+    other_tail = plan.lengths[j] - q
+    count = max(tail, other_tail)
     charges = 0
     if j == i or max(p, q) + count > fluid.MOST_WAYPOINTS:
         return _NO_EDIT
-    for number in range(own):
+    for number in range(tail):
         charges += plan.waypoints[i, p + number].stay == fluid.CHARGE
-    for number in range(other):
+    for number in range(other_tail):
         charges -= plan.waypoints[j, q + number].stay == fluid.CHARGE
     if charges != 0:
         return _NO_EDIT
     for number in range(count):
         _swap_waypoints(plan.waypoints[i, p + number], plan.waypoints[j, q + number])
-    plan.lengths[i] = p + other
-    plan.lengths[j] = q + own
+    plan.lengths[i] = p + other_tail
+    plan.lengths[j] = q + tail
     return slot
 
 

@@ -84,10 +84,13 @@ def sweep(
     from dess.analysis.ask.sweep import Sweep
     from dess.analysis.metrics import ALIASES, PRODUCT, SUCCESS, column_as_told
 
+    policies = None
+    if policy:
+        policies = [name for text in policy for name in text.split(",")]
     question = sweep_question(
         options.parse_all_values(settings or []),
         scenario,
-        [name for text in policy for name in text.split(",")] if policy else None,
+        policies,
         missions,
         seed,
         options.parse_all_settings(map(_with_quotes, price or []), "--price", PRICE),
@@ -101,14 +104,15 @@ def sweep(
         allowed = one_of(metric, [*ALIASES, *measured])
         raise InputError(f"--metric: {shown(metric)} is not measured{allowed}")
     page = f"{PREFIX}{question.study.name}"
-    found = _run_question(question, page, out, workers, dry_run, yes)
-    answer = Sweep(question, found)
-    parameters = {"metric": ranking} if metric else {}
-    changes = (
-        around.question_around(found, question.study.scenario) if question.study.selection else None
-    )
-    if changes:
-        _run_question(changes, page, out, workers, dry_run, yes)
+    results_of_sweep = _run_question(question, page, out, workers, dry_run, yes)
+    answer = Sweep(question, results_of_sweep)
+    parameters = {}
+    if metric:
+        parameters["metric"] = ranking
+    if question.study.selection:
+        changes = around.question_around(results_of_sweep, question.study.scenario)
+        if changes:
+            _run_question(changes, page, out, workers, dry_run, yes)
 
     def render(progress: "Progress") -> Path:
         from dess.reports.pages.render import render_study
@@ -118,7 +122,7 @@ def sweep(
     tables = {"table": answer.table(ranking)}
     if question.study.selection:
         tables["fleets"] = answer.fleets()
-        show = partial(_print_fleets, answer, ranking if metric else SUCCESS)
+        show = partial(_print_fleets, answer, parameters.get("metric", SUCCESS))
     else:
         show = partial(_print_settings, answer, ranking)
     _print_answer(answer, answer.answers(ranking), tables, show, render, as_json, "sweep")
@@ -169,7 +173,7 @@ def what_if(
     fixed = options.parse_all_settings(baseline or [], "--baseline")
     question = what_if_question(changes, fixed, scenario, policy, missions, seed, results)
     check_shown(question, shown)
-    found = _run_question(question, WHAT_IF, out, workers, dry_run, yes)
+    results_of_pair = _run_question(question, WHAT_IF, out, workers, dry_run, yes)
     parameters = {
         "settings": changes,
         "baseline": fixed,
@@ -186,7 +190,7 @@ def what_if(
         render([WHAT_IF], results, out, progress, parameters)
         return out / f"{WHAT_IF}.html"
 
-    answer = WhatIf(question, found, shown or best_policy(found, VARIATION))
+    answer = WhatIf(question, results_of_pair, shown or best_policy(results_of_pair, VARIATION))
     show = partial(_print_measures, answer)
     tables = {"table": answer.table()}
     _print_answer(answer, answer.answers(), tables, show, render, as_json, "what-if question")
@@ -266,11 +270,11 @@ def _print_settings(answer: "Sweep", ranking: str) -> None:
     if prices:
         cells[COST] = [numbers.format_money(cost, prices.currency) for cost in top[COST]]
     console.print_table([*map(str, cells)], cells.astype(str).to_numpy().tolist())
-    first = f", the first {SHOWN} are shown" if len(table) > SHOWN else ""
+    settings = f"{len(table):,} settings"
+    if len(table) > SHOWN:
+        settings += f", the first {SHOWN} are shown"
     what = metric_of(ranking).within
-    console.print_text(
-        f"{len(table):,} settings{first}; ≈: the {what} may be as good as that of the first"
-    )
+    console.print_text(f"{settings}; ≈: the {what} may be as good as that of the first")
 
 
 def _print_fleets(answer: "Sweep", further: str) -> None:
@@ -289,9 +293,11 @@ def _print_fleets(answer: "Sweep", further: str) -> None:
     rows = cheapest.fleet_rows(results)
     cells = cheapest.fleet_cells(results, cheapest.shown_rows(rows, SHOWN), further)
     print_frame("Fleet", cells.set_index("Fleet"))
-    shown = f", {SHOWN} of them shown" if len(rows) > SHOWN else ""
+    pairs = f"{len(rows):,} pairs of a fleet and a policy"
+    if len(rows) > SHOWN:
+        pairs += f", {SHOWN} of them shown"
     console.print_text(
-        f"{len(rows):,} pairs of a fleet and a policy{shown}, the cheapest first; required: "
+        f"{pairs}, the cheapest first; required: "
         f"{requirements_in_words(requirements_of(results))}; {cheapest.VERDICTS_EXPLAINED}"
     )
     if around.is_known(results):
@@ -311,4 +317,6 @@ def _with_quotes(text: str) -> str:
     key, _, value = text.partition("=")
     is_text = key.strip() == "currency" or (key.strip() == "age" and value.strip(" .0123456789"))
     quoted = not is_text or value.strip().startswith(("'", '"'))
-    return text if quoted else f"{key}={json.dumps(value)}"
+    if quoted:
+        return text
+    return f"{key}={json.dumps(value)}"

@@ -66,9 +66,12 @@ def print_system_error(error: OSError | SystemExit) -> int:
         return 1
     place = error.filename or " and ".join(broken)
     reason = error.strerror or str(error)
-    line = f"dess: error: {place}: {reason}" if place else f"dess: error: {reason}"
-    is_long = error.errno == errno.ENAMETOOLONG  # such a name is bad input
-    return print_failure(f"{line}; allowed: another path" if is_long else line, 2 if is_long else 1)
+    line = f"dess: error: {reason}"
+    if place:
+        line = f"dess: error: {place}: {reason}"
+    if error.errno == errno.ENAMETOOLONG:  # such a name is bad input
+        return print_failure(f"{line}; allowed: another path", 2)
+    return print_failure(line, 1)
 
 
 def print_failure(message: str, code: int) -> int:
@@ -121,7 +124,7 @@ def ask_questions(
     """
     for name, answer in given.items():
         check(name, answer)
-    found = dict(given)
+    answered = dict(given)
     asked = [name for name in questions if name not in given]
     missing = [name for name in asked if questions[name][1] is None]
     if missing and not sys.stdin.isatty():
@@ -130,13 +133,15 @@ def ask_questions(
     while asked:
         name = asked[0]
         meaning, default = questions[asked[0]]
-        answer = input(f"{name}: {meaning}? ").strip() if sys.stdin.isatty() else ""
+        answer = ""
+        if sys.stdin.isatty():
+            answer = input(f"{name}: {meaning}? ").strip()
         try:
             check(name, answer or default or "")
-            found[asked.pop(0)] = answer or default or ""
+            answered[asked.pop(0)] = answer or default or ""
         except InputError as error:
             print_text(error, sys.stderr)
-    return found
+    return answered
 
 
 @contextmanager
@@ -238,8 +243,10 @@ def progress_bar(unit: str, total: int = 0) -> Iterator[Any]:
     from tqdm import tqdm
 
     is_terminal = sys.stderr.isatty()
-    delay, interval = (1, 0.1) if is_terminal else (10, 10)
-    with tqdm(total=total, unit=unit, delay=delay, mininterval=interval) as progress:
+    times: dict[str, float] = {"delay": 10, "mininterval": 10}
+    if is_terminal:
+        times = {"delay": 1, "mininterval": 0.1}
+    with tqdm(total=total, unit=unit, **times) as progress:
         before = ""
 
         def begin() -> None:
@@ -367,8 +374,10 @@ def _mission_bar() -> "Iterator[tuple[Progress, Announce]]":
             elif started.number:
                 shown.set_description(f"round {started.number + 1}", refresh=False)
             else:
-                present = f", {started.present:,} of them present" if started.present else ""
-                print_text(f"{started.missions:,} missions{present}", sys.stderr)
+                line = f"{started.missions:,} missions"
+                if started.present:
+                    line += f", {started.present:,} of them present"
+                print_text(line, sys.stderr)
             shown.total = started.missions
             shown.initial += started.present  # took no time
 

@@ -81,8 +81,8 @@ def evaluate(
             "seconds": evaluation.seconds,
         }
         | {
-            name: of.interval(metric_for_length(name, space.max_slots, space.units))._asdict()
-            for name, of in evaluation.moments.items()
+            name: moments.interval(metric_for_length(name, space.max_slots, space.units))._asdict()
+            for name, moments in evaluation.moments.items()
         }
         | {name: unknown for name in measures_of(space) if name not in evaluation.moments}
         for evaluation in evaluations
@@ -122,16 +122,20 @@ def _replace_nan(row: Any) -> Any:
     """A row in which null stands for nan, which JSON does not have."""
     if isinstance(row, dict):
         return {name: _replace_nan(value) for name, value in row.items()}
-    return None if row != row else row
+    if row != row:
+        return None
+    return row
 
 
 def _print_rows(rows: list[dict[str, Any]]) -> None:
     from dess.analysis.metrics import column_as_told
 
     for row in rows:
-        metrics = {name: of for name, of in row.items() if isinstance(of, dict)}
+        metrics = {name: estimate for name, estimate in row.items() if isinstance(estimate, dict)}
         metrics = {
-            name: of for name, of in metrics.items() if column_as_told(name, metrics) == name
+            name: estimate
+            for name, estimate in metrics.items()
+            if column_as_told(name, metrics) == name
         }
         cells = [[name, *(f"{x:.4f}" for x in value.values())] for name, value in metrics.items()]
         console.print_table([row["policy"], "mean", "low", "high"], cells)

@@ -46,18 +46,18 @@ def show_policy(
     """
     from dess.policies.registry import describe_policy
 
-    found = describe_policy(name)
+    about = describe_policy(name)
     if as_json:
-        print(json.dumps(found._asdict(), indent=2))
+        print(json.dumps(about._asdict(), indent=2))
         return
-    any_place = "any scenario" if not found.requires else f"only {_print_settings(found.requires)}"
-    console.print_text(f"{found.name}: {found.origin} ({found.code})")
+    any_place = "any scenario" if not about.requires else f"only {_print_settings(about.requires)}"
+    console.print_text(f"{about.name}: {about.origin} ({about.code})")
     console.print_text(
-        f"scenarios: {any_place}; of the shipped ones {', '.join(found.scenarios) or 'none'}"
+        f"scenarios: {any_place}; of the shipped ones {', '.join(about.scenarios) or 'none'}"
     )
-    if found.trained_on:
-        console.print_text(f"trained on: {_print_settings(found.trained_on)}")
-    console.print_text(f"\n{found.card.strip()}")
+    if about.trained_on:
+        console.print_text(f"trained on: {_print_settings(about.trained_on)}")
+    console.print_text(f"\n{about.card.strip()}")
 
 
 @scenarios.callback()
@@ -101,18 +101,19 @@ def show_scenario(
     description = scenario_description(name)
     if as_json:
         rows = [field._asdict() for field in declared_fields(space)]
-        shown = {"scenario": name, "description": description, "fields": rows}
-        units = {"units": space.units._asdict()} if space.units else {}
-        print(json.dumps(shown | units, indent=2))
+        shown: dict[str, Any] = {"scenario": name, "description": description, "fields": rows}
+        if space.units:
+            shown["units"] = space.units._asdict()
+        print(json.dumps(shown, indent=2))
         return
     for text in (description, space.units):
         if text:
             console.print_text(text)
     if everything:
         for f in declared_fields(space):
-            default = (
-                f"default {_format_value(f.default)}" if f.default is not None else "no default"
-            )
+            default = "no default"
+            if f.default is not None:
+                default = f"default {_format_value(f.default)}"
             console.print_text(f"{f.name} = {_format_value(f.value)} {f.unit}".rstrip())
             console.print_text(f"    {f.meaning}; {default}; allowed: {f.allowed}")
         return
@@ -122,11 +123,11 @@ def show_scenario(
     ]
     columns = [*zip(*rows_, strict=True)][:-1]
     rest = console.WIDTH - sum(max(map(len, column)) + 2 for column in columns)
-    lines = [
-        [*(row[:3] if number == 0 else [""] * 3), line]
-        for row in rows_
-        for number, line in enumerate(wrap(row[3], rest))
-    ]
+    lines = []
+    for *cells, meaning in rows_:
+        for line in wrap(meaning, rest):
+            lines.append([*cells, line])
+            cells = [""] * len(cells)
     console.print_table(heads, lines, left=len(heads))
 
 
@@ -154,9 +155,9 @@ def new_scenario(
     if nodes.absolute().parent != path.absolute().parent:
         raise InputError(f"--nodes: {nodes} is in another folder; allowed: a file beside {path}")
     parts = (answer.partition("=") for answer in answers or [])
-    given = {key.strip(): value.strip() for key, _, value in parts}
+    typed_answers = {key.strip(): value.strip() for key, _, value in parts}
     new = NewScenario(nodes)
-    console.ask_questions(given, new.questions(given), new.check)
+    console.ask_questions(typed_answers, new.questions(typed_answers), new.check)
     text = new.text()
     draft = parsed_scenario(text, path, DRAFT)
     on_land = len({*draft.nodes} & {*draft.no_fly})
@@ -204,7 +205,10 @@ def show_study(
     from dess.analysis.study.study import load_study
 
     data = load_study(name).model_dump(mode="json", exclude_none=True)
-    print(json.dumps(data, indent=2) if as_json else tomli_w.dumps(data).strip())
+    if as_json:
+        print(json.dumps(data, indent=2))
+    else:
+        print(tomli_w.dumps(data).strip())
 
 
 def _print_settings(values: dict[str, Any]) -> str:
@@ -215,4 +219,6 @@ def _format_value(value: Any) -> str:
     """A value as TOML has it; of a long list its length."""
     if isinstance(value, list) and len(value) > 4:
         return f"{len(value)} of them"
-    return "" if value is None else json.dumps(value)
+    if value is None:
+        return ""
+    return json.dumps(value)

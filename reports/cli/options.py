@@ -119,9 +119,9 @@ def read_docstring(function: Callable) -> str:
     """The docstring of a function, also under ``python -OO``, which leaves it out."""
     if sys.flags.optimize < 2:
         return getdoc(function) or ""
-    (found,) = ast.parse(getsource(function)).body
-    assert isinstance(found, ast.FunctionDef)
-    return ast.get_docstring(found) or ""
+    (definition,) = ast.parse(getsource(function)).body
+    assert isinstance(definition, ast.FunctionDef)
+    return ast.get_docstring(definition) or ""
 
 
 def note_departures(policies: Iterable[str], spaces: "Iterable[ScenarioSpace]") -> None:
@@ -197,7 +197,9 @@ def _quote_quantities(value: str, is_single: bool = True) -> str:
 
 
 def _with_quotes(text: str) -> str:
-    return json.dumps(text.strip()) if text.strip() else text
+    if not text.strip():
+        return text
+    return json.dumps(text.strip())
 
 
 def _find_field(name: str, option: str = SET) -> "FieldInfo":
@@ -227,14 +229,18 @@ def _check_word(name: str, word: str, option: str = SET) -> None:
         return
     if words:
         raise InputError(f"{option}: {name}: {shown(word)} is unknown{one_of(word, words)}")
-    problem = f"is not {kind}" if kind else "has the wrong form"
+    problem = "has the wrong form"
+    if kind:
+        problem = f"is not {kind}"
     raise InputError(f"{option}: {name}: {shown(word)} {problem}; allowed: {form_of(field)}")
 
 
 def _is_plain(value: Any) -> bool:
     """Whether fields and parameters can have a value: dates and nan are not allowed."""
-    if isinstance(value, list | dict):
-        return all(map(_is_plain, value.values() if isinstance(value, dict) else value))
+    if isinstance(value, dict):
+        return all(map(_is_plain, value.values()))
+    if isinstance(value, list):
+        return all(map(_is_plain, value))
     return isinstance(value, str | int) or (isinstance(value, float) and math.isfinite(value))
 
 
@@ -278,18 +284,18 @@ def parse_values(text: str) -> tuple[str, tuple[Any, ...]]:
         _find_field(field)
     if takes_quantities(field):
         values = _quote_quantities(values, is_single=False)
-    elif found := _RANGE.fullmatch(values):
-        return field, list_values(field, _parse_range(field, text, **found.groupdict()))
+    elif match := _RANGE.fullmatch(values):
+        return field, list_values(field, _parse_range(field, text, **match.groupdict()))
     try:
-        given = parse_setting(f"{field}=[{values}]" if equals else text, allowed="")[1]
+        listed = parse_setting(f"{field}=[{values}]" if equals else text, allowed="")[1]
     except InputError:
-        given = [word.strip() for word in values.split(",")]
-        named = [word for word in given if word.replace("-", "_").isidentifier()]
+        listed = [word.strip() for word in values.split(",")]
+        named = [word for word in listed if word.replace("-", "_").isidentifier()]
         for word in named:
             _check_word(field, word)
-        if not equals or len(named) < len(given):
+        if not equals or len(named) < len(listed):
             raise _range_error(text, "is not KEY=VALUES", ALLOWED) from None
-    return field, list_values(field, given)
+    return field, list_values(field, listed)
 
 
 def _parse_range(field: str, text: str, low: str, high: str, count: str | None) -> Any:
@@ -299,8 +305,9 @@ def _parse_range(field: str, text: str, low: str, high: str, count: str | None) 
     first = _parse_number(text, low)
     last = _parse_number(text, high)
     if first > last:
-        number = "" if count is None else f":{count}"
-        turned = f"{field}={high.strip()}..{low.strip()}{number}"
+        turned = f"{field}={high.strip()}..{low.strip()}"
+        if count is not None:
+            turned += f":{count}"
         raise _range_error(text, "begins with the larger number", turned)
     if count is not None:
         return _space_evenly(text, first, last, count, field in INTEGERS)
@@ -317,7 +324,9 @@ def _space_evenly(
     """Evenly spaced numbers, both ends included."""
     from dess.analysis.study.design import MAX_SIZE
 
-    number = int(count) if count.strip().isdecimal() else 0
+    number = 0
+    if count.strip().isdecimal():
+        number = int(count)
     if not 2 <= number <= MAX_SIZE:
         raise _range_error(text, "has no number of values", f"2 to {MAX_SIZE:,} after the colon")
     values = [first + (last - first) * place / (number - 1) for place in range(number)]
@@ -345,9 +354,9 @@ def _range_error(text: str, problem: str, allowed: str) -> InputError:
 
 
 def _refuse_repetition(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    unique: dict[str, Any] = {}
     for key, value in pairs:
-        if key in found:
+        if key in unique:
             raise InputError(f"{option}: {key} is given twice; allowed: once")
-        found[key] = value
-    return found
+        unique[key] = value
+    return unique

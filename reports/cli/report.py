@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -59,7 +59,9 @@ def report(
         figures: Also write every figure as a file into the folder NAME-figures beside its page:
             svg, pdf or png, or several of them.
     """
-    formats = [kind.strip() for kind in figures.split(",")] if figures else []
+    formats = []
+    if figures:
+        formats = [kind.strip() for kind in figures.split(",")]
     for kind in formats:
         if kind not in PICTURES:
             raise InputError(f"--figures: {shown(kind)} is unknown{one_of(kind, PICTURES)}")
@@ -121,8 +123,11 @@ def verify(
 
     from dess.reports.pages.verify import verify_page, verify_results
 
-    seed = secrets.randbelow(2**32) if seed is None else seed
-    check = verify_results if path.is_dir() else verify_page
+    if seed is None:
+        seed = secrets.randbelow(2**32)
+    check: Any = verify_page
+    if path.is_dir():
+        check = verify_results
     with console.compile_notice():
         verdicts = check(path, missions, seed, policy or [], yes)
     if as_json:

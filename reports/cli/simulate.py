@@ -32,6 +32,8 @@ METRICS = (
 )
 
 T = TypeVar("T")
+# The options whose parameter has another name.
+_OPTION_OF = {"settings": "set"}
 app = typer.Typer()
 
 
@@ -123,9 +125,11 @@ def simulate(
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
         others = _metric_values(mission).items()
-        told = _values_in_units(record.measured, mission)
+        in_units = _values_in_units(record.measured, mission)
         metrics |= {k: value for k, value in others if k not in (*asked.names, *metrics, "uavs")}
-        measured = {"operations": told} if record.operations is not None else {}
+        measured = {}
+        if record.operations is not None:
+            measured["operations"] = in_units
         print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
     elif not is_binary:
         _print_mission(mission)
@@ -154,7 +158,8 @@ class _Asked:
     @property
     def names(self) -> dict[str, Any]:
         shown = ["policy", "scenario", "seed", "replication"]
-        shown += ["study", "point"] if self.point is not None else []
+        if self.point is not None:
+            shown += ["study", "point"]
         return {name: getattr(self, name) for name in shown}
 
 
@@ -191,7 +196,9 @@ def _choose_of_study(option: str, given: T | None, there: Sequence[T], allowed: 
     if given is None:
         raise InputError(f"--{option}: the study has {len(there):,}; allowed: one of {allowed}")
     if given not in there:
-        end = one_of(given, map(str, there)) if isinstance(given, str) else f"; allowed: {allowed}"
+        end = f"; allowed: {allowed}"
+        if isinstance(given, str):
+            end = one_of(given, map(str, there))
         raise InputError(f"--{option}: {shown(given)} is not in the study{end}")
     return given
 
@@ -201,7 +208,7 @@ def _refuse_given(context: typer.Context, *names: str) -> None:
     for name in names:
         source = context.get_parameter_source(name)
         if source and source.name != "DEFAULT":
-            option = "set" if name == "settings" else name
+            option = _OPTION_OF.get(name, name)
             raise InputError(f"--{option}: comes from the study; allowed: --of without --{option}")
 
 

@@ -73,8 +73,8 @@ def run(
     from dess.analysis.study.study import load_study
 
     changes = {"missions": missions, "policies": policy}
-    given = {key: value for key, value in changes.items() if value is not None}
-    studies = [load_study(name, **given) for name in names]
+    chosen = {key: value for key, value in changes.items() if value is not None}
+    studies = [load_study(name, **chosen) for name in names]
     if out and len(studies) == 1:
         folders = [out]
     else:
@@ -208,8 +208,8 @@ def _parse_targets(texts: Iterable[str]) -> dict[str, float]:
     targets = {}
     for name, share in options.parse_all_settings(texts, "--target", TARGET).items():
         if (metric := ALIASES.get(name, name)) not in METRICS | MEASURES:
-            known = one_of(name, [*METRICS, *ALIASES, *MEASURES])
-            raise InputError(f"--target: {name!r} is unknown{known}")
+            candidates = one_of(name, [*METRICS, *ALIASES, *MEASURES])
+            raise InputError(f"--target: {name!r} is unknown{candidates}")
         is_number = isinstance(share, int | float) and not isinstance(share, bool)
         if metric in MEASURES and not (is_number and share >= 0):
             raise InputError(f"--target: {name}: {share!r} is not allowed; allowed: 0 or more")
@@ -232,6 +232,9 @@ def _make_tables(
     from dess.analysis.answers.settings.sobol import sobol_indices_of
 
     policy = policy or summary.best_policy(results.missions)
+    costs = pd.DataFrame()
+    if results.study.costs:
+        costs = cost_front(results)
     return {
         "means": means,
         "distributions": summary.product_distributions(results),
@@ -239,7 +242,7 @@ def _make_tables(
         "comparisons": summary.compare_with_best(results),
         "learned_against_heuristic": summary.compare_learned_with_heuristic(results),
         "sensitivities": sobol_indices_of(results),
-        "costs": cost_front(results) if results.study.costs else pd.DataFrame(),
+        "costs": costs,
         "selected": summary.selected_settings(results),
         "gaps": optimality.by_fleet(results),
         "checks": summary.means_of_check(results),
@@ -256,11 +259,13 @@ def _make_document(
     placed = (row for of_table in rows.values() for row in of_table if row.get("point") is not None)
     for row in placed:
         row |= {field: value for field, value in values[row["point"]].items() if field not in row}
-    about = {
+    about: dict[str, Any] = {
         "study": results.study.name,
         "accepted": results.manifest["accepted"],
     }
-    return about | ({"targets": targets} if targets else {}) | rows
+    if targets:
+        about["targets"] = targets
+    return about | rows
 
 
 def _add_field_values(results: "Results", means: "pd.DataFrame") -> "pd.DataFrame":
@@ -291,11 +296,11 @@ def diff(
     from dess.analysis.answers import diff
     from dess.reports.cli.tables import print_diff
 
-    found = diff.diff_results(_load_folder(a), _load_folder(b))
+    differences = diff.diff_results(_load_folder(a), _load_folder(b))
     if as_json:
-        print(json.dumps(_diff_document(found, most), indent=2))
+        print(json.dumps(_diff_document(differences, most), indent=2))
     else:
-        print_diff(found, most)
+        print_diff(differences, most)
 
 
 def _diff_document(found: "Diff", most: int) -> dict:

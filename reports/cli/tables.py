@@ -11,7 +11,16 @@ from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.fleet.costs import setting_cells
 from dess.analysis.answers.settings.points import points_in_words, setting_in_words
 from dess.analysis.answers.settings.sobol import index_table
-from dess.analysis.metrics import EITHER, METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_of
+from dess.analysis.metrics import (
+    EITHER,
+    METRICS,
+    PRODUCT,
+    RATIO,
+    SUCCESS,
+    Metric,
+    measured_in,
+    metric_of,
+)
 from dess.analysis.paper import values
 from dess.analysis.results.tables import Results
 from dess.analysis.tables import comparison_cells, format_counts
@@ -47,10 +56,10 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
     elif len(results.store.manifest.points) == 1:
         _print_means(summary.means_of_points(results), "mean, 95 % interval", printed)
     elif short:
-        few = len(results.store.manifest.points) <= MANY_POINTS
-        _print_by_point(
-            results, summary.means_of_points(results) if few else pd.DataFrame(), [PRODUCT]
-        )
+        of_points = pd.DataFrame()
+        if len(results.store.manifest.points) <= MANY_POINTS:
+            of_points = summary.means_of_points(results)
+        _print_by_point(results, of_points, [PRODUCT])
 
 
 def print_details(
@@ -64,7 +73,9 @@ def print_details(
         everything: Whether the means of all metrics are printed, not of the product alone.
     """
     measured = measured_in({*frames["means"]["metric"]})
-    metrics = [*METRICS, *measured] if everything else [PRODUCT]
+    metrics = [PRODUCT]
+    if everything:
+        metrics = [*METRICS, *measured]
     printers = {
         "sensitivities": lambda table: _print_titled(
             "shares of the collection ratio's variance:",
@@ -100,8 +111,10 @@ def _print_titled(title: str, cells: pd.DataFrame) -> None:
 
 def _print_selections(selected: pd.DataFrame) -> None:
     """The selected point of every policy, and the guarantee of the procedure."""
-    heads = ["condition"] if "condition" in selected and any(selected["condition"]) else []
-    cells = selected.set_index("policy")[[*heads, "setting", "missions", "left"]]
+    columns = ["setting", "missions", "left"]
+    if "condition" in selected and any(selected["condition"]):
+        columns = ["condition", *columns]
+    cells = selected.set_index("policy")[columns]
     cells["missions"] = format_counts(cells["missions"])
     print_frame("selected for", cells)
     for guarantee in dict.fromkeys(selected["guarantee"]):
@@ -171,6 +184,16 @@ def _best_policies(rows: pd.DataFrame) -> pd.Series:
     return may_be.groupby("point")["policy"].agg(" ≈ ".join)
 
 
+def _target_in_words(metric: Metric, end: float) -> str:
+    """A target, as ``success of 0.99 or more``."""
+    bound = f"{metric.within} of {end:g}"
+    if metric.is_told:
+        bound += f" {metric.unit}"
+    if metric.less_is_better:
+        return f"{bound} or less"
+    return f"{bound} or more"
+
+
 def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, float]) -> None:
     """Print the settings that meet targets.
 
@@ -179,11 +202,7 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
         means: Rows of ``summary.add_verdicts`` of these settings.
         targets: Metric -> the least mean.
     """
-    asked = [
-        f"{of.within} of {end:g}{f' {of.unit}' * of.is_told} or "
-        + ("less" if of.less_is_better else "more")
-        for of, end in ((metric_of(metric), end) for metric, end in targets.items())
-    ]
+    asked = [_target_in_words(metric_of(metric), end) for metric, end in targets.items()]
     product = means[means["metric"] == PRODUCT].set_index(["policy", "point"])
     count = f"{len(product):,} of {len(results.store.manifest.points) * len(results.policies):,}"
     meet = "meets" if len(product) == 1 else "meet"
@@ -317,5 +336,7 @@ def _print_most_changed(found: diff.Diff, most: int) -> None:
 
 def _shorten_fields(fields: list[str]) -> str:
     """The first of the fields that differ, and how many more there are."""
-    more = f", and {len(fields) - FIELDS} more" if len(fields) > FIELDS else ""
-    return ", ".join(fields[:FIELDS]) + more
+    first = ", ".join(fields[:FIELDS])
+    if len(fields) > FIELDS:
+        return f"{first}, and {len(fields) - FIELDS} more"
+    return first

@@ -56,11 +56,14 @@ def train(
     from dess.policies.registry import folder_of
 
     fields = dict(parse_setting(text) for text in settings or [])
-    changes: dict[str, Any] = {} if seed is None else {"seed": seed}
+    changes: dict[str, Any] = {}
+    if seed is not None:
+        changes["seed"] = seed
     if scenario is not None:
         changes |= {"scenario": scenario, "seas": (), "evaluation_seas": ()}
     config = load_config(name, fields, **changes)
-    if start and not folder_of(start):
+    start_folder = folder_of(start or "")
+    if start and not start_folder:
         raise InputError(
             f"--from: {shown(start)} is no trained policy; allowed: one, or its folder"
         )
@@ -71,7 +74,9 @@ def train(
     def announce(memory: int) -> None:
         """Print how much memory [bytes] the missions take, and how to see the curves."""
         view = missing("tensorboard", "a live view of the curves")
-        what = "replay memory" if config.algorithm == "dqn" else "missions of a tick"
+        what = "missions of a tick"
+        if config.algorithm == "dqn":
+            what = "replay memory"
         console.print_text(f"{what}: {memory / 2**20:,.0f} MiB", sys.stderr)
         console.print_text(
             view or f"curves: tensorboard --logdir {shlex.quote(str(out / EVENTS))}", sys.stderr
@@ -86,7 +91,7 @@ def train(
                 resume=resume,
                 device=device,
                 accept_size=yes,
-                start=str(folder_of(start)) if start else "",
+                start=str(start_folder or ""),
                 announce=announce,
                 progress=progress,
             )
@@ -125,11 +130,12 @@ def _training_bar(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
             ticks_done = training.tick - first[0]
             seconds = training.seconds - first[1]
             if not is_said and ticks_done >= 2 and seconds > MEASURED:
-                each = seconds / ticks_done
+                seconds_per_tick = seconds / ticks_done
                 is_said = True
-                rest = numbers.format_duration(each * (ticks - training.tick))
+                pace = numbers.format_seconds(seconds_per_tick)
+                rest = numbers.format_duration(seconds_per_tick * (ticks - training.tick))
                 bar.write(
-                    f"on this machine: {numbers.format_seconds(each)} a tick, about {rest} to go",
+                    f"on this machine: {pace} a tick, about {rest} to go",
                     file=sys.stderr,
                 )
             if bar.n == 0:  # a resumed training begins at its tick

@@ -133,13 +133,13 @@ def find_parts(cells: Iterable[NotebookNode]) -> list[dict[str, Any]]:
 
 def split_sections(cells: Iterable[NotebookNode]) -> list[tuple[Markup, list[NotebookNode]]]:
     """Headings as HTML, each taken out of its cell, with the cells below; the first has none."""
-    found: list[tuple[Markup, list[NotebookNode]]] = [(Markup(), [])]
+    sections: list[tuple[Markup, list[NotebookNode]]] = [(Markup(), [])]
     for cell in cells:
         if cell.cell_type == "markdown" and (heading := _HEADING.match(cell.source)):
             cell.source = cell.source[heading.end() :]
-            found.append((Markup(heading[1]), []))
-        found[-1][1].append(cell)
-    return found
+            sections.append((Markup(heading[1]), []))
+        sections[-1][1].append(cell)
+    return sections
 
 
 def section_anchor(heading: Markup) -> str:

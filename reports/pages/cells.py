@@ -51,10 +51,10 @@ def _serve_notebooks() -> None:
     running = set[Connection]()
     while True:
         for number, cells in islice(waiting, AT_ONCE - len(running)):
-            here, there = Pipe(duplex=False)
-            Process(target=_run_cells, args=(number, cells, there)).start()
-            there.close()
-            running.add(here)
+            receiver, sender = Pipe(duplex=False)
+            Process(target=_run_cells, args=(number, cells, sender)).start()
+            sender.close()
+            running.add(receiver)
         if not running:
             return
         ready = wait(running)

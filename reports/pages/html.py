@@ -100,7 +100,9 @@ def load_template(name: str, **filters: Callable[..., str]) -> Template:
         **filters: Filters in addition to ``indexed`` and those of Jinja. Only a page explains
             terms; elsewhere ``explained`` text is the same text.
     """
-    finalize = _escape_unless_marked if name.endswith(".md") else None
+    finalize = None
+    if name.endswith(".md"):
+        finalize = _escape_unless_marked
     loader = PackageLoader("dess.reports", "templates")
     environment = Environment(loader=loader, finalize=finalize, trim_blocks=True, **JINJA)
     environment.filters |= {"indexed": set_indices, "explained": Markup.escape, **filters}
@@ -272,7 +274,9 @@ def make_table(
             and the shown table as LaTeX.
         wrap: Whether long cells are broken into several lines.
     """
-    look = ["table", "wrap"] if wrap else "table"
+    look = ["table"]
+    if wrap:
+        look += ["wrap"]
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
     html = _CELL.sub(_wrap_cell, html) if wrap else _align_numbers(html, len(frame.columns))
     html = str(set_indices(Markup(_EMPTY_HEADER.sub(r"<td\1></td>", html))))
@@ -281,7 +285,9 @@ def make_table(
     )
     if caption:
         html = html.replace(">", f"><caption>{set_indices(caption)}</caption>", 1)
-    below = "" if data is None else _download_links(caption, data, frame)
+    below = ""
+    if data is not None:
+        below = _download_links(caption, data, frame)
     label = escape(caption or "Table")
     return HTML(
         f'<div class="scroll" role="region" tabindex="0" aria-label="{label}">{html}</div>{below}'
@@ -298,19 +304,21 @@ def _align_numbers(table: str, columns: int) -> str:
     for column in range(columns):
         places = range(column, len(cells), columns)
         widths = {
-            place: _measure_digits(found[0])
+            place: _measure_digits(number[0])
             for place in places
-            if (found := _NUMBER.match(cells[place]))
+            if (number := _NUMBER.match(cells[place]))
         }
         for place, width in widths.items():
             indents[place] = max(widths.values()) - width
-    aligned = (
-        f'<td style="--indent:{indent:g}">{_keep_together(cell)}</td>'
-        if indent
-        else f"<td>{_keep_together(cell)}</td>"
-        for cell, indent in zip(cells, indents, strict=True)
-    )
+    aligned = map(_indent_cell, cells, indents)
     return _CELL.sub(lambda _: next(aligned), table)
+
+
+def _indent_cell(cell: str, indent: float) -> str:
+    """A cell that begins so many digits to the right."""
+    if indent:
+        return f'<td style="--indent:{indent:g}">{_keep_together(cell)}</td>'
+    return f"<td>{_keep_together(cell)}</td>"
 
 
 def _wrap_cell(cell: re.Match[str]) -> str:
@@ -410,8 +418,10 @@ def show_parts(*parts: Table | HTML | Markdown | Iterable[tuple[Any, ...]]) -> N
     for part in parts:
         if isinstance(part, HTML | Markdown):
             display(part)
+        elif isinstance(part, Table):
+            display(make_table(*part))
         else:
-            display(make_table(*part) if isinstance(part, Table) else make_gallery(part))
+            display(make_gallery(part))
 
 
 def encode_figure(drawing: "Figure", kind: str) -> bytes:
@@ -425,7 +435,9 @@ def encode_figure(drawing: "Figure", kind: str) -> bytes:
         mpl.rcParams |= {"pdf.fonttype": 42, "savefig.dpi": 200}  # journals refuse Type 3
         drawing.savefig(buffer, format=kind, metadata=_NO_METADATA[kind])
     content = buffer.getvalue()
-    return _PLACES.sub(_shorten_coordinates, content) if kind == "svg" else content
+    if kind == "svg":
+        return _PLACES.sub(_shorten_coordinates, content)
+    return content
 
 
 def _shorten_coordinates(coordinates: re.Match[bytes]) -> bytes:
@@ -436,11 +448,20 @@ def _shorten_coordinates(coordinates: re.Match[bytes]) -> bytes:
 def _describe_figure(
     drawing: "Figure", alt: str, caption: str = "", data: pd.DataFrame | None = None
 ) -> dict[str, Any]:
-    links = "" if data is None else _download_links(alt, data, data)
+    links = ""
+    if data is not None:
+        links = _download_links(alt, data, data)
     kinds = filter(None, os.environ.get(ASKED, "").split(","))
     files = {kind: b64encode(encode_figure(drawing, kind)).decode() for kind in kinds}
-    shown = {"alt": alt, "source": _figure_address(drawing), "caption": caption, "links": links}
-    return shown | ({"files": files} if files else {})
+    shown: dict[str, Any] = {
+        "alt": alt,
+        "source": _figure_address(drawing),
+        "caption": caption,
+        "links": links,
+    }
+    if files:
+        shown["files"] = files
+    return shown
 
 
 def _figure_address(drawing: "Figure") -> str:

@@ -223,12 +223,12 @@ def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:
             f"parameter: own-sea has the {', '.join(lacking)} of its example, bay; "
             "allowed: those of the scenario, each by --parameter"
         )
-    known = set().union(*(report.parameters for report in reports)) - {"results"}
+    allowed = set().union(*(report.parameters for report in reports)) - {"results"}
     for name in names:
-        if name not in known:
+        if name not in allowed:
             raise InputError(
                 f"parameter: {name!r} is unknown to {', '.join(r.name for r in reports)}"
-                f"{one_of(name, sorted(known))}"
+                f"{one_of(name, sorted(allowed))}"
             )
 
 

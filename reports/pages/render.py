@@ -69,15 +69,15 @@ def make_index(
 
 def sort_pages(pages: Iterable[str], group: str | None = None) -> list[str]:
     """File names of pages in the order of the index: those of a group, or all."""
-    known = {*pages}
-    studies = sorted(name for name in known if _OF_STUDY.fullmatch(name))
+    present = {*pages}
+    studies = sorted(name for name in present if _OF_STUDY.fullmatch(name))
     order = []
     for heading, names in notebook.GROUPS.items():
         if group in (None, heading):
             if heading == next(iter(notebook.GROUPS)):
                 order += studies
             order += [f"{name}.html" for name in names]
-    return [name for name in order if name in known]
+    return [name for name in order if name in present]
 
 
 def group_pages(pages: Iterable[str]) -> list[tuple[str, list[str]]]:
@@ -145,8 +145,8 @@ def page_key(report: notebook.Report, studies: Mapping[str, Path]) -> str:
 def has_key(page: Path, key: str) -> bool:
     """Whether a file is a page with this key that has not been altered."""
     try:
-        found = Page.read(page)
-        return bool(key) and found.card.key == key and found.is_sealed
+        existing = Page.read(page)
+        return bool(key) and existing.card.key == key and existing.is_sealed
     except (OSError, InputError):
         return False
 
@@ -217,8 +217,10 @@ def render(
     """
     results = Path(results)
     out = Path(out)
-    given = parameters or {}
-    values = {name: notebook.replace_paths(value, os.path.abspath) for name, value in given.items()}
+    typed_values = parameters or {}
+    values = {
+        name: notebook.replace_paths(value, os.path.abspath) for name, value in typed_values.items()
+    }
     asked = [*dict.fromkeys(names)]
     reports = [
         notebook.read_report(name, notebooks) for name in asked or notebook.report_names(notebooks)
@@ -300,11 +302,11 @@ def _write_pages(
     kernels.run_reports(
         changed, progress, [folder for folder, count in read_by.items() if count > 1]
     )
-    made = {}
+    new_pages = {}
     if changed:
         from dess.reports.pages.body import make_page  # imports nbconvert
 
-        made = {report.page: make_page(report) for report in changed}
+        new_pages = {report.page: make_page(report) for report in changed}
     complete = [report for report in reports if not report.failure]
     files: dict[str, str | bytes] = {
         f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete if not r.is_current
@@ -312,8 +314,8 @@ def _write_pages(
     for report in complete:
         files |= {f"{report.folder}/{name}": picture for name, picture in _decode_figures(report)}
     with locked(out / LOCK, _BUSY, PATIENCE):
-        others = find_pages(out, but=made)
-        pages = add_bars(others | made)
+        others = find_pages(out, but=new_pages)
+        pages = add_bars(others | new_pages)
         files |= {name: page.text for name, page in pages.items() if page != others.get(name)}
         files[INDEX] = make_index(pages, left_out)
         write_files({out / name: text for name, text in files.items()})
@@ -349,8 +351,8 @@ def _find_finished_page(
 
 def _find_results(report: notebook.Report, results: Path) -> dict[str, Path]:
     """The results folders that a report reads, by name."""
-    found = (paths_in(results, f"{name}/{MANIFEST}") for name in report.optional)
-    others = [path.parent.name for paths in found for path in paths]
+    optional_files = (paths_in(results, f"{name}/{MANIFEST}") for name in report.optional)
+    others = [path.parent.name for paths in optional_files for path in paths]
     return {name: results / name for name in (*report.studies, *others)}
 
 

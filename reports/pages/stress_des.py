@@ -90,7 +90,7 @@ def describe_model(manifest: Manifest, others: Sequence[Manifest] = ()) -> Descr
     module: Any = page.make_module(values)
     sections = {part[4]: part.strip() for part in _HEADING.split(str(module)) if part.strip()}
     overview = module.steps, module.repeated, module.end
-    studies = pd.DataFrame(_describe_study(each) for each in (manifest, *others))
+    studies = pd.DataFrame(_describe_study(of_study) for of_study in (manifest, *others))
     return Description(sections, studies, overview, _list_parameters(space))
 
 
@@ -105,11 +105,14 @@ def _describe_study(manifest: Manifest) -> dict[str, str]:
     """A study as a row of the table of item 1.3."""
     study = manifest["study"]
     rules = {"by a stopping rule": study["precision"], "by a selection": study["selection"]}
+    design = "one point"
+    if study["design"]:
+        design = study["design"]["kind"]
     missions = [_format_span([n for counts in manifest["missions"] for n in counts])]
     return {
         "Study": study["name"],
         "Aim": study["description"] or "",
-        "Design": f"{study['design']['kind'] if study['design'] else 'one point'}",
+        "Design": design,
         "Design points": _format_number(len(manifest["points"])),
         "Missions per policy and point": ", ".join(missions + [r for r, on in rules.items() if on]),
         "Policies": numbers.join_words(study["policies"]),
@@ -136,8 +139,8 @@ def _list_parameters(space: ScenarioSpace) -> pd.DataFrame:
     fields = {**fields_of(ScenarioSpace), **fields_of(Scenario)}
     stored = space.model_dump()  # without the sections that are off
     rows = [
-        (f"{field}: {known.description}", _format_value(space, field))
-        for field, known in fields.items()
+        (f"{field}: {about_field.description}", _format_value(space, field))
+        for field, about_field in fields.items()
         if field.partition(".")[0] in stored
     ]
     return pd.DataFrame(rows, columns=["Input parameter [unit]", "Value"])
@@ -145,7 +148,9 @@ def _list_parameters(space: ScenarioSpace) -> pd.DataFrame:
 
 def _format_value(space: ScenarioSpace, field: str) -> str:
     """The value of a field as text."""
-    value: Any = space.zone_pads[0] if field == "pads" else space.value(field)
+    value: Any = space.value(field)
+    if field == "pads":
+        value = space.zone_pads[0]
     if field == "nodes":
         return _format_cells(value)
     if field == "no_fly":
@@ -160,7 +165,9 @@ def _format_value(space: ScenarioSpace, field: str) -> str:
         return _format_span(value)
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return ", ".join(map(str, value)) if isinstance(value, tuple) else _format_number(value)
+    if isinstance(value, tuple):
+        return ", ".join(map(str, value))
+    return _format_number(value)
 
 
 def _format_cells(nodes: Sequence[tuple[int, int]]) -> str:

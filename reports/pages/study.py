@@ -38,18 +38,23 @@ def list_simulated(results: Results) -> html.Marked:
         f"{field_named(field).within} {_format_set_value(value)}"
         for field, value in study.set.items()
     ]
+    also = ""
+    if fixed:
+        also = f", with {numbers.join_words(fixed)}"
     policies = numbers.join_words([html.format_code(policy) for policy in results.policies])
     missions = numbers.format_span(n for of_policy in manifest.missions for n in of_policy)
-    each = f" per policy{' and design point' * (points > 1)}"
+    unit = " per policy"
+    if points > 1:
+        unit += " and design point"
     lines = [
         html.fill_markdown(
             "- **Scenario:** {scenario}{fixed}.",
             scenario=html.format_code(study.scenario),
-            fixed=", with " * bool(fixed) + numbers.join_words(fixed),
+            fixed=also,
         ),
         f"- **Policies:** {policies}.",
         *_describe_design(results),
-        f"- **Missions:** {missions}{each}, {len(results.missions):,} in all.",
+        f"- **Missions:** {missions}{unit}, {len(results.missions):,} in all.",
         list_notes(results),
     ]
     return html.Marked("\n".join(filter(None, lines)))
@@ -57,8 +62,8 @@ def list_simulated(results: Results) -> html.Marked:
 
 def list_notes(results: Results) -> html.Marked:
     """Which trained policies act outside of their training, as a list."""
-    found = list_departures(results.policies, results.store.manifest.scenarios)
-    lines = [html.fill_markdown("- **Note:** {line}.", line=line) for line in found]
+    departures = list_departures(results.policies, results.store.manifest.scenarios)
+    lines = [html.fill_markdown("- **Note:** {line}.", line=line) for line in departures]
     return html.Marked("\n".join(lines))
 
 
@@ -81,7 +86,9 @@ def page_title(results: Results) -> str:
 
 def _describe_sea(scenario: str) -> str:
     """A scenario in words: the paper's sea, or that of its name or file."""
-    return "the paper's sea" if scenario == "paper" else f"the sea {Path(scenario).stem}"
+    if scenario == "paper":
+        return "the paper's sea"
+    return f"the sea {Path(scenario).stem}"
 
 
 def leading_metric(results: Results, metric: str | None) -> str:
@@ -107,7 +114,9 @@ def shown_metrics(results: Results, by: str) -> list[str]:
         by: The metric that the page is about, which comes first.
     """
     asked = [requirement.column for requirement in requirements_of(results)]
-    return [*dict.fromkeys([by, *asked])] if asked else metrics_of_page(by)
+    if asked:
+        return [*dict.fromkeys([by, *asked])]
+    return metrics_of_page(by)
 
 
 def list_guarantees(results: Results) -> html.Marked:
@@ -199,7 +208,9 @@ def make_study_report(folder: Path, values: Mapping[str, Any] = MappingProxyType
         cell for cell in original.cells if all(kept.get(tag, True) for tag in cell_tags(cell))
     ]
     points = len(results.store.manifest.points)
-    where = f"{points:,} design points" if points > 1 else f"the scenario {study.scenario}"
+    where = f"the scenario {study.scenario}"
+    if points > 1:
+        where = f"{points:,} design points"
     description = study.description or f"{numbers.join_words(results.policies)} at {where}."
     title = page_title(results)
     original.cells[0].source = f"# {html.escape_text(title)}\n\n{html.escape_text(description)}"
@@ -213,8 +224,9 @@ def find_shown_parts(results: Results) -> dict[str, bool]:
     study = results.study
     several = len(manifest.points) > 1
     fields = len(varied_values(results))
-    kind = results.design  # a design that varies one field at most is a grid
-    kind = kind if kind in ("saltelli", "latin-hypercube") or fields > 1 else "grid"
+    kind = results.design
+    if fields <= 1 and kind not in ("saltelli", "latin-hypercube"):
+        kind = "grid"  # it varies one field at most
     is_ranked = kind != "saltelli"
     is_search = isinstance(study.selection, Cheapest)
     is_scan = kind == "grid" or (kind == "table" and fields <= 2)

@@ -114,10 +114,14 @@ def verify_page(
     page = Page.read(path, LIMIT, _ALLOWED)
     if not page.has_seal:
         raise InputError(f"{path}: is not a page of dess; allowed: {_ALLOWED}")
-    altered = [] if page.is_sealed else ["the page has been altered"]
+    altered = []
+    if not page.is_sealed:
+        altered = ["the page has been altered"]
     files = [_check_files(learned.files) for learned in page.learned]
     studies = page.evidence
-    notes = [] if studies else ["contains no missions to simulate again"]
+    notes = []
+    if not studies:
+        notes = ["contains no missions to simulate again"]
     sampling = _Sampling(missions, seed, named, yes)
     drawn = [
         _draw_missions(evidence, sampling) for evidence in studies
@@ -196,8 +200,8 @@ def _compare_missions(evidence: Evidence, drawn: _Drawn, named: Collection[str] 
     for mission, space, team in drawn:
         record = simulate(space, team, evidence.seed, mission.replication)
         if changed := difference_in_words(record, mission.record):
-            of = (mission.policy, mission.values, mission.replication)
-            command = tables.of_fields(evidence, *of)
+            coordinates = (mission.policy, mission.values, mission.replication)
+            command = tables.of_fields(evidence, *coordinates)
             lines.append(f"{changed}; command: {command}")
     return Check(evidence.study.name, len(drawn), lines, evidence.changes_here(named))
 
