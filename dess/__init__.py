@@ -7,15 +7,12 @@
     records = dess.simulate_batch(scenario, "greedy", seed=1, replications=1000)
     records.missions["success"].mean()
 
-Names are imported on first use, so that ``import dess`` is fast. It lets Gymnasium know the names
-of the environments.
+Names are imported on first use, so that ``import dess`` is fast.
 """
 
 from importlib import import_module, metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from dess.envs.registration import register
 
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
     from dess.api import simulate as simulate
@@ -50,8 +47,6 @@ __all__ = ["__version__", *_HOME, *_FLOORS]
 # An archive that was unpacked without links has text files in their places.
 if not Path(__file__).with_name("reports").is_dir():
     __path__.append(str(Path(__file__).parents[1]))
-
-register()
 
 
 def __getattr__(name: str) -> Any:

@@ -1,6 +1,6 @@
 """``single_env``: a mission of one UAV as a Gymnasium ``Env``.
 
-env = gymnasium.make("dess/Paper-v0")   # after ``import dess``; or single_env("paper")
+env = gymnasium.make("dess.envs:dess/Paper-v0")   # or single_env("paper")
 observation, info = env.reset(seed=1)
 observation, reward, terminated, truncated, info = env.step(4)
 """

@@ -67,7 +67,9 @@ def test_contract():
 
 
 def test_make_vec_env_makes_missions_of_a_lone_uav():
-    env = env_util.make_vec_env("dess/Paper-v0", 2, seed=1, env_kwargs={"scenario": QUICK})
+    env = env_util.make_vec_env(
+        "dess.envs:dess/Paper-v0", 2, seed=1, env_kwargs={"scenario": QUICK}
+    )
     model = stable_baselines3.PPO("MlpPolicy", env, n_steps=8, batch_size=8, n_epochs=1).learn(32)
     assert model.num_timesteps == 32
     assert all(masks.shape == (5,) for masks in env.env_method("action_masks"))

@@ -17,17 +17,14 @@ from dess import InputError
 from dess.envs.observations.observer import KINDS
 from tests.dess.envs.episodes import PAPER
 
-NAME = "dess/Paper-v0"
+NAME = "dess.envs:dess/Paper-v0"
 
 
-@pytest.mark.parametrize("first", ["dess", "gymnasium"])
-def test_gymnasium_knows_the_names_once_dess_is_imported(first):
-    """In any order, and with the module in front of the name as before."""
-    other = {"dess": "gymnasium", "gymnasium": "dess"}[first]
-    script = f"import {first}, {other}, sys; assert 'dess.envs.vector' not in sys.modules; "
-    script += f"gymnasium.make('{NAME}'); gymnasium.make('dess:{NAME}', scenario='fig4'); "
+def test_gymnasium_finds_the_environments_by_their_name():
+    """In a new process, which has imported nothing of dess."""
+    script = f"import gymnasium; gymnasium.make('{NAME}'); gymnasium.make('dess/Paper-v0'); "
     script += f"print(gymnasium.make_vec('{NAME}', 2).num_envs, "
-    script += f"gymnasium.make_vec('dess.envs.vector:{NAME}', 3, scenario='fig4').num_envs)"
+    script += f"gymnasium.make_vec('{NAME}', 3, scenario='fig4').num_envs)"
     done = subprocess.run([sys.executable, "-W", "error", "-c", script], capture_output=True)
     assert done.returncode == 0, done.stderr.decode()
     assert done.stdout.split()[0].decode() == str(2 * PAPER.uavs[1])
