@@ -86,7 +86,8 @@ def cut(text: str, length: int) -> str:
 
 def listed(names: Iterable[str]) -> str:
     """Names as a message lists them: of many only the first, and the number of the others."""
-    known, length = [*names], 0
+    known = [*names]
+    length = 0
     for number, name in enumerate(known):
         length += len(name) + 2
         if length > _NAMES and number:
@@ -172,7 +173,8 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
         return f"{place}: {shown(value)} is unknown{one_of(value, known)}"
     if kind == "union_tag_invalid":
         known = re.findall("'([^']*)'", first["ctx"]["expected_tags"])
-        named, tag = first["ctx"]["discriminator"].strip("'"), first["ctx"]["tag"]
+        named = first["ctx"]["discriminator"].strip("'")
+        tag = first["ctx"]["tag"]
         return f"{place}.{named}: {shown(tag)} is unknown{one_of(tag, known)}"
     allowed = form_of(field) if field else f"a table of {listed(fields)}"
     if kind == "value_error":
@@ -212,7 +214,8 @@ def form_of(field: "FieldInfo", described: bool = False) -> str:
 
 def _form(annotation: Any, metadata: Sequence[Any]) -> str:
     """What the values of a type may be, in words."""
-    origin, parts = get_origin(annotation), get_args(annotation)
+    origin = get_origin(annotation)
+    parts = get_args(annotation)
     if origin is Annotated:
         limits = [m for part in parts[1:] for m in getattr(part, "metadata", [part])]
         return _form(parts[0], [*limits, *metadata])
@@ -277,7 +280,9 @@ def _field_at(
         The fields that may stand there, the innermost field that contains the place, and whether
         the place is the whole field, not a part of it.
     """
-    fields, field, is_whole = _keys(model), None, False
+    fields = _keys(model)
+    field = None
+    is_whole = False
     for part in loc:
         is_whole = part in fields
         if is_whole:
@@ -294,7 +299,8 @@ def _keys(model: "type[BaseModel]") -> dict[str, "FieldInfo"]:
 
 def _leaves(annotation: Any) -> list[Any]:
     """The types that a union or a list is made of; any other annotation itself."""
-    origin, parts = get_origin(annotation), get_args(annotation)
+    origin = get_origin(annotation)
+    parts = get_args(annotation)
     if origin is Annotated:
         return _leaves(parts[0])
     if origin in (Union, UnionType):

@@ -97,7 +97,9 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 @cache
 def path_of(module: str) -> Path | None:
     """The source file of a module, looked for once, or None; its packages are not imported."""
-    found, places, names = None, None, module.split(".")
+    found = None
+    places = None
+    names = module.split(".")
     for end in range(len(names)):
         found = PathFinder.find_spec(".".join(names[: end + 1]), places)
         if found is None:

@@ -93,7 +93,8 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         for name, value in given.items():
             check_known(name, value, _CHOICES[name])
         self.render_mode = render_mode
-        self._mask_in_info, self._stay = mask == "info", ended == "stay"
+        self._mask_in_info = mask == "info"
+        self._stay = ended == "stay"
         self._stepper = MissionStepper(scenario, 1, seed)
         self._observer = Observer(self._stepper.space, observation, guarded)
         self._components = Components(self._stepper.space)
@@ -229,7 +230,8 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         state = self._stepper.state
         rows, masks = self._observer.observe_all(state, shown)
         masks = masks.view(np.int8)
-        observed, infos = rows_of(rows), list(_infos(outcome, state.uavs["active"][0]))
+        observed = rows_of(rows)
+        infos = list(_infos(outcome, state.uavs["active"][0]))
         if self._mask_in_info:
             for info, mask in zip(infos, masks, strict=True):
                 info["action_mask"] = mask

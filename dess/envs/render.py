@@ -10,10 +10,14 @@ from dess.physics.chart import NO_FLY
 from dess.scenario.scenario import ScenarioSpace
 
 _CELL = 16  # pixels
-_SEA, _LINES, _ZONE = (233, 241, 247), (212, 224, 234), (190, 205, 190)
+_SEA = (233, 241, 247)
+_LINES = (212, 224, 234)
+_ZONE = (190, 205, 190)
 _LAND = (214, 205, 186)
-_NO_DATA, _FULL = np.array((255, 255, 255)), np.array((31, 78, 121))
-_IDLE, _CHARGING = (255, 255, 255), (0, 0, 0)
+_NO_DATA = np.array((255, 255, 255))
+_FULL = np.array((31, 78, 121))
+_IDLE = (255, 255, 255)
+_CHARGING = (0, 0, 0)
 # Colours for colour-blind readers, after Okabe and Ito.
 _FLEET = ((213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
 
@@ -31,7 +35,8 @@ def draw(space: ScenarioSpace, state: State, environment: int = 0) -> np.ndarray
     Returns:
         An image of shape (16 H, 16 W, 3) and type uint8 of W x H cells, with north on top.
     """
-    uavs, residual = state.uavs[environment], state.residual[environment]
+    uavs = state.uavs[environment]
+    residual = state.residual[environment]
     cells = np.full((*space.chart.zones.shape, 3), _SEA, np.uint8)
     cells[space.chart.zones >= 0] = _ZONE
     cells[space.chart.zones == NO_FLY] = _LAND
@@ -79,5 +84,7 @@ class Window:
 
 def _square(image: np.ndarray, x: int, y: int, margin: int, colour: Any) -> None:
     """Paint a cell, except for a margin [pixels] at its edges."""
-    top, left, size = y * _CELL + margin, x * _CELL + margin, _CELL + 1 - 2 * margin
+    top = y * _CELL + margin
+    left = x * _CELL + margin
+    size = _CELL + 1 - 2 * margin
     image[top : top + size, left : left + size] = colour

@@ -66,11 +66,13 @@ class MissionStepper:
         self.space = spaces_of([scenario])[0]
         check_slotted([self.space])
         self.indices = np.arange(num_envs)
-        self.world, self.state = world_of(self.space), state_of([self.space], num_envs)
+        self.world = world_of(self.space)
+        self.state = state_of([self.space], num_envs)
         self._starts = starts_of([self.space])
         self._is_extended = self.space.is_extended
         self._scratch = empty_scratch(self.space.uavs[1], len(self.space.nodes))
-        self.is_started, self._is_seeded = False, seed is not None
+        self.is_started = False
+        self._is_seeded = seed is not None
         self.start_at(seed or 0, 0)
 
     @property
@@ -116,7 +118,8 @@ class MissionStepper:
             InputError: If a seed or the replication is out of range, or there are not as many
                 seeds.
         """
-        replication, following = (options or {}).get("replication"), seed
+        replication = (options or {}).get("replication")
+        following = seed
         if seed is None and not self._is_seeded:
             # Drawn at each start, so that copies of an environment play missions of their own; a
             # number that every reader of a record can represent.
@@ -175,9 +178,11 @@ def _step(
     """Run one slot of every mission and write the ``OUTCOME`` records."""
     fleet = uavs.shape[1]
     arrivals = np.empty(len(nodes), np.int64)
-    charged, collected = np.empty(fleet, np.int64), np.empty(fleet)
+    charged = np.empty(fleet, np.int64)
+    collected = np.empty(fleet)
     for b in range(len(missions)):
-        mission, team = missions[b], uavs[b]
+        mission = missions[b]
+        team = uavs[b]
         for i in range(fleet):
             u = team[i]
             u.action = actions[b, i]
@@ -188,7 +193,8 @@ def _step(
             nodes, mean_snr, order, means, chart, batches, search,
         )  # fmt: skip
         for i in range(fleet):
-            u, to = team[i], out[b, i]
+            u = team[i]
+            to = out[b, i]
             ended = to.acted and not u.active
             to.reward = u.reward
             to.end = u.end

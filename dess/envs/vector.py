@@ -97,7 +97,8 @@ class HarvestVectorEnv(VectorEnv):
         self.missions = int(num_envs)
         self._stepper = MissionStepper(scenario, self.missions, seed)
         self._observer = Observer(self._stepper.space, observation, guarded)
-        self.state, self.world = self._stepper.state, self._stepper.world.shown()
+        self.state = self._stepper.state
+        self.world = self._stepper.world.shown()
         self.num_envs = self.state.uavs.size
         self.single_observation_space = self._observer.space
         self.single_action_space = spaces.Discrete(len(ACTION_NAMES))
@@ -180,7 +181,8 @@ class HarvestVectorEnv(VectorEnv):
         Returns:
             (R,) terminated and truncated, and (N, I) the UAVs that observe something next.
         """
-        active, shown = self.state.uavs["active"], outcome["acted"].copy()
+        active = self.state.uavs["active"]
+        shown = outcome["acted"].copy()
         ended = (self.state.missions["active"] == 0) & ~self._waiting
         over = np.repeat(ended, active.shape[1])
         truncated = over & (outcome["end"].ravel() == TRUNCATED)

@@ -91,7 +91,8 @@ class World(NamedTuple):
 
     def shown(self) -> "World":
         """The same world, of which nothing can be written to."""
-        order, means = read_only(self.order.view()), read_only(self.means.view())
+        order = read_only(self.order.view())
+        means = read_only(self.means.view())
         return World(self.nodes, self.mean_snr, order, means, self.chart)
 
 
@@ -131,10 +132,12 @@ def world_of(scenario: ScenarioSpace) -> World:
 @lru_cache(maxsize=8)
 def _world_of(scenario: ScenarioSpace, thread: int) -> World:
     m, (columns, rows) = scenario.communication_slots, scenario.size
-    places, longest = m * fleet.places_per_slot(scenario.fleet), max(columns, rows)
+    places = m * fleet.places_per_slot(scenario.fleet)
+    longest = max(columns, rows)
     fine = np.arange(places * (longest - 1) + 1)
     diagonal = np.sqrt(2) * np.sqrt((columns**2 + rows**2) / 2) * scenario.cell_size
-    edge, reach = scenario.radio.anchor or diagonal / 2, scenario.radio.range or math.inf
+    edge = scenario.radio.anchor or diagonal / 2
+    reach = scenario.radio.range or math.inf
     mean_snr = np.empty((longest, len(fine)))
     for row in range(longest):  # each takes a moment, all of a large grid may take seconds
         # From an integer: at equal distances, the SNR is equal to the bit.
@@ -156,12 +159,15 @@ def _fill_row(u, row, nodes, mean_snr, order, means):
     count, m = means.shape[1:]
     places = (mean_snr.shape[1] - 1) // (mean_snr.shape[0] - 1)  # per cell
     part = places // (m * u.slots_per_cell)  # places that the UAV flies per communication slot
-    step, along_x = STEP_X[u.executed] + STEP_Y[u.executed], STEP_Y[u.executed] == 0
-    value, high = np.empty((count, m)), np.empty(count)
+    step = STEP_X[u.executed] + STEP_Y[u.executed]
+    along_x = STEP_Y[u.executed] == 0
+    value = np.empty((count, m))
+    high = np.empty(count)
     for k in range(count):
         high[k] = -math.inf
         order[row, k] = k
-        dx, dy = u.x - nodes[k, 0], u.y - nodes[k, 1]
+        dx = u.x - nodes[k, 0]
+        dy = u.y - nodes[k, 1]
         fine, coarse = (places * dx, dy) if along_x else (places * dy, dx)
         for n in range(m):  # the UAV has still this part of the step before it
             ahead = (u.slots_left * m + m - 1 - n) * part
@@ -170,7 +176,8 @@ def _fill_row(u, row, nodes, mean_snr, order, means):
     gap = count // 2
     while gap > 0:  # Shell's sort
         for end in range(gap, count):
-            k, rank = order[row, end], end
+            k = order[row, end]
+            rank = end
             while rank >= gap and _is_before(high, k, order[row, rank - gap]):
                 order[row, rank] = order[row, rank - gap]
                 rank -= gap
@@ -224,9 +231,11 @@ def best_node(mission, i, residual, order, means, batches, search, n):
             mission slot and the group of slot ``n``.
         n: Communication slot, 1..m.
     """
-    group, word = (n - 1) // GROUP, (n - 1) % GROUP
+    group = (n - 1) // GROUP
+    word = (n - 1) % GROUP
     reach = mission.shadowing_deviation * streams.MAX_NORMAL
-    best, node = -math.inf, -1
+    best = -math.inf
+    node = -1
     for count in range(batches.shape[1]):
         batch = batches[i, count]
         if count == search[i, DRAWN]:
@@ -236,7 +245,8 @@ def best_node(mission, i, residual, order, means, batches, search, n):
             _draw(mission, group * 65536 + i, batch, search[i, WIDTH])
         snr, k = _best_of_batch(mission, residual, batch, word, search[i, WIDTH])
         if snr > best or (snr == best and k < node):
-            best, node = snr, k
+            best = snr
+            node = k
         if batch.rest + reach < best or batch.rest == -math.inf:
             break
     return best, node
@@ -246,7 +256,8 @@ def best_node(mission, i, residual, order, means, batches, search, n):
 def _fill_batch(mission, residual, order, means, row, rank, group, batch):
     """Put the next nodes of a row, from a rank on, into a batch; return the rank after the last."""
     node, mean = batch.node, batch.mean
-    first, count = group * GROUP, min(GROUP, mission.communication_slots - group * GROUP)
+    first = group * GROUP
+    count = min(GROUP, mission.communication_slots - group * GROUP)
     place = 0
     while place < _BATCH and rank < mission.nodes:
         k = order[row, rank]
@@ -297,7 +308,8 @@ def _best_of_batch(mission, residual, batch, word, width):
     exact = 0  # a bit per place: whether its bound has been replaced by the exact value
     while True:
         place = batch.top[word]
-        node, snr = batch.node[place], batch.snr[word, place]
+        node = batch.node[place]
+        snr = batch.snr[word, place]
         if snr == -math.inf:
             return snr, -1
         drawn = batch.words[word, place]

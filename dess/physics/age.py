@@ -76,7 +76,9 @@ def write_age(mission, sensors, teeth, out):
     m = mission.communication_slots
     lengths = np.nonzero(teeth)[0]
     count = len(lengths) + mission.nodes
-    lows, highs, weights = np.zeros(count), np.empty(count), np.ones(count)
+    lows = np.zeros(count)
+    highs = np.empty(count)
+    weights = np.ones(count)
     ended = 0
     peaks = 0.0
     for row in range(len(lengths)):
@@ -109,7 +111,8 @@ def age_of_teeth(lows, highs, weights):
     if time <= 0.0:
         return math.nan, math.nan
     mean = (weights * (highs - lows) * (highs + lows)).sum() / (2.0 * time)
-    ends, changes = np.concatenate((highs, lows)), np.concatenate((weights, -weights))
+    ends = np.concatenate((highs, lows))
+    changes = np.concatenate((weights, -weights))
     order = np.argsort(-ends)
     passing, above = 0.0, 0.0  # teeth that pass the present age; time spent above it
     age = ends[order[0]]

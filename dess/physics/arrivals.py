@@ -116,7 +116,8 @@ def draw_arrival(missions, sources, starts, factors, k):
         starts, factors: As from ``factors_of``.
         k: Index of the node.
     """
-    mission, source = missions[0], sources[k]
+    mission = missions[0]
+    source = sources[k]
     highest = factors.max()
     while source.time < math.inf:
         words = streams.block(

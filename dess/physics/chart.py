@@ -17,7 +17,8 @@ Cell = tuple[int, int]
 Rectangle = tuple[int, int, int, int]  # x, y, width and height
 
 # Cells in ``Chart.zones`` that are in no zone.
-OPEN, NO_FLY = -1, -2
+OPEN = -1
+NO_FLY = -2
 FAR = 2**15 - 1  # [cells]: there is no way
 
 # The most cells of a grid of which the ways between all are kept: 200 MB.
@@ -104,9 +105,11 @@ def chart_at(
     nearest = spread(cells, parking)[1].reshape(cells.shape)
     if not no_fly:
         return _chart_of(cells, parking, sizes, nearest, np.empty((0, 0), np.int16), None)
-    places, rows = [(x, y) for y, x in np.ndindex(cells.shape)], None
+    places = [(x, y) for y, x in np.ndindex(cells.shape)]
+    rows = None
     if cells.size > MOST_CHARTED:
-        places, rows = [*{*parking_of(zones), *nodes}], np.full(cells.size, -1, np.int64)
+        places = [*{*parking_of(zones), *nodes}]
+        rows = np.full(cells.size, -1, np.int64)
         rows[[y * width + x for x, y in places]] = np.arange(len(places))
     ways = np.full((len(places), cells.size), FAR, np.int16)
     numbers = np.array([y * width + x for x, y in places])
@@ -140,7 +143,8 @@ def spread(zones: np.ndarray, sources: np.ndarray) -> tuple[np.ndarray, np.ndarr
         (H * W,) the cells on the way, ``FAR`` where there is none, and (H * W,) the number of the
         nearest source, the lowest on a tie.
     """
-    lengths, nearest = np.full(zones.size, FAR, np.int16), np.zeros(zones.size, np.int32)
+    lengths = np.full(zones.size, FAR, np.int16)
+    nearest = np.zeros(zones.size, np.int32)
     cells = sources[:, 1] * zones.shape[1] + sources[:, 0]
     is_open = zones.reshape(-1)[cells] != NO_FLY
     nearest[cells[is_open]] = np.flatnonzero(is_open)
@@ -159,7 +163,8 @@ def _neighbours(zones: np.ndarray) -> np.ndarray:
 @kernel
 def _spread(neighbours, sources, lengths, nearest):
     queue = np.empty(len(lengths), np.int32)
-    first, last = 0, len(sources)
+    first = 0
+    last = len(sources)
     queue[:last] = sources
     for cell in sources:
         lengths[cell] = 0
@@ -169,7 +174,9 @@ def _spread(neighbours, sources, lengths, nearest):
         for side in range(4):
             to = neighbours[cell, side]
             if to >= 0 and lengths[to] == FAR:
-                queue[last], lengths[to], nearest[to] = to, lengths[cell] + 1, nearest[cell]
+                queue[last] = to
+                lengths[to] = lengths[cell] + 1
+                nearest[to] = nearest[cell]
                 last += 1
 
 
@@ -200,14 +207,17 @@ def length_around(zones, ways, rows, closed, x, y, to_x, to_y):
     lengths = np.full(zones.size, FAR, np.int16)
     lengths[closed] = -1
     near, far = np.empty(zones.size, np.int64), np.empty(zones.size, np.int64)
-    near[0], nears, fars = y * width + x, 1, 0
+    near[0] = y * width + x
+    nears = 1
+    fars = 0
     lengths[near[0]] = 0
     bound = _at_least(ways, rows, width, x, y, to_x, to_y)
     while nears + fars > 0:
         if nears == 0:
             near, far, nears, fars, bound = far, near, fars, 0, bound + 2
         nears -= 1
-        x, y = near[nears] % width, near[nears] // width
+        x = near[nears] % width
+        y = near[nears] // width
         length = lengths[near[nears]]
         left = _at_least(ways, rows, width, x, y, to_x, to_y)
         if left == 0:
@@ -215,7 +225,8 @@ def length_around(zones, ways, rows, closed, x, y, to_x, to_y):
         if length + left < bound:
             continue  # a shorter way to this cell has been found since it was put there
         for step_x, step_y in ((0, -1), (1, 0), (0, 1), (-1, 0)):
-            next_x, next_y = x + step_x, y + step_y
+            next_x = x + step_x
+            next_y = y + step_y
             if not (0 <= next_x < width and 0 <= next_y < height):
                 continue
             to = next_y * width + next_x
@@ -263,7 +274,8 @@ def distance(chart, x, y, to_x, to_y):
 def _distance(ways, rows, zones, x, y, to_x, to_y):
     if ways.size == 0:
         return abs(x - to_x) + abs(y - to_y)
-    cell, to = y * zones.shape[1] + x, to_y * zones.shape[1] + to_x
+    cell = y * zones.shape[1] + x
+    to = to_y * zones.shape[1] + to_x
     if rows is None:
         return np.int64(ways[to, cell])
     return _distance_on_large_grid(ways, rows, zones, cell, to)
@@ -277,5 +289,8 @@ def _distance_on_large_grid(ways, rows, zones, cell, to):
         return np.int64(ways[rows[cell], to])
     width = zones.shape[1]
     none = np.empty(0, np.int64)
-    x, y, to_x, to_y = cell % width, cell // width, to % width, to // width
+    x = cell % width
+    y = cell // width
+    to_x = to % width
+    to_y = to // width
     return length_around(zones, ways, rows, none, x, y, to_x, to_y)

@@ -110,8 +110,10 @@ def blocks(seed, replication, stream, substream, slot, indices, words, count):
         count: How many of the indices to compute, from the first on.
     """
     key = np.uint64(seed)
-    low, high = key & _MASK, key >> _SHIFT
-    c1, c3 = np.uint64(slot), np.uint64(replication)
+    low = key & _MASK
+    high = key >> _SHIFT
+    c1 = np.uint64(slot)
+    c3 = np.uint64(replication)
     c2 = (np.uint64(stream) << np.uint64(24)) | np.uint64(substream)
     for r in range(count):
         w0, w1, w2, w3 = philox(np.uint64(indices[r]), c1, c2, c3, low, high)

@@ -54,8 +54,10 @@ class Wind(Section):
 
     def pushes(self) -> Moves:
         """What the mean wind takes of moves to the north, east, south and west [% per cell]."""
-        towards, (north, east, south, west) = math.radians(self.direction), self.moves
-        x, y = -self.strength * math.sin(towards), self.strength * math.cos(towards)
+        towards = math.radians(self.direction)
+        north, east, south, west = self.moves
+        x = -self.strength * math.sin(towards)
+        y = self.strength * math.cos(towards)
         return y + north, -x + east, -y + south, x + west
 
 
@@ -229,11 +231,13 @@ def _relax(zones, extras, slots, costs):
         changed = False
         for place in range(zones.size):
             cell = place if forth else zones.size - 1 - place
-            y, x = cell // columns, cell % columns
+            y = cell // columns
+            x = cell % columns
             if zones[y, x] == NO_FLY:
                 continue
             for action, (step_x, step_y) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
-                a, b = x + step_x, y + step_y
+                a = x + step_x
+                b = y + step_y
                 if 0 <= a < columns and 0 <= b < rows and costs[b, a] < FAR:
                     cost = min(costs[b, a] + slots + extras[action, b, a], FAR - 1)
                     if cost < costs[y, x]:

@@ -68,7 +68,8 @@ def _titles(
 
 def _too_large(c: Fields) -> Iterator[str]:
     """The tables of a mission fit into memory."""
-    ways, (columns, rows) = max(5 * len(c.nodes) * legs(c.fleet), places_per_slot(c.fleet)), c.size
+    ways = max(5 * len(c.nodes) * legs(c.fleet), places_per_slot(c.fleet))
+    columns, rows = c.size
     if columns * rows * c.communication_slots * ways > MOST_ENTRIES:
         yield (
             "grid, nodes, communication_slots, fleet: too large together; allowed: 5 * grid^2 * "
@@ -115,7 +116,8 @@ def _unreachable(c: Fields) -> Iterator[str]:
 
 def _unfit(c: Fields) -> Iterator[str]:
     """The rates, the pads and the initial data fit to the nodes and the zones."""
-    count, (low, high) = len(c.nodes), c.initial_data
+    count = len(c.nodes)
+    low, high = c.initial_data
     if c.data_sheet.is_on:
         if c.data_sheet.data_rate is None:
             yield f"data_sheet.data_rate: is missing; allowed: {DataSheet.form_of('data_rate')}"
@@ -133,7 +135,8 @@ def _unfit(c: Fields) -> Iterator[str]:
     for number, ((*_, width, height), pads) in enumerate(
         zip(c.rectangles, c.zone_pads, strict=True)
     ):
-        name, cells = f"zones.{number - 1}.pads" if number else "pads", width * height
+        name = f"zones.{number - 1}.pads" if number else "pads"
+        cells = width * height
         if pads > cells:
             yield f"{name}: {pads} is more than the zone has cells; allowed: 1..{cells}"
     if 0 < c.radio.range <= c.altitude:

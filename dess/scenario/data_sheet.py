@@ -225,7 +225,8 @@ class DataSheet(Section):
     def _slots(self, name: str, most: float = 1e12) -> float:
         """A time in slots, of which there are at least one and no more than ``most``."""
         slot = self.units.slot
-        slots, least = self.number(name) / slot, printed(slot, "s")
+        slots = self.number(name) / slot
+        least = printed(slot, "s")
         if slots < 1:
             self._refuse(name, f"is less than a slot of {least}", f"{least} or more")
         if slots > most:
@@ -246,7 +247,8 @@ class DataSheet(Section):
 
     def _of_nodes(self, name: str, size: float) -> tuple[float, tuple[float, ...]]:
         """The mean of a field of the nodes in units of a size, and each if they are listed."""
-        given, units = getattr(self, name), self.extra(name)["units"]
+        given = getattr(self, name)
+        units = self.extra(name)["units"]
         texts = (given,) if isinstance(given, str) else given
         values = tuple(measured(text, units)[0] / size for text in texts)
         return sum(values) / len(values), () if isinstance(given, str) else values
@@ -260,7 +262,8 @@ class DataSheet(Section):
             loss = 20 * math.log10(4 * math.pi * anchor * self.number("frequency") / 299_792_458)
             noise = 10 * math.log10(1.380649e-20 * 290 * self.number("bandwidth"))
             snr = self.number("tx_power") - loss - noise - self.number("noise_figure")
-        reach, cell = self.number("range"), self.units.cell
+        reach = self.number("range")
+        cell = self.units.cell
         if self.range and reach < cell:
             size = printed(cell, "m")
             problem = f"is less than a cell of {size}, the way of a slot at {self.cruise}"

@@ -96,7 +96,9 @@ def make_coast(draws: Draws, land: np.ndarray) -> None:
 def make_lane(draws: Draws, land: np.ndarray) -> None:
     """Make a shipping lane of two rows along the grid, which UAVs may only cross at some gates."""
     rows, columns = land.shape
-    top, width, gates = rows // 2 + draws.integer(-2, 1), draws.integer(3, 4), draws.integer(2, 4)
+    top = rows // 2 + draws.integer(-2, 1)
+    width = draws.integer(3, 4)
+    gates = draws.integer(2, 4)
     land[top : top + 2] = True
     for gate in range(gates):
         part = columns // gates
@@ -208,7 +210,8 @@ def _archipelago(draws: Draws) -> _Sea:
 
 def _corridor(draws: Draws) -> _Sea:
     """Turbines in rows, each with a node at it or, where UAVs must fly around it, beside it."""
-    length, width = draws.integer(40, 64), draws.integer(16, 20)
+    length = draws.integer(40, 64)
+    width = draws.integer(16, 20)
     along, across = draws.integer(5, 6), draws.integer(5, 6)
     land = np.zeros((width, length), np.bool_)
     first, top = draws.integer(1, 3), draws.integer(1, 3)
@@ -222,7 +225,8 @@ def _corridor(draws: Draws) -> _Sea:
         sites = [(x, y + 1) for x, y in turbines]
     nodes = max(len(sites) * draws.integer(50, 90) // 100, 6)
     if draws.integer(0, 1):
-        land, sites = land.T.copy(), [(y, x) for x, y in sites]
+        land = land.T.copy()
+        sites = [(y, x) for x, y in sites]
     return _Sea(land, sites, nodes)
 
 
@@ -283,7 +287,8 @@ def _fields_of(name: str, seed: int) -> dict[str, Any]:
 
 def _attempt(draws: Draws, family: Family, seed: int) -> dict[str, Any]:
     """The fields of a sea, or none if nodes or zones are too far apart."""
-    sea, most_uavs = family.sea(draws), 2 + 2 * (seed % 3)
+    sea = family.sea(draws)
+    most_uavs = 2 + 2 * (seed % 3)
     rows, columns = sea.land.shape
     least = _LEAST_FAR if rows + columns > _FAR else _LEAST
     reach = 2 * least // 5  # as far as nodes may be: there and back with a fifth to spare

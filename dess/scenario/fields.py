@@ -331,7 +331,8 @@ def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
         InputError: If ``zones.pads`` has another length than ``zones``.
     """
     result: dict[str, Any] = {}
-    below, above = dotted(base), dotted(values)
+    below = dotted(base)
+    above = dotted(values)
     replaced = {each for for_all, each in _EACH.items() if for_all in above}
     if "nodes" in values:  # the names are those of others
         replaced |= {"names", "moved"}
@@ -344,7 +345,8 @@ def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
         else:
             result[name] = value
     if ZONE_PADS in result:
-        pads, zones = tuples(result.pop(ZONE_PADS)), result.get("zones") or ()
+        pads = tuples(result.pop(ZONE_PADS))
+        zones = result.get("zones") or ()
         each = pads if isinstance(pads, list | tuple) else [pads] * len(zones)
         if not zones or len(each) != len(zones):
             allowed = f"a number, or a list of {len(zones)}" if zones else "with further zones"

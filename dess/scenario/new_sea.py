@@ -170,7 +170,8 @@ class NewScenario:
         self._check_size(answers, cell)
         columns, rows, side = self._sides(answers, cell)
         x, y = _place(answers["base"])
-        cells, zone = self.nodes.spots, f"[{x:.0f}, {y:.0f}, {side}, {side}]"
+        cells = self.nodes.spots
+        zone = f"[{x:.0f}, {y:.0f}, {side}, {side}]"
         if self.nodes.is_geographic:
             cells = Projection.about(cells, (columns, rows), cell).cells(cells)
             zone = f"{{lon = {x!r}, lat = {y!r}, width = {side}, height = {side}}}"

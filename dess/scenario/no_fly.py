@@ -146,7 +146,8 @@ def _of_places(
             f"{path}: has degrees, and the nodes are cells; allowed: cells, nodes from a file "
             "with degrees, or centre"
         )
-    closed, unseen = np.zeros(size[::-1], np.bool_), []
+    closed = np.zeros(size[::-1], np.bool_)
+    unseen = []
     chosen = source.chosen(found)
     if not is_geographic and any(_has_radius(place) for place in chosen):
         _note(f"{path}: the column radius is not used, since its places are cells and no degrees")
@@ -155,7 +156,8 @@ def _of_places(
             cells, is_near = _cells_of(place, projection, source, _radius(place, path))
             unseen += [place.where] if is_near and not cells.any() else []
         else:
-            cells, cell = np.zeros_like(closed), place.shapes[0][1][0][0].astype(int)
+            cells = np.zeros_like(closed)
+            cell = place.shapes[0][1][0][0].astype(int)
             if not places.is_on_grid(cell, size):
                 what = f"off the grid of {size[0]} x {size[1]} cells, at {cell.tolist()}"
                 allowed = f"0 <= x < {size[0]}, 0 <= y < {size[1]}"
@@ -240,7 +242,8 @@ def _cells_of(
         radius: Of its points, which are circles then [m].
     """
     size = projection.size
-    closed, is_near = np.zeros(size[::-1], np.bool_), False
+    closed = np.zeros(size[::-1], np.bool_)
+    is_near = False
     for kind, rings in place.shapes:
         reach = source.buffer
         if kind == places.LINE:
@@ -248,7 +251,8 @@ def _cells_of(
         elif kind == places.POINT:
             reach += radius
         for turned in projection.shapes(rings):
-            low, high = turned[0].min(0), turned[0].max(0)
+            low = turned[0].min(0)
+            high = turned[0].max(0)
             margin = reach / projection.cell_size
             if (high + margin < 0).any() or (low - margin >= size).any():
                 continue
@@ -300,7 +304,8 @@ def centres_in(rings: list[np.ndarray], size: Size) -> np.ndarray:
     for row in range(size[1]):
         y = row + 0.5
         crosses = (starts[:, 1] <= y) != (ends[:, 1] <= y)
-        (x0, y0), (x1, y1) = starts[crosses].T, ends[crosses].T
+        x0, y0 = starts[crosses].T
+        x1, y1 = ends[crosses].T
         crossings = np.sort(x0 + (y - y0) * (x1 - x0) / (y1 - y0))
         inside[row] = np.searchsorted(crossings, np.arange(size[0]) + 0.5) % 2 == 1
     return inside

@@ -24,7 +24,8 @@ from dess.scenario.quantities import form_of, quantity_of
 MAX_NODES, MAX_GRID = 1024, 256  # as of a scenario
 # What columns are called that are used without being asked for, whatever the case.
 NAMES = ("name", "label", "id")
-RATES, DATA = ("rate", "arrival_rate", "data_rate"), ("data", "initial_data", "backlog")
+RATES = ("rate", "arrival_rate", "data_rate")
+DATA = ("data", "initial_data", "backlog")
 
 # The fields of a scenario that a file may give to each of its nodes.
 AMOUNTS = ("data_sheet.data_rate", "data_sheet.backlog", "arrivals.rates", "arrivals.initial")
@@ -143,7 +144,8 @@ class NodesFound(NamedTuple):
             self._refuse_shared(groups, projection, is_cell_fixed)
         if len(groups) > MAX_NODES:
             raise InputError(f"{self.path}: has {len(groups):,} nodes; allowed: 1..{MAX_NODES}")
-        names, members = [*map(self._name, range(len(own)))], [*groups.values()]
+        names = [*map(self._name, range(len(own)))]
+        members = [*groups.values()]
         found = {
             "nodes": [*groups],
             "moved": moved,
@@ -210,7 +212,8 @@ class NodesFound(NamedTuple):
 
     def _title(self, number: int) -> str:
         """Where a node stands in the file, and its name."""
-        name, where = self._name(number), self.rows[number].where
+        name = self._name(number)
+        where = self.rows[number].where
         return f"{where} ({name})" if name else where
 
     def _check_on_grid(self, own: list[Cell], size: Size, is_cell_fixed: bool) -> None:
@@ -239,7 +242,8 @@ class NodesFound(NamedTuple):
 
     def _finer(self, projection: Projection) -> str:
         """The smallest cells that the largest grid allows, if they part all nodes."""
-        coarse, largest = projection.cell_size, (MAX_GRID, MAX_GRID)
+        coarse = projection.cell_size
+        largest = (MAX_GRID, MAX_GRID)
         reach = np.abs(projection.cells(self.spots) - np.array(projection.size) / 2).max()
         finest = float(f"{max(coarse * reach / (MAX_GRID / 2 - 2), 0.01):.2g}")
         cells = np.floor(projection._replace(size=largest, cell_size=finest).cells(self.spots))
@@ -260,7 +264,9 @@ def _nearest_free(
 
     The first node in a cell that is open stays there; then the others choose, in their order.
     """
-    is_free, cells, moved = ~closed, [*own], []
+    is_free = ~closed
+    cells = [*own]
+    moved = []
     for number, (x, y) in enumerate(own):
         moved += [] if is_free[y, x] else [number]
         is_free[y, x] = False
@@ -269,7 +275,8 @@ def _nearest_free(
         if not len(free):
             raise InputError("nodes: there are more than open cells; allowed: a larger grid")
         x, y = free[((free + 0.5 - spots[number]) ** 2).sum(1).argmin()].tolist()
-        cells[number], is_free[y, x] = (x, y), False
+        cells[number] = (x, y)
+        is_free[y, x] = False
     return cells, moved
 
 

@@ -76,7 +76,9 @@ class OwnSea(NamedTuple):
         Raises:
             InputError: If a file cannot be read, or does not fit.
         """
-        found, projection, about = None, None, (self.grid.size, self.grid.cell_size)
+        found = None
+        projection = None
+        about = (self.grid.size, self.grid.cell_size)
         if _is_named(of_nodes):
             source = self._file(NodesFile, of_nodes, "nodes")
             found = NodesFound.read(self.beside("nodes", source.file), source)
@@ -102,7 +104,8 @@ class OwnSea(NamedTuple):
     def _amounts(self, source: NodesFile) -> list[Amounts]:
         """The rates and the data that a file may give to each node."""
         sheet, arrivals = self.grid.data_sheet, self.grid.arrivals
-        rates, data = (source.rate, RATES), (source.data, DATA)
+        rates = (source.rate, RATES)
+        data = (source.data, DATA)
         if not sheet.is_on:
             low, high = self.grid.initial_data
             amount = low if low == high else None
@@ -116,10 +119,12 @@ class OwnSea(NamedTuple):
             ]
         kinds = []
         for name, columns, missing in (("data_rate", rates, None), ("backlog", data, 0.0)):
-            field, of_sheet = f"data_sheet.{name}", getattr(sheet, name)
+            field = f"data_sheet.{name}"
+            of_sheet = getattr(sheet, name)
             is_listed = isinstance(of_sheet, tuple)
             otherwise = missing if is_listed or not of_sheet else sheet.number(name)
-            unit, limits = sheet.extra(name)["units"], sheet.extra(name)["limits"][0]
+            unit = sheet.extra(name)["units"]
+            limits = sheet.extra(name)["limits"][0]
             kinds.append(Amounts(field, *columns, unit, limits, field, otherwise, is_listed))
         return kinds
 
@@ -136,7 +141,8 @@ class OwnSea(NamedTuple):
 
     def _zones(self, values: Mapping[str, Any], projection: Projection | None) -> dict[str, Any]:
         """The charging zones."""
-        zone, zones = values.get("zone"), values.get("zones")
+        zone = values.get("zone")
+        zones = values.get("zones")
         if isinstance(zone, str):
             zone, *others = zones_in(self.beside("zone", zone), self.grid.size)
             zones = zones or [{"cells": cells} for cells in others]

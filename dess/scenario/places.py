@@ -202,7 +202,8 @@ def read_table(path: Path) -> Places:
     if len(found) != 1:
         there = ", ".join(columns) or "none"
         raise InputError(f"{path}: has columns {there}; allowed: x and y, or lon and lat")
-    is_geographic, places = found == [GEOGRAPHIC], []
+    is_geographic = found == [GEOGRAPHIC]
+    places = []
     for line, texts in rows:
         filled = zip(columns, map(str.strip, texts), strict=False)
         values = dict.fromkeys(columns, "") | dict(filled)
@@ -292,7 +293,8 @@ def _shapes(geometry: _Geometry, place: str) -> Iterator[Shape]:
     for number, inner in enumerate(geometry.geometries):
         where = f"{place}.geometries.{number}"
         yield from _shapes(validated(_Geometry, inner, where), where)
-    kind, place = geometry.type.removeprefix("Multi"), f"{place}.coordinates"
+    kind = geometry.type.removeprefix("Multi")
+    place = f"{place}.coordinates"
     parts = {place: geometry.coordinates}
     if kind != geometry.type:
         parts = {f"{place}.{n}": part for n, part in enumerate(geometry.coordinates)}
@@ -330,7 +332,8 @@ def _positions(value: Any, place: str) -> np.ndarray:
     most = np.array(LIMITS[GEOGRAPHIC])
     for number, axis in np.argwhere(~(np.abs(found) <= most + _ROUNDING)):
         where = f"{place}.{number}" if len(found) > 1 else place
-        name, limit = GEOGRAPHIC[axis], most[axis]
+        name = GEOGRAPHIC[axis]
+        limit = most[axis]
         line = f"{name} is {found[number, axis]:g}; allowed: -{limit}..{limit}"
         raise InputError(f"{where}: {line}")
     return np.clip(found, -most, most)

@@ -148,7 +148,8 @@ def _number(text: str, unit: str, units: str) -> Fraction:
     found = _NUMBER.fullmatch(text)
     if not found:
         refuse(text, "is not a number and a unit", units)
-    number, name = found[1], re.sub(" ?/ ?", "/", found[2].strip())
+    number = found[1]
+    name = re.sub(" ?/ ?", "/", found[2].strip())
     if not name:
         refuse(text, "has no unit", units)
     size = _sizes(unit).get(name)

@@ -346,7 +346,8 @@ def _out_of_range(c: Constants) -> Iterator[str]:
             given = low if low == high else [low, high]
             reason = f" (cells of the zone, at most {MOST_UAVS})" if name == "uavs" else ""
             yield f"{name}: {given} is out of range; allowed: {least}..{most}{reason}"
-    start, complete = ends["charge_start"][1], ends["charge_complete"][0]
+    start = ends["charge_start"][1]
+    complete = ends["charge_complete"][0]
     if start >= complete:
         yield (
             f"charge_start: {start} is not below charge_complete {complete}; "

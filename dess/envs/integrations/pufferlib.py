@@ -68,7 +68,8 @@ class HarvestPufferEnv(pufferlib.PufferEnv):
         self.env.close()
 
     def _write(self, observations: Any, info: dict[str, Any]) -> None:
-        self.observations[:, :-5], self.observations[:, -5:] = observations, info["action_mask"]
+        self.observations[:, :-5] = observations
+        self.observations[:, -5:] = info["action_mask"]
         self.masks[:] = info["active"]
 
 

@@ -49,7 +49,8 @@ class HarvestMultiAgentEnv(MultiAgentEnv):
     def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
         """Run one mission slot; see ``HarvestEnv.step``."""
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
-        terminated["__all__"], truncated["__all__"] = not self.env.agents, False
+        terminated["__all__"] = not self.env.agents
+        truncated["__all__"] = False
         seen = {agent: _renamed(own) for agent, own in observations.items()}
         return seen, rewards, terminated, truncated, infos
 

@@ -29,7 +29,8 @@ class SB3VecEnv(VecEnv):
     """
 
     def __init__(self, env: HarvestVectorEnv):
-        self.env, self._started = env, time.time()
+        self.env = env
+        self._started = time.time()
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
 
     def reset(self) -> Any:
@@ -57,7 +58,8 @@ class SB3VecEnv(VecEnv):
         final = {"terminal_observation": info["final_obs"][row], "TimeLimit.truncated": truncated}
         mission = info["final_info"]
         if mission["uav"]["end"][row] != ACTIVE:  # the fleet has this UAV
-            reward, slots = float(mission["uav"]["reward"][row]), int(mission["slots"][row])
+            reward = float(mission["uav"]["reward"][row])
+            slots = int(mission["slots"][row])
             final["episode"] = {"r": reward, "l": slots, "t": time.time() - self._started}
             final["is_success"] = bool(mission["success"][row])
         return final

@@ -38,7 +38,8 @@ def component_names(scenario: Scenario | ScenarioSpace) -> list[str]:
 
 def _beyond_the_paper(space: ScenarioSpace) -> list[list[str]]:
     """The names of five groups of components; a group is empty if the scenario has it not."""
-    nodes, failures = range(len(space.nodes)), space.failures
+    nodes = range(len(space.nodes))
+    failures = space.failures
     mates = [f"mate_{j}_grounded" for j in range(1, space.uavs[1])]
     return [
         ["grounded", *mates] if failures.uav_rate > 0 else [],
@@ -89,9 +90,11 @@ class Components:
 @kernel
 def _encode(state, chart, missions, uavs, has, common, out):
     for row in range(len(missions)):
-        b, i = missions[row], uavs[row]
+        b = missions[row]
+        i = uavs[row]
         if i >= 0:
-            mission, team = state.missions[b], state.uavs[b]
+            mission = state.missions[b]
+            team = state.uavs[b]
             _encode_uav(mission, chart, team, i, state.residual[b], out[row])
             _encode_beyond(has, mission, chart, team, i, state.sensors[b], out[row, common:])
 
@@ -99,9 +102,11 @@ def _encode(state, chart, missions, uavs, has, common, out):
 @kernel
 def _encode_uav(mission, chart, uavs, i, residual, out):
     """What every observation has of one UAV, in the order of ``component_names``."""
-    u, home = uavs[i], chart.parking[chart.nearest[uavs[i].y, uavs[i].x]]
+    u = uavs[i]
+    home = chart.parking[chart.nearest[uavs[i].y, uavs[i].x]]
     rows, columns = chart.zones.shape
-    column, row = 1.0 / (columns - 1), 1.0 / (rows - 1)
+    column = 1.0 / (columns - 1)
+    row = 1.0 / (rows - 1)
     out[0] = u.active
     out[1] = u.x * column
     out[2] = u.y * row
@@ -144,7 +149,8 @@ def _quota_share(u):
 def _encode_beyond(has, mission, chart, uavs, i, sensors, out):
     """Write the components of UAV ``i`` in the order of ``_beyond_the_paper``."""
     can_be_grounded, pads_fail, nodes_fail, has_wind, has_age = has
-    u, at = uavs[i], 0
+    u = uavs[i]
+    at = 0
     if can_be_grounded:
         out[0] = u.grounded
         at = 1
@@ -161,7 +167,8 @@ def _encode_beyond(has, mission, chart, uavs, i, sensors, out):
         at += mission.nodes
     if has_wind:
         for action in range(HOVER):
-            x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
+            x = u.x + STEP_X[action]
+            y = u.y + STEP_Y[action]
             if is_open(chart, x, y):
                 extra = move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
                 out[at + action] = mission.flight_cost * extra / 100.0

@@ -36,7 +36,8 @@ class Maps:
     version = 1  # of the encoding; weights trained with another version cannot be used
 
     def __init__(self, layout: Layout) -> None:
-        self.layout, width = layout, (2 * layout.grid - 1) // POOL
+        self.layout = layout
+        width = (2 * layout.grid - 1) // POOL
         self.shapes = ((LAYERS, CROP, CROP), (LAYERS, width, width), (1,))
 
     def encode(
@@ -63,11 +64,13 @@ class Maps:
 def _encode(states, layout, missions, uavs, local, far, own):
     """Write the maps of all rows into zeroed arrays."""
     zone, nodes = layout.zone, layout.nodes
-    centre, middle = layout.grid - 1, CROP // 2
+    centre = layout.grid - 1
+    middle = CROP // 2
     for r in range(len(missions)):
         if uavs[r] < 0:
             continue
-        team, residual = states.uavs[missions[r]], states.residual[missions[r]]
+        team = states.uavs[missions[r]]
+        residual = states.residual[missions[r]]
         x, y = team[uavs[r], column.X], team[uavs[r], column.Y]
         own[r, 0] = team[uavs[r], column.BATTERY] / np.float32(BATTERY_SCALE)
         # All positions below are relative to the UAV's cell.
@@ -78,7 +81,8 @@ def _encode(states, layout, missions, uavs, local, far, own):
             _add(local[r], far[r], centre, DATA, nodes[k, 0] - x, nodes[k, 1] - y, data)
         for i in range(len(team)):
             if team[i, column.ACTIVE]:
-                dx, dy = team[i, column.X] - x, team[i, column.Y] - y
+                dx = team[i, column.X] - x
+                dy = team[i, column.Y] - y
                 battery = team[i, column.BATTERY] / np.float32(BATTERY_SCALE)
                 _add(local[r], far[r], centre, FLYING_TIME, dx, dy, battery)
                 _add(local[r], far[r], centre, STATUS, dx, dy, np.float32(1))
@@ -87,10 +91,12 @@ def _encode(states, layout, missions, uavs, local, far, own):
 @inlined
 def _add(local, far, centre, layer, dx, dy, value):
     """Add a value at a cell to a layer of both maps, if the cell lies in them."""
-    x, y = CROP // 2 + dx, CROP // 2 + dy
+    x = CROP // 2 + dx
+    y = CROP // 2 + dy
     if 0 <= x < CROP and 0 <= y < CROP:
         local[layer, y, x] += value
-    x, y = (centre + dx) // POOL, (centre + dy) // POOL
+    x = (centre + dx) // POOL
+    y = (centre + dy) // POOL
     if x < far.shape[2] and y < far.shape[1]:
         far[layer, y, x] += value / np.float32(POOL * POOL)
 
@@ -99,8 +105,10 @@ def _add(local, far, centre, layer, dx, dy, value):
 def _mark_zone(layer, centre, pool, dx, dy, width, height):
     """Set each cell of a layer to the share that the zone covers."""
     end = len(layer) * pool
-    left, right = max(centre + dx, 0), min(centre + dx + width, end)
-    top, bottom = max(centre + dy, 0), min(centre + dy + height, end)
+    left = max(centre + dx, 0)
+    right = min(centre + dx + width, end)
+    top = max(centre + dy, 0)
+    bottom = min(centre + dy + height, end)
     for y in range(top, bottom):
         for x in range(left, right):
             layer[y // pool, x // pool] += np.float32(1) / np.float32(pool * pool)

@@ -66,7 +66,9 @@ class Observer:
             InputError: If there is no such kind, or it does not fit the scenario.
         """
         check_known("observation", kind, KINDS)
-        self.kind, self.guarded, self._chart = kind, guarded, scenario.chart
+        self.kind = kind
+        self.guarded = guarded
+        self._chart = scenario.chart
         self._encoder: Any = Components(scenario) if kind == "state" else encoder_of(kind, scenario)
         boxes = [spaces.Box(-np.inf, np.inf, shape) for shape in self._encoder.shapes]
         if kind == "state":

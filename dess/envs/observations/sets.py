@@ -134,14 +134,16 @@ def _tables(zones: bytes, shape: tuple[int, int], cells: bytes) -> _Tables:
     ways = np.stack([spread(chart, node[None])[0] for node in nodes], 1)
     rectangles = [np.argwhere(chart == zone)[:, ::-1] for zone in range(chart.max() + 1)]
     zone_ways = np.stack([spread(chart, rectangle)[0] for rectangle in rectangles], 1)
-    ways, zone_ways = np.minimum(ways, _FARTHEST), np.minimum(zone_ways, _FARTHEST)
+    ways = np.minimum(ways, _FARTHEST)
+    zone_ways = np.minimum(zone_ways, _FARTHEST)
     near = np.pad(exp(-np.arange(_FARTHEST + 1)[:, None] / SCALES), ((0, 0), (0, 1)))
     places = nodes @ [1, shape[1]]
     around = near[ways[places], :3].transpose(1, 2, 0) / _NORMS[:, None]
     around *= (1 - np.eye(len(nodes)))[:, None]
     home = zone_ways.min(1)
     numbers = np.arange(sum(shape) + _FARTHEST)
-    shares, parts = 1 / (numbers + 1), 1 / np.maximum(numbers, 1)
+    shares = 1 / (numbers + 1)
+    parts = 1 / np.maximum(numbers, 1)
     floats = (np.ascontiguousarray(a, np.float32) for a in (around, near, shares, parts))
     return _Tables(ways, zone_ways, home, home[places], *floats)
 
@@ -191,22 +193,30 @@ class Sets:
 
 @kernel
 def _encode(states, rows_mission, rows_uav, sea, tables, out):
-    count, columns = len(sea.nodes), sea.chart.zones.shape[1]
-    places, opens = np.empty(5, np.int64), np.empty(5, np.bool_)
-    data, units = np.empty(count, np.float32), np.float32(1.0) / sea.unit
+    count = len(sea.nodes)
+    columns = sea.chart.zones.shape[1]
+    places = np.empty(5, np.int64)
+    opens = np.empty(5, np.bool_)
+    data = np.empty(count, np.float32)
+    units = np.float32(1.0) / sea.unit
     memory = (
         np.empty((7, count), np.float32),
         np.empty(count, np.int16),
         np.empty((5, 8), np.float32),
     )
     for row in range(len(rows_mission)):
-        b, i = rows_mission[row], rows_uav[row]
+        b = rows_mission[row]
+        i = rows_uav[row]
         if i < 0:
             continue
-        mission, team, residual = states.missions[b], states.uavs[b], states.residual[b]
-        x, y = np.int64(team[i, column.X]), np.int64(team[i, column.Y])
+        mission = states.missions[b]
+        team = states.uavs[b]
+        residual = states.residual[b]
+        x = np.int64(team[i, column.X])
+        y = np.int64(team[i, column.Y])
         for action in range(5):
-            to_x, to_y = x + STEP_X[action], y + STEP_Y[action]
+            to_x = x + STEP_X[action]
+            to_y = y + STEP_Y[action]
             opens[action] = is_open(sea.chart, to_x, to_y)
             places[action] = to_y * columns + to_x if opens[action] else y * columns + x
         total = np.float32(0.0)
@@ -224,11 +234,15 @@ def _encode(states, rows_mission, rows_uav, sea, tables, out):
 @inlined
 def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
     """Write the nodes; leave the sums of data times nearness, by move and of all, in memory."""
-    me, cells, columns, count = team[i], sea.nodes, sea.chart.zones.shape[1], len(data)
+    me = team[i]
+    cells = sea.nodes
+    columns = sea.chart.zones.shape[1]
+    count = len(data)
     by_node, least, sums = memory
     free, crowd, near_0, near_1, near_2, beyond_1, beyond_2 = by_node
     here = tables.ways[places[HOVER]]
-    x, y = np.int64(me[column.X]), np.int64(me[column.Y])
+    x = np.int64(me[column.X])
+    y = np.int64(me[column.Y])
     least[:] = 1000
     by_node[1:] = 0.0
     for j in range(len(team)):
@@ -243,25 +257,33 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
         free[k] = data[k] * crowd[k]
     for j in range(count):
         if data[j] > 0.0:
-            around, full, own = tables.around[j], data[j], free[j]
+            around = tables.around[j]
+            full = data[j]
+            own = free[j]
             for k in range(count):
                 near_0[k] += own * around[0, k]
                 near_1[k] += own * around[1, k]
                 near_2[k] += own * around[2, k]
                 beyond_1[k] += full * around[1, k]
                 beyond_2[k] += full * around[2, k]
-    needed, battery = np.int64(me[column.NEEDED]), np.int64(me[column.BATTERY])
+    needed = np.int64(me[column.NEEDED])
+    battery = np.int64(me[column.BATTERY])
     own_home = np.int64(tables.home[places[HOVER]])
     must_charge = me[column.MUST_CHARGE] > 0
-    per_slot, per_mean = np.float32(1.0) / (needed + 1), np.float32(0.4) / (mean + np.float32(0.01))
+    per_slot = np.float32(1.0) / (needed + 1)
+    per_mean = np.float32(0.4) / (mean + np.float32(0.01))
     sums[:] = 0.0
     for k in range(count):
-        line, way, units = lines[k], np.int64(here[k]), data[k]
+        line = lines[k]
+        way = np.int64(here[k])
+        units = data[k]
         home = np.int64(tables.node_home[k])
-        lead, spare = np.int64(least[k]) - way, needed - way
+        lead = np.int64(least[k]) - way
+        spare = needed - way
         if must_charge:
             spare = battery - 1 - home - way
-        dx, dy = cells[k, 0] - x, cells[k, 1] - y
+        dx = cells[k, 0] - x
+        dy = cells[k, 1] - y
         near = tables.near[way]
         line[0] = 1.0
         line[1] = min(units, np.float32(4.0))
@@ -287,7 +309,8 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
         for move in range(4):
             nearer = np.float32(tables.ways[places[move], k] < here[k])
             moves[move, k] = nearer
-            full, own = nearer * data[k], nearer * free[k]
+            full = nearer * data[k]
+            own = nearer * free[k]
             for s in range(4):
                 sums[move, s] += full * near[s]
                 sums[move, 4 + s] += own * near[s]
@@ -297,8 +320,12 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
         moves[8, k] = 1.0
         length = abs(dx) + abs(dy)
         if length > 0:
-            east, south = dx * tables.parts[length], dy * tables.parts[length]
-            moves[4, k], moves[5, k], moves[6, k], moves[7, k] = -south, east, south, -east
+            east = dx * tables.parts[length]
+            south = dy * tables.parts[length]
+            moves[4, k] = -south
+            moves[5, k] = east
+            moves[6, k] = south
+            moves[7, k] = -east
 
 
 @inlined
@@ -319,18 +346,23 @@ def _rate(rates, square):
 @inlined
 def _own(mission, team, i, sea, mean, total, line):
     """Write the UAV's own state and what it is to know of the sea."""
-    me, active, needs, others = team[i], 0, 0, 0
+    me = team[i]
+    active = 0
+    needs = 0
+    others = 0
     for j in range(len(team)):
         if team[j, column.ACTIVE]:
             active += 1
             needs += team[j, column.NEEDED]
             if j != i and team[j, column.MUST_CHARGE]:
                 others += 1
-    battery, needed = np.int64(me[column.BATTERY]), np.int64(me[column.NEEDED])
+    battery = np.int64(me[column.BATTERY])
+    needed = np.int64(me[column.NEEDED])
     home = np.int64(me[column.HOME])
     start = np.int64(mission[column.CHARGE_START])
     complete = np.int64(mission[column.CHARGE_COMPLETE])
-    slack, slots = battery - 1 - home, np.float32(max(needs, 1))
+    slack = battery - 1 - home
+    slots = np.float32(max(needs, 1))
     line[0] = battery / 100.0
     line[1] = min(needed, 300) / 100.0
     line[2] = me[column.LATCH]
@@ -363,18 +395,21 @@ def _own(mission, team, i, sea, mean, total, line):
 @inlined
 def _mates(team, i, columns, tables, lines, moves):
     """Write the active teammates of UAV ``i``, seen from it."""
-    me, number = team[i], 0
+    me = team[i]
+    number = 0
     for j in range(len(team)):
         if j == i:
             continue
-        mate, line = team[j], lines[number]
+        mate = team[j]
+        line = lines[number]
         number += 1
         if not mate[column.ACTIVE]:
             continue
         dx = np.int64(mate[column.X]) - me[column.X]
         dy = np.int64(mate[column.Y]) - me[column.Y]
         way = abs(dx) + abs(dy)
-        battery, needed = np.int64(mate[column.BATTERY]), np.int64(mate[column.NEEDED])
+        battery = np.int64(mate[column.BATTERY])
+        needed = np.int64(mate[column.NEEDED])
         home = np.int64(mate[column.HOME])
         slack = battery - 1 - home
         line[0] = 1.0
@@ -395,11 +430,18 @@ def _mates(team, i, columns, tables, lines, moves):
         line[15] = (needed - me[column.NEEDED]) / 50.0
         line[16] = home == 0
         to = moves[:, number - 1]
-        to[0], to[1], to[2], to[3] = dy < 0, dx > 0, dy > 0, dx < 0
+        to[0] = dy < 0
+        to[1] = dx > 0
+        to[2] = dy > 0
+        to[3] = dx < 0
         to[8] = 1.0
         if way > 0:
-            east, south = dx * tables.parts[way], dy * tables.parts[way]
-            to[4], to[5], to[6], to[7] = -south, east, south, -east
+            east = dx * tables.parts[way]
+            south = dy * tables.parts[way]
+            to[4] = -south
+            to[5] = east
+            to[6] = south
+            to[7] = -east
 
 
 @inlined
@@ -409,7 +451,8 @@ def _zones(team, i, sea, tables, places, columns, lines, moves):
     here = tables.zone_ways[places[HOVER]]
     nearest = tables.home[places[HOVER]]
     for zone in range(len(sea.pads)):
-        line, way = lines[zone], np.int64(here[zone])
+        line = lines[zone]
+        way = np.int64(here[zone])
         charging = waiting = coming = 0
         for j in range(len(team)):
             mate = team[j]
@@ -440,10 +483,14 @@ def _zones(team, i, sea, tables, places, columns, lines, moves):
 @inlined
 def _actions(team, i, data, sea, tables, places, opens, mean, sums, lines):
     """Write per action what is known of the cell it leads to."""
-    me, cells, columns = team[i], sea.nodes, sea.chart.zones.shape[1]
+    me = team[i]
+    cells = sea.nodes
+    columns = sea.chart.zones.shape[1]
     for action in range(5):
-        line, place = lines[action], places[action]
-        x, y = place % columns, place // columns
+        line = lines[action]
+        place = places[action]
+        x = place % columns
+        y = place // columns
         line[0] = action == HOVER
         line[1] = me[column.MASK] >> action & 1
         line[2] = opens[action]
@@ -461,14 +508,17 @@ def _actions(team, i, data, sea, tables, places, opens, mean, sums, lines):
             for part in range(2):
                 nearer, all_ = sums[action, 4 * part + s], sums[HOVER, 4 * part + s]
                 line[5 + 3 * part + s] = (less * all_ + (more - less) * nearer) / _NORMS[s]
-        square, served = 1_000_000, -1
+        square = 1_000_000
+        served = -1
         for k in range(len(cells)):
-            dx, dy = cells[k, 0] - x, cells[k, 1] - y
+            dx = cells[k, 0] - x
+            dy = cells[k, 1] - y
             distance = dx * dx + dy * dy
             if data[k] > 0.0 and (
                 distance < square or (distance == square and data[k] > data[served])
             ):
-                square, served = distance, k
+                square = distance
+                served = k
         if served >= 0:
             rate = _rate(sea.rates, square)
             line[11] = min(rate, np.float32(2.0))

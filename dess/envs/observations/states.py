@@ -122,13 +122,15 @@ def compact_states(state: State, chart: Chart, guarded: bool) -> CompactStates:
 def _fill(missions, uavs, residual, guarded, chart, reach, out_missions, out_uavs, out_residual):
     memory = parking_memory(chart, uavs.shape[1])
     for b in range(len(missions)):
-        mission, team = missions[b], uavs[b]
+        mission = missions[b]
+        team = uavs[b]
         out_missions[b, CHARGE_START] = mission.charge_start
         out_missions[b, CHARGE_COMPLETE] = mission.charge_complete
         out_residual[b] = residual[b]
         data = data_left(mission, residual[b])
         for i in range(mission.uavs):
-            u, row = team[i], out_uavs[b, i]
+            u = team[i]
+            row = out_uavs[b, i]
             row[X], row[Y], row[BATTERY] = u.x, u.y, u.battery
             row[NEEDED] = min(max(slots_needed(mission, u), 0), _MOST)
             row[ACTIVE], row[LATCH], row[CHARGING] = u.active, u.latch, u.charging

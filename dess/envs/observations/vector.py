@@ -90,23 +90,31 @@ def _encode(
 ):
     count = len(nodes)
     least = np.empty(count, np.float32)
-    columns, rows = nodes[:, 0].astype(np.float32), nodes[:, 1].astype(np.float32)
+    columns = nodes[:, 0].astype(np.float32)
+    rows = nodes[:, 1].astype(np.float32)
     units = np.empty(count)
     near, free = np.empty(_WIDTH, np.float32), np.empty(_WIDTH, np.float32)
-    before, total = -1, 0.0
+    before = -1
+    total = 0.0
     for row in range(len(rows_mission)):
-        b, i, line = rows_mission[row], rows_uav[row], out[row]
+        b = rows_mission[row]
+        i = rows_uav[row]
+        line = out[row]
         line[:] = 0.0
         if i < 0:
             continue
-        mission, team, data = missions[b], uavs[b], residual[b]
+        mission = missions[b]
+        team = uavs[b]
+        data = residual[b]
         if b != before:  # the UAVs of a mission share what follows from its data
-            before, total = b, 0.0
+            before = b
+            total = 0.0
             for k in range(count):
                 total += data[k]
                 units[k] = data[k] / DATA_UNIT
         me = team[i]
-        x, y = np.int64(me[column.X]), np.int64(me[column.Y])
+        x = np.int64(me[column.X])
+        y = np.int64(me[column.Y])
         at = _own(mission, team, i, total / (count * DATA_UNIT), line)
         line[at + x] = 1.0
         line[at + grid + y] = 1.0
@@ -115,7 +123,8 @@ def _encode(
         near[:] = 0.0
         free[:] = 0.0
         for k in range(count):
-            dx, dy = nodes[k, 0] - x, nodes[k, 1] - y
+            dx = nodes[k, 0] - x
+            dy = nodes[k, 1] - y
             slots = abs(dx) + abs(dy)
             lead = np.int64(least[k]) - slots
             line[at + k] = units[k]
@@ -179,7 +188,8 @@ def nearest_teammates(team, i, columns, rows, least):
     least[:] = 10_000
     for j in range(len(team)):
         if j != i and team[j, column.ACTIVE] and not team[j, column.CHARGING]:
-            x, y = np.float32(team[j, column.X]), np.float32(team[j, column.Y])
+            x = np.float32(team[j, column.X])
+            y = np.float32(team[j, column.Y])
             for k in range(len(least)):
                 least[k] = min(least[k], abs(columns[k] - x) + abs(rows[k] - y))
 
@@ -187,9 +197,11 @@ def nearest_teammates(team, i, columns, rows, least):
 @inlined
 def _actions(team, i, near, free, line, at):
     """Write per action the mask, the teammates near the cell it leads to, and the data near it."""
-    me, scales = team[i], len(SCALES)
+    me = team[i]
+    scales = len(SCALES)
     for action in range(5):
-        x, y = me[column.X] + STEP_X[action], me[column.Y] + STEP_Y[action]
+        x = me[column.X] + STEP_X[action]
+        y = me[column.Y] + STEP_Y[action]
         line[at] = me[column.MASK] >> action & 1
         for j in range(len(team)):
             if j != i and team[j, column.ACTIVE]:
@@ -206,20 +218,25 @@ def _actions(team, i, near, free, line, at):
 @inlined
 def _mates(team, i, line, at):
     """Write the nearest active teammates, relative to UAV ``i``."""
-    x, y = np.int64(team[i, column.X]), np.int64(team[i, column.Y])
+    x = np.int64(team[i, column.X])
+    y = np.int64(team[i, column.Y])
     last_slots, last = -1, -1
     for _ in range(MATES):
-        nearest, least = -1, 10_000
+        nearest = -1
+        least = 10_000
         for j in range(len(team)):
             slots = abs(team[j, column.X] - x) + abs(team[j, column.Y] - y)
             after = slots > last_slots or (slots == last_slots and j > last)
             if j != i and team[j, column.ACTIVE] and after and slots < least:
-                nearest, least = j, slots
+                nearest = j
+                least = slots
         if nearest < 0:
             return
-        last_slots, last = least, nearest
+        last_slots = least
+        last = nearest
         mate = team[nearest]
-        dx, dy = mate[column.X] - x, mate[column.Y] - y
+        dx = mate[column.X] - x
+        dy = mate[column.Y] - y
         line[at] = 1.0
         line[at + 1] = dx / 30.0
         line[at + 2] = dy / 30.0
