@@ -14,6 +14,8 @@ from importlib import import_module, metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dess.base.floors import import_floor
+
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
     from dess.api import simulate as simulate
     from dess.api import simulate_batch as simulate_batch
@@ -39,7 +41,7 @@ _HOME = {
     "vector_env": "envs.vector",
 }
 
-_FLOORS = ("policies", "analysis")  # above this one, imported by name alone
+_FLOORS = ("policies", "analysis")  # see ``dess.base.floors``
 
 __all__ = ["__version__", *_HOME, *_FLOORS]
 
@@ -53,7 +55,7 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         return metadata.version("dess")
     if name in _FLOORS:
-        return import_module(f"dess.{name}")
+        return import_floor(name)
     if name in _HOME:
         return getattr(import_module(f"dess.{_HOME[name]}"), name)
     raise AttributeError(f"module 'dess' has no attribute {name!r}")

@@ -4,20 +4,18 @@ import gc
 import os
 import sys
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 
-FOLDERS = ("policies", "analysis", "reports")  # beside this one in the repository
+from dess.base.errors import InputError
+from dess.base.floors import check_floors
 
 
 def main() -> int:
     """Run the command; the exit code."""
-    if missing := [name for name in FOLDERS if find_spec(f"dess.{name}") is None]:
-        print(
-            f"dess: {Path(__file__).parent} is a part of the package, without "
-            f"{' and '.join(missing)}; allowed: an installation with pip, or the whole repository",
-            file=sys.stderr,
-        )
+    try:
+        check_floors()
+    except InputError as error:
+        print(f"dess: {error}", file=sys.stderr)
         return 2
     gc.set_threshold(50_000, 20, 50)  # what a command imports stays: to search it takes a tenth
     # The products of learned policies are small: threads of NumPy would only wait for each other.

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from dess.base.floors import check_floors
 from dess.model import batch, mission
 from dess.model.record import MissionRecord, Records
 from dess.scenario.scenario import AnyScenario
@@ -94,8 +95,9 @@ def load_policies(policy: Any) -> list[Any]:
         policy: A policy or the name of one or more, or a list of these.
 
     Raises:
-        InputError: If there is no policy of a name.
+        InputError: If there is no policy of a name, or no ``dess.policies``.
     """
+    check_floors()
     from dess.policies import load_team
 
     members = policy if isinstance(policy, list | tuple) else [policy]

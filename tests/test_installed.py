@@ -46,11 +46,14 @@ def test_the_wheel_runs_without_the_repository(installed, tmp_path):
 
 def test_a_copy_of_dess_alone_says_what_is_missing(tmp_path):
     shutil.copytree(ROOT / "dess", tmp_path / "dess", symlinks=True)
-    command = [sys.executable, "-m", "dess", "policies"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 2
-    assert "without policies and analysis and reports; allowed:" in done.stderr
-    assert done.stderr.count("\n") == 1
+    simulate = "import dess; dess.simulate(dess.load_scenario('paper'), 'greedy', seed=1)"
+    for command in (["-m", "dess", "policies"], ["-c", simulate]):
+        command = [sys.executable, *command]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode
+        assert "without policies and analysis and reports; allowed:" in done.stderr.splitlines()[-1]
+        assert "ModuleNotFoundError" not in done.stderr
+        assert ("Traceback" in done.stderr) == ("-c" in command)  # Python's own, of the script
 
 
 @pytest.mark.slow

@@ -24,12 +24,12 @@ import nbformat
 
 import dess
 from dess import InputError
-from dess.__main__ import FOLDERS
 from dess.analysis.results.chunks import MANIFEST
 from dess.analysis.results.manifest import Manifest
 from dess.base.files.documents import LIMIT
 from dess.base.files.reading import Missing, paths_in, read_bytes
 from dess.base.files.writing import delete, locked, write_files
+from dess.base.floors import FLOORS
 from dess.reports.pages import INDEX, LOCK, PREFIX, check_pages, kernels, notebook
 from dess.reports.pages.html import fill_page, load_template
 from dess.reports.pages.kernels import Progress
@@ -156,7 +156,7 @@ def _hash_software() -> str:
     """A hash of the files of this package and of the versions of all libraries."""
     # In a checkout, folders of the package lie beside it, and ``**`` does not follow links to them.
     folders = [PACKAGE]
-    for name in FOLDERS:
+    for name in FLOORS:
         if (PACKAGE / name).is_symlink() or not (PACKAGE / name).is_dir():
             folders.append(PACKAGE.parent / name)
     files = sorted(
