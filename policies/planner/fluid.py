@@ -524,7 +524,7 @@ def _end_slot(mission, chart, v):
     if has_landed or (v.counted >= v.quota and not lands(mission)):
         v.active = v.charging = 0
     elif v.battery <= 0:
-        lacking = (v.quota - v.counted) / mission.communication_slots
+        lacking = max(v.quota - v.counted, 0) / mission.communication_slots
         penalty = _DEPLETED + _SLOT_MISSED * lacking
         v.active = v.charging = 0
     if lands(mission):

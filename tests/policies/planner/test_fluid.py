@@ -20,6 +20,7 @@ from dess.policies.planner.rates import load_rates
 from dess.policies.planner.search import BEST, TRIED, empty_workspace, improve_plan
 from tests.dess.model.flights import first_view
 
+DEPLETED = 100.0  # the penalty for an empty battery [data units]
 CALM = {"shadowing_variance": 0.0, "arrival_rate": 0.0}
 
 
@@ -107,6 +108,17 @@ def test_a_charge_adds_what_the_engines_add_whenever_it_begins(flying_time):
     battery = [event.battery for event in record.events if event.event == "move"]
     assert battery[:60] == [int(craft["battery"][0]) for craft in policy.crafts[1:]]
     assert battery[59] > 40
+
+
+def test_without_a_quota_an_empty_battery_costs_the_same_however_much_was_sent():
+    """No communications are lacking, and none are too many."""
+    scenario = ScenarioSpace.of(**ALONE | CALM | {"quota": 0, "landing": True, "max_slots": 60})
+    view = first_view(scenario, 5)
+    for field, value in {"x": 7, "y": 7, "battery": 3}.items():  # too far from the zone
+        view.state.uavs[0][field] = value
+    _, value, collected = _flown(view, empty_plan(1), 60)
+    assert collected > 0
+    assert collected - value == pytest.approx(DEPLETED)
 
 
 @pytest.mark.parametrize("replication", range(4))
