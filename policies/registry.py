@@ -17,7 +17,6 @@ Other packages register theirs under the entry point ``dess.policies``.
 import inspect
 import os
 import re
-import shlex
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
@@ -178,8 +177,8 @@ def _check_untrained(folder: Path) -> None:
     """Raise an error if a folder has a training that has not written any weights yet."""
     if os.path.exists(folder / CHECKPOINT):  # False for a name that no folder can have
         raise InputError(
-            f"policy: {folder} is a training that has no weights yet; allowed: after "
-            f"dess train CONFIG --out {shlex.quote(str(folder))} --resume"
+            f"policy: {folder} is a training that has no weights yet; allowed: after the command "
+            "that began it is run again with --resume"
         )
 
 

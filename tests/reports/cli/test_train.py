@@ -83,7 +83,10 @@ def test_the_seed_can_be_set(dess):
 # Arguments, and what the line on stderr must name.
 BAD = {
     "train tiny.toml --out out --device cuda": ["no CUDA device", "auto, cpu"],
-    "evaluate --policy begun": ["begun is a training that has no weights yet", "--resume"],
+    "evaluate --policy begun": [
+        "begun is a training that has no weights yet",
+        "again with --resume",
+    ],
 }
 
 
