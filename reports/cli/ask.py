@@ -155,7 +155,7 @@ def what_if(
 
     Args:
         settings: What the variation changes: a field of the scenario and its value, in TOML
-            syntax; repeatable.
+            syntax, a quantity such as 35 min without quotes; repeatable.
         baseline: A field that is set in the baseline, and in the variation as well where --set
             does not set it; repeatable.  [default: the scenario as it is]
         policy: A policy, or several that the UAVs follow in turn, compared with itself;

@@ -91,7 +91,8 @@ SetOption = Annotated[
         SET,
         metavar="KEY=VALUE",
         autocompletion=complete_fields,
-        help="Set a field of the scenario to a value in TOML syntax; repeatable.",
+        help="Set a field of the scenario to a value in TOML syntax, a quantity such as 35 min "
+        "without quotes; repeatable.",
     ),
 ]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random draws.")]

@@ -53,7 +53,7 @@ def report(
         results: Folder that contains a results folder per study.
         out: Folder of the pages.
         settings: A change that the report what-if asks about: a field of the scenario, the
-            value in TOML syntax; repeatable.
+            value in TOML syntax, a quantity such as 35 min without quotes; repeatable.
         parameters: A parameter of the notebooks, such as missions or policies of what-if, the
             value in TOML syntax; repeatable.
         figures: Also write every figure as a file into the folder NAME-figures beside its page:
