@@ -22,7 +22,8 @@ from dess.base.files.reading import read_text
 from dess.base.files.writing import write_file
 from dess.policies.learner.config import MISSION_SEED, load_config, read_description
 from dess.policies.learner.trained import read_weights
-from dess.policies.registry import CARD, HEURISTICS, load
+from dess.policies.registry import CARD, load
+from dess.policies.shipped import HEURISTICS
 
 # The seed of the missions of model cards, which neither training nor selection of weights uses.
 EVALUATION_SEED = 20_261_121

@@ -33,6 +33,7 @@ from dess.base.files.reading import Missing, paths_in, read_text
 from dess.base.sources import path_of
 from dess.model.view import View
 from dess.policies.learner.config import CHECKPOINT, CONFIG, field_ranges, read_description
+from dess.policies.shipped import HEURISTICS, PLANNERS
 from dess.scenario.fields import SAMPLED
 from dess.scenario.scenario import ScenarioSpace, load_scenario, scenario_names
 
@@ -64,24 +65,7 @@ class Policy(Protocol):
 
 GROUP = "dess.policies"
 
-# The classes of ``dess.policies.heuristics`` and of ``dess.policies.planner``, and what they do.
-HEURISTICS = {
-    "random": ("Random", "a random safe move, clear of teammates"),
-    "random-unguarded": (
-        "RandomUnguarded",
-        "the same without the return guard: it shows what the guard is worth",
-    ),
-    "nearest": ("Nearest", "the nearest node with enough data"),
-    "greedy": ("Greedy", "the best residual data for the distance"),
-    "tour": ("Tour", "a fixed circuit through the nodes, split among the UAVs"),
-    "age": ("Age", "the stalest data for the distance"),
-}
-PLANNERS = {
-    "planner": ("Planner", "a plan for the whole team, kept up to date"),
-    "planner-short": ("ShortPlanner", "the same with a fifth of the search"),
-    "planner-long": ("LongPlanner", "the same with a longer search"),
-}
-SHIPPED = HEURISTICS | PLANNERS
+CLASSES = HEURISTICS | PLANNERS  # the shipped policies that are classes
 
 TRAINED = Path(__file__).with_name("trained")  # one folder per trained policy
 
@@ -104,7 +88,7 @@ class TypedByUser(str):
 
 def names() -> list[str]:
     """All policies by name, the shipped ones first."""
-    shipped = [*SHIPPED, *trained_names()]
+    shipped = [*CLASSES, *trained_names()]
     return [*shipped, *sorted(set(_registered_policies()) - set(shipped))]
 
 
@@ -118,7 +102,7 @@ def describe_policies() -> dict[str, str]:
 
     Those of other packages are loaded; if one cannot be loaded, its description says so.
     """
-    shipped = {name: description for name, (_, description) in SHIPPED.items()}
+    shipped = {name: policy.about for name, policy in CLASSES.items()}
     shipped |= {name: _describe_trained(TRAINED / name) for name in trained_names()}
     outside = {name: _describe_registered(point) for name, point in _registered_policies().items()}
     return {name: (outside | shipped)[name] for name in names()}
@@ -139,9 +123,9 @@ def load(name: str | Path) -> Policy:
     """
     is_typed = isinstance(name, TypedByUser)
     name = str(name)
-    if name in SHIPPED:
-        module = f"dess.policies.{'planner' if name in PLANNERS else 'heuristics'}"
-        return _make_policy(name, module, lambda: _find_class(module, SHIPPED[name][0]))
+    if name in CLASSES:
+        shipped = CLASSES[name]
+        return _make_policy(name, shipped.module, lambda: _find_class(shipped.module, shipped.kind))
     if folder := folder_of(name):
         from dess.policies.learner.trained import load_policy  # imports numba
 
@@ -393,7 +377,7 @@ def _read_card(folder: Path | None) -> str:
 
 def _describe_origin(name: str) -> str:
     """Where a policy comes from, in words."""
-    if name in (*SHIPPED, *trained_names()):
+    if name in (*CLASSES, *trained_names()):
         return f"shipped with dess {version('dess')}"
     if folder := folder_of(name):
         return f"the folder {folder}"

@@ -23,6 +23,12 @@ ROOMS = {
         *("model.view", "model.guard", "model.batch", "model.mission"),
         *("envs.observations", "envs", "envs.integrations"),
     ),
+    "policies": (
+        *("shipped", "network", "adapter", "heuristics", "planner", "learner.config"),
+        *("learner.policy", "learner.trained", "learner.network", "learner.training"),
+        *("learner.dqn", "learner.ppo", "learner.checkpoint", "learner.session", "learner"),
+        "registry",
+    ),
     "analysis": (
         *("names", "numbers", "metrics", "stats", "tables", "bound", "study", "results"),
         *("execution", "figures", "answers.settings", "answers.fleet", "answers", "paper"),

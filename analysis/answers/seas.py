@@ -22,14 +22,14 @@ from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import column_tests, relative_change
 from dess.analysis.stats.intervals import Interval, column_intervals
+from dess.policies.shipped import REFERENCES
 from dess.scenario.scenario import SEA
 
 # Groups of seas by their number of nodes: the largest number of each but the last.
 _NODES = (15, 30, 60)
 _NODES_IN_WORDS = ("1 to 15", "16 to 30", "31 to 60", "61 and more")
 ALL = "all"
-# The slow policies that others are compared with.
-REFERENCES = ("planner", "planner-long", "planner-short")
+
 GROUPS = {"family": "Family", "nodes": "Nodes", "uavs": "UAVs"}
 _ENDS = ["mean", "low", "high"]
 

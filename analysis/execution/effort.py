@@ -17,11 +17,12 @@ from dess.analysis.results.store import Store, source_folders
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.study import Study
 from dess.base.files.memory import check_memory
-from dess.policies.registry import SHIPPED, folder_of, load_team
+from dess.policies.registry import folder_of, load_team
+from dess.policies.shipped import SHIPPED
 from dess.scenario.scenario import ScenarioSpace
 
 # The policies from the slowest to the fastest: the time of a decision [s] as measured on one core.
-SECONDS = {"planner": 4e-4, "planner-short": 7e-5, "any": 2.5e-5, "greedy": 2e-6}
+SECONDS = {n: SHIPPED[n].seconds for n in ("planner", "planner-short", "any", "greedy")}
 BASELINE = "greedy"  # the policy without learning and search that the best one is compared with
 # From the best to the worst. A search of the same length is worse for a larger fleet.
 OF_SMALL_FLEETS = ("planner", "planner-short", "any", BASELINE)
@@ -62,11 +63,10 @@ WORKER_MEMORY = 300 * 2**20
 LONG_RUN = 3600.0
 SPREAD = 3.0  # how much longer or shorter than here missions may take elsewhere
 
-# The times of a decision [s] on one core, of the shipped policies, of other trained ones, and of
-# classes of others, in which anything may happen.
-_SECONDS = SECONDS | {"planner-long": 3e-3, "ddqn-paper": 7e-5}
-_SECONDS |= dict.fromkeys(("ddqn", "ddqn-2", "ddqn-3"), 6e-6)
-_HEURISTIC, _TRAINED, _OTHER = (2e-6, 2e-6), (5e-6, 7e-5), (2e-6, 1e-3)
+# The least and the largest time of a decision [s] on one core of trained policies that are not
+# shipped, and of classes of others, in which anything may happen.
+_TRAINED = (5e-6, 7e-5)
+_OTHER = (2e-6, 1e-3)
 START = 15.0  # what a run may take to start its workers and to write its results [s]
 BOUND = (1e-4, 1e-2)  # the time of an upper bound [s] for every decision of its mission
 
@@ -131,10 +131,9 @@ def seconds_of(
 
 def _decision_time(policy: str) -> tuple[float, float]:
     """The least and the largest time of a decision of a policy [s]."""
-    if policy in _SECONDS:
-        return _SECONDS[policy], _SECONDS[policy]
     if policy in SHIPPED:
-        return _HEURISTIC
+        seconds = SHIPPED[policy].seconds
+        return seconds, seconds
     return _TRAINED if folder_of(policy) else _OTHER
 
 

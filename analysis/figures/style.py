@@ -31,6 +31,7 @@ from pandas.api.types import is_numeric_dtype
 
 from dess.analysis.names import value_text
 from dess.analysis.numbers import format_minus
+from dess.policies.shipped import WITH_LOOK
 
 Look: TypeAlias = tuple[str, str]  # a colour and a marker
 Values: TypeAlias = Literal["x", "y", "xy"]
@@ -38,11 +39,7 @@ Values: TypeAlias = Literal["x", "y", "xy"]
 INK, MUTED, GRID = "#22303c", "#7a8791", "#dde4e9"
 SEA, ZONE, ZONE_EDGE, LAND = "#f3f8fb", "#ffe08a", "#d9a400", "#cdbf9f"  # of maps
 UAVS = ("#1b1b1b", "#b3123f", "#1f5fbf", "#00734d", "#8a4b00", "#7b2fa0", "#007a8a", "#66707a")
-# Policies that look the same in all figures, whatever other policies are drawn.
-KNOWN_POLICIES = (
-    *("random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper"),
-    *("planner-long", "age", "random-unguarded", "planner"),
-)
+
 LINES, MARKERS = ("-", "--", ":", "-."), "os^vPX*"
 WIDTH, DPI = 5.2, 150  # inches, dots per inch
 OUTLINED: dict = {"path_effects": [withStroke(linewidth=2.5, foreground="white")]}  # of texts
@@ -186,14 +183,14 @@ def _darken_until_readable(colour: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def policy_colours(policies: Iterable[str], drawn: Iterable[str] | None = None) -> dict[str, Look]:
-    """Colour and marker of every policy; those of ``KNOWN_POLICIES`` always have the same.
+    """Colour and marker of every policy; those of ``WITH_LOOK`` always have the same.
 
     Args:
         policies: All policies of a study, so that each looks the same in all of its figures.
         drawn: Those of them that a figure shows; by default all.
     """
     names = list(dict.fromkeys(policies))
-    numbers = {name: KNOWN_POLICIES.index(name) for name in names if name in KNOWN_POLICIES}
+    numbers = {name: WITH_LOOK.index(name) for name in names if name in WITH_LOOK}
     free = [n for n in range(len(names)) if n not in numbers.values()]
     numbers |= dict(zip((name for name in names if name not in numbers), free, strict=False))
     shown = names if drawn is None else dict.fromkeys(drawn)

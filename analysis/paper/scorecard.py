@@ -20,6 +20,7 @@ from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import INCONCLUSIVE, position_of
 from dess.base.files.reading import parse_toml, read_text
 from dess.policies.learner.config import TrainingConfig
+from dess.policies.shipped import NULLS
 
 TRAININGS = "trainings"  # in place of the name of a study, for claims about learning curves
 
@@ -133,8 +134,7 @@ CLAIMS = [
 # The learner with the paper's observation, network and algorithm.
 PAPERS_NETWORK = "ddqn-paper"
 SMALLER = "-paper"  # ends the names of studies of it alone, with fewer missions
-# Policies that have learned nothing.
-NULLS = ("greedy", "random", "random-unguarded")
+
 COLUMNS = ("the best learned policy", PAPERS_NETWORK, *NULLS)
 # Trainings with and without transfer learning, with the methods of the best learned policy.
 VARIANTS = ("quick", "no transfer")

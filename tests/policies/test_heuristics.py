@@ -14,7 +14,7 @@ from dess.model.guard import guard
 from dess.model.mission import simulate
 from dess.model.state import HOVER
 from dess.model.view import View
-from dess.policies.registry import HEURISTICS
+from dess.policies.shipped import HEURISTICS
 from dess.scenario.scenario import Scenario, load_scenario
 from tests.dess.model.flights import assert_same_alone, cells_of
 from tests.drawn import NORTH, SOUTH, Checked, replications, seeds, spaces

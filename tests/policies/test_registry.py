@@ -11,11 +11,11 @@ import pytest
 import dess
 from dess import InputError, policies
 from dess.model.mission import simulate
-from dess.policies import registry
+from dess.policies import registry, shipped
 from dess.policies.heuristics import Greedy
 from dess.policies.learner.config import validate_config
 from dess.policies.learner.trained import expected_weights, make_observation, save_policy
-from dess.policies.registry import SHIPPED, Policy, TypedByUser, describe_policy
+from dess.policies.registry import CLASSES, Policy, TypedByUser, describe_policy
 from dess.scenario.scenario import Scenario, load_scenario, scenario_names
 from tests.outside import install_package
 from tests.policies.learner.tiny import refusal_of
@@ -48,11 +48,15 @@ def outside(tmp_path, monkeypatch):
     install_package(tmp_path, monkeypatch, "outside_policies", OUTSIDE, **classes)
 
 
+def test_every_shipped_policy_has_a_row_in_the_table():
+    assert {*shipped.SHIPPED} == {*registry.CLASSES, *registry.trained_names()}
+
+
 @pytest.mark.parametrize("text", ["gredy", "", "greedy,,tour", "Greedy"])
 def test_unknown_names_are_refused(text):
     line = refusal_of(policies.load_team, text)
     assert line.startswith("policy: ")
-    assert all(name in line for name in SHIPPED) or "others" in line
+    assert all(name in line for name in CLASSES) or "others" in line
     assert "FILE.py:CLASS" in line and "entry point dess.policies" in line
 
 

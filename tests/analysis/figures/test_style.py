@@ -8,7 +8,8 @@ from IPython.core.formatters import DisplayFormatter
 from dess import load_scenario
 from dess.analysis.figures import style
 from dess.analysis.figures.missions import sea_figure
-from dess.analysis.figures.style import KNOWN_POLICIES, node_colours, policy_colours, signed_points
+from dess.analysis.figures.style import node_colours, policy_colours, signed_points
+from dess.policies.shipped import WITH_LOOK
 
 
 @pytest.mark.parametrize("count", [1, 9, 25, 40])
@@ -22,7 +23,7 @@ def test_neighbouring_nodes_differ_in_colour(count):
 
 
 def test_policies_look_the_same_wherever_they_are_and_none_like_another():
-    everywhere = policy_colours(KNOWN_POLICIES)
+    everywhere = policy_colours(WITH_LOOK)
     for names in (["ddqn", "mine", "greedy", "ddqn"], ["a", "b", "ddqn-paper"], ["b", "a"]):
         looks = policy_colours(names)
         assert [*looks] == [*dict.fromkeys(names)]

@@ -10,7 +10,7 @@ from dess import ScenarioSpace, load_scenario
 from dess.analysis import load_study
 from dess.analysis.names import declared_fields as fields_in
 from dess.analysis.study.study import study_names
-from dess.policies.registry import SHIPPED, trained_names
+from dess.policies.registry import CLASSES, trained_names
 from dess.reports.cli.commands import app
 from dess.scenario.fields import fields_of
 from dess.scenario.scenario import scenario_families, scenario_names
@@ -18,7 +18,7 @@ from dess.scenario.scenario import scenario_families, scenario_names
 
 def test_names_are_listed(dess):
     for command, names in {
-        "policies": [*SHIPPED, *trained_names()],
+        "policies": [*CLASSES, *trained_names()],
         "scenarios": [*scenario_names(), *scenario_families()],
         "studies": study_names(),
     }.items():
