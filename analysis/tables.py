@@ -62,7 +62,8 @@ def estimate_cells(
         write: Writes a mean and the ends of its interval.
     """
 
-    order, known = rows[columns].unique(), rows[rows["mean"].notna()]
+    order = rows[columns].unique()
+    known = rows[rows["mean"].notna()]
     table = numbers.estimates_as_text(known, [*index], columns, write)
     table = table[[name for name in order if name in table]].fillna("").reset_index()
     for name in index:

@@ -89,7 +89,8 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
         trained_policies_by_learner(results).values(),
         key=lambda trainings: -means[trainings].mean(),
     )
-    ranked, of_learners = rank_policies(results.missions), {*sum(trained, [])}
+    ranked = rank_policies(results.missions)
+    of_learners = {*sum(trained, [])}
     firsts = [trainings[0] for trainings in trained]
     others = [policy for policy in ranked if policy not in of_learners]
     if not firsts or not others:
@@ -347,7 +348,8 @@ def differences_along_parameters(missions: pd.DataFrame, candidates: int = 1) ->
         bin_of, names = divide_into_bins(missions[field], max(1, min(BINS, len(missions) // LEAST)))
         large = np.flatnonzero(np.bincount(bin_of) >= LEAST)
         for position, code in enumerate(large if len(large) > 1 else []):
-            part, value = missions[bin_of == code], names[code]
+            part = missions[bin_of == code]
+            value = names[code]
             ours, theirs = (values_within(part, PRODUCT + end, ()) for end in ("", OF_BASELINE))
             found = compare_pairs(ours, theirs, metric=PRODUCT)
             rows.append((field, position, value, *found[:4], found.n))
@@ -579,7 +581,9 @@ def _time_calls(team: list[Policy], results: Results, clock: Clock) -> list[floa
     """The times of the calls of a team [s], in as many whole missions as ``CALLS`` calls take."""
     calls: list[float] = []
     timed = [_Timed(policy, clock, calls) for policy in team]
-    space, seed, replication = results.scenario(), results.store.manifest.seed, 0
+    space = results.scenario()
+    seed = results.store.manifest.seed
+    replication = 0
     with threadpool_limits(1):
         while len(calls) < CALLS:
             simulate(space, timed, seed, replication)
@@ -605,7 +609,10 @@ class _Timed:
     """A policy whose calls are timed; the first one is made twice, since it compiles and loads."""
 
     def __init__(self, policy: Policy, clock: Clock, calls: list[float]):
-        self.name, self.policy, self.clock, self.calls = policy.name, policy, clock, calls
+        self.name = policy.name
+        self.policy = policy
+        self.clock = clock
+        self.calls = calls
         self.decisions = 0
 
     def act(self, view: View) -> np.ndarray:

@@ -86,7 +86,8 @@ def diff_results(a: Results, b: Results) -> Diff:
     Raises:
         InputError: If no mission is in both; with different seeds, no policy at a design point.
     """
-    both, is_paired = f"{a.store.folder} and {b.store.folder}", len(_distinct_seeds(a, b)) == 1
+    both = f"{a.store.folder} and {b.store.folder}"
+    is_paired = len(_distinct_seeds(a, b)) == 1
     keys = _KEYS if is_paired else _KEYS[:2]
     single = len(a.policies) == len(b.policies) == 1
     teams = dict(zip(b.policies, a.policies if single else b.policies, strict=True))
@@ -107,13 +108,15 @@ def diff_results(a: Results, b: Results) -> Diff:
     sides = None
     if not is_paired:
         rows = pd.concat([missions_a.assign(side="a"), missions_b.assign(side="b")])
-        common, sides = common[:0], rows.merge(cells, on=_KEYS[:2])
+        common = common[:0]
+        sides = rows.merge(cells, on=_KEYS[:2])
     numbered = common[_KEYS].assign(mission=np.arange(len(common)))
     uavs = [_uavs_of_missions(a, missions_a, numbered), _uavs_of_missions(b, missions_b, numbered)]
     pairs = uavs[0].merge(uavs[1], on=["mission", "uav"], how="outer", suffixes=("_a", "_b"))
     common.insert(0, "fields", _differing_fields(common, pairs))
     points = cells[["point_a", "point_b"]].drop_duplicates()
-    missions, alone_in = common.drop(columns=_KEYS[:2]), pd.concat(alone, ignore_index=True)
+    missions = common.drop(columns=_KEYS[:2])
+    alone_in = pd.concat(alone, ignore_index=True)
     return Diff(a, b, missions, alone_in, points, sides)
 
 
@@ -136,7 +139,8 @@ def estimate_differences(found: Diff, by: Sequence[str] = ("policy_a",)) -> pd.D
         return _unpaired_effects(found.unpaired, by)
     by_group = found.missions.assign(differ=found.missions["fields"] != "").groupby([*by])
     counts = by_group["differ"].agg(missions="size", differ="sum").reset_index()
-    keys, sides = ["policy_a", "point_a", "replication"], []
+    keys = ["policy_a", "point_a", "replication"]
+    sides = []
     for side in "ab":
         metrics = {f"{name}_{side}": name for name in METRICS}
         metrics["uavs_a"] = "uavs"  # by which means are post-stratified
@@ -168,7 +172,8 @@ def most_changed(found: Diff, missions: int) -> pd.DataFrame:
     rows = found.changed[:missions]
     for side, results in (("a", found.a), ("b", found.b)):
         which = rows[[f"policy_{side}", f"point_{side}", "replication"]]
-        asked, folder = which.itertuples(index=False), results.store.folder
+        asked = which.itertuples(index=False)
+        folder = results.store.folder
         commands = [results.command(p, point, n, folder) for p, point, n in asked]
         rows = rows.assign(**{f"command_{side}": commands})
     return rows
@@ -176,14 +181,16 @@ def most_changed(found: Diff, missions: int) -> pd.DataFrame:
 
 def differing_origins(found: Diff) -> list[str]:
     """In what the origins of the two results differ, with a line for each part."""
-    a, b = found.a.store.manifest, found.b.store.manifest
+    a = found.a.store.manifest
+    b = found.b.store.manifest
     modules = sorted({*differing_modules(a.code, b.code), *differing_modules(b.code, a.code)})
     teams = found.missions[["policy_a", "policy_b"]].drop_duplicates().itertuples(index=False)
     weights_a, weights_b = ({t.policy: t.weights for t in m.policies} for m in (a, b))
     changed = [" and ".join({p: None, q: None}) for p, q in teams if weights_a[p] != weights_b[q]]
     names = [n for n in {**a.libraries, **b.libraries} if a.libraries.get(n) != b.libraries.get(n)]
     libraries = [f"{n} {a.libraries.get(n, '-')} and {b.libraries.get(n, '-')}" for n in names]
-    seeds, constants = _distinct_seeds(found.a, found.b), _differing_constants(found)
+    seeds = _distinct_seeds(found.a, found.b)
+    constants = _differing_constants(found)
     parts = {
         "seeds": [f"{' and '.join(map(str, seeds))}, so that missions are compared without pairs"]
         * (len(seeds) > 1),
@@ -247,7 +254,8 @@ def _uavs_of_missions(
     results: Results, missions: pd.DataFrame, numbered: pd.DataFrame
 ) -> pd.DataFrame:
     """The UAVs of the numbered missions."""
-    manifest, tables = results.store.manifest, [results.uavs]
+    manifest = results.store.manifest
+    tables = [results.uavs]
     for number, policy in enumerate(results.policies):
         if parts := check_parts(manifest, number):
             tables.append(results.store.uavs(parts).assign(policy=policy))
@@ -287,13 +295,15 @@ def _rows_of_one_side(
     rows = missions[found.to_numpy() != "both"]
     scenario = f"the scenario of study {results.study.name}"
     words = pd.Series([setting or scenario for setting in points_in_words(results)])
-    points, no_policy = rows["point"].map(words), ~rows["team"].isin(others["team"])
+    points = rows["point"].map(words)
+    no_policy = ~rows["team"].isin(others["team"])
     no_point = ~rows["scenario"].isin(others["scenario"])
     cells = "policy " + rows["policy"] + " at " + points
     what = cells.mask(no_point, points).mask(no_policy, "policy " + rows["policy"])
     parts = rows.assign(part=~no_policy & ~no_point).groupby(what.rename("what"), sort=False)
     spans = parts.agg(part=("part", "all"), missions=("part", "size"))
-    first, last = parts["replication"].min(), parts["replication"].max()
+    first = parts["replication"].min()
+    last = parts["replication"].max()
     replications = ", replications " + first.astype(str) + " to " + last.astype(str)
     names = spans.index.to_series() + replications.where(spans["part"], "")
     return pd.DataFrame(

@@ -88,10 +88,12 @@ def compare_variants(last: pd.DataFrame, baseline: str) -> pd.DataFrame:
     rows = []
     for variant, sample in values.items():
         mean, _, high = mean_interval(sample)
-        alone, half = len(sample) == 1, high - mean
+        alone = len(sample) == 1
+        half = high - mean
         room = np.array([-half, half, *(np.sqrt(len(sample) + 1) * np.array([-half, half]))])
         ends = np.full(4, np.nan) if alone else np.clip(mean + room, 0.0, 1.0)
-        gap, p = Interval(np.nan, np.nan, np.nan), np.nan
+        gap = Interval(np.nan, np.nan, np.nan)
+        p = np.nan
         if variant != baseline:
             gap, p = difference_of_trainings(sample, values[baseline])
         rows.append((variant, len(sample), mean, *ends, *gap, p))
@@ -147,11 +149,13 @@ def _plot_variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> "F
     split = ((values.min() < OFF * level) & (values.max() >= OFF * level)).any()
     ends = drawn[drawn >= (0 if split else OFF * level)].agg(["min", "max"])
     room = 0.06 * (ends["max"] - ends["min"]) or 0.01
-    left, right = max(ends["min"] - room, -0.02), min(ends["max"] + room, 1.02)
+    left = max(ends["min"] - room, -0.02)
+    right = min(ends["max"] + room, 1.02)
     with style.new_panels(0.9 + 0.42 * len(table), values="x") as (figure, ax):
         ax.axvline(level, color=style.INK, linestyle="--", linewidth=1, zorder=1, gid="baseline")
         for y, (_, row) in enumerate(table.iterrows()):
-            name, reached = row["variant"], values.get_group(row["variant"])
+            name = row["variant"]
+            reached = values.get_group(row["variant"])
             if reached.max() < left:
                 ax.plot(left, y, "<", color=style.INK, markersize=7, clip_on=False, gid=name)
             else:
@@ -232,7 +236,8 @@ def difference_of_trainings(
         The interval and the p-value. The ends are nan if both are single trainings, and equal to
         the difference if all trainings of each side agree. The p-value is 1 if it is unknown.
     """
-    a, b = np.asarray(a, float), np.asarray(b, float)
+    a = np.asarray(a, float)
+    b = np.asarray(b, float)
     gap = float(a.mean() - b.mean())
     if a.size + b.size < 3:
         return Interval(gap, np.nan, np.nan), 1.0
@@ -281,7 +286,8 @@ def _format_interval(mean: float, low: float, high: float) -> str:
 
 
 # The metrics that are evaluated while training, and their names.
-LEARNED_REWARD, LEARNED_PRODUCT = "evaluation_reward", f"evaluation_{PRODUCT}"
+LEARNED_REWARD = "evaluation_reward"
+LEARNED_PRODUCT = f"evaluation_{PRODUCT}"
 SHOWN = {LEARNED_REWARD: "Cumulative reward", LEARNED_PRODUCT: METRICS[PRODUCT]}
 # Pairs of variants of the shipped curves, with and without transfer learning, by what both have in
 # common otherwise.
@@ -396,7 +402,8 @@ def plot_trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str])
     with style.new_panels(3.9, values="y", legend=2) as (figure, ax):
         for (variant, label), colour, line in looks:
             of_variant = averages[averages["variant"] == variant]
-            last, n = of_variant["phase"].iloc[-1], of_variant["seed"].nunique()
+            last = of_variant["phase"].iloc[-1]
+            n = of_variant["seed"].nunique()
             names = {last: f"{label}, n = {n}"}
             for (_, phase), curve in of_variant.groupby(["seed", "phase"], sort=False):
                 ax.plot(curve["updates"], curve["value"], line if phase == last else ":",
@@ -407,7 +414,8 @@ def plot_trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str])
                 ax.annotate("phase II", (start, 0), xycoords=("data", "axes fraction"),
                             xytext=(4, 12), textcoords="offset points", fontsize=8.5,
                             **style.OUTLINED)  # fmt: skip
-        low, high = averages["value"].min(), averages["value"].max()
+        low = averages["value"].min()
+        high = averages["value"].max()
         room = 0.12 * (high - low) or 0.1
         style.set_axis_unit(ax.yaxis, "%" if metric == LEARNED_PRODUCT else "")
         ax.set(title=SHOWN[metric], ylim=(low - room, high + room))
@@ -487,7 +495,8 @@ def transfer_table(
     """
     rows = []
     for (name, metric), compared in transfers.items():
-        last, named = compared.last, "Reward" if metric == LEARNED_REWARD else "Product"
+        last = compared.last
+        named = "Reward" if metric == LEARNED_REWARD else "Product"
         write = numbers.format_points if metric == LEARNED_PRODUCT else _format_rewards
         difference_at_end = write(*last)
         if last.low == last.high:
@@ -532,7 +541,8 @@ def read_curves(path: Path) -> pd.DataFrame:
         InputError: If the file is missing or damaged, or holds no such curves.
     """
     curves = read_table(path, CURVES).to_pandas()
-    averages, pairs = curves.assign(value=0.0), pairs_in(curves).values()
+    averages = curves.assign(value=0.0)
+    pairs = pairs_in(curves).values()
     ends = [{*last_phase(averages, a).index} & {*last_phase(averages, b).index} for a, b in pairs]
     if BASELINE not in {*curves["variant"]} or not ends or not all(ends):
         known = " and ".join(next(iter(PAIRS.values())))
@@ -559,7 +569,8 @@ def rliable_scores(results: Results, metric: str = PRODUCT) -> dict[str, np.ndar
     """
     if metric not in ALWAYS:
         raise InputError(f"metric: {metric!r} is unknown{one_of(metric, ALWAYS)}")
-    algorithms, points = _policies_of_runs(results), range(len(results.store.manifest.points))
+    algorithms = _policies_of_runs(results)
+    points = range(len(results.store.manifest.points))
     runs = len(next(iter(algorithms.values())))
     cells = results.missions.groupby(["policy", "point"], sort=False)[metric]
     size = int(cells.size().min()) // runs

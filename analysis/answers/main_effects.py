@@ -232,7 +232,8 @@ def main_effects_table(table: pd.DataFrame, changes: ByField, ratios: ByField) -
     lines = []
     for field, pairs_of_field in changes.items():
         for policy, pairs in pairs_of_field.items():
-            values, along = rows.loc[(policy, field)], shape_of_changes(pairs)
+            values = rows.loc[(policy, field)]
+            along = shape_of_changes(pairs)
             ends = values.iloc[[0, -1]]
             first, last = [
                 f"{numbers.format_percent(row.mean)} at {row.value}" for row in ends.itertuples()
@@ -266,7 +267,8 @@ def plot_effect(
         ``METRICS``. policies: All policies of the study, so that every policy has the same colour
         on all pages.
     """
-    rows, looks = table[table["field"] == field], style.policy_colours(policies, changes)
+    rows = table[table["field"] == field]
+    looks = style.policy_colours(policies, changes)
     first = rows[rows["position"] == 0]
     steps = pd.concat(
         [pairs[pairs["first"] == 0].assign(policy=name) for name, pairs in changes.items()]
@@ -307,7 +309,8 @@ def plot_one_by_one(table: pd.DataFrame, policies: list[str]) -> Figure:
         policies: All policies of the study, so that every policy has the same colour on all pages.
     """
     rows = table[table["metric"] == PRODUCT]
-    fields, looks = [*rows["field"].unique()], style.policy_colours(policies, rows["policy"])
+    fields = [*rows["field"].unique()]
+    looks = style.policy_colours(policies, rows["policy"])
     with panel_grid(3.4, len(fields), len(fields)) as (figure, axes):
         for ax, field in zip(axes, fields, strict=True):
             style.plot_along(rows[rows["field"] == field], looks, "%", ax)

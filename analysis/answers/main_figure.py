@@ -18,7 +18,8 @@ def draw_main_figure(results: Results, metric: str) -> Drawing:
     """
     if requirements_of(results):
         return draw_cheapest(results)
-    fields, kind = [*varied_values(results)], results.design
+    fields = [*varied_values(results)]
+    kind = results.design
     if kind == "saltelli":
         return next(draw_indices(results, metric))
     if not fields:

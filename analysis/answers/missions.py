@@ -68,7 +68,8 @@ def fate_in_words(mission: Mission) -> str:
     Args:
         mission: The mission.
     """
-    ends, scenario = mission.uavs["end"].tolist(), mission.scenario
+    ends = mission.uavs["end"].tolist()
+    scenario = mission.scenario
     failures = [
         f"{ends.count(end)} of {len(ends)} UAVs {fate}"
         for end, fate in _FATES.items()

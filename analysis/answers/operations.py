@@ -107,7 +107,8 @@ def changes_from_reference(
         raise InputError(
             f"{field}: is never {reference!r} in the study; allowed: one of its values"
         )
-    rows, of = [], metric_in_missions(results.missions, metric)
+    rows = []
+    of = metric_in_missions(results.missions, metric)
     for policy, missions in results.missions.groupby("policy", sort=False):
         wide = by_replication(missions, metric, "point")
         for point, partner in _pairs_of_points(table, field, reference):
@@ -179,7 +180,8 @@ def enough_pads(results: Results, margin: float) -> pd.DataFrame:
 
 def short_of_pads(results: Results, margin: float) -> list[int]:
     """The design points with one pad, and with one pad less than is enough, for every fleet."""
-    table, found = values_of_points(results), enough_pads(results, margin)
+    table = values_of_points(results)
+    found = enough_pads(results, margin)
     enough = found[found["policy"] == results.policies[0]].set_index("uavs")["pads"]
     fewer = table[table["pads"] < table["uavs"].map(enough)]
     fewest = table[table["pads"] == table["pads"].min()]
@@ -188,7 +190,8 @@ def short_of_pads(results: Results, margin: float) -> list[int]:
 
 def enough_pads_sentence(results: Results, margin: float) -> str:
     """How many pads are enough for every fleet, by the first policy of the study."""
-    found, most = enough_pads(results, margin), max(varied_values(results).get("pads", [0]))
+    found = enough_pads(results, margin)
+    most = max(varied_values(results).get("pads", [0]))
     parts = []
     for row in found[found["policy"] == results.policies[0]].itertuples():
         part = f"{row.pads} {'are' if row.pads > 1 else 'is'} enough for {row.uavs} UAVs"
@@ -209,7 +212,9 @@ def few_pads_sentence(results: Results) -> str:
     differences those of ``changes_from_reference``.
     """
     pads = varied_values(results).get("pads", [0])
-    fewest, most, lines = min(pads), max(pads), []
+    fewest = min(pads)
+    most = max(pads)
+    lines = []
     for metric in (SUCCESS, RATIO):
         shares = means_of_metrics(results, [metric]).set_index(["policy", "uavs", "pads"])["mean"]
         lost = changes_from_reference(results, "pads", most, metric)
@@ -277,7 +282,8 @@ def published_age_in_words() -> str:
 
 def mission_lengths_sentence(results: Results) -> str:
     """How many mission slots the missions last, in a sentence."""
-    slots, longest = results.missions["slots"], results.scenario().max_slots
+    slots = results.missions["slots"]
+    longest = results.scenario().max_slots
     whole = int((slots == longest).sum())
     if whole == len(slots):
         return f"Every mission lasts to its last slot, {longest:,}."

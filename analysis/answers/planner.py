@@ -173,7 +173,8 @@ def at_home(results: Results, policies: Sequence[str]) -> Drawing:
     Its data have a row per policy and slot: ``policy``, ``slot``, ``share``, and ``n``, the number
     of UAVs whose mission is not over. Slots with less than half of the UAVs of slot 0 have no row.
     """
-    zones, tables = results.scenario().chart.zones, []
+    zones = results.scenario().chart.zones
+    tables = []
     for policy in policies:
         slots = pd.concat([uav_slots(events) for events in _event_logs(results, policy)])
         inside = pd.Series(zones[slots["y"], slots["x"]] >= 0, slots.index)
@@ -201,7 +202,8 @@ def return_table(results: Results, policies: Sequence[str]) -> pd.DataFrame:
     for policy in policies:
         logs = _event_logs(results, policy)
         begun = pd.concat([events[events["event"] == "charge_start"] for events in logs])
-        uavs, (slot, battery) = sum(map(_count_uavs, logs)), begun[["time", "battery"]].mean()
+        uavs = sum(map(_count_uavs, logs))
+        slot, battery = begun[["time", "battery"]].mean()
         sessions = f"{len(begun) / uavs:.2f}"
         rows.append((policy, sessions, f"{slot:.1f}", f"{battery:.1f} %", uavs))
     heads = ["Policy", "Sessions per UAV", "Begin in slot", "Battery then", "UAVs"]
@@ -220,7 +222,8 @@ def draw_plan(results: Results, mission: Mission) -> Drawing:
 
     Nothing is simulated. If the policy is no planner, no plan is drawn.
     """
-    planner, courses = load(mission.policy), list[Course]()
+    planner = load(mission.policy)
+    courses = list[Course]()
     if isinstance(planner, Planner):
         place = results.store.manifest.seed, mission.replication
         courses = first_plan(results.scenario(), *place, planner)

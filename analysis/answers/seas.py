@@ -199,7 +199,8 @@ def unseen_seas_sentence(
     share = shares_of_reference(results, reference).set_index("policy").loc[policy]
     gain = differences_from_baseline(results, baseline).set_index("policy").loc[policy]
     seconds = {cost.policy: cost.batch for cost in times.costs}
-    slow, fast = seconds.get(reference), seconds.get(policy)
+    slow = seconds.get(reference)
+    fast = seconds.get(policy)
     faster = f" in 1/{slow / fast:,.0f} of its time" if slow and fast else ""
     reached = numbers.format_interval(*share[_ENDS])
     more = numbers.format_points(*gain[["difference", "low", "high"]])

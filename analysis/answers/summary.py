@@ -63,7 +63,8 @@ def means_of_points(results: Results) -> pd.DataFrame:
         A row per policy, design point and metric, as ``dess.analysis.summary`` returns it. After a
         search, the intervals allow for it (``stats.intervals.level_after``).
     """
-    cell, looks = ["policy", "point"], {of: results.looks(of) for of in results.policies}
+    cell = ["policy", "point"]
+    looks = {of: results.looks(of) for of in results.policies}
     if not any(of_policy.any() for of_policy in looks.values()):
         return summary(results.missions, by=cell)
     tables = [
@@ -162,7 +163,8 @@ def compare_with_paper(
         number of UAVs, see ``format_with_mark``; of all missions, also the share with the battery
         for the way home, which the paper does not have.
     """
-    policies, of_home = estimates["policy"].unique(), estimates[estimates["metric"] == HOME]
+    policies = estimates["policy"].unique()
+    of_home = estimates[estimates["metric"] == HOME]
     columns = {("", "Policy"): ["paper", *policies]}
     for metric in next(iter(printed.values())):
         of_metric = estimates[estimates["metric"] == metric]
@@ -222,7 +224,9 @@ def paper_sentence(means: pd.DataFrame, policy: str, printed: Mapping[str, float
         policy: The policy.
         printed: The paper's numbers by metric.
     """
-    texts, n, count = metrics_of_policy(means, policy), means["n"].min(), means["policy"].nunique()
+    texts = metrics_of_policy(means, policy)
+    n = means["n"].min()
+    count = means["policy"].nunique()
     return (
         f"The best of {count} policies, {policy}, succeeds in {texts[SUCCESS]} of {n:,} missions "
         f"with a product of {texts[PRODUCT]}; the paper prints "
@@ -319,7 +323,8 @@ def worst_missions_table(results: Results, rows: pd.DataFrame) -> Table:
         "Collection ratio": rows["collection_ratio"].map(numbers.format_percent),
         "Reward": rows["reward"].map(numbers.format_quantity),
     }
-    policy, point = rows["policy"].iloc[0], {*rows["point"]}
+    policy = rows["policy"].iloc[0]
+    point = {*rows["point"]}
     words = points_in_words(results)[point.pop()] if len(point) == 1 else ""
     caption = f"The worst missions of {policy}{', ' * bool(words)}{words}"
     return Table(pd.DataFrame(cells), caption, rows)
@@ -330,7 +335,8 @@ def count_tests(results: Results) -> int:
 
     Compared are every two policies, and every learner of several trainings with every heuristic.
     """
-    trained, policies = trained_policies_by_learner(results), len(results.policies)
+    trained = trained_policies_by_learner(results)
+    policies = len(results.policies)
     several = sum(len(trainings) > 1 for trainings in trained.values())
     heuristics = policies - sum(map(len, trained.values()))
     return len(METRICS) * (policies * (policies - 1) // 2 + several * heuristics)
@@ -479,7 +485,8 @@ def quantile_table(rows: pd.DataFrame, metric: str) -> Table:
         rows: Rows of ``dess.analysis.distribution``.
         metric: The metric.
     """
-    of, heads = metric_of(metric), []
+    of = metric_of(metric)
+    heads = []
     for row in rows.itertuples():
         share = numbers.format_level(row.share)
         heads.append(
@@ -541,7 +548,8 @@ def selected_settings(results: Results) -> pd.DataFrame:
     """
     if isinstance(results.study.selection, Cheapest):
         return cheapest.selected_fleets(results)
-    words, rows = points_in_words(results), []
+    words = points_in_words(results)
+    rows = []
     for policy in results.policies:
         if (c := results.choice(policy)) is not None:
             found = (policy, c.best, words[c.best], c.missions, len(c.survivors))
@@ -576,7 +584,8 @@ def plot_performance(summary: pd.DataFrame, metric: str, printed: float | None =
         metric: The metric.
         printed: The paper's number.
     """
-    rows, of = summary[summary["metric"] == metric], metric_of(metric)
+    rows = summary[summary["metric"] == metric]
+    of = metric_of(metric)
     with style.new_panels(1.3 + 0.42 * len(rows), values="x") as (figure, ax):
         style.plot_in_rows(rows, ax)
         for y, mean in enumerate(rows["mean"]):

@@ -56,11 +56,13 @@ def question_around(results: Results, scenario: str, missions: int = 100) -> Que
         The question, a design point for the fleet and one for every change of it. None without a
         data sheet, or if no fleet is known to meet the requirements, or its policy is a file.
     """
-    policy, manifest = cheapest.best_policy(results), results.store.manifest
+    policy = cheapest.best_policy(results)
+    manifest = results.store.manifest
     points = cheapest.cheapest_answer(results).points
     if not points or not results.scenario(points[-1]).units or is_path(policy):
         return None
-    fixed, values = manifest.study.set, manifest.points[points[-1]].values
+    fixed = manifest.study.set
+    values = manifest.points[points[-1]].values
     changes = []
     for change in _changed_fields(results.scenario(points[-1])):
         try:
@@ -97,7 +99,8 @@ def _place_of_question(results: Results) -> Path:
 
 def _changed_fields(space: ScenarioSpace) -> Iterator[dict[str, Any]]:
     """What is changed, one after the other: the fleet, then its conditions."""
-    sheet, rate = space.data_sheet, space.data_sheet.data_rate or ""
+    sheet = space.data_sheet
+    rate = space.data_sheet.data_rate or ""
     yield {"uavs": space.uavs[1] + 1}
     yield {"pads": space.zone_pads[0] + 1}
     calm = f"{times(sheet.cruise or '', WIND)} from W"
@@ -113,7 +116,8 @@ def table_around(results: Results) -> Table:
     Args:
         results: The study that ``question_around`` was asked about.
     """
-    found, requirements = load_results(_place_of_question(results)), requirements_of(results)
+    found = load_results(_place_of_question(results))
+    requirements = requirements_of(results)
     start, *rows = [point.values for point in found.store.manifest.points]
     changes = [{f: v for f, v in row.items() if v != start.get(f)} for row in rows]
     words = ["the fleet: " + fleets_in_words(found)[0], *map(_in_words, changes)]
@@ -159,5 +163,6 @@ def _verdict_on_row(row: pd.Series, requirements: Sequence[Requirement]) -> Verd
 
 def _in_words(change: dict[str, Any]) -> str:
     ((field, value),) = change.items()
-    name, is_list = field_named(field), isinstance(value, list | tuple)
+    name = field_named(field)
+    is_list = isinstance(value, list | tuple)
     return f"{name.within} doubled" if is_list else name.words(value)

@@ -18,9 +18,11 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
             says so.
         metric: The metric that ranks its settings, where it does not search for a fleet.
     """
-    space, units = results.scenario(), results.scenario().units
+    space = results.scenario()
+    units = results.scenario().units
     assert units
-    sheet, nodes = space.data_sheet, numbers.format_count(len(space.nodes), "node")
+    sheet = space.data_sheet
+    nodes = numbers.format_count(len(space.nodes), "node")
     varied = {f.removeprefix("data_sheet.") for f in results.store.manifest.values[0]}
     wide, high = (printed(cells * units.cell, "m") for cells in space.size)
     quota = "" if space.quota == 0 else " with its quota filled"

@@ -117,7 +117,9 @@ class Question:
     @property
     def command(self) -> str:
         """The command that asks the question again."""
-        study, design, rule = self.study, self.study.design, self.study.selection
+        study = self.study
+        design = self.study.design
+        rule = self.study.selection
         if isinstance(design, Table):
             before, after = design.rows
             sides = {"set": after, "baseline": study.set | before}
@@ -279,7 +281,8 @@ def what_if_question(
     for name, values in (("settings", settings), ("baseline", baseline or {})):
         if not isinstance(values, Mapping):
             raise InputError(f"{name}: {values!r}; allowed: fields and values, such as {{uavs=5}}")
-    fixed, changed = dotted(dict(baseline or {})), dotted(dict(settings))
+    fixed = dotted(dict(baseline or {}))
+    changed = dotted(dict(settings))
     measuring = {field for field in changed if field.endswith(".measured")}
     if changed.keys() - measuring:  # what changes is something else, which both sides measure
         fixed |= {field: changed.pop(field) for field in sorted(measuring)}

@@ -126,7 +126,8 @@ class Sweep:
         if x is None:
             if not (fields := [*varied_values(self.results)]):
                 raise InputError("x: no field is swept; allowed: a sweep of one field or more")
-            x, hue = fields[0], hue or next(iter(fields[1:]), None)
+            x = fields[0]
+            hue = hue or next(iter(fields[1:]), None)
         return draw_curves(self.results, x, hue, metric).figure
 
 

@@ -391,7 +391,8 @@ class WhatIf:
 
     def measures(self, policy: str) -> pd.DataFrame:
         """The rows of the table of a policy, as a table to print."""
-        table, lines = self.table(), []
+        table = self.table()
+        lines = []
         for row in table[table["policy"] == policy].itertuples():
             in_percent = metric_of(row.metric).in_percent
             write, unit = (
@@ -408,7 +409,8 @@ class WhatIf:
 
     def pairing(self) -> pd.DataFrame:
         """How much common random numbers narrow the intervals, as a table to print."""
-        table, lines = self.table(), []
+        table = self.table()
+        lines = []
         for row in table[table["metric"].isin([*METRICS])].itertuples():
             if np.isnan(row.variance_reduction):  # the same in all missions
                 lines.append((row.policy, _SHORT[row.metric], "no variance", *"–––"))
@@ -503,7 +505,8 @@ class Example:
 
     def commands(self) -> list[str]:
         """The commands that simulate both missions again."""
-        command, lines = self.answer.results.command, []
+        command = self.answer.results.command
+        lines = []
         for point, side in enumerate(SIDES):
             lines += [f"# {side}", command(self.answer.shown, point, self.replication)]
         return lines

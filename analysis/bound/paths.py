@@ -75,7 +75,8 @@ def phases_of(scenario: Scenario) -> Phases:
     start, low, full = scenario.flying_time, scenario.charge_start, scenario.charge_complete
     charging = most_charging(scenario, slots)
     # Charges before flying slot ``late`` do not suffice for the rest of the mission.
-    first, late = max(start - low, 0), min(max(slots - full, 0), slots)
+    first = max(start - low, 0)
+    late = min(max(slots - full, 0), slots)
     width = min(full - low, _WIDTH)
     early = early_charges(slots, start, low, full)
     last = np.minimum(early + width, late) - 1
@@ -101,7 +102,8 @@ def _without_battery(scenario: Scenario, flying: np.ndarray) -> Phases:
     charging = int(-(-needed // scenario.charge_rate))
     if scenario.flying_time > scenario.charge_start:
         charging = 0
-    slots, never = np.array([len(flying)]), np.array([0])
+    slots = np.array([len(flying)])
+    never = np.array([0])
     clock = np.minimum(flying + charging, scenario.max_slots - 1)[None, :]
     most = min(len(flying) + charging, scenario.max_slots)
     return Phases(clock, slots, slots, never, never.repeat(len(flying)), never, most)
@@ -219,14 +221,16 @@ def bound_of_beginning(blocks, local, now, ahead, had, then_had, home, there, le
     left = local[home, blocks.levels[later]] if memory > 0 else 0.0
     new = then_had[there] - (had[there] if level > 0 else 0.0)
     known = local[there, blocks.levels[level]]
-    least, best = np.inf, 0
+    least = np.inf
+    best = 0
     for q in range(local.shape[1]):
         price = local[there, q]
         value = now[q] + ahead[memory, q] + price * new
         if level > 0:
             value += max(price - known, 0.0) * had[there]
         if value < least:
-            least, best = value, q
+            least = value
+            best = q
     least += left * (then_had[home] - had[home])
     return least + max(left - start, 0.0) * had[home], best
 
@@ -253,7 +257,9 @@ def bound_paths(to_zone, phases, data, period, blocks, local, values, waiting, c
 @kernel
 def _bound_slot(f, to_zone, phases, data, period, blocks, local, values, waiting, ceilings):
     """Bound what a UAV can earn after f flying slots, from what it can earn after f + 1."""
-    slots, levels, (width, height) = len(ceilings) - 1, len(blocks.levels), to_zone.shape
+    slots = len(ceilings) - 1
+    levels = len(blocks.levels)
+    width, height = to_zone.shape
     begins = np.empty((5, width, height, levels, levels))
     scratch = np.empty(local.shape[1]), np.empty(local.shape[1])
     for phase in range(len(phases.deadline) - 1, -1, -1):
@@ -263,9 +269,11 @@ def _bound_slot(f, to_zone, phases, data, period, blocks, local, values, waiting
         here[:] = -waiting[last_slot(phases, phase, f, len(waiting) - 1)]
         if f == slots:
             continue
-        had, then_had = data_had(data, phases, phase, f), data_had(data, phases, phase, f + 1)
+        had = data_had(data, phases, phase, f)
+        then_had = data_had(data, phases, phase, f + 1)
         if f < phases.deadline[phase]:
-            gain, then = values[period[phases.clock[phase, f]]], ceilings[f + 1, phase]
+            gain = values[period[phases.clock[phase, f]]]
+            then = ceilings[f + 1, phase]
             _bound_beginnings(
                 to_zone, phases, f, phase, blocks, local, gain, then, had, then_had, begins
             )
@@ -301,11 +309,13 @@ def _raise_by_charging(blocks, local, new, charged, x, y, here):
 @inlined
 def _bound_beginnings(to_zone, phases, f, phase, blocks, local, gain, then, had, then_had, begins):
     """The least bounds of all steps into another block, per level of memory before and after."""
-    levels, (width, height) = len(blocks.levels), to_zone.shape
+    levels = len(blocks.levels)
+    width, height = to_zone.shape
     for action in range(4):
         for x in range(width):
             for y in range(height):
-                x2, y2 = x + STEP_X[action], y + STEP_Y[action]
+                x2 = x + STEP_X[action]
+                y2 = y + STEP_Y[action]
                 if not is_reached(to_zone, phases, phase, f + 1, x2, y2):
                     continue
                 home, there = blocks.home[x, y], blocks.home[x2, y2]
@@ -324,10 +334,12 @@ def _raise_by_acting(
     to_zone, phases, f, phase, blocks, local, gain, then, had, then_had, begins, x, y, scratch, here
 ):  # fmt: skip
     """Raise the ceilings of a state to what its actions can earn."""
-    home, prices = blocks.home[x, y], local.shape[1]
+    home = blocks.home[x, y]
+    prices = local.shape[1]
     line, least = scratch
     for action in range(5):
-        x2, y2 = x + STEP_X[action], y + STEP_Y[action]
+        x2 = x + STEP_X[action]
+        y2 = y + STEP_Y[action]
         if not is_reached(to_zone, phases, phase, f + 1, x2, y2):
             continue
         there = blocks.home[x2, y2]

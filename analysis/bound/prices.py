@@ -59,7 +59,8 @@ def next_prices(centre, most, lowest, points, bounds, slopes, width):
         for i in range(count):
             slope += weights[i] * slopes[i]
         prices = np.minimum(np.maximum(centre - width * slope, 0.0), most)
-        above, under = 0, -1
+        above = 0
+        under = -1
         for i in range(count):
             model[i] = offsets[i] + (slopes[i] * (prices - centre)).sum()
             if model[i] > model[above]:
@@ -174,7 +175,8 @@ def check_scenario(scenario: ScenarioSpace) -> None:
 
 def ceilings_memory(scenario: ScenarioSpace, detail: Detail) -> int:
     """The memory [bytes] of ``Bounds.ceilings`` in the mission that takes the most."""
-    slots, near = paths.most_flying(scenario), min(detail.near, max(len(scenario.nodes) - 1, 1))
+    slots = paths.most_flying(scenario)
+    near = min(detail.near, max(len(scenario.nodes) - 1, 1))
     battery = scenario.flying_time[0], scenario.charge_start[1], scenario.charge_complete[0]
     phases = 2 + len(paths.early_charges(slots, *battery)) if scenario.flight_cost else 1
     return (
@@ -207,7 +209,8 @@ def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
     points = POINTS if scenario.shadowing_variance > 0 else np.zeros(1)
     below = spread_normal(points) if scenario.shadowing_variance > 0 else np.array([0.0, 1.0])
     rates = rates_of(record, world.mean_snr, points)
-    zones, cells = np.array(scenario.rectangles), world.chart.zones
+    zones = np.array(scenario.rectangles)
+    cells = world.chart.zones
     ways = chart.spread(cells, world.chart.parking)[0].reshape(cells.shape)
     to_zone = ways.T.astype(np.int64, order="C")
     return Known(starts, data, world.nodes, rates, below, phases, zones, to_zone)
@@ -232,7 +235,8 @@ class Bounds:
 
     def __init__(self, known: Known, detail: Detail):
         self.known = known
-        size, (phases, slots) = known.to_zone.shape, known.phases.clock.shape
+        size = known.to_zone.shape
+        phases, slots = known.phases.clock.shape
         self.blocks = paths.blocks_of(known.nodes, size, detail.near, np.array(detail.levels))
         self.parts = np.array(detail.local)
         last = int(known.phases.clock.max())
@@ -247,8 +251,11 @@ class Bounds:
 
     def at(self, prices: np.ndarray) -> tuple[float, np.ndarray]:
         """The bound at prices (S, K), as a share of all data, and its derivatives (S, K)."""
-        known, cuts = self.known, self.cuts[:-1]
-        team, data, total = len(known.starts), known.data, known.data[-1].sum()
+        known = self.known
+        cuts = self.cuts[:-1]
+        team = len(known.starts)
+        data = known.data
+        total = known.data[-1].sum()
         worth = np.maximum(1.0 - prices[::-1].cumsum(axis=0)[::-1], 0.0)
         local = worth[-1][:, None] * self.parts
         waiting = ((1.0 - prices[-1]) * data).sum(axis=1) / team
@@ -276,11 +283,14 @@ def improve_prices(known: Known, iterations: int, detail: Detail) -> Bound:
     shape = len(bounds.cuts), len(known.nodes)
     most = np.full(shape, np.inf)
     most[-1] = 1.0
-    kept, lowest = most, 1.0  # with prices of 1 at the end
+    # with prices of 1 at the end
+    kept = most
+    lowest = 1.0
     if known.data[-1].sum() > 0 and iterations > 0:
         kept, lowest = _descend_to_minimum(bounds, _first_prices(known, shape), most, iterations)
     if lowest * (1.0 + _ROUNDING) >= 1.0:
-        kept, lowest = np.where(np.isinf(most), 0.0, most), 1.0
+        kept = np.where(np.isinf(most), 0.0, most)
+        lowest = 1.0
     return Bound(min(lowest * (1.0 + _ROUNDING), 1.0), kept, bounds.cuts, iterations)
 
 
@@ -297,12 +307,17 @@ def _descend_to_minimum(
     bounds: Bounds, prices: np.ndarray, most: np.ndarray, iterations: int
 ) -> tuple[np.ndarray, float]:
     """The prices with the lowest bound of those that the bundle method tries, and the bound."""
-    points, found = np.empty((iterations, prices.size)), np.empty(iterations)
+    points = np.empty((iterations, prices.size))
+    found = np.empty(iterations)
     slopes = np.empty(points.shape)
-    centre, lowest, width, predicted = prices, np.inf, 0.0, np.inf
+    centre = prices
+    lowest = np.inf
+    width = 0.0
+    predicted = np.inf
     for i in range(iterations):
         found[i], slope = bounds.at(prices)
-        points[i], slopes[i] = prices.ravel(), slope.ravel()
+        points[i] = prices.ravel()
+        slopes[i] = slope.ravel()
         if i == 0:
             width = _FIRST_DECREASE / (slope**2).sum() if slope.any() else 1.0
         elif found[i] < lowest - 0.5 * (lowest - predicted):
@@ -310,7 +325,8 @@ def _descend_to_minimum(
         elif found[i] > lowest + (lowest - predicted):
             width *= 0.6
         if found[i] < lowest:
-            centre, lowest = prices, float(found[i])
+            centre = prices
+            lowest = float(found[i])
         if lowest > 1.0 and i >= iterations // _HOPE:
             break  # a bound of 1 is known already
         if i + 1 < iterations:

@@ -36,7 +36,8 @@ def spread_normal(points: np.ndarray) -> np.ndarray:
     """
     below = np.array([0.5 * math.erfc(-z / math.sqrt(2.0)) for z in points])
     density = np.exp(-(points**2) / 2) / math.sqrt(2.0 * math.pi)
-    mass, moment = np.diff(below), -np.diff(density)
+    mass = np.diff(below)
+    moment = -np.diff(density)
     upper = (moment - points[:-1] * mass) / np.diff(points)
     probabilities = np.zeros(len(points))
     probabilities[1:] += upper
@@ -66,7 +67,8 @@ def _levels_at(x, y, offset, along_x, nodes, rates, levels):
     """Set the rates of all nodes at a place: a cell, plus ``offset`` communication slots."""
     places = (rates.shape[1] - 1) // (rates.shape[0] - 1)  # per cell
     for k in range(len(nodes)):
-        dx, dy = x - nodes[k, 0], y - nodes[k, 1]
+        dx = x - nodes[k, 0]
+        dy = y - nodes[k, 1]
         fine, coarse = (places * dx, dy) if along_x else (places * dy, dx)
         row = rates[abs(coarse), abs(fine + offset)]
         for j in range(rates.shape[2]):
@@ -81,10 +83,13 @@ def _best_of(levels, worth, without, below, values, chances, winners, rank, orde
     value 0, of no node. The last value stands for all further ones, which are very unlikely.
     """
     top = levels.shape[1] - 1
-    floor, lowest = 0.0, -1  # the maximum is never below the floor
+    # the maximum is never below the floor
+    floor = 0.0
+    lowest = -1
     for k in range(len(worth)):
         if k != without and worth[k] * levels[k, 0] > floor:
-            floor, lowest = worth[k] * levels[k, 0], k
+            floor = worth[k] * levels[k, 0]
+            lowest = k
     able = 0  # nodes that can be above the floor, in descending order of their highest value
     for k in range(len(worth)):
         value = worth[k] * levels[k, top]
@@ -98,13 +103,16 @@ def _best_of(levels, worth, without, below, values, chances, winners, rank, orde
     begun, count = 0, 0  # nodes whose highest value has been reached, and those of the result
     left = 1.0  # chance that the maximum is smaller than the values so far
     while left > _UNLIKELY:
-        best, chosen = floor, -1
+        best = floor
+        chosen = -1
         for i in range(begun):
             value = worth[order[i]] * levels[order[i], rank[i]]
             if value > best:
-                best, chosen = value, i
+                best = value
+                chosen = i
         if begun < able and worth[order[begun]] * levels[order[begun], top] > best:
-            best, chosen = worth[order[begun]] * levels[order[begun], top], begun
+            best = worth[order[begun]] * levels[order[begun], top]
+            chosen = begun
             rank[begun] = top
             begun += 1
         values[count] = best
@@ -161,7 +169,9 @@ def step_values(worth, local, nodes, block, rates, below, values):
 @kernel
 def _row_values(x, worth, local, nodes, block, rates, below, values):
     """Add to ``values`` what hovering in the cells of row ``x`` and flying from there is worth."""
-    (width, height), count, levels = block.shape, len(nodes), rates.shape[2]
+    width, height = block.shape
+    count = len(nodes)
+    levels = rates.shape[2]
     m = (rates.shape[1] - 1) // (rates.shape[0] - 1)
     scratch = (
         np.empty((count, levels)), np.empty(count * levels + 1), np.empty(count * levels + 1),
@@ -177,7 +187,8 @@ def _row_values(x, worth, local, nodes, block, rates, below, values):
         cell *= m
     for y in range(height):
         for along_x in (True, False):
-            x2, y2 = x + along_x, y + (not along_x)
+            x2 = x + along_x
+            y2 = y + (not along_x)
             if x2 == width or y2 == height:
                 continue
             there, back = (EAST, WEST) if along_x else (SOUTH, NORTH)
@@ -194,7 +205,8 @@ def _row_values(x, worth, local, nodes, block, rates, below, values):
 @kernel
 def step_takings(x, y, action, worth, nodes, rates, below, takings):
     """Add to ``takings`` (K,) what the step to cell ``x, y`` takes of each node at its best."""
-    count, levels = len(nodes), rates.shape[2]
+    count = len(nodes)
+    levels = rates.shape[2]
     m = (rates.shape[1] - 1) // (rates.shape[0] - 1)
     rows = np.empty((count, levels))
     values, chances = np.empty(count * levels + 1), np.empty(count * levels + 1)
@@ -212,25 +224,31 @@ def step_takings(x, y, action, worth, nodes, rates, below, takings):
 @inlined
 def _ceiling_of_staying(local, now, ahead, had, then_had, home, q):
     """The ceiling of local price ``q`` by a step within the block, and the local price after."""
-    least, best = np.inf, q
+    least = np.inf
+    best = q
     for line in range(local.shape[1]):
         value = now[line] + ahead[line] + local[home, line] * (then_had[home] - had[home])
         value += max(local[home, line] - local[home, q], 0.0) * had[home]
         if value < least:
-            least, best = value, line
+            least = value
+            best = line
     return least, best
 
 
 @inlined
 def _ceiling_of_leaving(blocks, local, now, ahead, had, then_had, home, there, level, q):
     """The same by a step into another block, and the level at which ``home`` is remembered."""
-    least, best, chosen = np.inf, 0, 0
+    least = np.inf
+    best = 0
+    chosen = 0
     for later in range(len(blocks.levels)):
         value, line = paths.bound_of_beginning(
             blocks, local, now, ahead, had, then_had, home, there, level, later, local[home, q]
         )
         if value < least:
-            least, best, chosen = value, line, later
+            least = value
+            best = line
+            chosen = later
     return least, best, chosen
 
 
@@ -245,22 +263,28 @@ def _choose_service(
     had = paths.data_had(data, phases, phase, f)
     then_had = paths.data_had(data, phases, phase, f + 1)
     most = -waiting[paths.last_slot(phases, phase, f, len(waiting) - 1)]
-    choice, line, later = paths.STOP, q, 0
+    choice = paths.STOP
+    line = q
+    later = 0
     if paths.may_charge(to_zone, phases, phase, f, x, y):
         new = paths.data_had(data, phases, phases.after[f], f) - had
         value = ceilings[f, phases.after[f], x, y, memory, q] + local[home, q] * new[home]
         if memory > 0:
             value += local[node, blocks.levels[level]] * new[node]
         if value > most:
-            most, choice = value, paths.CHARGE
+            most = value
+            choice = paths.CHARGE
     if f >= phases.deadline[phase]:
         return choice, line, later
     s = period[phases.clock[phase, f]]
     for action in range(5):
-        x2, y2 = x + STEP_X[action], y + STEP_Y[action]
+        x2 = x + STEP_X[action]
+        y2 = y + STEP_Y[action]
         if not paths.is_reached(to_zone, phases, phase, f + 1, x2, y2):
             continue
-        there, now, ahead = blocks.home[x2, y2], values[s, action, x2, y2], ceilings[f + 1, phase]
+        there = blocks.home[x2, y2]
+        now = values[s, action, x2, y2]
+        ahead = ceilings[f + 1, phase]
         if there == home:
             value, best = _ceiling_of_staying(
                 local, now, ahead[x2, y2, memory], had, then_had, home, q
@@ -274,7 +298,10 @@ def _choose_service(
                 blocks, local, now, ahead[x2, y2], had, then_had, home, there, known, q
             )
         if value > most:
-            most, choice, line, later = value, action, best, kept
+            most = value
+            choice = action
+            line = best
+            later = kept
     return choice, line, later
 
 
@@ -296,7 +323,11 @@ def add_slopes(
     Returns:
         The bound of the UAV, and the earliest mission slot of its last flying slot.
     """
-    phase, f, memory, home, last = 0, 0, 0, blocks.home[x, y], slopes[-1]
+    phase = 0
+    f = 0
+    memory = 0
+    home = blocks.home[x, y]
+    last = slopes[-1]
     had = paths.data_had(data, phases, phase, 0)
     start = ceilings[0, 0, x, y, 0] + local[home] * had[home]
     q = np.argmin(start)
@@ -319,7 +350,8 @@ def add_slopes(
             phase = phases.after[f]
         new = then_had - had
         s = period[phases.clock[phase, f]]
-        x, y = x + STEP_X[choice % 5] * (choice < 5), y + STEP_Y[choice % 5] * (choice < 5)
+        x = x + STEP_X[choice % 5] * (choice < 5)
+        y = y + STEP_Y[choice % 5] * (choice < 5)
         there = blocks.home[x, y]
         if there == home:
             last[home] += parts[line] * new[home] + max(parts[line] - parts[q], 0.0) * had[home]
@@ -333,7 +365,8 @@ def add_slopes(
             last[there] += parts[line] * new[there]
             known_price = parts[blocks.levels[known]]
             last[there] += max(parts[line] - known_price, 0.0) * had[there]
-        home, q = there, line
+        home = there
+        q = line
         if choice == paths.CHARGE:
             continue
         priced = worth[s].copy()

@@ -301,7 +301,8 @@ def check_run(
             ``workers`` is out of range; if a policy cannot act in a scenario of the study, such as
             a learned policy on a layout that differs from that of its training.
     """
-    plan, teams = plan_study(study, out, workers, accept_code), len(study.policies)
+    plan = plan_study(study, out, workers, accept_code)
+    teams = len(study.policies)
     if reuse and total_time(plan, workers).low > LONG_RUN:
         plan = plan_study(study, out, workers, accept_code, reuse)
     missing = sum(planned.missing for planned in plan[:teams])
@@ -344,17 +345,20 @@ def _check_policies(study: Study) -> None:
 
 def _count_missions(study: Study, store: Store) -> list[Planned]:
     """What is needed for now, and what of it is present: of every policy, then of the bounds."""
-    manifest, logged = store.manifest, [study.logged] * study.size
+    manifest = store.manifest
+    logged = [study.logged] * study.size
     plan = []
     for team, policy in enumerate(study.policies):
         parts = parts_of(manifest, team) + check_parts(manifest, team)
-        needed, missing = missions_in(parts), missions_in(store.missing("missions", parts))
+        needed = missions_in(parts)
+        missing = missions_in(store.missing("missions", parts))
         logs = missions_in(store.missing("events", parts_of(manifest, team, logged)))
         most = _most_missions(study) if study.rule and missing else needed
         plan.append(Planned(policy, needed, needed - missing, logs, max(most, needed)))
     if study.bounds:
         parts = bound_parts(manifest)
-        needed, missing = missions_in(parts), missions_in(store.missing("bounds", parts))
+        needed = missions_in(parts)
+        missing = missions_in(store.missing("bounds", parts))
         plan.append(Planned("upper bounds", needed, needed - missing, most=needed))
     return plan
 

@@ -230,7 +230,8 @@ def _simulate_pieces(
     asked: Asked, pieces: Iterable[range], progress: Progress | None
 ) -> Iterator[tuple[Records, float]]:
     """The records of each piece of the replications, and the time of the simulation alone [s]."""
-    policies, pool = load_team(asked.team), Here(asked.workers)
+    policies = load_team(asked.team)
+    pool = Here(asked.workers)
     about = (asked.scenario, policies, asked.seed)
     if asked.engine == "batch":
         simulate_batch(*about, 1)  # compiles

@@ -129,16 +129,19 @@ class _Run:
         Raises:
             ChunkError: If a chunk could not be computed, after the other chunks of the round.
         """
-        manifest, teams = self.store.manifest, range(len(self.study.policies))
+        manifest = self.store.manifest
+        teams = range(len(self.study.policies))
         points = len(self.study.points)
-        before, wanted = [[0] * points for _ in teams], [[self.study.first] * points for _ in teams]
+        before = [[0] * points for _ in teams]
+        wanted = [[self.study.first] * points for _ in teams]
         logs = [chunks.parts_of(manifest, team, [self.study.logged] * points) for team in teams]
         asked: chunks.Present = defaultdict(list)
         while wanted != before:
             of_teams = (chunks.parts_of(manifest, team, wanted[team]) for team in teams)
             parts = new_parts(of_teams, asked)
             self._round(parts, new_parts(logs, defaultdict(list)))
-            before, logs = wanted, []
+            before = wanted
+            logs = []
             wanted = [self._more(team, wanted[team]) for team in teams]
         selected = [self._select(team, wanted[team]) for team in teams]
         chosen = manifest.model_copy(update={"selected": selected})

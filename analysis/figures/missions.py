@@ -55,7 +55,8 @@ def plot_trajectories(events: event_log.Events, scenario: Scenario, ax: Axes) ->
         steps = np.round([to_x - x, to_y - y])  # one cell, without the shift of paths
         ax.quiver(x, y, *steps, color=colours[slots.loc[slots["moved"], "node"]], zorder=4,
                   gid=f"moves-{uav}", **_ARROW)  # fmt: skip
-        hovers, charges = ~slots["moved"] & ~slots["charging"], ways[slots["charging"]]
+        hovers = ~slots["moved"] & ~slots["charging"]
+        charges = ways[slots["charging"]]
         ax.scatter(ways["x"][hovers], ways["y"][hovers], c=colours[slots["node"][hovers]],
                    marker="x", s=34, linewidths=1.7, zorder=5, gid=f"hovers-{uav}")  # fmt: skip
         ax.scatter(charges["x"], charges["y"], color=style.INK, marker=(8, 2, 0), s=70,
@@ -133,8 +134,10 @@ def plot_age(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
 
 def plot_occupancy(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     """The UAVs that charge (stacked, in their colours) and that wait for a pad, over time."""
-    slots, edges = event_log.uav_slots(events), np.arange(event_log.mission_length(events) + 1)
-    base, colours = np.zeros(len(edges)), style.uav_colours(scenario.uavs)
+    slots = event_log.uav_slots(events)
+    edges = np.arange(event_log.mission_length(events) + 1)
+    base = np.zeros(len(edges))
+    colours = style.uav_colours(scenario.uavs)
     for state, hatch in (("charging", None), ("waiting", "/////")):
         for uav, busy in slots[slots[state]].groupby("uav"):
             top = base + np.isin(edges, busy["slot"])
@@ -200,7 +203,8 @@ def plot_courses(
     """
     values = sorted(rows[line].unique()) if line != "policy" else rows[line].unique()
     looks = style.policy_colours(values) if line == "policy" else style.graded_colours(values)
-    height, shape = 1.9 * len(titles) + 1.3, {"sharex": True, "squeeze": False}
+    height = 1.9 * len(titles) + 1.3
+    shape = {"sharex": True, "squeeze": False}
     with style.new_panels(height, len(titles), "y", 4, heading, **shape) as (figure, axes):
         for ax, (panel, title) in zip(axes.flat, titles.items(), strict=True):
             for value, course in rows[rows["panel"] == panel].groupby(line, sort=False):
@@ -254,10 +258,12 @@ def name_places(
     centres = np.array(nodes) * (scale, -scale)
     discs = [_box_ends(x - NODE_RADIUS, y, 2 * NODE_RADIUS, 2 * NODE_RADIUS) for x, y in centres]
     map_box = np.array([-scale / 2, (0.5 - size[1]) * scale, (size[0] - 0.5) * scale, scale / 2])
-    taken, places = [*discs], []
+    taken = [*discs]
+    places = []
     for (x, y), name in zip(centres, names, strict=False):
         width = 0.62 * NAME_SIZE * len(name)
-        beside, above = NODE_RADIUS + 1, NODE_RADIUS + 0.55 * NAME_SIZE
+        beside = NODE_RADIUS + 1
+        above = NODE_RADIUS + 0.55 * NAME_SIZE
         choices = [
             (beside, 0.0),
             (beside, above - 4),
@@ -294,7 +300,8 @@ def _overlapping_area(box: np.ndarray, other: np.ndarray) -> float:
 @mpl.rc_context({"text.parse_math": True})  # an arrow is a symbol in TeX
 def _map_legend(ax: Axes) -> None:
     """The symbols of the map (Table I)."""
-    served, arrow = style.node_colours(2)[1], r"$\rightarrow$"
+    served = style.node_colours(2)[1]
+    arrow = r"$\rightarrow$"
     marks = (
         ("s", "start and charging zone", style.ZONE_EDGE, style.ZONE, 9),
         ("o", "sensor node", style.INK, served, 8),

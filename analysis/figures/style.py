@@ -40,7 +40,8 @@ INK, MUTED, GRID = "#22303c", "#7a8791", "#dde4e9"
 SEA, ZONE, ZONE_EDGE, LAND = "#f3f8fb", "#ffe08a", "#d9a400", "#cdbf9f"  # of maps
 UAVS = ("#1b1b1b", "#b3123f", "#1f5fbf", "#00734d", "#8a4b00", "#7b2fa0", "#007a8a", "#66707a")
 
-LINES, MARKERS = ("-", "--", ":", "-."), "os^vPX*"
+LINES = ("-", "--", ":", "-.")
+MARKERS = "os^vPX*"
 WIDTH, DPI = 5.2, 150  # inches, dots per inch
 OUTLINED: dict = {"path_effects": [withStroke(linewidth=2.5, foreground="white")]}  # of texts
 # In all figures, blue means better, orange worse, and grey inconclusive.
@@ -227,9 +228,11 @@ def side_by_side_shifts(count: int, half_width: float) -> np.ndarray:
 
 def axis_ends(rows: pd.DataFrame, length: float = 0.0, zero: bool = False) -> tuple[float, float]:
     """The ends of an axis for all intervals, at least ``length`` long, and with 0 if asked."""
-    low, high = rows["low"].min(), rows["high"].max()
+    low = rows["low"].min()
+    high = rows["high"].max()
     if zero:
-        low, high = min(low, 0.0), max(high, 0.0)
+        low = min(low, 0.0)
+        high = max(high, 0.0)
     room = max(0.06 * (high - low), 0.005)
     return min(low - room, high - length), high + room
 
@@ -294,7 +297,8 @@ def plot_along(
         options: Further arguments of ``Axes.errorbar``.
     """
     ticks = rows.drop_duplicates("position").sort_values("position")
-    span, gap = float(np.ptp(ticks["position"])), ticks["position"].diff().min()
+    span = float(np.ptp(ticks["position"]))
+    gap = ticks["position"].diff().min()
     half_width = min(0.12 * gap, 0.02 * span) if span else 0.02
     curves = rows[line].map(value_text)
     for name, shift in zip(looks, side_by_side_shifts(len(looks), half_width), strict=True):

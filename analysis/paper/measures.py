@@ -130,11 +130,13 @@ class EvidenceOfPolicy:
 
     def logs(self, uavs: int) -> list[tuple[pd.DataFrame, np.ndarray]]:
         """The stored event logs of missions with a number of UAVs, each with the (K, 2) nodes."""
-        missions, logged = self.missions(uavs), self.results.study.logged
+        missions = self.missions(uavs)
+        logged = self.results.study.logged
         missions = missions[missions["replication"] < logged]
         if missions.empty:
             raise MissingError(f"the study {self.study} stores no event logs")
-        which, results = missions[["point", "replication"]].itertuples(index=False), self.results
+        which = missions[["point", "replication"]].itertuples(index=False)
+        results = self.results
         return [
             (results.events(self.policy, point, n), np.array(results.scenario(point).nodes))
             for point, n in which
@@ -464,7 +466,8 @@ def final_lead(judge: Judge, evidence: EvidenceOfTrainings, metric: str, unit: U
 
 def level_from(judge: Judge, evidence: EvidenceOfTrainings, metric: str) -> Finding:
     """The step from which on the mean curve without transfer learning stays near its end."""
-    transfer, curves = evidence.transfer(metric), evidence.curves(metric)
+    transfer = evidence.transfer(metric)
+    curves = evidence.curves(metric)
     means = last_phase(curves, evidence.without).mean(axis="columns")
     since = int(means.index[settling_position(means, MARGIN)])
     level = Quantity.exact(since, unit="steps", name="level from")

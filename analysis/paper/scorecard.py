@@ -241,12 +241,14 @@ def _evidence_of_policy(
     """The results in a study of the policy of a column: the best one, of a learned column."""
     if study not in studies:
         raise measures.MissingError(f"the study {study} has not been run")
-    results, which = studies[study], f"policy {column}"
+    results = studies[study]
+    which = f"policy {column}"
     learners = summary.trained_policies_by_learner(results)
     if column in NULLS:
         among = [name for name in results.policies if name == column]
     elif column == COLUMNS[0]:
-        among, which = [name for of in learners.values() for name in of], "learned policy"
+        among = [name for of in learners.values() for name in of]
+        which = "learned policy"
     else:
         among = learners.get(column, [])
     if not among:
@@ -270,7 +272,8 @@ def _find_for_claim(
     claim: Claim, known: Mapping[str, Any], evidence: Callable[[], Any]
 ) -> measures.Finding:
     """What a policy's results say about a claim or, without results, why there are none."""
-    printed, judge = claim.printed, claim.rule.judge
+    printed = claim.printed
+    judge = claim.rule.judge
     if printed:
         known = {**known, "printed": printed.interval}
     takes = known.keys() & signature(judge).parameters.keys()

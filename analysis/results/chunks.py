@@ -84,7 +84,8 @@ def check_parts(manifest: Manifest, team: int) -> list[Part]:
     The selection was not based on any of these missions.
     """
     check = manifest.study.selection.check if manifest.study.selection else 0
-    cells, replications = manifest.cells[team], range(CHECK, CHECK + check)
+    cells = manifest.cells[team]
+    replications = range(CHECK, CHECK + check)
     return [Part(cells[point], replications) for point in manifest.selected_points(team)]
 
 
@@ -95,18 +96,22 @@ def split_into_chunks(parts: Iterable[Part], size: int) -> Iterator[Chunk]:
     for part in parts:
         rest = part.replications
         while len(rest):
-            waiting.append(Part(part.cell, rest[:room]))
-            rest, room = rest[room:], room - len(rest[:room])
+            taken = rest[:room]
+            waiting.append(Part(part.cell, taken))
+            rest = rest[len(taken) :]
+            room -= len(taken)
             if not room:
                 yield Chunk(part.cell.team, tuple(waiting))
-                waiting, room = [], size
+                waiting = []
+                room = size
     if waiting:
         yield Chunk(waiting[0].cell.team, tuple(waiting))
 
 
 def gaps_between(wanted: range, present: list[range]) -> list[range]:
     """The parts of a range that are in none of the present ranges."""
-    missing, begin = [], wanted.start
+    missing = []
+    begin = wanted.start
     for there in sorted(present, key=lambda r: r.start):
         if there.start > begin:
             missing.append(range(begin, min(there.start, wanted.stop)))

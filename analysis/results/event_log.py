@@ -81,7 +81,8 @@ def age_falls(events: Events) -> pd.DataFrame:
         falls = log[log["event"] == "delivery"]
         newest = falls["generated"].groupby(falls["node"]).cummax()
         before = newest.groupby(falls["node"]).shift(fill_value=0.0)
-        falls, newest = falls[newest > before], newest[newest > before]
+        falls = falls[newest > before]
+        newest = newest[newest > before]
     else:
         flows = _node_flows(log)
         falls = flows[(flows["event"] == "communication") & (_data_held(flows) == 0.0)]
@@ -94,7 +95,8 @@ def ages_of_nodes(events: Events) -> pd.DataFrame:
 
     The last row is the end of the mission.
     """
-    log, falls = pd.DataFrame(events), age_falls(events)
+    log = pd.DataFrame(events)
+    falls = age_falls(events)
     nodes = log.loc[(log["event"] == "mission_start") & (log["node"] >= 0), "node"].to_numpy()
     times = np.arange(mission_length(log) + 1)
     newest = falls["newest"].groupby([np.ceil(falls["time"]).astype(int), falls["node"]]).max()
@@ -107,7 +109,8 @@ def mean_age(events: Events) -> pd.DataFrame:
 
     Between corners the age grows by 1 per slot; at a fall there are two, before and after it.
     """
-    log, falls = pd.DataFrame(events), age_falls(events)
+    log = pd.DataFrame(events)
+    falls = age_falls(events)
     nodes = ((log["event"] == "mission_start") & (log["node"] >= 0)).sum()
     before = falls.groupby("node")["newest"].shift(fill_value=0.0)
     gains = (falls["newest"] - before).groupby(falls["time"]).sum().cumsum() / nodes
@@ -126,7 +129,8 @@ def mission_length(events: Events) -> int:
 
 def _node_flows(log: pd.DataFrame) -> pd.DataFrame:
     """The rows of the initial data and of all that changes the data of nodes, with ``change``."""
-    gains, losses = ("mission_start", "arrival"), ("communication", "data_lost", "loss")
+    gains = ("mission_start", "arrival")
+    losses = ("communication", "data_lost", "loss")
     flows = log[log["event"].isin(gains + losses) & (log["node"] >= 0)]
     return flows.assign(change=flows["value"].where(flows["event"].isin(gains), -flows["value"]))
 
@@ -164,8 +168,10 @@ def _is_between(log: pd.DataFrame, table: pd.DataFrame, start: str, end: str) ->
 
 def _is_waiting(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
     """A UAV waits from its ``charge_request`` on until it charges, moves off or tries to."""
-    overruled, requested = _slots_of(log, "collision"), _slots_of(log, "charge_request")
-    waiting, queued = np.zeros(len(table), bool), False
+    overruled = _slots_of(log, "collision")
+    requested = _slots_of(log, "charge_request")
+    waiting = np.zeros(len(table), bool)
+    queued = False
     keys = zip(table["uav"], table["slot"], table["moved"], table["charging"], strict=True)
     for row, (uav, slot, moved, charging) in enumerate(keys):
         stays = queued and slot > 0 and not moved and (uav, slot) not in overruled
@@ -191,7 +197,8 @@ def causes_of_failure(events: Events, scenario: Scenario, first: int = 1) -> lis
     log = pd.DataFrame(events)
     end = "landing" if scenario.landing else "quota_filled"
     ended = set(log.loc[log["event"] == end, "uav"])
-    slots, levels = uav_slots(log), battery_levels(log)
+    slots = uav_slots(log)
+    levels = battery_levels(log)
     # The battery before each slot: that at its start.
     starts = levels.rename(columns={"time": "slot", "battery": "before"})
     slots = slots.merge(starts, on=["uav", "slot"])
@@ -202,9 +209,12 @@ def causes_of_failure(events: Events, scenario: Scenario, first: int = 1) -> lis
 def _cause_of_uav(
     log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int, first: int
 ) -> str:
-    own, flown = log[log["uav"] == uav], slots[slots["uav"] == uav]
-    kind, last = type_of(scenario.fleet, uav), flown.iloc[-1]
-    quota, after = kind.quota or scenario.quota, int(last["slot"]) + 1
+    own = log[log["uav"] == uav]
+    flown = slots[slots["uav"] == uav]
+    kind = type_of(scenario.fleet, uav)
+    last = flown.iloc[-1]
+    quota = kind.quota or scenario.quota
+    after = int(last["slot"]) + 1
     to_go = f"{max(quota - (own['event'] == 'communication').sum(), 0)} of {quota}"
     to_go = f"with {to_go} communication slots to go" if quota else "without having landed"
     name = f"UAV {first + uav}"
@@ -223,7 +233,8 @@ def _cause_of_uav(
     cells = home[flown["from_y"], flown["from_x"]]
     covers = flown["before"] > cells * kind.slots_per_cell * scenario.flight_cost
     if away and covers.any():
-        row, way = flown[covers].iloc[-1], numbers.format_count(cells[covers][-1], "cell")
+        row = flown[covers].iloc[-1]
+        way = numbers.format_count(cells[covers][-1], "cell")
         facts.append(
             f"its battery last covered the way to a zone after {row['slot']} slots, with "
             f"{row['before']} % for {way}"
@@ -231,7 +242,8 @@ def _cause_of_uav(
     spent = (flown["before"] - flown["battery"] - scenario.flight_cost).clip(lower=0)
     if spent.any():
         facts.append(f"the wind cost {spent.sum()} %")
-    waited, charging = flown[flown["waiting"]], slots[slots["charging"]]
+    waited = flown[flown["waiting"]]
+    charging = slots[slots["charging"]]
     for zone, rows in waited.groupby(zones[waited["y"], waited["x"]]):
         there = charging["slot"].isin(rows["slot"]) & (zones[charging["y"], charging["x"]] == zone)
         busy = f", while {_uavs_in_words(charging['uav'][there], first)} charged there"
@@ -267,10 +279,12 @@ def paths_of(events: Events, scenario: Scenario) -> pd.DataFrame:
         where a whole number is the middle of a cell; ``lon, lat`` [degrees], if the sea has them;
         ``altitude`` [m]; ``battery`` [%].
     """
-    table, slots = battery_levels(events), uav_slots(events)
+    table = battery_levels(events)
+    slots = uav_slots(events)
     for axis in ("x", "y"):
         for uav, of_uav in slots.groupby("uav"):
-            moves, last = of_uav[of_uav["moved"]], type_of(scenario.fleet, int(uav)).slots_per_cell
+            moves = of_uav[of_uav["moved"]]
+            last = type_of(scenario.fleet, int(uav)).slots_per_cell
             times = np.stack([moves["slot"], moves["slot"] + last], axis=1).ravel()
             cells = moves[[f"from_{axis}", axis]].to_numpy().ravel()
             first = of_uav[f"from_{axis}"].iloc[0]

@@ -66,7 +66,8 @@ class Manifest(provenance.Origin):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        names, study = [team.policy for team in self.policies], self.study
+        names = [team.policy for team in self.policies]
+        study = self.study
         if len({*names}) < len(names):
             raise ValueError("policies: one is listed twice")
         shape = [len(self.points)] * len(names)
@@ -170,7 +171,8 @@ class Manifest(provenance.Origin):
         return new.model_copy(update=update)
 
     def _check_extended_by(self, new: "Manifest", path: Path) -> None:
-        name, held = new.study.name, self.study.name
+        name = new.study.name
+        held = self.study.name
         teams = {team.policy: team.weights for team in new.policies}
         dropped = [team.policy for team in self.policies if team.policy not in teams]
         changed = [t.policy for t in self.policies if teams.get(t.policy) != t.weights]

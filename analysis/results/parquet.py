@@ -181,7 +181,8 @@ def are_of(tables: Sequence[pa.Table], rows: Sequence[Row]) -> bool:
     replications = np.concatenate([*map(np.arange, starts, stops)])
     if not others:
         return _are_of(missions, cells, replications)
-    fleet, (uavs,) = missions["uavs"].to_numpy(), others
+    fleet = missions["uavs"].to_numpy()
+    (uavs,) = others
     first = np.repeat(np.cumsum(fleet) - fleet, fleet)
     return (
         _are_of(missions, cells, replications)
@@ -289,7 +290,8 @@ def _are_valid(table: pa.Table) -> bool:
         if column.null_count:
             return False
         if limits := _column_limits(name, column.type):
-            (low, high), values = limits, column.to_numpy()
+            low, high = limits
+            values = column.to_numpy()
             if not ((values >= low) & (values <= high)).all():
                 return False
     if "cuts" in table.column_names:  # there are prices for every cut, as many of each

@@ -109,7 +109,8 @@ def mission_of(
     """
     record = simulate(space, team, seed, replication, events=True)
     assert record.events is not None
-    scenario, names = sample_scenario(space, seed, replication), (policy.name for policy in team)
+    scenario = sample_scenario(space, seed, replication)
+    names = (policy.name for policy in team)
     events = pd.DataFrame(record.events.columns())
     return Mission(",".join(names), scenario, record, _uavs_of(record), events)
 
@@ -121,7 +122,8 @@ def resimulate(results: Results, policy: str, point: int, replication: int) -> M
         InputError: If the study has no such mission, or if the new record differs from the stored
             one.
     """
-    space, seed = results.scenario(point), results.store.manifest.seed
+    space = results.scenario(point)
+    seed = results.store.manifest.seed
     mission = mission_of(space, load_team(policy, space.uavs[1]), seed, replication)
     if changed := difference_in_words(
         mission.record, stored_record(results, policy, point, replication)
@@ -165,7 +167,8 @@ def difference_in_words(record: MissionRecord, fields: Mapping[str, Any]) -> str
     changed = [name for name in names if simulated.get(name) != fields.get(name)]
     if not changed:
         return ""
-    first, more = changed[0], f", and {len(changed) - 1} more" if changed[1:] else ""
+    first = changed[0]
+    more = f", and {len(changed) - 1} more" if changed[1:] else ""
     return f"{first} is {fields.get(first)} and {simulated.get(first)} when simulated again{more}"
 
 

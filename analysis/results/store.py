@@ -68,7 +68,8 @@ class Store:
     """
 
     def __init__(self, folder: Path, manifest: Manifest):
-        self.folder, self.manifest = folder, manifest
+        self.folder = folder
+        self.manifest = manifest
         self._lock = ExitStack()  # what holds it
         self.damaged: list[Path] = []
         self._clear()
@@ -245,12 +246,14 @@ class Store:
 
         A file that has other missions as well stays.
         """
-        parts, names = [part for chunk in large for part in chunk.parts], {c.name for c in large}
+        parts = [part for chunk in large for part in chunk.parts]
+        names = {c.name for c in large}
         rows = [parquet.parts_in(tables[0]) for tables in self._tables_with("missions", parts)]
         held = {chunks.name_of(of_file): of_file for of_file in rows}
         if held.keys() == names:
             return
-        frames, merged = self._frames(parts), defaultdict(list)
+        frames = self._frames(parts)
+        merged = defaultdict(list)
         for chunk in (chunk for chunk in large if chunk.name not in held):
             self.keep("missions", chunk, _tables_of(chunk, frames))
         for part in parts:
@@ -380,7 +383,8 @@ class Store:
         return [*{id(tables): tables for tables in found}.values()]
 
     def _incomplete(self, part: chunks.Part, gap: range) -> str:
-        team, values = part.cell.team, self.manifest.points[part.cell.point].values
+        team = part.cell.team
+        values = self.manifest.points[part.cell.point].values
         where = f" at {json.dumps(values)}" if values else ""
         present = f"the first {gap.start - part.replications.start} of {len(part.replications)}"
         what = "bounds"

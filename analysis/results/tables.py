@@ -59,7 +59,8 @@ def of_fields(origin: Origin, policy: str, values: dict[str, Any], replication: 
     changes = origin.study.set | values
     name = changes.pop(SEA, origin.study.scenario)
     if not is_scenario_name(name):
-        name, paper = "paper", load_scenario("paper").model_dump(mode="json")
+        name = "paper"
+        paper = load_scenario("paper").model_dump(mode="json")
         fields = origin.space(values).model_dump(mode="json")
         changes = {k: v for k, v in fields.items() if k not in paper or v != paper[k]}
     settings = [w for k, v in dotted(changes).items() for w in ("--set", f"{k}={toml_value(v)}")]
@@ -182,7 +183,8 @@ class Results:
             folder: The results folder that the command reads the scenario from. Without it, the
                 command is longer and sets the fields of the scenario itself.
         """
-        cell, manifest = self.cell(policy, point), self.store.manifest
+        cell = self.cell(policy, point)
+        manifest = self.store.manifest
         if folder is None:
             return of_fields(manifest, policy, manifest.points[point].values, replication)
         return of_folder(folder, manifest, cell, replication)
@@ -199,7 +201,8 @@ class Results:
     def _chosen(self, policy: str, kind: type) -> Any:
         """What a rule of this kind has selected for a policy; None if the study has another."""
         self.check_policy(policy)
-        manifest, rule = self.store.manifest, self.study.selection
+        manifest = self.store.manifest
+        rule = self.study.selection
         if not rule or not isinstance(rule, kind):
             return None
         parts = parts_of(manifest, self.policies.index(policy))
@@ -273,7 +276,8 @@ def results_of(store: Store) -> Results:
     missions, uavs, checks = {}, {}, {}
     for number, team in enumerate(manifest.policies):
         parts = parts_of(manifest, number)
-        missions[team.policy], uavs[team.policy] = store.missions(parts), store.uavs(parts)
+        missions[team.policy] = store.missions(parts)
+        uavs[team.policy] = store.uavs(parts)
         if checked := check_parts(manifest, number):
             checks[team.policy] = store.missions(checked)
     if not manifest.complete:

@@ -175,7 +175,8 @@ def difference_test(
         level: Confidence level.
     """
     differences = differences_of(a, b)
-    rare, of = intervals.rare_differences(metric, a.mean(), b.mean()), metric_of(metric)
+    rare = intervals.rare_differences(metric, a.mean(), b.mean())
+    of = metric_of(metric)
     if rare is None or (differences.size == 1 and not of.is_bounded):
         return t_test(differences, level)
     smooth, p = t_test(add_rare_pairs(differences, rare), level)
@@ -215,7 +216,9 @@ def column_tests(
     constant = differences.max() - differences.min() <= _ROUNDING * size
     differences = differences.mask(differences.abs().le(_ROUNDING * size, axis=1), 0.0)
     present = differences.notna()
-    n, mean, of = differences.count(), differences.mean(), metric_of(metric)
+    n = differences.count()
+    mean = differences.mean()
+    of = metric_of(metric)
     half = -differences.sem() * stdtrit(np.maximum(n - 1, 1), (1 - levels) / 2)
     ends = {"low": mean - half, "high": mean + half}
     table = pd.DataFrame({"difference": mean, **ends, "n": n, "student": half})
@@ -235,14 +238,16 @@ def column_tests(
     squares += (rare[0] - centre) ** 2 + (rare[1] - centre) ** 2
     error = np.sqrt(squares / (size - 1) / size)
     half = -stdtrit(size - 1, (1 - levels) / 2) * error
-    table["low"], table["high"] = centre - half, centre + half
+    table["low"] = centre - half
+    table["high"] = centre + half
     table["p"] = 2 * stdtr(size - 1, -(centre / error).abs())
     limit = of.range[1] - of.range[0]
     table[["low", "high"]] = table[["low", "high"]].clip(-limit, limit)
     if not of.is_bounded:
         table.loc[n == 1, ["low", "high", "p"]] = np.nan, np.nan, 1.0
     if of.is_outcome:
-        gains, losses = (differences > 0).sum(), (differences < 0).sum()
+        gains = (differences > 0).sum()
+        losses = (differences < 0).sum()
         exact = (differences.isin((-1, 0, 1)) | ~present).all() & (n > 0)
         table.loc[exact, "p"] = [*map(mcnemar_p_value, gains[exact], losses[exact])]
     return table
@@ -323,7 +328,8 @@ def compare_unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Pai
     test = scipy.stats.ttest_ind([*a, *more], [*b, *more], equal_var=False)
     ends = test.confidence_interval(intervals.LEVEL)
     p = 1.0 if np.isnan(test.pvalue) else float(test.pvalue)
-    n, difference = min(len(a), len(b)), float(np.mean(a) - np.mean(b))
+    n = min(len(a), len(b))
+    difference = float(np.mean(a) - np.mean(b))
     return Paired(difference, float(ends.low), float(ends.high), p, np.nan, np.nan, n)
 
 
@@ -341,11 +347,15 @@ def relative_change(
         reference: (n,) reference values of the same replications, whose mean is not 0.
         metric: The metric; by default one without bounds.
     """
-    mean, base, n, of = values.mean(), reference.mean(), len(values), metric_of(metric)
+    mean = values.mean()
+    base = reference.mean()
+    n = len(values)
+    of = metric_of(metric)
     ratio = float(mean / base)
     if n == 1:
         return intervals.Interval(ratio - 1, np.nan, np.nan)
-    residuals, (least, most) = values - ratio * reference, of.range
+    residuals = values - ratio * reference
+    least, most = of.range
     if of.has_range:
         more = max(most - mean, mean - ratio * least)
         less = min(least - mean, mean - ratio * most)
@@ -396,7 +406,8 @@ def compare(
     others = [name for name in tables if name != baseline]
     if not others:
         raise InputError(f"{of}: nothing to compare with {baseline}; allowed: two or more")
-    rows, known = [], {metric: metric_in_missions(missions, metric) for metric in metrics}
+    rows = []
+    known = {metric: metric_in_missions(missions, metric) for metric in metrics}
     for name in others:
         check_same_missions(tables, name, baseline)
         for group, (a, b) in match_groups([tables[name], reference], by):

@@ -57,7 +57,8 @@ def bounded_ends(mean: Any, variance: Any, n: Any, level: Any = LEVEL) -> tuple[
     centre = (n * mean + added) / size
     squares = n * (variance + (mean - centre) ** 2) + added * (centre**2 + (1 - centre) ** 2)
     half = stdtrit(size - 1, (1 + level) / 2) * np.sqrt(squares / (size - 1) / size)
-    low, high = np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0)
+    low = np.maximum(centre - half, 0.0)
+    high = np.minimum(centre + half, 1.0)
     return np.minimum(low, mean), np.maximum(high, mean)
 
 
@@ -110,7 +111,8 @@ def skewness_of(squares: Any, cubes: Any, n: Any) -> Any:
         n: (...) numbers of values.
     """
     is_known = (n > 2) & (squares > 0)
-    size, spread = np.where(is_known, n, 3), np.where(is_known, squares, 1.0)
+    size = np.where(is_known, n, 3)
+    spread = np.where(is_known, squares, 1.0)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         plain = np.sqrt(size) * cubes / spread**1.5
     skewness = np.sqrt(size * (size - 1)) / (size - 2) * plain
@@ -180,7 +182,8 @@ class Moments(NamedTuple):
         sample = np.asarray(values, float)
         total = float(sample.sum())
         deviations = sample - total / sample.size
-        squares, cubes = float((deviations**2).sum()), float((deviations**3).sum())
+        squares = float((deviations**2).sum())
+        cubes = float((deviations**3).sum())
         return cls(sample.size, total, squares, cubes, float(sample.min()), float(sample.max()))
 
     @property
@@ -196,7 +199,8 @@ class Moments(NamedTuple):
         Formulas for robust, one-pass parallel computation of covariances and arbitrary-order
         statistical moments, Sandia report SAND2008-6212.
         """
-        n, apart = self.n + others.n, others.mean - self.mean
+        n = self.n + others.n
+        apart = others.mean - self.mean
         between = self.n * others.n / n * (self.n - others.n) / n
         within = (self.n * others.squares - others.n * self.squares) / n
         return type(self)(
@@ -272,7 +276,8 @@ class Moments(NamedTuple):
 
 def wilson_interval(successes: int, n: int, level: float = LEVEL) -> Interval:
     """Share of successes with its Wilson score interval, which holds near 0 and 1 as well."""
-    share, z = successes / n, ndtri(0.5 + 0.5 * level)
+    share = successes / n
+    z = ndtri(0.5 + 0.5 * level)
     width = 2 * (n + z**2)
     centre = (2 * n * share + z**2) / width
     half = z / width * np.sqrt(4 * n * share * (1 - share) + z**2)
@@ -325,7 +330,8 @@ def stratified_interval(values: np.ndarray, metric: str | Metric, level: float =
         level: Confidence level.
     """
     present = ~np.isnan(values)
-    n, points = present.sum(axis=0), values.shape[1]
+    n = present.sum(axis=0)
+    points = values.shape[1]
     if points == 1:
         return interval_of(metric, values[present], level)
     means = np.nansum(values, axis=0) / n
@@ -393,7 +399,8 @@ def column_intervals(
     Returns:
         (K, 4): ``mean``, ``low``, ``high``, ``n``, with the columns as index; nan without values.
     """
-    n, mean = values.count(), values.mean()
+    n = values.count()
+    mean = values.mean()
     level = pd.Series(levels, index=values.columns)
     deviations = values - mean
     skewness = skewness_of((deviations**2).sum(), (deviations**3).sum(), n)

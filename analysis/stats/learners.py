@@ -85,7 +85,8 @@ def compare_crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
         return Crossed(*of_missions, np.nan, np.nan, p, np.nan, spread, np.nan)
     if np.ptp(d) == 0:
         return Crossed(*of_missions, mean, mean, sign_test(d[:, 0]), 0.0, 0.0, 0.0)
-    row, column = d.mean(axis=1, keepdims=True), d.mean(axis=0, keepdims=True)
+    row = d.mean(axis=1, keepdims=True)
+    column = d.mean(axis=0, keepdims=True)
     rest = float(np.sum((d - row - column + mean) ** 2)) / (trainings - 1) / (missions - 1)
     between = float(row.var(ddof=1))  # Var(training) + Var(rest) / R
     shared = max(float(column.var(ddof=1)) - rest / trainings, 0.0)  # Var(mission)
@@ -143,7 +144,8 @@ def compare_learners(
     check_share("level", level)
     tables = metrics_by_treatment(missions, "policy", metrics, by)
     reference = select_table(tables, "policy", baseline)
-    rows, known = [], {metric: metric_in_missions(missions, metric) for metric in metrics}
+    rows = []
+    known = {metric: metric_in_missions(missions, metric) for metric in metrics}
     for learner, checkpoints in learners.items():
         if not checkpoints or len(set(checkpoints)) < len(checkpoints) or baseline in checkpoints:
             raise InputError(

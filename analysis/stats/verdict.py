@@ -131,7 +131,8 @@ def front_membership(
     # Less the first one, equal costs stay equal, without rounding errors.
     base = np.array([row[there][0] for row, there in zip(costs, present, strict=True)])
     excess = np.where(present, costs - base[:, None], 0.0)
-    known, mask = np.where(present, values, 0.0), present.astype(float)
+    known = np.where(present, values, 0.0)
+    mask = present.astype(float)
     batch = max(1, _BATCH // values.shape[1])
     for begin in range(0, draws, batch):
         size = min(batch, draws - begin)
@@ -194,7 +195,8 @@ def may_be_best(
     values = -values if metric_of(metric).less_is_better else values
     # What a replication adds to all settings cancels in their differences.
     centre = np.nanmean(np.where(present.any(1, keepdims=True), values, 0.0), axis=1, keepdims=True)
-    centred, mask = np.where(present, values - centre, 0.0), present.astype(float)
+    centred = np.where(present, values - centre, 0.0)
+    mask = present.astype(float)
     looks = np.zeros(values.shape[1], int) if looks is None else looks
     each = (1 - LEVEL) / max(values.shape[1] - 1, 1)
     blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
@@ -231,14 +233,18 @@ def _unbeaten_settings(
     ``rare`` has the differences that are added, of the other settings minus those of the block, and
     ``alpha`` the errors of the tests.
     """
-    own, here = values[:, block], mask[:, block]
+    own = values[:, block]
+    here = mask[:, block]
     n = here.T @ mask
     lead = here.T @ values - own.T @ mask  # of the other settings, summed over common replications
     squares = here.T @ values**2 + (own**2).T @ mask
     spread = np.maximum(squares - 2 * own.T @ values, 0.0)
     if rare is not None:
-        n, lead, more = n + 2 * (n > 1), lead + rare[0] + rare[1], rare[0] ** 2 + rare[1] ** 2
-        spread, squares = spread + more, squares + more
+        n = n + 2 * (n > 1)
+        lead = lead + rare[0] + rare[1]
+        more = rare[0] ** 2 + rare[1] ** 2
+        spread = spread + more
+        squares = squares + more
     with np.errstate(divide="ignore", invalid="ignore"):
         deviations = spread - lead**2 / n
         constant = deviations <= _ROUNDING * squares

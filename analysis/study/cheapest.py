@@ -40,8 +40,10 @@ class MeanTest:
 
     def __init__(self, required: float, tolerance: float, error: float):
         self.required = required
-        least, most = required - tolerance, required + tolerance
-        self._at_most, self._at_least = _Wealth(least, tolerance), _Wealth(1 - most, tolerance)
+        least = required - tolerance
+        most = required + tolerance
+        self._at_most = _Wealth(least, tolerance)
+        self._at_least = _Wealth(1 - most, tolerance)
         self._target = -np.log(error)
         self.verdict: Verdict = "open"
         self.missions = 0
@@ -63,7 +65,8 @@ class _Wealth:
     def __init__(self, bound: float, tolerance: float):
         # The best stake is about (mean - bound) / variance, which is 4 * tolerance or more.
         steps = max(int(np.ceil(np.log2(1 / (4 * tolerance * bound)))), 0)
-        self._bound, self._stakes = bound, _BOLDEST / bound * 0.5 ** np.arange(steps + 1)
+        self._bound = bound
+        self._stakes = _BOLDEST / bound * 0.5 ** np.arange(steps + 1)
         self._logs = np.full(steps + 1, -np.log(steps + 1))
 
     def after(self, values: np.ndarray) -> np.ndarray:
@@ -141,7 +144,8 @@ class Question:
         """
         verdicts = points.verdicts[self.candidates]
         possible = ~(verdicts == "missed").any(axis=1)
-        self.candidates, self._best = self.candidates[possible], None
+        self.candidates = self.candidates[possible]
+        self._best = None
         feasible = (verdicts[possible] == "met").all(axis=1)
         if not feasible.any():
             self.settled = not len(self.candidates)
@@ -151,7 +155,8 @@ class Question:
         leader = int(np.argmin(np.where(feasible, costs, np.inf)))
         bounds = excess(self.candidates, leader)
         left = bounds >= 0
-        self.candidates, self._best = self.candidates[left], int(left[:leader].sum())
+        self._best = int(left[:leader].sum())
+        self.candidates = self.candidates[left]
         self._next = self.candidates
         self.settled = bool((bounds <= indifference).all())
 
@@ -342,8 +347,10 @@ class Cheapest(StrictTable):
         """
         where = f"requirements.{AGE}"
         for space in spaces if AGE in self.requirements else ():
-            given, horizon = self.requirements["age"], horizon_of(space)
-            share, has_unit = self.amount("age") / horizon, isinstance(given, str)
+            given = self.requirements["age"]
+            horizon = horizon_of(space)
+            share = self.amount("age") / horizon
+            has_unit = isinstance(given, str)
             if not self.tolerance < share < 1 - self.tolerance or has_unit != bool(space.units):
                 form = 'a time such as "6 h"' if space.units else "mission slots"
                 allowed = f"{form} in the horizon of {horizon:g}{' h' * bool(space.units)}"
@@ -460,8 +467,10 @@ class _Points:
     """
 
     def __init__(self, k: int, first: int):
-        self.counts, self.looks = np.full(k, first), np.ones(k, int)
-        self.verdicts, self.promising = np.full(k, "open", object), np.zeros(k, bool)
+        self.counts = np.full(k, first)
+        self.looks = np.ones(k, int)
+        self.verdicts = np.full(k, "open", object)
+        self.promising = np.zeros(k, bool)
         self.costs = np.zeros(k)
 
 
@@ -476,7 +485,9 @@ class _Search:
     """
 
     def __init__(self, rule: Cheapest, samples: Samples, settings: Sequence[Setting]):
-        self.rule, self.samples, self.settings = rule, samples, settings
+        self.rule = rule
+        self.samples = samples
+        self.settings = settings
         self.points = _Points(len(samples), rule.first)
         self.questions = questions_about([setting.values for setting in settings])
         self.rounds, self.done = 1, False
@@ -503,7 +514,8 @@ class _Search:
             if number == leader:
                 continue
             both = [*candidate, *candidates[leader]]
-            n, looks = int(self.points.counts[both].min()), int(self.points.looks[both].min())
+            n = int(self.points.counts[both].min())
+            looks = int(self.points.looks[both].min())
             error = self._error / (self._pairs * looks * (looks + 1))
             costs, least = (
                 np.mean([self.samples[p]["cost"][:n] for p in of], axis=0)
@@ -515,7 +527,8 @@ class _Search:
         return bounds
 
     def _play(self) -> None:
-        points, needed = self.points, [*range(len(self.samples))]
+        points = self.points
+        needed = [*range(len(self.samples))]
         while all(len(self.samples[p]["cost"]) >= points.counts[p] for p in needed):
             for point in needed:
                 self._test(point)
@@ -539,8 +552,10 @@ class _Search:
 
         The verdict on all requirements together is missed if one is missed, met if all are met.
         """
-        points, sample = self.points, self.samples[point]
-        count, horizon = points.counts[point], self.settings[point].horizon
+        points = self.points
+        sample = self.samples[point]
+        count = points.counts[point]
+        horizon = self.settings[point].horizon
         points.costs[point] = np.mean(sample["cost"][:count])
         points.promising[point] = True
         for metric, test in self._tests[point].items():

@@ -53,7 +53,8 @@ class Costs(StrictTable):
         Raises:
             InputError: If it is not, or is given although it follows from a data sheet.
         """
-        follows, where = any(space.units for space in spaces), "costs.slot_seconds"
+        follows = any(space.units for space in spaces)
+        where = "costs.slot_seconds"
         if follows and self.slot_seconds is not None:
             raise InputError(f"{where}: follows from the data sheet; allowed: without this field")
         if self.hour and self.slot_seconds is None and not follows:
@@ -81,7 +82,8 @@ class Costs(StrictTable):
             InputError: If charging or lost UAVs have a price, and results of before lack what was
                 charged and lost.
         """
-        fleet, points = np.asarray(missions["uavs"]), np.asarray(missions["point"])
+        fleet = np.asarray(missions["uavs"])
+        points = np.asarray(missions["point"])
         mission = np.repeat(np.arange(len(fleet)), fleet)
         pads = np.array([space.charging_pads for space in spaces])
         charged = self._sum_of(uavs, "charged", mission, len(fleet), self.charge)

@@ -259,11 +259,14 @@ class _Race:
     """
 
     def __init__(self, rule: Selection, values: list[np.ndarray]):
-        self.rule, self.values = rule, values
+        self.rule = rule
+        self.values = values
         self.is_bounded = rule.procedure == "kn-bounded"
-        self.counts, self.looks = np.full(len(values), rule.first), np.ones(len(values), int)
+        self.counts = np.full(len(values), rule.first)
+        self.looks = np.ones(len(values), int)
         self.alive = np.arange(len(values))
-        self.stage, self.rounds = rule.first - 1, 1
+        self.stage = rule.first - 1
+        self.rounds = 1
         self.over = self.done = False
         if self._has_missions():
             # Sums are taken mission by mission: no result depends on the rounds.
@@ -312,7 +315,9 @@ class _Race:
         (s, s), of no meaning on the diagonal.
         """
         self.renewal = _grow_count(stage) if self.is_bounded else np.inf
-        points, first, delta = len(self.values), self.rule.first, self.rule.indifference
+        points = len(self.values)
+        first = self.rule.first
+        delta = self.rule.indifference
         if points == 1:
             self.reach = np.zeros((1, 1))
             return
@@ -345,7 +350,8 @@ class _Race:
             self.over = self._ends(means, left)
             if self.over:
                 break
-        self.alive, self.sums = self.alive[left], sums[left, self.stage - begin - 1]
+        self.alive = self.alive[left]
+        self.sums = sums[left, self.stage - begin - 1]
         self.reach = self.reach[np.ix_(left, left)]
 
     def _ends(self, means: np.ndarray, left: np.ndarray) -> bool:

@@ -227,9 +227,11 @@ class Study(StudyData):
     def _check_metrics(self) -> None:
         """Check that every design point measures what the rule decides by."""
         if self.precision:
-            key, asked = "precision.targets", {*self.precision.targets}
+            key = "precision.targets"
+            asked = {*self.precision.targets}
         elif isinstance(self.selection, Selection):
-            key, asked = "selection.metric", {self.selection.metric}
+            key = "selection.metric"
+            asked = {self.selection.metric}
         elif isinstance(self.selection, Cheapest):
             self.selection.check_age(self.scenarios)
             return
@@ -365,7 +367,8 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
         InputError: If there is no such study, or it is not valid; or if the file, not ``policies``
             among the overrides, names a policy of a Python file, which is code.
     """
-    text, overrides = str(name_or_path), {name: plain(of) for name, of in overrides.items()}
+    text = str(name_or_path)
+    overrides = {name: plain(of) for name, of in overrides.items()}
     where, values = _STUDIES.load(name_or_path)
     values = {"name": text if text in study_names() else Path(text).stem} | values
     scenario = values.get("scenario")
@@ -385,7 +388,8 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
 
 def _with_fewer_logs(values: dict[str, Any], overrides: dict[str, Any]) -> dict[str, Any]:
     """The overrides, with ``logged`` reduced if there are fewer missions than that."""
-    logged, missions = values.get("logged"), overrides.get("missions")
+    logged = values.get("logged")
+    missions = overrides.get("missions")
     if isinstance(logged, int) and isinstance(missions, int) and 1 <= missions < logged:
         return {"logged": missions} | overrides
     return overrides
@@ -406,7 +410,8 @@ def budget_of(study: StudyData) -> str:
     if study.name not in study_names():
         return "as asked"
     shipped = StudyData.model_validate({"name": study.name, **_STUDIES.load(study.name)[1]})
-    policies, missions = {*study.policies}, study.missions
+    policies = {*study.policies}
+    missions = study.missions
     words = []
     if policies < {*shipped.policies}:
         words.append(f"{len(policies)} of {len(shipped.policies)} policies")

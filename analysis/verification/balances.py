@@ -39,7 +39,8 @@ def studies_in(folder: Path, *, but: str = "") -> tuple[dict[str, Results], list
         folder: A folder that contains a results folder per study.
         but: A study to leave out.
     """
-    loaded, damaged = {}, []
+    loaded = {}
+    damaged = []
     for path in paths_in(folder, f"*/{MANIFEST}"):
         name = path.parent.name
         if name != but:
@@ -91,7 +92,8 @@ def balance_check(logs: Sequence[Log]) -> Check:
     """Check at every node, bit for bit, that initial + arrived = collected + residual data."""
     off = max((float(np.abs(log.residuals[-1] - log.left).max()) for log in logs), default=0.0)
     lowest = min((float(log.residuals.min()) for log in logs), default=0.0)
-    lowest, n = min(lowest, 0.0), sum(log.left.size for log in logs)
+    lowest = min(lowest, 0.0)
+    n = sum(log.left.size for log in logs)
     seen = f"off by {off:g} data units at most, never below {lowest:g}"
     return Check.exact(CONSERVATION, "Every node of every log", _KEPT, seen, n, max(off, -lowest))
 
@@ -115,7 +117,8 @@ def battery_errors(log: Log) -> np.ndarray:
     limited power is not checked, only that they take all of it, and none more than it can.
     """
     s, table = log.scenario, log.uav_slots
-    uavs, charging = table.groupby("uav"), table["charging"]
+    uavs = table.groupby("uav")
+    charging = table["charging"]
     before = uavs["battery"].shift().fillna(table["uav"].map(_first_battery(s)))
     flown = (before - s.flight_cost * (1 + _wind_surcharges(s, table))).clip(lower=0)
     flown = flown.where(~table["grounded"], before)
@@ -147,8 +150,10 @@ def _wind_surcharges(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
     """(N,) the battery [%] that the wind costs in each UAV slot; a move pays in its first."""
     wind = scenario.wind
     field = surcharges(scenario.size, *wind.pushes(), wind.gusts, wind.seed)
-    x, y = table["x"].to_numpy(), table["y"].to_numpy()
-    step_x, step_y = x - table["from_x"], y - table["from_y"]
+    x = table["x"].to_numpy()
+    y = table["y"].to_numpy()
+    step_x = x - table["from_x"]
+    step_y = y - table["from_y"]
     action = np.select([step_y < 0, step_x > 0, step_y > 0], [NORTH, EAST, SOUTH], WEST)
     return np.where(table["moved"], field[action, y, x], 0)
 
@@ -156,7 +161,8 @@ def _wind_surcharges(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
 def _charges_rightly(log: Log, before: pd.Series) -> pd.Series:
     """Whether a UAV that charges gains what it can, or all in its zone gain the shared power."""
     s, table = log.scenario, log.uav_slots
-    charging, place = table["charging"], [table["slot"], _zone_of(s, table)]
+    charging = table["charging"]
+    place = [table["slot"], _zone_of(s, table)]
     starts = log.events.loc[log.events["event"] == "charge_start", ["uav", "time"]]
     begins = pd.MultiIndex.from_frame(table[["uav", "slot"]]).isin(
         [*starts.itertuples(index=False)]
@@ -181,7 +187,8 @@ def record_check(logs: Sequence[Log]) -> Check:
 
 def _adds_up(log: Log) -> bool:
     """Whether a log adds up to the record of its mission, and to those of its UAVs."""
-    events, uavs = log.events, log.uavs.set_index("uav")
+    events = log.events
+    uavs = log.uavs.set_index("uav")
     value = events.groupby("event")["value"].sum()
     filled = {*events.loc[events["event"] == "quota_filled", "uav"]}
     served = events[events["event"] == "communication"].groupby("uav")["value"]
@@ -241,7 +248,8 @@ def engine_check(results: Results, again: CrossCheck) -> Check:
         results: The results of a study that the batch engine simulated.
         again: Some of its missions, simulated again with the SimPy engine.
     """
-    n, differing = len(again.missions), sum(bool(mission.differs) for mission in again.missions)
+    n = len(again.missions)
+    differing = sum(bool(mission.differs) for mission in again.missions)
     seen = f"{n - differing:,} of {n:,} missions"
     test = f"Record of the {results.manifest['study']['engine']} engine, simulated again with SimPy"
     simulated = {mission.policy for mission in again.missions}

@@ -145,7 +145,8 @@ def _reason_in_words(row: pd.Series) -> str:
 def checks_sentence(judged: pd.DataFrame) -> str:
     """How many checks hold, in a sentence."""
     held, refuted = (len(_tests_with_verdict(judged, verdict)) for verdict in (HOLDS, REFUTED))
-    exact, chance = judged["error"].count(), judged["p"].count()
+    exact = judged["error"].count()
+    chance = judged["p"].count()
     return (
         f"{held} of {len(judged)} comparisons with theory hold and {refuted} do not; {exact} are "
         f"exact, {chance} are statistical."
@@ -161,7 +162,9 @@ def checks_summary(judged: pd.DataFrame) -> str:
     refuted, open_tests = (
         _tests_with_verdict(judged, verdict) for verdict in (REFUTED, INCONCLUSIVE)
     )
-    n, exact, chance = len(judged), judged["error"].count(), judged["p"].count()
+    n = len(judged)
+    exact = judged["error"].count()
+    chance = judged["p"].count()
     if refuted:
         verdict = f"**{len(refuted)} of {n} checks do not hold**: {numbers.join_words(refuted)}."
     else:
@@ -220,7 +223,8 @@ class Fit(NamedTuple):
         """The observed and expected shares of the first classes, as many as fit on a line."""
         if not self.n:
             return ""
-        rows, percent = self.table.head(3), 100 / self.n
+        rows = self.table.head(3)
+        percent = 100 / self.n
         observed = ", ".join(f"{r.label}: {percent * r.observed:.2f} %" for r in rows.itertuples())
         expected = " / ".join(f"{percent * number:.2f}" for number in rows["expected"])
         return f"{observed}; expected {expected} %"
@@ -239,12 +243,14 @@ def poisson_fit(counts: np.ndarray, mean: float) -> Fit:
         counts: An array of counts, of any shape.
         mean: Mean of the distribution, above 0.
     """
-    n, law = counts.size, stats.poisson(mean)
+    n = counts.size
+    law = stats.poisson(mean)
     numbers = np.arange(int(law.ppf(1 - 1e-12)) + 1)
     frequent = numbers[n * law.pmf(numbers) >= LEAST]
     if not len(frequent):
         return _fit_of_counts(["0 or more"], np.array([n]), np.array([float(n)]))
-    low, high = int(frequent[0]), int(frequent[-1])
+    low = int(frequent[0])
+    high = int(frequent[-1])
     low -= n * law.cdf(low - 1) >= LEAST
     high += n * law.sf(high) >= LEAST
     classes = np.arange(low, high + 1)

@@ -55,7 +55,8 @@ def rate_moments(scenario: World, distance: float) -> Moments:
 
     ``E[delta_n log2(1 + SNR(d, eta))]`` and its standard deviation, ``eta`` being normal [dB].
     """
-    mean_db, spread = mean_snr(scenario, distance), np.sqrt(scenario.shadowing_variance)
+    mean_db = mean_snr(scenario, distance)
+    spread = np.sqrt(scenario.shadowing_variance)
 
     def expectation(function: Any) -> float:
         def weighed(z: float) -> float:

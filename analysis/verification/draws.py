@@ -73,7 +73,8 @@ def arrival_checks(counts: np.ndarray, rate: float) -> list[Check]:
         Check(ARRIVALS, f"{name}: chi-square", f"Poisson({mean:g})", fit.shares, fit.n, fit.p)
         for name, fit, mean in arrival_fits(counts, rate)
     ]
-    totals, mean = counts.sum(1), counts.shape[1] * rate
+    totals = counts.sum(1)
+    mean = counts.shape[1] * rate
     return [
         *checks,
         _rates_check(counts, rate),
@@ -85,7 +86,8 @@ def arrival_checks(counts: np.ndarray, rate: float) -> list[Check]:
 def _rates_check(counts: np.ndarray, rate: float) -> Check:
     """Check that the total of each node has the known rate."""
     slots, nodes = counts.shape
-    expected, totals = slots * rate, counts.sum(0)
+    expected = slots * rate
+    totals = counts.sum(0)
     p = chi_square(totals, np.full(nodes, expected), nodes) if expected >= LEAST else None
     rates = totals / max(slots, 1)
     seen = f"{rates.min():.4g} to {rates.max():.4g}" if slots else ""
@@ -95,7 +97,9 @@ def _rates_check(counts: np.ndarray, rate: float) -> Check:
 
 def _dispersion_check(totals: np.ndarray) -> Check:
     """Check the variance / mean of the counts per slot, by its moments conditional on the sum."""
-    test, n, units = "Index of dispersion per slot", totals.size, int(totals.sum())
+    test = "Index of dispersion per slot"
+    n = totals.size
+    units = int(totals.sum())
     if n < _FEWEST or units < _FEWEST:
         return Check(ARRIVALS, test, "1", "", n)
     index = totals.var(ddof=1) / totals.mean()
@@ -105,7 +109,8 @@ def _dispersion_check(totals: np.ndarray) -> Check:
 
 def _lag_check(totals: np.ndarray, mean: float) -> Check:
     """Check that the counts of successive slots are uncorrelated."""
-    test, n = "Correlation of a slot and the next", totals.size - 1
+    test = "Correlation of a slot and the next"
+    n = totals.size - 1
     if n < _FEWEST:
         return Check(ARRIVALS, test, "0", "", max(n, 0))
     correlation = ((totals[1:] - mean) * (totals[:-1] - mean)).mean() / mean
@@ -115,7 +120,8 @@ def _lag_check(totals: np.ndarray, mean: float) -> Check:
 def arrived_check(missions: pd.DataFrame, space: ScenarioSpace) -> Check:
     """Compare the arrivals of all missions with lambda per node and mission slot."""
     slots = int(missions["slots"].sum()) * len(space.nodes)
-    test, rate = "Arrivals of all missions: rate per node and slot", space.arrival_rate
+    test = "Arrivals of all missions: rate per node and slot"
+    rate = space.arrival_rate
     mean = float(missions["arrived"].sum() / slots)
     if not rate:
         return Check(ARRIVALS, test, "0", f"{mean:g}", slots, error=mean)
@@ -134,7 +140,8 @@ def parameter_fits(missions: pd.DataFrame, space: ScenarioSpace) -> dict[str, Fi
 
 def parameter_checks(missions: pd.DataFrame, space: ScenarioSpace) -> list[Check]:
     """Check that the drawn parameters are uniform and independent of each other."""
-    fits, n = parameter_fits(missions, space), len(missions)
+    fits = parameter_fits(missions, space)
+    n = len(missions)
     checks = []
     for field, fit in fits.items():
         low, high = getattr(space, field)
@@ -145,7 +152,8 @@ def parameter_checks(missions: pd.DataFrame, space: ScenarioSpace) -> list[Check
 
 def _independence_checks(values: pd.DataFrame) -> list[Check]:
     """Check that all pairs of columns are uncorrelated, by one test for all pairs."""
-    pairs, n = [*combinations(values, 2)], len(values)
+    pairs = [*combinations(values, 2)]
+    n = len(values)
     if not pairs or n < _FEWEST:
         return []
     table = np.corrcoef(values.rank(), rowvar=False)
@@ -169,7 +177,8 @@ def initial_checks(starts: np.ndarray, totals: np.ndarray, space: ScenarioSpace)
         known = f"{low:g}"
         return [Check.exact(DRAWS, "Initial data per node", known, known, starts.size, error)]
     range_of = f"U({low:g}, {high:g})"
-    per_node, total = stats.uniform(low, high - low), closed_forms.initial_total(space)
+    per_node = stats.uniform(low, high - low)
+    total = closed_forms.initial_total(space)
     return [
         _distribution_check("node", starts.ravel(), per_node, range_of),
         _distribution_check("mission", totals, total, f"sum of {len(space.nodes)} {range_of}"),
@@ -196,7 +205,8 @@ def start_check(cells: np.ndarray, space: ScenarioSpace) -> Check:
     in_zone = ((offset >= 0) & (offset < [width, height])).all(1)
     number = np.where(in_zone, offset @ [1, width], -1)  # -1 for a cell outside the zone
     fit = uniform_fit(number, 0, width * height - 1)
-    test, known = "Start cell of the first UAV: chi-square", f"uniform on {width * height} cells"
+    test = "Start cell of the first UAV: chi-square"
+    known = f"uniform on {width * height} cells"
     return Check(DRAWS, test, known, fit.range, len(cells), fit.p)
 
 
@@ -209,7 +219,8 @@ _COMMUNICATIONS = ["node", "value", "best", "known", "residual"]
 def rate_check(rates: pd.DataFrame) -> Check:
     """Compare the rates of ``measurements.compare_rates`` with the integral over all shadowing."""
     test = "Mean rate of a lone UAV at each distance: chi-square"
-    known, n = "E[δ log₂(1 + SNR)] by integration", int(rates["n"].sum())
+    known = "E[δ log₂(1 + SNR)] by integration"
+    n = int(rates["n"].sum())
     off = float((rates["mean"] / rates["known"] - 1).abs().max())
     seen = f"within {100 * off:.2g} % at {len(rates)} distances"
     if not (rates["error"] > 0).all():  # without shadowing, nothing is random
@@ -220,7 +231,8 @@ def rate_check(rates: pd.DataFrame) -> Check:
 
 def shadowing_checks(deviates: np.ndarray) -> list[Check]:
     """Compare ``measurements.shadowing_deviates`` with independent normal variables."""
-    n, test = deviates.size, "Correlation of a communication slot and the next"
+    n = deviates.size
+    test = "Correlation of a communication slot and the next"
     mean, deviation = (format_minus(f"{value:.3f}") for value in (deviates.mean(), deviates.std()))
     seen = f"mean {mean}, deviation {deviation}"
     p = float(stats.kstest(deviates, stats.norm.cdf).pvalue)
@@ -258,7 +270,8 @@ def recompute_communications(log: Log, seed: int) -> pd.DataFrame:
         highest SNR of those with data; ``known``, the smaller of its rate and its ``residual``
         [data units].
     """
-    scenario, m = log.scenario, log.scenario.communication_slots
+    scenario = log.scenario
+    m = log.scenario.communication_slots
     served = log.events["event"] == "communication"
     rows = log.events[served]
     slot = np.ceil(rows["time"]).to_numpy(np.int64) - 1
@@ -287,7 +300,9 @@ def _shadowing_of_slots(
     """
     block = (n // 4 * 65536 + uav).astype(np.uint64)
     lane = (np.uint64(streams.SHADOWING) << np.uint64(24)) | block
-    key, mask, half = np.uint64(seed), np.uint64(2**32 - 1), np.uint64(32)
+    key = np.uint64(seed)
+    mask = np.uint64(2**32 - 1)
+    half = np.uint64(32)
     words = streams.philox.py_func(
         np.arange(len(log.scenario.nodes), dtype=np.uint64)[None, :],
         slot.astype(np.uint64)[:, None],
@@ -335,7 +350,8 @@ def coverage_check(metric: str, values: np.ndarray, size: int, share: bool) -> C
     test = f"{metric}: intervals of blocks of {size:,} missions"
     if n < 2 or np.ptp(values) == 0:  # coverage cannot be tested
         return Check(COVERAGE, test, "", "", n)
-    missions, hits = n * size, int(table["holds"].sum())
+    missions = n * size
+    hits = int(table["holds"].sum())
     if share:
         known = closed_forms.wilson_coverage(round(values[:missions].sum()), missions, size)
     else:

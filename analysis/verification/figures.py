@@ -29,7 +29,8 @@ def plot_fit(observed: Fit, title: str, label: str) -> Figure:
         title: The title of the figure.
         label: The label of the classes.
     """
-    table, spots = observed.table, np.arange(len(observed.table))
+    table = observed.table
+    spots = np.arange(len(observed.table))
     expected = table["expected"]
     error = np.sqrt(expected * (1 - expected / expected.sum()).clip(lower=1e-12))
     with style.new_panels(4.6, **_ABOVE) as (figure, (ax, below)):
@@ -81,7 +82,8 @@ def plot_slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
         repeated: The condition for another slot.
         end: What follows after the last slot.
     """
-    last, arrow = len(steps), {"arrowstyle": "-|>", "color": style.INK}
+    last = len(steps)
+    arrow = {"arrowstyle": "-|>", "color": style.INK}
     box = {"boxstyle": "round", "edgecolor": style.MUTED}
     with style.new_panels(0.8 * (last + 1)) as (figure, ax):
         for number, (name, text) in enumerate([*steps, (end, "")]):

@@ -171,7 +171,8 @@ def compare_rates(space: ScenarioSpace, means: Sequence[float]) -> pd.DataFrame:
         communication slot], ``known`` and ``error``, the closed form's mean and the standard error
         of a mean of n draws.
     """
-    rows, n = [], _draws_per_distance(space)
+    rows = []
+    n = _draws_per_distance(space)
     for (dx, dy), mean in zip(offsets_of_node(space), means, strict=True):
         distance = float(closed_forms.distance_to_node(space, dx, dy))
         known, deviation = closed_forms.rate_moments(space, distance)
@@ -245,9 +246,11 @@ def simulate_missions(
         count: Missions of every policy to simulate again, all of them if there are fewer.
         progress: Called after every mission.
     """
-    space, seed = results.scenario(), results.store.manifest.seed
+    space = results.scenario()
+    seed = results.store.manifest.seed
     teams = {name: load_team(name) for name in results.policies if not python_files_in(name)}
-    missions, chosen = [], [*_missions_to_repeat(results, teams, count)]
+    missions = []
+    chosen = [*_missions_to_repeat(results, teams, count)]
     for done, (policy, replication) in enumerate(chosen, 1):
         record = simulate(space, teams[policy], seed, replication)
         differs = difference_in_words(record, stored_record(results, policy, 0, replication))
@@ -320,7 +323,9 @@ def read_cross_check(folder: str | Path, results: Results) -> CrossCheck:
         Outdated: If they belong to other results.
         InputError: If they are damaged.
     """
-    path, space, key = Path(folder) / FILE, results.scenario(), results.store.manifest.key
+    path = Path(folder) / FILE
+    space = results.scenario()
+    key = results.store.manifest.key
     missions = CrossCheck.load(path, _ALLOWED, fixed={"study": key})
     if len(missions.rates) != len(offsets_of_node(space)):
         raise InputError(f"{path}: rates: are not those of the study; allowed: {_ALLOWED}")

@@ -86,7 +86,9 @@ class Suite:
         """
         if block not in range(2, _LARGEST_BLOCK + 1):
             raise InputError(f"block: {block!r}; allowed: 2..{_LARGEST_BLOCK:,}")
-        space, seed, logs = self.space, self.study.store.manifest.seed, self.logs
+        space = self.space
+        seed = self.study.store.manifest.seed
+        logs = self.logs
         of_best = self._missions_of(self.best)
         initial = np.array([log.initial for log in self.realisations])
         start_cells = np.array([log.first_cell for log in self.realisations])

@@ -105,7 +105,8 @@ def judge_fleets_everywhere(results: Results) -> pd.DataFrame:
         ``verdict`` holds under all of them, and a metric is that of the condition under which the
         fleet is worst at it. ``n`` is the least number of missions under a condition.
     """
-    table, rows = judge_settings(results), []
+    table = judge_settings(results)
+    rows = []
     conditions = table["condition"].nunique()
     for (policy, _), under_conditions in table.groupby(["policy", "fleet"], sort=False):
         if len(under_conditions) == conditions:
@@ -163,10 +164,12 @@ def quoted_settings(results: Results) -> pd.DataFrame:
         The rows of ``judge_settings``. The metrics, the cost and ``n`` of settings that were
         checked are those of ``checked_settings``.
     """
-    table, setting = judge_settings(results), ["policy", "point"]
+    table = judge_settings(results)
+    setting = ["policy", "point"]
     if results.checks.empty:
         return table
-    rows, checked = table.set_index(setting), checked_settings(results).set_index(setting)
+    rows = table.set_index(setting)
+    checked = checked_settings(results).set_index(setting)
     rows.loc[checked.index, checked.columns] = checked
     return rows.reset_index()[[*table]]
 
@@ -337,7 +340,8 @@ class FleetAnswer:
 
     def budget_sentence(self) -> str:
         """Whether the budget ended before the answer was sure, and what would settle it."""
-        choice, rule = self._choice, self.results.study.selection
+        choice = self._choice
+        rule = self.results.study.selection
         if not choice.done or self._answer.settled:
             return ""
         assert isinstance(rule, Cheapest)
@@ -351,10 +355,12 @@ class FleetAnswer:
         """The next cheaper fleet and why it is not the answer; without an answer, the closest."""
         selected = self.fleets[self.fleets["selected"]]
         if len(selected):
-            other, which = self.fleets[self.fleets[COST] < self.cost].tail(1), "next cheaper"
+            other = self.fleets[self.fleets[COST] < self.cost].tail(1)
+            which = "next cheaper"
         else:
             nearest = least_spare(self.fleets, self._required).nlargest(1).index
-            other, which = self.fleets.loc[nearest], "closest"
+            other = self.fleets.loc[nearest]
+            which = "closest"
         if other.empty:
             return ""
         row = other.iloc[0]
@@ -438,7 +444,8 @@ def shown_point(results: Results) -> int:
 
 def shown_missions(results: Results) -> pd.DataFrame:
     """The missions of the answer that pages show, those of ``shown_point``."""
-    missions, policy = results.missions, best_policy(results)
+    missions = results.missions
+    policy = best_policy(results)
     is_shown = (missions["policy"] == policy) & (missions["point"] == shown_point(results))
     return missions[is_shown]
 
@@ -455,7 +462,8 @@ def cheapest_sentence(results: Results) -> str:
 
 def other_policies_sentences(results: Results) -> list[str]:
     """A sentence for each other policy: what its cheapest fleet is, so how much depends on it."""
-    best, sentences = cheapest_answer(results), []
+    best = cheapest_answer(results)
+    sentences = []
     for other in _last_answers(results):
         if other.policy == best.policy:
             continue
@@ -637,7 +645,9 @@ def _ends_of_values(results: Results, point: int) -> dict[str, str]:
 
     With more UAVs or pads a fleet is cheaper only if that saves enough of the others.
     """
-    table, space, prices = values_of_points(results), results.scenario(point), prices_of(results)
+    table = values_of_points(results)
+    space = results.scenario(point)
+    prices = prices_of(results)
     price_of = {"uavs": prices.uav, "pads": prices.pad, ZONE_PADS: prices.pad * len(space.zones)}
     price_of = {field: price for field, price in price_of.items() if field in table}
     spent = {

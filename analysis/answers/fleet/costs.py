@@ -61,7 +61,8 @@ def priced_settings(results: Results) -> pd.DataFrame:
     """
     prices_of(results)
     table = rank_settings(results, COST).drop(columns=["rank", "tied"])
-    of_points, words = conditions_in_words(results), fleets_in_words(results)
+    of_points = conditions_in_words(results)
+    words = fleets_in_words(results)
     table.insert(0, "condition", [of_points[point] for point in table["point"]])
     table.insert(1, "fleet", [words[point] for point in table["point"]])
     order = {"kind": "stable", "key": lambda texts: texts.map(of_points.index)}
@@ -80,7 +81,9 @@ def mean_cost_parts(results: Results) -> pd.DataFrame:
     Raises:
         InputError: If the study has no prices.
     """
-    prices, missions, uavs = prices_of(results), results.missions, results.uavs
+    prices = prices_of(results)
+    missions = results.missions
+    uavs = results.uavs
     amounts = prices.parts(results.store.manifest.scenarios, missions, uavs)
     table = missions[["policy", "point", COST]].assign(**amounts)
     means = table.groupby(["policy", "point"], sort=False, as_index=False)[[*PARTS, COST]].mean()
@@ -222,9 +225,12 @@ def _mission_values(results: Results, rows: pd.DataFrame, name: str) -> np.ndarr
 @compute_once
 def fleets_in_words(results: Results) -> list[str]:
     """The fleet of every design point in words: all that has a price or varies."""
-    prices, table, fleets = prices_of(results), values_of_points(results), []
+    prices = prices_of(results)
+    table = values_of_points(results)
+    fleets = []
     for point, others in enumerate(_fields_in_words(results, True)):
-        space, words = results.scenario(point), []
+        space = results.scenario(point)
+        words = []
         if prices.uav or prices.lost_uav or "uavs" in table:
             low, high = space.uavs
             words.append(field_named("uavs").words(low if low == high else [low, high]))

@@ -70,7 +70,8 @@ def compare_with_baseline(
             "policy", sort=False
         ):
             wide = by_replication(missions, metric, "point")
-            of, others = metric_in_missions(results.missions, metric), wide.drop(columns=point)
+            of = metric_in_missions(results.missions, metric)
+            others = wide.drop(columns=point)
             looks = results.looks(str(policy))
             # The pairs end with the missions of the one that has fewer.
             seen = np.minimum(looks[others.columns.to_numpy()], looks[point])
@@ -86,7 +87,8 @@ def compare_with_baseline(
 
 def baseline_table(results: Results, point: int, metric: str) -> Table:
     """Every design point compared with a baseline point."""
-    data, of = compare_with_baseline(results, point, metrics_of_page(metric)), metric_of(metric)
+    data = compare_with_baseline(results, point, metrics_of_page(metric))
+    of = metric_of(metric)
     rows = data[data["metric"] == metric]
     order = rows["difference"].abs().sort_values(ascending=False, kind="stable").index
     top = rows.loc[order[:MOST_ROWS]].sort_values("difference", ascending=False, kind="stable")

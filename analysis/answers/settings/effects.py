@@ -105,12 +105,11 @@ def _average_labelled(
 ) -> pd.DataFrame:
     """``average_over_others`` at each combination of labels of design points."""
     groups = labels.groupby([*labels], sort=False)
-    cell_of, cells = groups.ngroup().to_numpy(), labels.drop_duplicates(ignore_index=True)
+    cell_of = groups.ngroup().to_numpy()
+    cells = labels.drop_duplicates(ignore_index=True)
     sizes = np.bincount(cell_of)
-    missions, of = (
-        missions_with_metric(results, metric, policy),
-        metric_in_missions(results.missions, metric),
-    )
+    missions = missions_with_metric(results, metric, policy)
+    of = metric_in_missions(results.missions, metric)
     design = results.manifest["study"]["design"] or {}
     if sampled := design.get("kind") == "saltelli":  # only its samples A and B are independent
         last = len(design["ranges"]) + 2
@@ -169,7 +168,9 @@ def _bin_values(values: pd.Series) -> pd.Series:
 
 def effect_table(results: Results, metric: str) -> Table:
     """The size of the effect of every field on a metric."""
-    effects, of, rows = main_effects(results, metric), metric_of(metric), []
+    effects = main_effects(results, metric)
+    of = metric_of(metric)
+    rows = []
     for (field, policy), part in effects.groupby(["field", "policy"], sort=False):
         low, high = part.loc[part["mean"].idxmin()], part.loc[part["mean"].idxmax()]
         both = [f"{of.write(row['mean'])} at {row['value']}" for row in (low, high)]

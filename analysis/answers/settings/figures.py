@@ -89,7 +89,8 @@ def plot_curves(
         panel: A column with a panel for each value; by default there is one panel.
     """
     parts = [*style.place_values(rows, x).groupby(panel or (lambda _: ""), sort=False)]
-    of_policies, shared = line == "policy", {"sharex": True, "sharey": True, "squeeze": False}
+    of_policies = line == "policy"
+    shared = {"sharex": True, "sharey": True, "squeeze": False}
     values = style.ordered_values(rows[line])
     looks = style.policy_colours(values) if of_policies else style.graded_colours(values)
     heading = None if of_policies else field_named(line).label
@@ -128,7 +129,8 @@ def draw_heat_map(
         InputError: If there is no such field, metric or policy.
     """
     policy = policy or str(rank_settings(results, metric)["policy"].iloc[0])
-    of, named = metric_of(metric), [x, y, *filter(None, [facet])]
+    of = metric_of(metric)
+    named = [x, y, *filter(None, [facet])]
     data = average_over_others(results, [*named[2:], x, y], metric, policy)
     values = varied_values(results)
     panels = evenly_spaced(values[facet]) if facet else [None]
@@ -176,7 +178,8 @@ def draw_heat_map(
 
 def draw_heat_maps(results: Results, metrics: Iterable[str]) -> Iterator[Drawing]:
     """Every metric of every policy over the two fields that the design varies."""
-    values, metrics = varied_values(results), [*metrics]
+    values = varied_values(results)
+    metrics = [*metrics]
     y, x = sorted(values, key=lambda field: len(values[field]))
     for policy in results.policies:
         for metric in metrics:
@@ -200,7 +203,8 @@ def draw_main_effects(
         metric: The metric.
         policy: The policy; by default all policies.
     """
-    effects, of = main_effects(results, metric, policy), metric_of(metric)
+    effects = main_effects(results, metric, policy)
+    of = metric_of(metric)
     looks = style.policy_colours(results.policies, effects["policy"])
 
     def draw(field: str, ax: Axes) -> None:
@@ -224,7 +228,8 @@ def draw_scatter(results: Results, metric: str = PRODUCT, policy: str | None = N
         metric: The metric.
         policy: The policy; by default all policies.
     """
-    table, of = rank_settings(results, metric, policy), metric_of(metric)
+    table = rank_settings(results, metric, policy)
+    of = metric_of(metric)
     looks = style.policy_colours(results.policies, table["policy"])
 
     def draw(field: str, ax: Axes) -> None:
@@ -254,7 +259,8 @@ def plot_distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Drawing:
         missions: A row per mission, with ``policy`` and the metric.
         metric: The metric.
     """
-    of, by_policy = metric_of(metric), missions.groupby("policy", sort=False)
+    of = metric_of(metric)
+    by_policy = missions.groupby("policy", sort=False)
     with style.new_panels(3.9, legend=4) as (figure, ax):
         style.plot_distributions({str(name): part[metric] for name, part in by_policy}, ax)
         ax.set_xlabel(of.label)

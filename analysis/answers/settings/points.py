@@ -92,7 +92,8 @@ def ends_of_point(results: Results, point: int) -> dict[str, str]:
     Returns:
         For each of these fields ``least`` or ``largest``.
     """
-    space, found = results.scenario(point), {}
+    space = results.scenario(point)
+    found = {}
     for field, values in values_of_points(results).items():
         if is_numeric_dtype(values) and field in space.numeric:
             low, high = space.limits(field)

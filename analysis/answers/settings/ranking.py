@@ -90,10 +90,14 @@ def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) ->
         table: The result of ``rank_settings`` for the metric.
         metric: The metric.
     """
-    of, best, others, tied = metric_of(metric), table.iloc[0], len(table) - 1, table[table["tied"]]
+    of = metric_of(metric)
+    best = table.iloc[0]
+    others = len(table) - 1
+    tied = table[table["tied"]]
     value = of.written(*best[[metric, f"{metric}_low", f"{metric}_high"]])
     names = [setting_in_words(results, row.policy, row.point) for row in tied.itertuples()]
-    what, many = "setting" if varied_values(results) else "policy", len(names) - 1
+    what = "setting" if varied_values(results) else "policy"
+    many = len(names) - 1
     named = f" ({'; '.join(names[1:])})" * (many <= MOST_NAMES)
     if others == 1:
         rest = f"The other {what} {'may be as good' if many else 'is significantly worse'}."
@@ -149,7 +153,8 @@ def other_policies_sentences(results: Results, ranked: pd.DataFrame, metric: str
         ranked: The result of ``ranked`` for the metric.
         metric: The metric.
     """
-    words, best = points_in_words(results), ranked.iloc[0]
+    words = points_in_words(results)
+    best = ranked.iloc[0]
     others = ranked[ranked["policy"] != best["policy"]].drop_duplicates("policy")
     ends = others[[metric, f"{metric}_low", f"{metric}_high"]].to_numpy()
     named = zip(others["policy"], others["point"], ends, strict=True)
@@ -182,7 +187,8 @@ def rank_settings(
     Raises:
         InputError: If there is no such metric or policy.
     """
-    missions, cell = missions_with_metric(results, metric, policy), ["policy", "point"]
+    missions = missions_with_metric(results, metric, policy)
+    cell = ["policy", "point"]
     table = missions.groupby(cell, sort=False).size().rename("n").reset_index()
     table = table.join(values_of_points(results), on="point")
     looks = {policy: results.looks(policy) for policy in missions["policy"].unique()}
@@ -221,7 +227,8 @@ def allowance_for_setting(results: Results, rows: pd.DataFrame, metric: str) -> 
         rows: Its ``rank_settings``.
         metric: The metric that ranks them.
     """
-    first, of = rows.iloc[0], metric_of(metric)
+    first = rows.iloc[0]
+    of = metric_of(metric)
     missions = missions_with_metric(results, metric, first["policy"])
     values = missions.loc[missions["point"] == first["point"], metric].to_numpy(float)
     plain = mean_interval(values[~np.isnan(values)])

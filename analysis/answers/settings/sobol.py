@@ -34,7 +34,8 @@ def plot_indices(rows: pd.DataFrame, title: str) -> Figure:
         rows: Rows of ``dess.analysis.answers.settings.sobol.sobol_indices_of`` of a policy and a
         metric. title: The title of the figure.
     """
-    rows, look = rows.reset_index(drop=True), style.dot_style((style.readable_palette()[0], "o"))
+    rows = rows.reset_index(drop=True)
+    look = style.dot_style((style.readable_palette()[0], "o"))
     with style.new_panels(1.5 + 0.45 * len(rows), values="x", legend=2) as (figure, ax):
         for index, label, fill_style in (
             ("first", "alone (first order)", "none"),
@@ -57,7 +58,8 @@ def plot_indices(rows: pd.DataFrame, title: str) -> Figure:
 
 def draw_indices(results: Results, metric: str = PRODUCT) -> Iterator[Drawing]:
     """Sobol indices of every parameter for every policy."""
-    table, called = sobol_indices_of(results), metric_of(metric).within
+    table = sobol_indices_of(results)
+    called = metric_of(metric).within
     for policy, data in table[table["metric"] == metric].groupby("policy", sort=False):
         caption = (
             f"{policy}: n = {data['n'].min():,} missions; lines are {INTERVALS} by bootstrap. "
@@ -136,7 +138,8 @@ def index_table(indices: pd.DataFrame) -> Table:
 
 def variance_sentence(results: Results, metric: str) -> str:
     """Which fields explain most of the variance of a metric for the first policy, in a sentence."""
-    rows, called = sobol_indices_of(results), metric_of(metric).within
+    rows = sobol_indices_of(results)
+    called = metric_of(metric).within
     rows = rows[(rows["metric"] == metric) & (rows["policy"] == results.policies[0])].dropna()
     parts = [
         f"{field_named(row.parameter).within if row.parameter != NOISE else 'the replication'} "
@@ -175,8 +178,10 @@ def _estimate_indices(design: Saltelli, values: np.ndarray) -> pd.DataFrame:
     half = ndtri(0.5 + LEVEL / 2)
     for name, share in (("first", b * (mixed - a)), ("total", (a - mixed) ** 2 / 2)):
         indices = weights @ share / variance if varies else np.full((3, len(table)), np.nan)
-        table[name], error = indices[0], half * indices[1:].std(axis=0, ddof=1)
-        table[f"{name}_low"], table[f"{name}_high"] = table[name] - error, table[name] + error
+        error = half * indices[1:].std(axis=0, ddof=1)
+        table[name] = indices[0]
+        table[f"{name}_low"] = table[name] - error
+        table[f"{name}_high"] = table[name] + error
     return table.assign(n=len(values))
 
 
