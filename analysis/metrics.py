@@ -53,7 +53,9 @@ class Metric:
     @property
     def range(self) -> tuple[float, float]:
         """The smallest and the largest value that a mission, and so a mean, can have."""
-        return (0.0, 1.0) if self.is_bounded else (self.least, self.most)
+        if self.is_bounded:
+            return (0.0, 1.0)
+        return (self.least, self.most)
 
     @property
     def has_range(self) -> bool:
@@ -62,12 +64,17 @@ class Metric:
 
     def lasting(self, horizon: float) -> "Metric":
         """The metric of missions that may last a time, in its unit; a time has a range then."""
-        return replace(self, most=self.horizons * horizon) if self.horizons else self
+        if self.horizons:
+            return replace(self, most=self.horizons * horizon)
+        return self
 
     @property
     def in_units(self) -> "Metric":
         """The metric as it is told with a data sheet, which has a column of its own."""
-        column = f"{self.column}_{self.told}" if self.told else self.column
+        if self.told:
+            column = f"{self.column}_{self.told}"
+        else:
+            column = self.column
         return replace(self, column=column, unit=self.told or self.unit, told="")
 
     @property
@@ -83,7 +90,9 @@ class Metric:
     @property
     def head(self) -> str:
         """The name above a column in the terminal."""
-        return self.within if self.in_percent or self.is_told else self.label
+        if self.in_percent or self.is_told:
+            return self.within
+        return self.label
 
     @property
     def is_told(self) -> bool:
@@ -136,7 +145,9 @@ class Metric:
         )
 
     def _with_unit(self, write: Callable[..., str]) -> Callable[..., str]:
-        return (lambda *ends: f"{write(*ends)} {self.unit}") if self.is_told else write
+        if self.is_told:
+            return lambda *ends: f"{write(*ends)} {self.unit}"
+        return write
 
 
 # What a failure costs: the reward of a filled quota is not earned, that of an empty battery is.
@@ -262,10 +273,13 @@ def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
     if of.kind == "cost" and MOST_LOST in missions:
         return replace(of, failure=float(missions[MOST_LOST].max()))
     longest = metric_of(MOST_SLOTS)
-    longest = longest.in_units if of.is_told else longest
+    if of.is_told:
+        longest = longest.in_units
     if not of.horizons or longest.column not in missions or not len(missions):
         return of
-    units = _SIZES[longest.unit] / _SIZES[of.unit] if of.is_told else 1.0
+    units = 1.0
+    if of.is_told:
+        units = _SIZES[longest.unit] / _SIZES[of.unit]
     return of.lasting(float(missions[longest.column].max()) * units)
 
 
@@ -276,7 +290,9 @@ def in_either(*columns: str) -> list[str]:
 
 def column_as_told(column: str, missions: Container[str]) -> str:
     """The column in which a table of missions tells a metric: in units if there is a data sheet."""
-    return of if (of := _TOLD.get(column, column)) in missions else column
+    if (of := _TOLD.get(column, column)) in missions:
+        return of
+    return column
 
 
 def columns_in_units(missions: Mapping[str, Any], units: Units) -> dict[str, Any]:
@@ -298,7 +314,9 @@ def size_of(unit: str, units: Units) -> float:
 
 def format_length(slots: int, units: Units | None) -> str:
     """The length of a mission, as ``215 mission slots`` or ``1.25 h``."""
-    return printed(slots * units.slot, "s") if units else f"{slots} mission slots"
+    if units:
+        return printed(slots * units.slot, "s")
+    return f"{slots} mission slots"
 
 
 def measured_in(missions: Container[str]) -> list[str]:

@@ -83,7 +83,9 @@ class Field:
             for v in values
         ]
         is_text = any(isinstance(value, bool | list | tuple | dict) for value in plain)
-        return [*map(value_text, plain)] if is_text else plain
+        if is_text:
+            return [*map(value_text, plain)]
+        return plain
 
 
 # What a mean time of repair of 0 says: there is no repair.
@@ -136,7 +138,10 @@ def field_named(field: str) -> Field:
     A value of a data sheet has its unit.
     """
     words = field.removeprefix("data_sheet.").replace("_", " ").capitalize()
-    name = words if field.startswith("data_sheet.") else field
+    if field.startswith("data_sheet."):
+        name = words
+    else:
+        name = field
     return _KNOWN.get(field) or Field(field, name, name)
 
 
@@ -163,7 +168,9 @@ class Declared(NamedTuple):
 def declared_fields(space: ScenarioSpace) -> list[Declared]:
     """Every field of a scenario, in the order of the model."""
     default = ScenarioSpace.of()
-    follows = space.data_sheet.fields() if space.units else {}
+    follows = {}
+    if space.units:
+        follows = space.data_sheet.fields()
     return [
         Declared(
             name,
@@ -181,7 +188,9 @@ def _meaning_of_field(name: str) -> tuple[str, str]:
     description = fields_of(ScenarioSpace)[name].description or ""
     meaning = description.partition(": ")[0]
     unit = re.search(r" \[([^\],]+)\]", meaning)
-    return (meaning.replace(unit[0], ""), unit[1]) if unit else (meaning, "")
+    if unit:
+        return (meaning.replace(unit[0], ""), unit[1])
+    return (meaning, "")
 
 
 def _allowed_values(space: ScenarioSpace, name: str) -> str:
@@ -196,7 +205,9 @@ def _allowed_values(space: ScenarioSpace, name: str) -> str:
 def _single_value(value: Any) -> Any:
     """A range of one value as this value."""
     is_range = isinstance(value, list) and len(value) == 2
-    return value[0] if is_range and value[0] == value[1] else value
+    if is_range and value[0] == value[1]:
+        return value[0]
+    return value
 
 
 def node_placing_sentence(space: ScenarioSpace) -> str:
@@ -207,7 +218,10 @@ def node_placing_sentence(space: ScenarioSpace) -> str:
             "node, with their data and rates added."
         )
     if space.moved:
-        verb = "are" if len(space.moved) > 1 else "is"
+        if len(space.moved) > 1:
+            verb = "are"
+        else:
+            verb = "is"
         return (
             f" Of the {len(space.nodes)} nodes, {len(space.moved)} {verb} in the nearest free "
             "cell, since their own is taken or closed."
@@ -221,11 +235,18 @@ def value_text(value: object) -> str:
         given = {key: of_key for key, of_key in value.items() if of_key is not None}
         return " ".join(f"{key} {value_text(of_key)}" for key, of_key in given.items())
     if isinstance(value, list | tuple):
-        joint = ", " if any(isinstance(item, dict) for item in value) else "–"
+        if any(isinstance(item, dict) for item in value):
+            joint = ", "
+        else:
+            joint = "–"
         return joint.join(map(value_text, value)) or "none"
     if isinstance(value, bool | np.bool_):
         return "yes" if value else "no"
-    return value if isinstance(value, str) else "none" if value is None else f"{value:g}"
+    if isinstance(value, str):
+        return value
+    if value is None:
+        return "none"
+    return f"{value:g}"
 
 
 def _tex_name(text: str) -> str:

@@ -15,7 +15,9 @@ _NAN = re.compile(r"\bnan\b")
 def why_nan(cells: Iterable[object]) -> str:
     """Why a table has nan, in words; empty if no cell has."""
     found = any(_NAN.search(str(cell)) for cell in cells)
-    return "nan: the missions are too few, or too similar, to estimate it" if found else ""
+    if found:
+        return "nan: the missions are too few, or too similar, to estimate it"
+    return ""
 
 
 def format_percent(value: float) -> str:
@@ -42,7 +44,9 @@ def format_estimate(row: pd.Series) -> str:
 def format_difference(value: float, reference: float) -> str:
     """A value minus a reference value in percentage points, as ``+7.4`` or ``−2.1``."""
     points = round(100 * (value - reference), 1) or 0.0  # no −0.0
-    return format_minus(f"{points:+.1f}") if points else "0.0"
+    if points:
+        return format_minus(f"{points:+.1f}")
+    return "0.0"
 
 
 def format_points(value: float, low: float, high: float) -> str:
@@ -59,7 +63,10 @@ def format_quantity(value: float) -> str:
     """A number with about four digits, as ``1,042`` or ``12.35``; 0 if it is but rounding of 0."""
     if abs(value) < _ROUNDING:
         return "0"
-    text = f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+    if abs(value) >= 1000:
+        text = f"{value:,.0f}"
+    else:
+        text = f"{value:.4g}"
     return text.replace("-", "−")
 
 
@@ -79,7 +86,9 @@ def format_estimates(
 def format_minus(number: str) -> str:
     """A number with a typographic minus sign (U+2212), and without a sign if it is zero."""
     is_zero = not float(number.replace(",", ""))
-    return number.replace("-", "") if is_zero else number.replace("-", "−")
+    if is_zero:
+        return number.replace("-", "")
+    return number.replace("-", "−")
 
 
 def format_margin(share: float) -> str:

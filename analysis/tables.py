@@ -67,9 +67,10 @@ def estimate_cells(
     table = numbers.estimates_as_text(known, [*index], columns, write)
     table = table[[name for name in order if name in table]].fillna("").reset_index()
     for name in index:
-        table[name] = (
-            format_counts(table[name]) if name == "n" else table[name].map(field_named(name).cell)
-        )
+        if name == "n":
+            table[name] = format_counts(table[name])
+        else:
+            table[name] = table[name].map(field_named(name).cell)
     heads = {field: field_named(field).name for field in index} | _HEADS
     return table.rename(columns=lambda name: heads.get(name) or value_text(name))
 

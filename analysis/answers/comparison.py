@@ -215,7 +215,10 @@ def pairing_sentence(comparison: pd.DataFrame) -> str:
     many = "infinitely many"
     if reduction < 1:
         times = f"{1 / (1 - reduction):.1f}"
-        many = "as many" if times == "1.0" else f"{times} times as many"
+        if times == "1.0":
+            many = "as many"
+        else:
+            many = f"{times} times as many"
     return f"{many} independent missions would be as precise"
 
 
@@ -408,7 +411,10 @@ def _plot_difference_along(rows: pd.DataFrame, overall: float, ends: tuple[float
         ax.axhline(0, **style.ZERO)
         ax.axhline(overall, color=style.MUTED, linestyle="--", zorder=1, gid="overall")
         for verdict, part in rows.groupby("verdict"):
-            fillstyle = "none" if verdict == INCONCLUSIVE else "full"
+            if verdict == INCONCLUSIVE:
+                fillstyle = "none"
+            else:
+                fillstyle = "full"
             arms = style.error_bar_arms(part)
             dot = style.dot_style((COLOURS[verdict], "o"))
             ax.errorbar(part["position"], part["mean"], yerr=arms, linestyle="",
@@ -462,7 +468,9 @@ def dependence_table(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFr
 def _equal_means(groups: Any) -> float:
     """The p-value of equal means; 1 if fewer than two groups have different values."""
     samples = [group.to_numpy() for _, group in groups if np.ptp(group) > 0]
-    return float(scipy.stats.alexandergovern(*samples).pvalue) if len(samples) > 1 else 1.0
+    if len(samples) > 1:
+        return float(scipy.stats.alexandergovern(*samples).pvalue)
+    return 1.0
 
 
 def _range_text(values: np.ndarray) -> str:
@@ -598,7 +606,9 @@ def _in_batches(team: list[Policy], results: Results, clock: Clock) -> float | N
         return None
     calls: list[float] = []
     timed = [_Timed(policy, clock, calls) for policy in team]
-    missions = 1 if any(hasattr(policy, "chunk") for policy in team) else SIDE_BY_SIDE
+    missions = 1
+    if not any(hasattr(policy, "chunk") for policy in team):
+        missions = SIDE_BY_SIDE
     with threadpool_limits(1):
         for space in scenarios[:: -(-len(scenarios) // POINTS)]:
             simulate_batch(space, timed, seed, range(missions))

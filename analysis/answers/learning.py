@@ -91,7 +91,10 @@ def compare_variants(last: pd.DataFrame, baseline: str) -> pd.DataFrame:
         alone = len(sample) == 1
         half = high - mean
         room = np.array([-half, half, *(np.sqrt(len(sample) + 1) * np.array([-half, half]))])
-        ends = np.full(4, np.nan) if alone else np.clip(mean + room, 0.0, 1.0)
+        if alone:
+            ends = np.full(4, np.nan)
+        else:
+            ends = np.clip(mean + room, 0.0, 1.0)
         gap = Interval(np.nan, np.nan, np.nan)
         p = np.nan
         if variant != baseline:
@@ -282,7 +285,9 @@ def ablation_table(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> pd
 
 def _format_interval(mean: float, low: float, high: float) -> str:
     """A mean with its interval, if it has one with a length."""
-    return numbers.format_interval(mean, low, high) if low < high else numbers.format_percent(mean)
+    if low < high:
+        return numbers.format_interval(mean, low, high)
+    return numbers.format_percent(mean)
 
 
 # The metrics that are evaluated while training, and their names.
@@ -340,7 +345,10 @@ class Transfer:
         """Where the mean curve with transfer is above, in words."""
         if self.since is None:
             return "ends below, or level"
-        where = "in all of phase II" if self.throughout else f"from step {self.since:,} on"
+        if self.throughout:
+            where = "in all of phase II"
+        else:
+            where = f"from step {self.since:,} on"
         return f"is above {where}"
 
 
@@ -457,12 +465,17 @@ def compare_transfer(averages: pd.DataFrame, using: str, without: str, shortest:
     lead = a.loc[steps].mean(axis=1) - b.loc[steps].mean(axis=1)
     behind = np.flatnonzero(lead <= 0)
     first = behind[-1] + 1 if len(behind) else 0
-    since = int(steps[first]) if first < len(steps) else None
+    since = None
+    if first < len(steps):
+        since = int(steps[first])
     last = difference_of_trainings(a.loc[steps[-1]].to_numpy(), b.loc[steps[-1]].to_numpy(), BAND)[
         0
     ]
     length = int(steps[-1])
-    verdict = judge_parts(verdict_above(last)) if length >= shortest else INCONCLUSIVE
+    if length >= shortest:
+        verdict = judge_parts(verdict_above(last))
+    else:
+        verdict = INCONCLUSIVE
     return Transfer(verdict, since, not len(behind), last, length, (a.shape[1], b.shape[1]))
 
 
@@ -496,9 +509,14 @@ def transfer_table(
     rows = []
     for (name, metric), compared in transfers.items():
         last = compared.last
-        named = "Reward" if metric == LEARNED_REWARD else "Product"
-        write = numbers.format_points if metric == LEARNED_PRODUCT else _format_rewards
-        difference_at_end = write(*last)
+        if metric == LEARNED_REWARD:
+            named = "Reward"
+        else:
+            named = "Product"
+        if metric == LEARNED_PRODUCT:
+            difference_at_end = numbers.format_points(*last)
+        else:
+            difference_at_end = _format_rewards(*last)
         if last.low == last.high:
             difference_at_end = f"{difference_at_end.split()[0]}, the same in all trainings"
         n = "{} and {}".format(*compared.trainings)

@@ -139,13 +139,19 @@ def shape_of_changes(pairs: pd.DataFrame) -> Shape:
     places = range(int(pairs["second"].max()) + 1)
     peaks = tuple(place for place in places if _rises_then_falls(place, ups, downs))
     if ups.empty or downs.empty:
-        words = LEVELS if sure.empty else RISES if downs.empty else FALLS
+        if sure.empty:
+            words = LEVELS
+        elif downs.empty:
+            words = RISES
+        else:
+            words = FALLS
     elif peaks:
         words = PEAK
     else:
-        words = (
-            VALLEY if any(_rises_then_falls(place, downs, ups) for place in places) else IRREGULAR
-        )
+        if any(_rises_then_falls(place, downs, ups) for place in places):
+            words = VALLEY
+        else:
+            words = IRREGULAR
     return Shape(words, peaks)
 
 
@@ -239,7 +245,9 @@ def main_effects_table(table: pd.DataFrame, changes: ByField, ratios: ByField) -
                 f"{numbers.format_percent(row.mean)} at {row.value}" for row in ends.itertuples()
             ]
             steps = [_format_total_change(of) for of in (pairs, ratios[field][policy])]
-            peaks = values.loc[[*along.peaks], "value"] if along.words == PEAK else []
+            peaks = []
+            if along.words == PEAK:
+                peaks = values.loc[[*along.peaks], "value"]
             named = (field_named(field).name, policy, along.words, first, last)
             lines.append((*named, *steps, " or ".join(peaks)))
     heads = ["Parameter", "Policy", "Along the values", "First", "Last", "Last − first"]

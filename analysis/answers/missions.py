@@ -275,7 +275,9 @@ def share_of_main_uav(data: np.ndarray) -> float:
         data: (I, K) result of ``data_by_uav_and_node``.
     """
     total = data.sum()
-    return float(data.max(axis=0).sum() / total) if total else np.nan
+    if total:
+        return float(data.max(axis=0).sum() / total)
+    return np.nan
 
 
 def share_in_own_sector(data: np.ndarray, nodes: np.ndarray) -> float:

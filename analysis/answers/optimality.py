@@ -23,7 +23,9 @@ _SAYS_NOTHING = 0.999  # a mean bound from which on it is not below 100 % as pag
 
 def results_in(folder: Path) -> Results | None:
     """The results of the study in a folder; None if it has not been run."""
-    return load_results(folder) if (folder / MANIFEST).exists() else None
+    if (folder / MANIFEST).exists():
+        return load_results(folder)
+    return None
 
 
 def by_fleet(results: Results) -> pd.DataFrame:
@@ -54,7 +56,10 @@ def fleet_bound_table(table: pd.DataFrame) -> pd.DataFrame:
     columns = {"Policy": table["policy"], "UAVs": table["uavs"].astype(str)}
     columns["Missions"] = table["n"].map("{:,}".format)
     for metric, head in _SHOWN.items():
-        write = _format_gap if metric == GAP else numbers.format_interval
+        if metric == GAP:
+            write = _format_gap
+        else:
+            write = numbers.format_interval
         columns[head] = numbers.format_estimates(table, metric, write)
     return pd.DataFrame(columns)
 

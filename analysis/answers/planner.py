@@ -152,15 +152,23 @@ def node_map(
         signed: Whether blue means above 0 and orange below 0, in percentage points.
         write: How other values are written.
     """
-    colours = ["white", style.BETTER] if not signed else [style.WORSE, "white", style.BETTER]
-    most = max(float(np.abs(values).max()), 0.01) if signed else 1.0
+    if not signed:
+        colours = ["white", style.BETTER]
+    else:
+        colours = [style.WORSE, "white", style.BETTER]
+    most = 1.0
+    if signed:
+        most = max(float(np.abs(values).max()), 0.01)
     with style.new_panels(5.4) as (figure, ax):
         maps.plot_chart(space, ax)
         ax.scatter(*np.transpose(space.nodes), c=values, s=420, zorder=3, edgecolors=style.MUTED,
                    cmap=sns.blend_palette(colours, as_cmap=True), linewidths=0.8,
                    vmin=-most if signed else 0.0, vmax=most)  # fmt: skip
         for cell, value in zip(space.nodes, values, strict=True):
-            text = numbers.format_difference(value, 0) if signed else write(value)
+            if signed:
+                text = numbers.format_difference(value, 0)
+            else:
+                text = write(value)
             ax.annotate(text, cell, ha="center", va="center", fontsize=8.5, zorder=4,
                         **style.OUTLINED)  # fmt: skip
         ax.set_title(title)
@@ -259,7 +267,8 @@ def draw_prices(results: Results, replication: int) -> Drawing:
         replication: The mission; if it has no bound, the first one that has is taken.
     """
     known = [number for _, number in results.bounds]
-    replication = replication if replication in known else known[0]
+    if replication not in known:
+        replication = known[0]
     values = node_prices(results, replication)
     return Drawing(
         node_map(results.scenario(), "Price of a node's data", values, write="{:.2f}".format),

@@ -201,7 +201,9 @@ def unseen_seas_sentence(
     seconds = {cost.policy: cost.batch for cost in times.costs}
     slow = seconds.get(reference)
     fast = seconds.get(policy)
-    faster = f" in 1/{slow / fast:,.0f} of its time" if slow and fast else ""
+    faster = ""
+    if slow and fast:
+        faster = f" in 1/{slow / fast:,.0f} of its time"
     reached = numbers.format_interval(*share[_ENDS])
     more = numbers.format_points(*gain[["difference", "low", "high"]])
     return (

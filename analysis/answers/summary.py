@@ -85,7 +85,10 @@ def settings_meeting(means: pd.DataFrame, targets: Mapping[str, float]) -> pd.Da
         targets: Metric -> the least mean, or the largest of a metric of which less is better.
     """
     for metric, end in targets.items():
-        met = means["high"] <= end if metric_of(metric).less_is_better else means["low"] >= end
+        if metric_of(metric).less_is_better:
+            met = means["high"] <= end
+        else:
+            met = means["low"] >= end
         passed = means[(means["metric"] == metric) & met]
         means = means.merge(passed[["policy", "point"]])
     return means
@@ -116,7 +119,10 @@ def add_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
             of = metric_in_missions(results.missions, str(metric))
             may_be = may_be_best(wide[rows["policy"]].to_numpy(float), of, looks)
             may_be &= within_reach(rows["low"], rows["high"], str(metric)).to_numpy()
-            best = TIED if may_be.sum() > 1 else BEST
+            if may_be.sum() > 1:
+                best = TIED
+            else:
+                best = BEST
             verdicts[rows.index] = np.where(may_be, best, WORSE)
     return means.assign(verdict=verdicts)
 
@@ -169,9 +175,14 @@ def compare_with_paper(
     for metric in next(iter(printed.values())):
         of_metric = estimates[estimates["metric"] == metric]
         for uavs, figures in printed.items():
-            rows = of_metric if uavs is None else of_metric[of_metric["uavs"] == uavs]
+            if uavs is None:
+                rows = of_metric
+            else:
+                rows = of_metric[of_metric["uavs"] == uavs]
             texts = [format_with_mark(row, figures[metric]) for row in rows.itertuples()]
-            head = "" if uavs is None else f"I = {uavs}"
+            head = ""
+            if uavs is not None:
+                head = f"I = {uavs}"
             columns[METRICS[metric], head] = [numbers.format_percent(figures[metric]), *texts]
     if None in printed and len(of_home):
         texts = [numbers.format_estimate(row) for _, row in of_home.iterrows()]
@@ -265,7 +276,10 @@ def rank_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) ->
         missions: A row per mission.
         among: The policies to rank; by default all.
     """
-    among = missions["policy"].unique() if among is None else [*among]
+    if among is None:
+        among = missions["policy"].unique()
+    else:
+        among = [*among]
     cell = ["policy", "point"]
     values = missions[cell].assign(value=values_within(missions, PRODUCT, cell))
     at_points = values.groupby(cell, sort=False)["value"].mean()
@@ -325,7 +339,9 @@ def worst_missions_table(results: Results, rows: pd.DataFrame) -> Table:
     }
     policy = rows["policy"].iloc[0]
     point = {*rows["point"]}
-    words = points_in_words(results)[point.pop()] if len(point) == 1 else ""
+    words = ""
+    if len(point) == 1:
+        words = points_in_words(results)[point.pop()]
     caption = f"The worst missions of {policy}{', ' * bool(words)}{words}"
     return Table(pd.DataFrame(cells), caption, rows)
 
@@ -390,7 +406,9 @@ def trained_policies_by_learner(results: Results) -> dict[str, list[str]]:
             policies.setdefault(learner, []).append(team.policy)
     names = [learner.rpartition(" ")[0] for learner in policies]  # without the hash
     unique = len({*names}) == len(names)
-    return dict(zip(names, policies.values(), strict=True)) if unique else policies
+    if unique:
+        return dict(zip(names, policies.values(), strict=True))
+    return policies
 
 
 def compare_learned_with_heuristic(results: Results) -> pd.DataFrame:
@@ -445,7 +463,10 @@ def allowance_for_difference(rows: pd.DataFrame, of: str, metric: str = PRODUCT)
         return ""
     row = widest.loc[(widest["half"] / widest["student"].clip(lower=1e-12)).idxmax()]
     unit = metric_of(metric)
-    scale, words = (100, " points") if unit.in_percent else (1, f" {unit.unit}".rstrip())
+    if unit.in_percent:
+        scale, words = (100, " points")
+    else:
+        scale, words = (1, f" {unit.unit}".rstrip())
     plain, wide = (f"±{scale * row[half]:.2g}{words}" for half in ("student", "half"))
     what = f"the difference of {row[of]} in {unit.within}"
     return allowance_sentence(what, plain, wide, int(row["n"]))

@@ -165,4 +165,6 @@ def _in_words(change: dict[str, Any]) -> str:
     ((field, value),) = change.items()
     name = field_named(field)
     is_list = isinstance(value, list | tuple)
-    return f"{name.within} doubled" if is_list else name.words(value)
+    if is_list:
+        return f"{name.within} doubled"
+    return name.words(value)

@@ -25,16 +25,27 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
     nodes = numbers.format_count(len(space.nodes), "node")
     varied = {f.removeprefix("data_sheet.") for f in results.store.manifest.values[0]}
     wide, high = (printed(cells * units.cell, "m") for cells in space.size)
-    quota = "" if space.quota == 0 else " with its quota filled"
+    quota = ""
+    if space.quota != 0:
+        quota = " with its quota filled"
     listed = "what the file of the nodes says"
 
     def given(field: str, otherwise: str) -> str:
         """A field of the sheet in words."""
-        value = "as asked" if field in varied else getattr(sheet, field)
-        return otherwise if not value else value if isinstance(value, str) else "a list of them"
+        if field in varied:
+            return "as asked"
+        value = getattr(sheet, field)
+        if not value:
+            return otherwise
+        if isinstance(value, str):
+            return value
+        return "a list of them"
 
     repair = given("repair", "")
-    fate = f"is repaired in {repair}" if repair else "is lost for good"
+    if repair:
+        fate = f"is repaired in {repair}"
+    else:
+        fate = "is lost for good"
     failures = f"a UAV fails every {given('mtbf', '')} of flying on average, and {fate}"
     return [
         f"Success: at the end of a mission every UAV has landed{quota}.",

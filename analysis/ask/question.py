@@ -135,7 +135,10 @@ class Question:
             words = ["sweep", *_option_per_value("set", _values_as_options(fixed | design.values))]
             teams = [",".join(study.policies)]
         words += [word for team in teams for word in ("--policy", team)]
-        missions = rule.check if isinstance(rule, Cheapest) else study.missions
+        if isinstance(rule, Cheapest):
+            missions = rule.check
+        else:
+            missions = study.missions
         words += ["--missions", str(missions), "--seed", str(study.seed)]
         if study.scenario != "paper":
             words += ["--scenario", Path(study.scenario).name]
@@ -215,7 +218,10 @@ def sweep_question(
     if requirements:
         decided["selection"] = _cheapest_rule(requirements, missions, study)
     if policies is None:
-        each = max(ROOM, missions) if requirements else missions
+        if requirements:
+            each = max(ROOM, missions)
+        else:
+            each = missions
         decided["policies"] = policies_for(study.scenarios, each)
     study = study.model_copy(update=decided)
     if name is None:
@@ -335,13 +341,17 @@ def value_in_words(space: ScenarioSpace, field: str) -> str:
         return f"{len(value)} cells"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else str(value).strip("()")
+    if isinstance(value, float):
+        return f"{value:g}"
+    return str(value).strip("()")
 
 
 def _value_of_field(space: ScenarioSpace, field: str) -> Any:
     """The value of a field; for ``pads``, the number of pads also if it follows from the zone."""
     value = space.value(field)
-    return space.zone_pads[0] if field == "pads" else value
+    if field == "pads":
+        return space.zone_pads[0]
+    return value
 
 
 def values_of(field: str, given: Any) -> tuple[Any, ...]:
@@ -354,7 +364,9 @@ def values_of(field: str, given: Any) -> tuple[Any, ...]:
     Raises:
         InputError: If there is none, or there are too many.
     """
-    return (_as_toml_value(given),) if _is_value(field, given) else list_values(field, given)
+    if _is_value(field, given):
+        return (_as_toml_value(given),)
+    return list_values(field, given)
 
 
 def list_values(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
@@ -396,7 +408,9 @@ def _as_toml_value(value: Any) -> Any:
     """A value in the types of TOML, without numpy types and tuples."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
-    return [_as_toml_value(item) for item in value] if isinstance(value, list | tuple) else value
+    if isinstance(value, list | tuple):
+        return [_as_toml_value(item) for item in value]
+    return value
 
 
 def strip_markdown(text: str) -> str:

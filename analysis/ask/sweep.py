@@ -57,11 +57,10 @@ class Sweep:
         study = self.question.study
         if study.costs is None:
             return table
-        priced = (
-            cheapest.judge_settings(self.results)
-            if study.selection
-            else priced_settings(self.results)
-        )
+        if study.selection:
+            priced = cheapest.judge_settings(self.results)
+        else:
+            priced = priced_settings(self.results)
         key = ["policy", "point"]
         more = [name for name in priced if name in key or name not in table]
         return table.merge(priced[more], on=key, how="left")

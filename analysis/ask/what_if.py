@@ -85,7 +85,9 @@ def missions_of(results: Results) -> pd.DataFrame:
         charging_per_uav=missions["slots_charging"] / missions["uavs"],
         waiting_per_uav=missions["slots_waiting"] / missions["uavs"],
     )
-    return found.assign(**columns_in_units(found, units)) if units else found
+    if units:
+        return found.assign(**columns_in_units(found, units))
+    return found
 
 
 def measured_columns(results: Results) -> list[str]:
@@ -143,7 +145,9 @@ def verdict_on_change(answer: Any) -> str:
         answer: A row of ``compare_sides``.
     """
     known = answer.low < answer.high or answer.p <= 1 - LEVEL
-    return position_of(answer) if known else INCONCLUSIVE
+    if known:
+        return position_of(answer)
+    return INCONCLUSIVE
 
 
 def missions_needed(answer: Any) -> float:
@@ -224,12 +228,17 @@ def format_change(answer: Any) -> str:
 
 def _format_amount(value: float, *ends: float, sign: str = "") -> str:
     """A number with two decimals, or more if it is small, and its interval if it has a length."""
-    digits = 2 if abs(value) >= 0.1 or not value else 4
+    if abs(value) >= 0.1 or not value:
+        digits = 2
+    else:
+        digits = 4
     rounded = [round(number, digits) or 0.0 for number in (value, *ends)]  # no -0.00
     texts = [
         numbers.format_minus(f"{number:{sign if number else ''}.{digits}f}") for number in rounded
     ]
-    return f"{texts[0]} [{', '.join(texts[1:])}]" if len({*ends}) > 1 else texts[0]
+    if len({*ends}) > 1:
+        return f"{texts[0]} [{', '.join(texts[1:])}]"
+    return texts[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +327,10 @@ class WhatIf:
             if mostly * gaps.mean() >= 0:
                 continue
             sides = "higher", "lower"
-            often, on_average = sides if mostly > 0 else sides[::-1]
+            if mostly > 0:
+                often, on_average = sides
+            else:
+                often, on_average = sides[::-1]
             before, after = (failures[policy, point] for point in (BASELINE, VARIATION))
             why = ""
             if mostly * (after - before) > 0:
@@ -395,14 +407,15 @@ class WhatIf:
         lines = []
         for row in table[table["policy"] == policy].itertuples():
             in_percent = metric_of(row.metric).in_percent
-            write, unit = (
-                (numbers.format_percent, " points") if in_percent else (_format_amount, "")
-            )
+            if in_percent:
+                write, unit = (numbers.format_percent, " points")
+            else:
+                write, unit = (_format_amount, "")
             sides = ["–" if np.isnan(mean) else write(mean) for mean in (row.before, row.after)]
             name = (_SHORT | MEASURES).get(row.metric) or metric_of(row.metric).label
-            difference = (
-                f"{MARKS[verdict_on_change(row)]} {format_change(row)}{unit}" if row.n else ""
-            )
+            difference = ""
+            if row.n:
+                difference = f"{MARKS[verdict_on_change(row)]} {format_change(row)}{unit}"
             lines.append([name, *sides, difference])
         heads = ["Mean per mission", "Baseline", "Variation", "Paired difference"]
         return pd.DataFrame(lines, columns=heads)
@@ -416,8 +429,14 @@ class WhatIf:
                 lines.append((row.policy, _SHORT[row.metric], "no variance", *"–––"))
                 continue
             left = 1 - row.variance_reduction
-            narrower = numbers.format_percent(1 - left**0.5) if left < 1 else "none"
-            worth = f"{row.n / left:,.0f}" if left else "any number"
+            if left < 1:
+                narrower = numbers.format_percent(1 - left**0.5)
+            else:
+                narrower = "none"
+            if left:
+                worth = f"{row.n / left:,.0f}"
+            else:
+                worth = "any number"
             amounts = (
                 numbers.format_minus(f"{row.correlation:.2f}"),
                 numbers.format_percent(left),

@@ -178,7 +178,10 @@ def may_charge(to_zone, phases, phase, f, x, y):
 def is_reached(to_zone, phases, phase, f, x, y):
     """Whether a UAV can be in a cell after f flying slots: it has left a zone before them."""
     width, height = to_zone.shape
-    radius = f if phase == 0 else f - phases.opens[0]
+    if phase == 0:
+        radius = f
+    else:
+        radius = f - phases.opens[0]
     return 0 <= x < width and 0 <= y < height and to_zone[x, y] <= radius
 
 
@@ -192,7 +195,9 @@ def last_slot(phases, phase, f, slots):
 def memory_of(blocks, home, node, level):
     """The memory of a UAV at ``home`` that remembers a node; 0 for none."""
     place = blocks.place[home, node]
-    return 1 + place * (len(blocks.levels) - 1) + level - 1 if level > 0 and place >= 0 else 0
+    if level > 0 and place >= 0:
+        return 1 + place * (len(blocks.levels) - 1) + level - 1
+    return 0
 
 
 @inlined
@@ -218,7 +223,9 @@ def bound_of_beginning(blocks, local, now, ahead, had, then_had, home, there, le
         start: Index of a local price of ``home``: its allowance is priced at that.
     """
     memory = memory_of(blocks, there, home, later)
-    left = local[home, blocks.levels[later]] if memory > 0 else 0.0
+    left = 0.0
+    if memory > 0:
+        left = local[home, blocks.levels[later]]
     new = then_had[there] - (had[there] if level > 0 else 0.0)
     known = local[there, blocks.levels[level]]
     least = np.inf
@@ -300,7 +307,9 @@ def _raise_by_charging(blocks, local, new, charged, x, y, here):
     home = blocks.home[x, y]
     for memory in range(len(here)):
         node, level = decode_memory(blocks, home, memory)
-        more = local[node, blocks.levels[level]] * new[node] if memory > 0 else 0.0
+        more = 0.0
+        if memory > 0:
+            more = local[node, blocks.levels[level]] * new[node]
         for q in range(local.shape[1]):
             value = charged[memory, q] + local[home, q] * new[home] + more
             here[memory, q] = max(here[memory, q], value)

@@ -178,7 +178,9 @@ def ceilings_memory(scenario: ScenarioSpace, detail: Detail) -> int:
     slots = paths.most_flying(scenario)
     near = min(detail.near, max(len(scenario.nodes) - 1, 1))
     battery = scenario.flying_time[0], scenario.charge_start[1], scenario.charge_complete[0]
-    phases = 2 + len(paths.early_charges(slots, *battery)) if scenario.flight_cost else 1
+    phases = 1
+    if scenario.flight_cost:
+        phases = 2 + len(paths.early_charges(slots, *battery))
     return (
         math.prod(_shape_of_ceilings(slots, phases, scenario.size, near, detail))
         * np.dtype(float).itemsize
@@ -206,8 +208,14 @@ def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
         record, residual, state.sensors[0], phases.slots, *empty_scratch(1, len(residual))
     )
     world = world_of(scenario)
-    points = POINTS if scenario.shadowing_variance > 0 else np.zeros(1)
-    below = spread_normal(points) if scenario.shadowing_variance > 0 else np.array([0.0, 1.0])
+    if scenario.shadowing_variance > 0:
+        points = POINTS
+    else:
+        points = np.zeros(1)
+    if scenario.shadowing_variance > 0:
+        below = spread_normal(points)
+    else:
+        below = np.array([0.0, 1.0])
     rates = rates_of(record, world.mean_snr, points)
     zones = np.array(scenario.rectangles)
     cells = world.chart.zones
@@ -319,7 +327,9 @@ def _descend_to_minimum(
         points[i] = prices.ravel()
         slopes[i] = slope.ravel()
         if i == 0:
-            width = _FIRST_DECREASE / (slope**2).sum() if slope.any() else 1.0
+            width = 1.0
+            if slope.any():
+                width = _FIRST_DECREASE / (slope**2).sum()
         elif found[i] < lowest - 0.5 * (lowest - predicted):
             width *= 2.0
         elif found[i] > lowest + (lowest - predicted):

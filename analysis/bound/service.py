@@ -69,7 +69,10 @@ def _levels_at(x, y, offset, along_x, nodes, rates, levels):
     for k in range(len(nodes)):
         dx = x - nodes[k, 0]
         dy = y - nodes[k, 1]
-        fine, coarse = (places * dx, dy) if along_x else (places * dy, dx)
+        if along_x:
+            fine, coarse = (places * dx, dy)
+        else:
+            fine, coarse = (places * dy, dx)
         row = rates[abs(coarse), abs(fine + offset)]
         for j in range(rates.shape[2]):
             levels[k, j] = row[j]
@@ -116,7 +119,10 @@ def _best_of(levels, worth, without, below, values, chances, winners, rank, orde
             rank[begun] = top
             begun += 1
         values[count] = best
-        winners[count] = order[chosen] if chosen >= 0 else lowest
+        if chosen >= 0:
+            winners[count] = order[chosen]
+        else:
+            winners[count] = lowest
         smaller = 0.0
         if chosen >= 0:
             smaller = left * below[rank[chosen]] / below[rank[chosen] + 1]
@@ -191,7 +197,10 @@ def _row_values(x, worth, local, nodes, block, rates, below, values):
             y2 = y + (not along_x)
             if x2 == width or y2 == height:
                 continue
-            there, back = (EAST, WEST) if along_x else (SOUTH, NORTH)
+            if along_x:
+                there, back = (EAST, WEST)
+            else:
+                there, back = (SOUTH, NORTH)
             between = np.zeros((2, local.shape[1]))
             homes = block[x2, y2], block[x, y]
             for way in range(2 if homes[0] != homes[1] else 1):
@@ -360,7 +369,9 @@ def add_slopes(
         else:
             known = level if node == there else 0
             memory = paths.memory_of(blocks, there, home, later)
-            left = parts[blocks.levels[later]] if memory > 0 else 0.0
+            left = 0.0
+            if memory > 0:
+                left = parts[blocks.levels[later]]
             last[home] += left * new[home] + max(left - parts[q], 0.0) * had[home]
             last[there] += parts[line] * new[there]
             known_price = parts[blocks.levels[known]]

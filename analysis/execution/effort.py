@@ -42,7 +42,10 @@ def policies_for(spaces: Iterable[ScenarioSpace], missions: int) -> tuple[str, .
     spaces = [*spaces]
     made = missions * sum(map(estimate_decisions, spaces))
     is_small = mean(mean(space.uavs) for space in spaces) <= SMALL
-    ranked = OF_SMALL_FLEETS if is_small else OF_LARGE_FLEETS
+    if is_small:
+        ranked = OF_SMALL_FLEETS
+    else:
+        ranked = OF_LARGE_FLEETS
     best = next((name for name in ranked if made * SECONDS[name] <= BUDGET), BASELINE)
     return tuple(dict.fromkeys((best, BASELINE)))
 
@@ -147,8 +150,13 @@ def check_time(what: str, seconds: float | Range) -> None:
     Raises:
         InputError: If it takes more than ``LONG_RUN``.
     """
-    if (seconds.low if isinstance(seconds, Range) else seconds) > LONG_RUN:
-        text = seconds if isinstance(seconds, Range) else numbers.format_duration(seconds)
+    if isinstance(seconds, Range):
+        least = seconds.low
+        text = str(seconds)
+    else:
+        least = seconds
+        text = numbers.format_duration(seconds)
+    if least > LONG_RUN:
         raise InputError(f"{what}, about {text}; allowed: {CONFIRMED}")
 
 
@@ -353,7 +361,10 @@ def _count_missions(study: Study, store: Store) -> list[Planned]:
         needed = missions_in(parts)
         missing = missions_in(store.missing("missions", parts))
         logs = missions_in(store.missing("events", parts_of(manifest, team, logged)))
-        most = _most_missions(study) if study.rule and missing else needed
+        if study.rule and missing:
+            most = _most_missions(study)
+        else:
+            most = needed
         plan.append(Planned(policy, needed, needed - missing, logs, max(most, needed)))
     if study.bounds:
         parts = bound_parts(manifest)
@@ -372,7 +383,9 @@ def _most_missions(study: Study) -> int:
     """The largest number of missions of a policy."""
     if not study.selection:
         return study.most * study.size
-    checked = study.size if isinstance(study.selection, Cheapest) else 1
+    checked = 1
+    if isinstance(study.selection, Cheapest):
+        checked = study.size
     return study.selection.budget + study.selection.check * checked
 
 

@@ -147,7 +147,9 @@ def _evaluate_in_parts(asked: Asked, size: int, progress: Progress | None) -> Ev
         _add_to_moments(moments, _metric_values(records, asked.scenario), records.missions["uavs"])
         uav_slots += int(records.missions["uav_slots"].sum())
         seconds += took
-    kept = records if size >= asked.missions else None
+    kept = None
+    if size >= asked.missions:
+        kept = records
     over_space = _over_space(moments, asked.scenario, asked.missions)
     return Evaluation(asked.team, over_space, uav_slots, seconds, kept)
 
@@ -175,7 +177,10 @@ def _add_to_moments(
         for fleet in np.unique(fleets[~np.isnan(values)]):
             new = Moments.of(values[(fleets == fleet) & ~np.isnan(values)])
             old = moments.setdefault(metric, {}).get(fleet)
-            moments[metric][int(fleet)] = old.with_others(new) if old else new
+            if old:
+                moments[metric][int(fleet)] = old.with_others(new)
+            else:
+                moments[metric][int(fleet)] = new
 
 
 def _over_space(moments: ByFleet, space: ScenarioSpace, missions: int) -> dict[str, Moments]:
@@ -188,7 +193,10 @@ def _metric_values(records: Records, space: ScenarioSpace) -> dict[str, np.ndarr
     values = {metric: records.missions[metric] for metric in (SUCCESS, HOME, *ALWAYS)}
     if len(records.operations):
         values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
-    values |= columns_in_units(values, space.units) if space.units else {}
+    if space.units:
+        values |= columns_in_units(values, space.units)
+    else:
+        values |= {}
     return {metric: of.astype(float) for metric, of in values.items()}
 
 
@@ -222,7 +230,10 @@ def check_evaluation(asked: Sequence[Asked], yes: bool = False) -> None:
 def _missions_at_once(scenario: ScenarioSpace) -> int:
     """Number of missions to simulate together: a power of two whose records fit in ``MEMORY``."""
     each = MISSION_RECORD.itemsize + scenario.uavs[1] * UAV_RECORD.itemsize
-    each += OPERATIONS.itemsize if scenario.is_extended else 0
+    if scenario.is_extended:
+        each += OPERATIONS.itemsize
+    else:
+        each += 0
     return 2 ** ((MEMORY // each).bit_length() - 1)
 
 

@@ -104,7 +104,7 @@ def run_study(
     if not isinstance(study, Study):
         study = load_study(study)
     check_workers(workers)
-    pool = Cluster(scheduler) if scheduler else Here(workers)
+    pool: Pool = Cluster(scheduler) if scheduler else Here(workers)
     with pool, Store.open(study, out, accept_code) as store:
         _Run(study, store, pool, progress, announce, reuse).complete()
         return results_of(store)
@@ -158,12 +158,16 @@ class _Run:
     def _more(self, team: int, counts: list[int]) -> list[int]:
         """How many missions the rule needs at each point of a team, given those present."""
         rule = self.study.rule
-        return rule.wanted(*self._samples(team, counts)) if rule else counts
+        if rule:
+            return rule.wanted(*self._samples(team, counts))
+        return counts
 
     def _select(self, team: int, counts: list[int]) -> Selected:
         """What is selected for a team; None if the study selects nothing."""
         rule = self.study.selection
-        return rule.choice(*self._samples(team, counts)).selected if rule else None
+        if rule:
+            return rule.choice(*self._samples(team, counts)).selected
+        return None
 
     def _samples(self, team: int, counts: list[int]) -> tuple[Samples, Sequence[Setting]]:
         """The missions and the settings of all design points, by which a rule decides."""
@@ -202,7 +206,10 @@ class _Run:
         """The jobs for what is missing of some parts, cut as if nothing were present."""
         study = self.study
         for team, of_team in groupby(parts, lambda part: part.cell.team):
-            policy = "the upper bound" if kind is BoundsJob else study.policies[team]
+            if kind is BoundsJob:
+                policy = "the upper bound"
+            else:
+                policy = study.policies[team]
             for chunk in chunks.split_into_chunks(of_team, self._size(kind, policy)):
                 if missing := tuple(self.store.missing(kind.kind, chunk.parts)):
                     spaces = tuple(study.scenarios[part.cell.point] for part in missing)

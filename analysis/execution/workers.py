@@ -352,7 +352,9 @@ def _silence_libraries() -> Iterator[None]:
 
 
 def _check_and_run(job: Job, code: str, own: list[Member] | str) -> Any:
-    other = "code of dess" if engine_code() != code else ""
+    other = ""
+    if engine_code() != code:
+        other = "code of dess"
     if job.code != own:
         other = f"code or weights of {job.policy}"
     if other:

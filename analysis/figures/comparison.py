@@ -23,7 +23,10 @@ def plot_claims(table: pd.DataFrame, width: int = 60) -> Figure:
     names = [*table["claim"].unique()]
     looks = style.policy_colours(table["policy"])
     lines = [fill(name, width) for name in names]
-    height = 0.3 * len(names) if width > max(map(len, names)) else 0.52 * len(names)
+    if width > max(map(len, names)):
+        height = 0.3 * len(names)
+    else:
+        height = 0.52 * len(names)
     with style.new_panels(height, values="x", legend=5) as (figure, ax):
         for shift, (policy, rows) in zip(
             style.side_by_side_shifts(len(looks), 0.3),

@@ -95,7 +95,10 @@ def plot_battery(events: event_log.Events, scenario: Scenario, ax: Axes) -> None
     """Battery [%] of every UAV over time, with the thresholds C_S and C_C of charging."""
     levels = event_log.battery_levels(events)
     for uav, curve in levels.groupby("uav"):
-        name = f"UAV {uav + 1}" if scenario.uavs <= 3 else f"{uav + 1}"
+        if scenario.uavs <= 3:
+            name = f"UAV {uav + 1}"
+        else:
+            name = f"{uav + 1}"
         ax.plot(curve["time"], curve["battery"], label=name, linewidth=1.6,
                 color=style.uav_colours(scenario.uavs)[uav],
                 linestyle=style.LINES[uav % len(style.LINES)])  # fmt: skip
@@ -116,7 +119,9 @@ def plot_residual(events: event_log.Events, scenario: Scenario, ax: Axes) -> Non
     ax.stackplot(data.index, data.to_numpy().T, colors=colours, alpha=0.75, linewidth=0)
     total = data.sum(axis=1)
     ax.plot(total.index, total, color=style.INK, linewidth=1.6, label="all nodes")
-    size = size_of("MB", scenario.units) if scenario.units else 1
+    size = 1.0
+    if scenario.units:
+        size = size_of("MB", scenario.units)
     _margin_note(f"{total.iloc[-1] * size:.0f} left", total.iloc[-1], ax)
     ax.set(title="Residual data, a band per node", ylim=(0, None))
     ax.set_ylabel(_unit_of_axis(ax.yaxis, "MB", "data units", scenario, 5))
@@ -149,7 +154,9 @@ def plot_occupancy(events: event_log.Events, scenario: Scenario, ax: Axes) -> No
     pads = scenario.charging_pads
     if pads <= scenario.uavs:
         ax.axhline(pads, color=style.MUTED, linewidth=0.9)
-    hatched = "; hatched: waiting" if slots["waiting"].any() else ""
+    hatched = ""
+    if slots["waiting"].any():
+        hatched = "; hatched: waiting"
     ax.set(title=f"Charging zone, {pads} pad{'s' if pads > 1 else ''}{hatched}", ylabel="UAVs")
     ax.set_ylim(0, scenario.uavs + 0.3)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=4))
@@ -160,7 +167,9 @@ def curves_of_mission(
     scenario: Scenario,
 ) -> dict[Callable[[event_log.Events, Scenario, Axes], None], float]:
     """The figures over the time of a mission, from top to bottom, and their heights [inches]."""
-    ages = {plot_age: 1.6} if scenario.age.measured else {}
+    ages = {}
+    if scenario.age.measured:
+        ages = {plot_age: 1.6}
     return {plot_battery: 1.6, plot_residual: 1.6, **ages, plot_occupancy: 1.1}
 
 
@@ -201,8 +210,14 @@ def plot_courses(
         titles: The titles of the panels, by ``panel``.
         heading: The title of the legend.
     """
-    values = sorted(rows[line].unique()) if line != "policy" else rows[line].unique()
-    looks = style.policy_colours(values) if line == "policy" else style.graded_colours(values)
+    if line != "policy":
+        values = sorted(rows[line].unique())
+    else:
+        values = rows[line].unique()
+    if line == "policy":
+        looks = style.policy_colours(values)
+    else:
+        looks = style.graded_colours(values)
     height = 1.9 * len(titles) + 1.3
     shape = {"sharex": True, "squeeze": False}
     with style.new_panels(height, len(titles), "y", 4, heading, **shape) as (figure, axes):
@@ -222,8 +237,13 @@ def _outcome_in_words(events: event_log.Events, scenario: Scenario) -> str:
     log = pd.DataFrame(events)
     data = log[log["node"] >= 0].groupby("event")["value"].sum()
     total = data["mission_start"] + data.get("arrival", 0.0)
-    share = data.get("communication", 0.0) / total if total else 1.0
-    event, what = ("landing", "landed") if scenario.landing else ("quota_filled", "quotas filled")
+    share = 1.0
+    if total:
+        share = data.get("communication", 0.0) / total
+    if scenario.landing:
+        event, what = ("landing", "landed")
+    else:
+        event, what = ("quota_filled", "quotas filled")
     count = (log["event"] == event).sum()
     return f"I = {scenario.uavs}: {share:.1%} collected, {count} of {scenario.uavs} {what}"
 

@@ -180,7 +180,9 @@ def _darken_until_readable(colour: tuple[float, ...]) -> tuple[float, ...]:
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
     luminance = np.dot([0.2126, 0.7152, 0.0722], linear)
     darker = tuple(0.97 * c for c in colour)
-    return colour if 1.05 / (luminance + 0.05) >= 3 else _darken_until_readable(darker)
+    if 1.05 / (luminance + 0.05) >= 3:
+        return colour
+    return _darken_until_readable(darker)
 
 
 def policy_colours(policies: Iterable[str], drawn: Iterable[str] | None = None) -> dict[str, Look]:
@@ -194,7 +196,9 @@ def policy_colours(policies: Iterable[str], drawn: Iterable[str] | None = None) 
     numbers = {name: WITH_LOOK.index(name) for name in names if name in WITH_LOOK}
     free = [n for n in range(len(names)) if n not in numbers.values()]
     numbers |= dict(zip((name for name in names if name not in numbers), free, strict=False))
-    shown = names if drawn is None else dict.fromkeys(drawn)
+    shown = names
+    if drawn is not None:
+        shown = list(dict.fromkeys(drawn))
     return {
         name: (readable_palette()[numbers[name] % 10], MARKERS[numbers[name] % 7]) for name in shown
     }
@@ -223,7 +227,9 @@ def error_bar_arms(
 
 def side_by_side_shifts(count: int, half_width: float) -> np.ndarray:
     """The (count,) offsets from ``-half_width`` to ``half_width`` that keep marks apart."""
-    return np.linspace(-half_width, half_width, count) if count > 1 else np.zeros(count)
+    if count > 1:
+        return np.linspace(-half_width, half_width, count)
+    return np.zeros(count)
 
 
 def axis_ends(rows: pd.DataFrame, length: float = 0.0, zero: bool = False) -> tuple[float, float]:
@@ -239,7 +245,9 @@ def axis_ends(rows: pd.DataFrame, length: float = 0.0, zero: bool = False) -> tu
 
 def signed_points(share: float, _: float = 0) -> str:
     """A difference of shares in percentage points, as ``+2.5`` for ``0.025``: a tick label."""
-    return format_minus(f"{100 * share:+.3g}") if round(share, 9) else "0"
+    if round(share, 9):
+        return format_minus(f"{100 * share:+.3g}")
+    return "0"
 
 
 def set_axis_unit(axis: Axis, unit: str, nbins: int = 6) -> None:
@@ -268,13 +276,18 @@ MOST_TICKS = 12
 
 def ordered_values(column: pd.Series) -> list[Any]:
     """The values of a column: numbers in ascending order, others in order of appearance."""
-    return sorted(column.unique()) if is_numeric_dtype(column) else [*column.unique()]
+    if is_numeric_dtype(column):
+        return sorted(column.unique())
+    return [*column.unique()]
 
 
 def place_values(rows: pd.DataFrame, field: str) -> pd.DataFrame:
     """Rows with the places of a field: numbers where they are, other values evenly spaced."""
     column = rows[field]
-    places = column if is_numeric_dtype(column) else pd.factorize(column)[0]
+    if is_numeric_dtype(column):
+        places = column
+    else:
+        places = pd.factorize(column)[0]
     return rows.assign(position=places, value=column.map(value_text))
 
 
@@ -299,7 +312,10 @@ def plot_along(
     ticks = rows.drop_duplicates("position").sort_values("position")
     span = float(np.ptp(ticks["position"]))
     gap = ticks["position"].diff().min()
-    half_width = min(0.12 * gap, 0.02 * span) if span else 0.02
+    if span:
+        half_width = min(0.12 * gap, 0.02 * span)
+    else:
+        half_width = 0.02
     curves = rows[line].map(value_text)
     for name, shift in zip(looks, side_by_side_shifts(len(looks), half_width), strict=True):
         means = rows[curves == name].sort_values("position")
@@ -362,7 +378,9 @@ def plot_distributions(values: Mapping[str, pd.Series], ax: Axes) -> None:
 def name_ticks(axis: Axis, values: Sequence[Any], places: Sequence[float] | np.ndarray) -> None:
     """Ticks with the names of values: as many as there is room for, turned if they are long."""
     spec = axis.axes.get_subplotspec()
-    columns = spec.get_gridspec().ncols if spec else 1
+    columns = 1
+    if spec:
+        columns = spec.get_gridspec().ncols
     step = ceil(len(values) * columns / MOST_TICKS)
     names = [value_text(value) for value in values[::step]]
     axis.set_ticks(places[::step], names)

@@ -54,7 +54,9 @@ class Pairs(NamedTuple):
         """The shape in words."""
         shape = self.shape
         tops = [value for value, position in self.positions.items() if position in shape.peaks]
-        peak = f", highest at {' or '.join(tops)}" if shape.words == main_effects.PEAK else ""
+        peak = ""
+        if shape.words == main_effects.PEAK:
+            peak = f", highest at {' or '.join(tops)}"
         differ = self.changes["p_adjusted"] <= 1 - LEVEL
         sure = self.changes.loc[differ, "difference"]
         counts = f"{(sure > 0).sum()} rises and {(sure < 0).sum()} falls"
@@ -110,7 +112,10 @@ class EvidenceOfPolicy:
         used for the selection.
         """
         selects = self.results.study.selection is not None
-        missions = self.results.checks if selects else self.results.missions
+        if selects:
+            missions = self.results.checks
+        else:
+            missions = self.results.missions
         chosen = missions["policy"] == self.policy
         if uavs is not None:
             chosen &= missions["uavs"] == uavs
@@ -206,24 +211,19 @@ class Quantity(NamedTuple):
         spread = low < high
         match self.unit:
             case "share":
-                return (
-                    numbers.format_interval(value, low, high)
-                    if spread
-                    else numbers.format_percent(value)
-                )
+                if spread:
+                    return numbers.format_interval(value, low, high)
+                return numbers.format_percent(value)
             case "points":
-                text = (
-                    numbers.format_points(value, low, high)
-                    if spread
-                    else numbers.format_difference(value, 0)
-                )
+                if spread:
+                    text = numbers.format_points(value, low, high)
+                else:
+                    text = numbers.format_difference(value, 0)
                 return f"{text} points"
             case "reward":
-                return (
-                    numbers.with_ends(_format_reward, value, low, high)
-                    if spread
-                    else _format_reward(value)
-                )
+                if spread:
+                    return numbers.with_ends(_format_reward, value, low, high)
+                return _format_reward(value)
             case "steps":
                 return f"{value:,.0f} steps"
             case "p":
@@ -276,7 +276,9 @@ class Finding:
             return {ABOVE: EXCEEDS, INCONCLUSIVE: MATCHES}.get(self.against, HOLDS)
         if self.verdict == REFUTED or (self.verdict == IN_PART and self.against == BELOW):
             return ABSENT if self.weakness else FALLS_SHORT
-        return NOT_APPLICABLE if self.verdict == NO_RESULTS else INCONCLUSIVE
+        if self.verdict == NO_RESULTS:
+            return NOT_APPLICABLE
+        return INCONCLUSIVE
 
 
 # The measures. Each gives what it finds in the evidence to the judge of a claim's rule.
@@ -483,7 +485,9 @@ def _at_the_end(transfer: Transfer, unit: Unit) -> tuple[Quantity, Quantity]:
 
 
 def _if_short(transfer: Transfer) -> str:
-    return "" if transfer.length >= values.CROSSING else "; too short to tell"
+    if transfer.length >= values.CROSSING:
+        return ""
+    return "; too short to tell"
 
 
 # Figures.

@@ -37,8 +37,12 @@ def reached(mean: Interval, printed: Interval) -> str:
     difference = gap(mean, printed)
     near = difference.low > -NEAR
     if difference.high < 0:
-        return verdict.IN_PART if near else verdict.REFUTED
-    return verdict.HOLDS if near else verdict.INCONCLUSIVE
+        if near:
+            return verdict.IN_PART
+        return verdict.REFUTED
+    if near:
+        return verdict.HOLDS
+    return verdict.INCONCLUSIVE
 
 
 def gap(mean: Interval, printed: Interval) -> Interval:
@@ -79,7 +83,9 @@ def slightly_lower(difference: Interval) -> str:
         return verdict.REFUTED
     if difference.high >= 0:
         return verdict.INCONCLUSIVE
-    return verdict.HOLDS if difference.low > -NEAR else verdict.IN_PART
+    if difference.low > -NEAR:
+        return verdict.HOLDS
+    return verdict.IN_PART
 
 
 def never_all(ratio: Interval, whole: Interval) -> str:
@@ -100,14 +106,18 @@ def best(leads: pd.DataFrame) -> str:
     positions = {verdict.position_by_test(difference, p) for difference, p in tests}
     if verdict.BELOW in positions:
         return verdict.REFUTED
-    return verdict.HOLDS if positions == {verdict.ABOVE} else verdict.INCONCLUSIVE
+    if positions == {verdict.ABOVE}:
+        return verdict.HOLDS
+    return verdict.INCONCLUSIVE
 
 
 def no_lower(leads: pd.DataFrame, margin: float) -> str:
     """Whether the metric at some values is not lower than at all others, up to a margin."""
     if (leads["wide_high"] < -margin).any():
         return verdict.REFUTED
-    return verdict.HOLDS if (leads["low"] > -margin).all() else verdict.INCONCLUSIVE
+    if (leads["low"] > -margin).all():
+        return verdict.HOLDS
+    return verdict.INCONCLUSIVE
 
 
 def alike(changes: pd.DataFrame, margin: float) -> str:
@@ -115,7 +125,9 @@ def alike(changes: pd.DataFrame, margin: float) -> str:
     if ((changes["wide_low"] > margin) | (changes["wide_high"] < -margin)).any():
         return verdict.REFUTED
     within = (changes["low"] >= -margin) & (changes["high"] <= margin)
-    return verdict.HOLDS if within.all() else verdict.INCONCLUSIVE
+    if within.all():
+        return verdict.HOLDS
+    return verdict.INCONCLUSIVE
 
 
 def rises(shape: Shape) -> str:
@@ -128,7 +140,9 @@ def peaks(shape: Shape, wanted: int) -> str:
     """Whether the metric rises up to a value and falls after it."""
     if wanted not in shape.peaks:
         return verdict.REFUTED
-    return verdict.HOLDS if shape.words == main_effects.PEAK else verdict.INCONCLUSIVE
+    if shape.words == main_effects.PEAK:
+        return verdict.HOLDS
+    return verdict.INCONCLUSIVE
 
 
 def chosen(choice: Choice, wanted: Collection[int]) -> str:
@@ -148,7 +162,9 @@ def passes(transfer: Transfer) -> str:
 def throughout(transfer: Transfer) -> str:
     """Whether the curve with transfer learning is above at every step."""
     in_part = transfer.verdict == verdict.HOLDS and not transfer.throughout
-    return verdict.IN_PART if in_part else transfer.verdict
+    if in_part:
+        return verdict.IN_PART
+    return transfer.verdict
 
 
 def levels_off(settled: float, transfer: Transfer) -> str:

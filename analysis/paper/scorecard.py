@@ -93,7 +93,9 @@ def _read_claim(
 ) -> Claim:
     """A claim of a section of the file."""
     measured = partial(getattr(measures, measure), **arguments or {})
-    number = _printed_quantity(**printed) if printed else None
+    number = None
+    if printed:
+        number = _printed_quantity(**printed)
     place = {name: section[name] for name in ("page", "study")}
     return Claim(rule=RULES[rule], measure=measured, printed=number, **place, **others)
 
@@ -107,7 +109,9 @@ def _printed_quantity(
     name: str = "",
 ) -> measures.Quantity:
     """A number of the paper, with an interval if it is a share of a known number of missions."""
-    n = _printed_number(missions) if missions else 0
+    n = 0
+    if missions:
+        n = _printed_number(missions)
     if is_share:
         return measures.Quantity(values.interval_of_share(_printed_number(figure), n), n)
     return measures.Quantity.exact(
@@ -174,7 +178,9 @@ class Row:
         ]
         if any(finding.passes for finding in nulls):
             return PASSED
-        return DIAGNOSTIC if nulls and all(finding.fails for finding in nulls) else OPEN
+        if nulls and all(finding.fails for finding in nulls):
+            return DIAGNOSTIC
+        return OPEN
 
 
 def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[Row]:
@@ -214,7 +220,9 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
 
 def indifference_margin(studies: Mapping[str, Results]) -> float:
     """The difference that does not matter: the indifference of the sweet spot's selection."""
-    rule = studies["sweet-spot"].manifest["study"]["selection"] if "sweet-spot" in studies else None
+    rule = None
+    if "sweet-spot" in studies:
+        rule = studies["sweet-spot"].manifest["study"]["selection"]
     return (rule or {}).get("indifference") or MARGIN
 
 
@@ -253,7 +261,10 @@ def _evidence_of_policy(
         among = learners.get(column, [])
     if not among:
         raise measures.MissingError(f"the study {study} has no {which}")
-    best = among[0] if len(among) == 1 else summary.best_policy(results.missions, among)
+    if len(among) == 1:
+        best = among[0]
+    else:
+        best = summary.best_policy(results.missions, among)
     return measures.EvidenceOfPolicy(results, best)
 
 

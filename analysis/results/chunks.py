@@ -83,7 +83,9 @@ def check_parts(manifest: Manifest, team: int) -> list[Part]:
 
     The selection was not based on any of these missions.
     """
-    check = manifest.study.selection.check if manifest.study.selection else 0
+    check = 0
+    if manifest.study.selection:
+        check = manifest.study.selection.check
     cells = manifest.cells[team]
     replications = range(CHECK, CHECK + check)
     return [Part(cells[point], replications) for point in manifest.selected_points(team)]

@@ -195,7 +195,10 @@ def causes_of_failure(events: Events, scenario: Scenario, first: int = 1) -> lis
         first: The number of the first UAV, as in what stands beside the sentences.
     """
     log = pd.DataFrame(events)
-    end = "landing" if scenario.landing else "quota_filled"
+    if scenario.landing:
+        end = "landing"
+    else:
+        end = "quota_filled"
     ended = set(log.loc[log["event"] == end, "uav"])
     slots = uav_slots(log)
     levels = battery_levels(log)
@@ -216,7 +219,10 @@ def _cause_of_uav(
     quota = kind.quota or scenario.quota
     after = int(last["slot"]) + 1
     to_go = f"{max(quota - (own['event'] == 'communication').sum(), 0)} of {quota}"
-    to_go = f"with {to_go} communication slots to go" if quota else "without having landed"
+    if quota:
+        to_go = f"with {to_go} communication slots to go"
+    else:
+        to_go = "without having landed"
     name = f"UAV {first + uav}"
     cell = f"after {after} slots at ({last['x']}, {last['y']})"
     if not (own["event"] == "battery_empty").any():
@@ -226,7 +232,10 @@ def _cause_of_uav(
     zones, parking, *_ = scenario.chart
     home = spread(zones, parking)[0].reshape(zones.shape)
     away = home[last["y"], last["x"]]
-    where = f"{numbers.format_count(away, 'cell')} from the nearest zone" if away else "in a zone"
+    if away:
+        where = f"{numbers.format_count(away, 'cell')} from the nearest zone"
+    else:
+        where = "in a zone"
     facts = [f"{name} ran empty {cell}, {where}, {to_go}"]
     if flown["charging"].any():
         flown = flown[flown["slot"] > flown["slot"][flown["charging"]].max()]
@@ -311,7 +320,10 @@ def path_text(events: Events, scenario: Scenario, kind: str) -> str:
     table = paths_of(events, scenario)
     if kind == "csv":
         return table.to_csv(index=False)
-    axes = ["lon", "lat"] if scenario.centre else ["x", "y"]
+    if scenario.centre:
+        axes = ["lon", "lat"]
+    else:
+        axes = ["x", "y"]
     others = table.columns.intersection(["time", "seconds", "battery"])
     paths = {uav: of[[*axes, "altitude", *others]] for uav, of in table.groupby("uav")}
     return (_paths_as_kml if kind == "kml" else _paths_as_geojson)(paths)

@@ -96,7 +96,9 @@ class Manifest(provenance.Origin):
     def selected_points(self, team: int) -> list[int]:
         """The design points that were selected for a team; none, if the study selects nothing."""
         selected = self.selected[team]
-        return [selected] if isinstance(selected, int) else selected or []
+        if isinstance(selected, int):
+            return [selected]
+        return selected or []
 
     @classmethod
     def of(cls, study: Study) -> "Manifest":
@@ -156,9 +158,9 @@ class Manifest(provenance.Origin):
             raise InputError(
                 f"{path}: made by other code of {modules}; allowed: {_ALLOWED}, or --accept-code"
             )
-        accepted = (
-            [provenance.Acceptance(modules=changes, missions=accepting or 0)] if changes else []
-        )
+        accepted = []
+        if changes:
+            accepted = [provenance.Acceptance(modules=changes, missions=accepting or 0)]
         held = {team.policy: team for team in self.policies}
         update: dict[str, Any] = {
             "engine_code": self.engine_code,
@@ -197,14 +199,18 @@ class Manifest(provenance.Origin):
         """A hash of all that the records depend on, and of their number."""
         keys = [cell.key for cells in self.cells for cell in cells]
         accepted = [change.data for change in self.accepted]
-        bounds = [[cell.key for cell in self.bound_cells]] if self.bound_code else []
+        bounds = []
+        if self.bound_code:
+            bounds = [[cell.key for cell in self.bound_cells]]
         content = _canonical_json([keys, self.missions, self.selected, accepted, *bounds])
         return sha256(content.encode()).hexdigest()[:16]
 
     def units_at(self, points: np.ndarray) -> Units | None:
         """What a slot, a cell and a data unit are at (n,) design points; None without sheets."""
         units = [space.units for space in self.scenarios]
-        return Units(*np.array(units)[points].T) if all(units) else None
+        if all(units):
+            return Units(*np.array(units)[points].T)
+        return None
 
     @cached_property
     def settings(self) -> list[Setting]:
@@ -223,7 +229,10 @@ class Manifest(provenance.Origin):
         fields = dict.fromkeys(field for point in self.points for field in point.values)
         base = self.space({})
         unset = {field: base.plain_value(field) for field in fields if field != SEA}
-        unset |= {SEA: self.study.scenario} if SEA in fields else {}
+        if SEA in fields:
+            unset |= {SEA: self.study.scenario}
+        else:
+            unset |= {}
         return [unset | point.values for point in self.points]
 
     @cached_property
@@ -247,7 +256,9 @@ class Manifest(provenance.Origin):
     def bound_cells(self) -> tuple[Cell, ...]:
         """The cells of the bounds, in the order of the design points; none without bounds."""
         run = {"version": self.version, "bound": self.bound_code, "seed": self.seed}
-        return self._cells(NO_TEAM, run) if self.bound_code else ()
+        if self.bound_code:
+            return self._cells(NO_TEAM, run)
+        return ()
 
     def _cells(self, team: int, run: dict[str, Any]) -> tuple[Cell, ...]:
         """The cells of what is made with the same code and seed at every design point."""

@@ -134,7 +134,10 @@ def tables_with(
 ) -> list[pa.Table]:
     """The tables of a chunk from their columns, such as those of ``rows_of``."""
     is_extended = any(name in missions and not np.isnan(missions[name]).all() for name in MEASURED)
-    schema = EXTENDED_MISSIONS if is_extended else MISSIONS
+    if is_extended:
+        schema = EXTENDED_MISSIONS
+    else:
+        schema = MISSIONS
     return [_arrow_table(missions, schema, chunk), _arrow_table(uavs, UAVS, chunk)]
 
 
@@ -304,7 +307,9 @@ def _column_limits(name: str, kind: pa.DataType) -> tuple[float, float] | None:
     """The least and the largest value of a column, if it has any."""
     if name in INDICES:
         return INDICES[name]
-    return (-_MOST, _MOST) if pa.types.is_floating(kind) and name not in MAYBE else None
+    if pa.types.is_floating(kind) and name not in MAYBE:
+        return (-_MOST, _MOST)
+    return None
 
 
 def files_in(folder: Path) -> list[Path]:

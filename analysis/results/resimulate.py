@@ -61,7 +61,8 @@ class Mission:
         Raises:
             InputError: If no log is given, and none is stored.
         """
-        events = results.events(policy, point, replication) if events is None else events
+        if events is None:
+            events = results.events(policy, point, replication)
         mission = {"policy": policy, "point": point, "replication": replication}
         record = _rows_of_mission(results.missions, mission).iloc[0]
         sampled = {name: int(record[name]) for name in SAMPLED}
@@ -168,7 +169,9 @@ def difference_in_words(record: MissionRecord, fields: Mapping[str, Any]) -> str
     if not changed:
         return ""
     first = changed[0]
-    more = f", and {len(changed) - 1} more" if changed[1:] else ""
+    more = ""
+    if changed[1:]:
+        more = f", and {len(changed) - 1} more"
     return f"{first} is {fields.get(first)} and {simulated.get(first)} when simulated again{more}"
 
 

@@ -385,7 +385,9 @@ class Store:
     def _incomplete(self, part: chunks.Part, gap: range) -> str:
         team = part.cell.team
         values = self.manifest.points[part.cell.point].values
-        where = f" at {json.dumps(values)}" if values else ""
+        where = ""
+        if values:
+            where = f" at {json.dumps(values)}"
         present = f"the first {gap.start - part.replications.start} of {len(part.replications)}"
         what = "bounds"
         if team != NO_TEAM:

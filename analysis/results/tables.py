@@ -38,7 +38,9 @@ def of_folder(folder: str | Path, manifest: Manifest, cell: Cell, replication: i
         cell: The team and the design point of the mission.
         replication: Of the mission.
     """
-    point = ["--point", str(cell.point)] if len(manifest.points) > 1 else []
+    point = []
+    if len(manifest.points) > 1:
+        point = ["--point", str(cell.point)]
     policy = manifest.policies[cell.team].policy
     which = [*point, "--policy", policy, "--replication", str(replication)]
     return shlex.join(["dess", "simulate", "--of", str(folder), *which])
@@ -87,7 +89,9 @@ def compute_once(
         if key not in results.answers:
             results.answers[key] = ask(results, *args, **named)
         answer = results.answers[key]
-        return answer.copy() if isinstance(answer, pd.DataFrame) else answer
+        if isinstance(answer, pd.DataFrame):
+            return answer.copy()
+        return answer
 
     return known
 
@@ -140,7 +144,9 @@ class Results:
     @property
     def design(self) -> str:
         """The kind of the design; the scenario alone is a grid."""
-        return self.study.design.kind if self.study.design else "grid"
+        if self.study.design:
+            return self.study.design.kind
+        return "grid"
 
     def scenario(self, point: int = 0) -> ScenarioSpace:
         """The scenario of a design point."""
@@ -154,7 +160,9 @@ class Results:
         """
         cell = self.cell(policy, point)
         logged = self.study.logged
-        log = self.store.load_log(cell, replication) if replication in range(logged) else None
+        log = None
+        if replication in range(logged):
+            log = self.store.load_log(cell, replication)
         if log is None:
             raise InputError(
                 f"{self.store.folder}: no event log of {policy}, point {point}, replication "
@@ -168,7 +176,9 @@ class Results:
 
         Pages name no other one, so that they do not depend on where the results are.
         """
-        within = f"{SWEEPS}/" if self.study.description == SWEEP else ""
+        within = ""
+        if self.study.description == SWEEP:
+            within = f"{SWEEPS}/"
         return f"results/{within}{self.study.name}"
 
     def command(
@@ -283,7 +293,10 @@ def results_of(store: Store) -> Results:
     if not manifest.complete:
         raise InputError(f"{store.folder}: incomplete; allowed: run the study again to complete it")
     all_missions = _label_missions(manifest, missions)
-    all_checks = _label_missions(manifest, checks) if checks else all_missions[:0]
+    if checks:
+        all_checks = _label_missions(manifest, checks)
+    else:
+        all_checks = all_missions[:0]
     bounds = store.bounds_of(bound_parts(manifest))
     if bounds:
         all_missions = _with_gaps(all_missions, bounds)

@@ -33,7 +33,8 @@ def metrics_by_treatment(
         raise InputError(f"by: {of} is what is compared; allowed: other columns")
     for metric in metrics:
         values = pd.to_numeric(missions[metric], errors="coerce")
-        values = values[missions[metric].notna()] if metric in EITHER else values
+        if metric in EITHER:
+            values = values[missions[metric].notna()]
         if odd := int(len(values) - np.isfinite(values).sum()):
             raise InputError(f"{metric}: no number in {odd} missions; allowed: finite numbers")
     keys = list(dict.fromkeys([*by, *(k for k in _MISSION if k in missions and k != of)]))
@@ -190,7 +191,9 @@ def difference_test(
 @cache
 def mcnemar_p_value(gains: int, losses: int) -> float:
     """The p-value of McNemar's exact test."""
-    return float(scipy.stats.binomtest(gains, gains + losses).pvalue) if gains + losses else 1.0
+    if gains + losses:
+        return float(scipy.stats.binomtest(gains, gains + losses).pvalue)
+    return 1.0
 
 
 def column_tests(
@@ -255,7 +258,9 @@ def column_tests(
 
 def sign_test(equal: np.ndarray) -> float:
     """The two-sided p-value of n equal differences: 2^(1 - n), or 1 if they are 0."""
-    return min(1.0, 2 * 0.5 ** len(equal)) if equal[0] else 1.0
+    if equal[0]:
+        return min(1.0, 2 * 0.5 ** len(equal))
+    return 1.0
 
 
 def add_rare_pairs(differences: np.ndarray, rare: Sequence[float] = (1.0, -1.0)) -> np.ndarray:
@@ -308,8 +313,12 @@ def compare_pairs(
     mean, p = difference_test(a, b, metric, level)
     differences = differences_of(a, b)
     of_a, of_b, of_differences = map(_sample_variance, (a, b, differences))
-    correlation = float(np.corrcoef(a, b)[0, 1]) if of_a and of_b else 0.0
-    reduction = 1 - of_differences / (of_a + of_b) if of_a + of_b else 0.0
+    correlation = 0.0
+    if of_a and of_b:
+        correlation = float(np.corrcoef(a, b)[0, 1])
+    reduction = 0.0
+    if of_a + of_b:
+        reduction = 1 - of_differences / (of_a + of_b)
     plain = intervals.mean_interval(differences, level)
     half = (plain.high - plain.low) / 2
     return Paired(*mean, p, correlation, reduction, a.size, half)
@@ -327,7 +336,9 @@ def compare_unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Pai
     more = [] if metric == REWARD else [0.0, 1.0]
     test = scipy.stats.ttest_ind([*a, *more], [*b, *more], equal_var=False)
     ends = test.confidence_interval(intervals.LEVEL)
-    p = 1.0 if np.isnan(test.pvalue) else float(test.pvalue)
+    p = 1.0
+    if not np.isnan(test.pvalue):
+        p = float(test.pvalue)
     n = min(len(a), len(b))
     difference = float(np.mean(a) - np.mean(b))
     return Paired(difference, float(ends.low), float(ends.high), p, np.nan, np.nan, n)
@@ -422,4 +433,6 @@ def compare(
 
 
 def _sample_variance(values: np.ndarray) -> float:
-    return float(values.var()) if np.ptp(values) else 0.0
+    if np.ptp(values):
+        return float(values.var())
+    return 0.0

@@ -281,7 +281,9 @@ def wilson_interval(successes: int, n: int, level: float = LEVEL) -> Interval:
     width = 2 * (n + z**2)
     centre = (2 * n * share + z**2) / width
     half = z / width * np.sqrt(4 * n * share * (1 - share) + z**2)
-    low = float(centre - half) if successes else 0.0
+    low = 0.0
+    if successes:
+        low = float(centre - half)
     return Interval(share, low, float(centre + half) if successes < n else 1.0)
 
 
@@ -341,7 +343,10 @@ def stratified_interval(values: np.ndarray, metric: str | Metric, level: float =
     if metric_of(metric).is_bounded:
         alone = float(((residuals**2).sum(axis=0) / n**2).sum()) / points**2
         missions = points**2 / float((1 / n).sum())
-        effect = min(max(common / alone, 1.0), points) if alone else points
+        if alone:
+            effect = min(max(common / alone, 1.0), points)
+        else:
+            effect = points
         low, high = bounded_ends(mean, alone * missions, missions / effect, level)
         return Interval(mean, float(low), float(high))
     replications = int(present.any(axis=1).sum())
@@ -528,7 +533,10 @@ def by_replication(
         metric: The metric.
         columns: What tells the settings apart, such as ``point``.
     """
-    names = [columns] if isinstance(columns, str) else [*columns]
+    if isinstance(columns, str):
+        names = [columns]
+    else:
+        names = [*columns]
     table = missions[["replication", *names]].assign(value=values_within(missions, metric, names))
     return table.pivot(index="replication", columns=columns, values="value")
 
@@ -563,7 +571,9 @@ def bootstrap_interval(
     Raises:
         ValueError: If there are no values.
     """
-    arrays = (samples,) if isinstance(samples, np.ndarray) else tuple(samples)
+    if isinstance(samples, np.ndarray):
+        samples = (samples,)
+    arrays = tuple(samples)
     n = len(arrays[0])
     if not n:
         raise ValueError("bootstrap_interval: no values")

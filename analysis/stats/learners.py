@@ -81,7 +81,9 @@ def compare_crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
     of_missions, p = t_test(d.mean(axis=0), level)  # for these trainings alone
     mean = of_missions.mean
     if trainings == 1 or missions == 1:
-        spread = float(d.std(ddof=1)) if missions > 1 else np.nan
+        spread = np.nan
+        if missions > 1:
+            spread = float(d.std(ddof=1))
         return Crossed(*of_missions, np.nan, np.nan, p, np.nan, spread, np.nan)
     if np.ptp(d) == 0:
         return Crossed(*of_missions, mean, mean, sign_test(d[:, 0]), 0.0, 0.0, 0.0)
@@ -159,7 +161,10 @@ def compare_learners(
             for metric in metrics:
                 of_learner = np.stack([a[metric] for a in parts])
                 result, differences = _compare_learner(of_learner, b[metric], known[metric], level)
-                about = LEARNER if len(parts) > 1 else CHECKPOINT
+                if len(parts) > 1:
+                    about = LEARNER
+                else:
+                    about = CHECKPOINT
                 labels = (learner, baseline, *group, metric, about)
                 rows.append((*labels, *result, *differences.shape))
     columns = ["learner", "baseline", *by, "metric", "about", *Crossed._fields, "trainings", "n"]
@@ -193,4 +198,6 @@ def _alpha_of(half: Callable[[float], float], distance: float) -> float:
     lowest = -100.0  # quantiles of Student's t are still exact here
     if excess(lowest) <= 0:
         return 0.0
-    return float(10 ** scipy.optimize.brentq(excess, lowest, 0.0)) if distance else 1.0
+    if distance:
+        return float(10 ** scipy.optimize.brentq(excess, lowest, 0.0))
+    return 1.0

@@ -35,7 +35,9 @@ def position_of(interval: Interval, reference: float = 0.0) -> str:
     """
     if interval.low > reference:
         return ABOVE
-    return BELOW if interval.high < reference else INCONCLUSIVE
+    if interval.high < reference:
+        return BELOW
+    return INCONCLUSIVE
 
 
 def position_by_test(difference: float, p: float, level: float = LEVEL) -> str:
@@ -47,7 +49,9 @@ def position_by_test(difference: float, p: float, level: float = LEVEL) -> str:
     significant = p <= 1 - level
     if significant and difference > 0:
         return ABOVE
-    return BELOW if significant and difference < 0 else INCONCLUSIVE
+    if significant and difference < 0:
+        return BELOW
+    return INCONCLUSIVE
 
 
 def verdict_above(interval: Interval, bound: float = 0.0) -> Part:
@@ -63,7 +67,9 @@ def judge_parts(*parts: Part) -> str:
     """
     if any(parts):
         return HOLDS if all(parts) else IN_PART
-    return REFUTED if False in parts else INCONCLUSIVE
+    if False in parts:
+        return REFUTED
+    return INCONCLUSIVE
 
 
 _BATCH = 2**21  # weights at a time, which take some megabytes for every n
@@ -158,7 +164,9 @@ def within_reach(low: pd.Series, high: pd.Series, metric: str | Metric) -> pd.Se
         high: (K,) upper ends.
         metric: The metric.
     """
-    return ~(low > high.min()) if metric_of(metric).less_is_better else ~(high < low.max())
+    if metric_of(metric).less_is_better:
+        return ~(low > high.min())
+    return ~(high < low.max())
 
 
 _BLOCK = 512  # settings that are compared with all others at once, which limits the memory
@@ -192,12 +200,14 @@ def may_be_best(
     """
     present = np.isfinite(values)
     means = np.nansum(values, axis=0) / np.maximum(present.sum(axis=0), 1)
-    values = -values if metric_of(metric).less_is_better else values
+    if metric_of(metric).less_is_better:
+        values = -values
     # What a replication adds to all settings cancels in their differences.
     centre = np.nanmean(np.where(present.any(1, keepdims=True), values, 0.0), axis=1, keepdims=True)
     centred = np.where(present, values - centre, 0.0)
     mask = present.astype(float)
-    looks = np.zeros(values.shape[1], int) if looks is None else looks
+    if looks is None:
+        looks = np.zeros(values.shape[1], int)
     each = (1 - LEVEL) / max(values.shape[1] - 1, 1)
     blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
     rare = [_rare_leads(metric, means, means[block, None]) for block in blocks]
@@ -208,7 +218,9 @@ def may_be_best(
         _unbeaten_settings(block, added, centred, mask, alpha)
         for block, added, alpha in zip(blocks, rare, alphas, strict=True)
     ]
-    return np.concatenate(parts) if parts else np.zeros(0, bool)
+    if parts:
+        return np.concatenate(parts)
+    return np.zeros(0, bool)
 
 
 def _rare_leads(

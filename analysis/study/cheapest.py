@@ -55,7 +55,10 @@ class MeanTest:
         met = _first_true(self._at_most.after(values) >= self._target)
         missed = _first_true(self._at_least.after(1 - values) >= self._target)
         if min(met, missed) < len(values):
-            self.verdict = "met" if met < missed else "missed"
+            if met < missed:
+                self.verdict = "met"
+            else:
+                self.verdict = "missed"
         self.missions += min(met + 1, missed + 1, len(values))
 
 
@@ -79,7 +82,9 @@ class _Wealth:
 
 def _first_true(holds: np.ndarray) -> int:
     """The index of the first true value, or the number of values if none is true."""
-    return int(np.argmax(holds)) if holds.any() else len(holds)
+    if holds.any():
+        return int(np.argmax(holds))
+    return len(holds)
 
 
 # A function that bounds costs. It takes the (s, g) design points of s candidates, and the number of
@@ -125,13 +130,17 @@ class Question:
     @property
     def needed(self) -> set[int]:
         """The design points that need more missions to settle the question."""
-        return set() if self.settled else set(self._next.ravel().tolist())
+        if self.settled:
+            return set()
+        return set(self._next.ravel().tolist())
 
     @property
     def answer(self) -> Answer:
         """The answer as far as it is known."""
         left = [tuple(points) for points in self.candidates.tolist()]
-        best = () if self._best is None else left[self._best]
+        best = ()
+        if self._best is not None:
+            best = left[self._best]
         return Answer(self._condition, best, tuple(left), self.settled)
 
     def look(self, points: "_Points", excess: Excess, indifference: float) -> None:
@@ -244,7 +253,9 @@ def as_share(metric: str, value: Any, horizon: float) -> Any:
         value: A value, or an array of values.
         horizon: The largest age.
     """
-    return 1 - value / horizon if metric == AGE else value
+    if metric == AGE:
+        return 1 - value / horizon
+    return value
 
 
 @dataclass(frozen=True)
@@ -319,7 +330,9 @@ class Cheapest(StrictTable):
     @model_validator(mode="after")
     def _are_shares(self) -> Self:
         for metric, least in self.requirements.items():
-            share = 0.0 if isinstance(least, str) else least
+            share = 0.0
+            if not isinstance(least, str):
+                share = least
             if metric != AGE and not self.tolerance < share < 1 - self.tolerance:
                 raise ValueError(
                     f"requirements.{metric}: {share:g} is out of range; allowed: between "
@@ -352,7 +365,10 @@ class Cheapest(StrictTable):
             share = self.amount("age") / horizon
             has_unit = isinstance(given, str)
             if not self.tolerance < share < 1 - self.tolerance or has_unit != bool(space.units):
-                form = 'a time such as "6 h"' if space.units else "mission slots"
+                if space.units:
+                    form = 'a time such as "6 h"'
+                else:
+                    form = "mission slots"
                 allowed = f"{form} in the horizon of {horizon:g}{' h' * bool(space.units)}"
                 raise InputError(f"{where}: {shown(given)} does not fit; allowed: {allowed}")
             if not space.age.measured:

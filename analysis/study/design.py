@@ -47,11 +47,15 @@ class DesignPoint:
 
 def by_field(value: Any) -> Any:
     """The values of a design by field: tables of sections become fields, lists tuples."""
-    return tuples(dotted(value)) if isinstance(value, dict) else value
+    if isinstance(value, dict):
+        return tuples(dotted(value))
+    return value
 
 
 def _rows_by_field(value: Any) -> Any:
-    return tuple(map(by_field, value)) if isinstance(value, list | tuple) else value
+    if isinstance(value, list | tuple):
+        return tuple(map(by_field, value))
+    return value
 
 
 def _have_values(fields: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
@@ -64,7 +68,10 @@ def _have_values(fields: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...
 def _are_ranges(ranges: dict[str, Any]) -> dict[str, Any]:
     for field, ends in ranges.items():
         if not _is_range(field, ends):
-            numbers = "integers" if field in INTEGERS else "numbers"
+            if field in INTEGERS:
+                numbers = "integers"
+            else:
+                numbers = "numbers"
             given = shown(list(ends) if isinstance(ends, tuple) else ends)
             raise ValueError(
                 f"{field}: {given} is not a range; allowed: [low, high], {numbers} with low <= high"
@@ -73,7 +80,9 @@ def _are_ranges(ranges: dict[str, Any]) -> dict[str, Any]:
 
 
 def _is_range(field: str, ends: Any) -> bool:
-    kinds = (int,) if field in INTEGERS else (int, float)
+    kinds: tuple[type, ...] = (int, float)
+    if field in INTEGERS:
+        kinds = (int,)
     return (
         isinstance(ends, tuple)
         and len(ends) == 2

@@ -207,7 +207,9 @@ class Selection(StrictTable):
                 f"selection.metric: {self.metric} is not measured in some missions; "
                 "allowed: a metric that every mission has"
             )
-        sign = -1.0 if metric_of(self.metric).less_is_better else 1.0
+        sign = 1.0
+        if metric_of(self.metric).less_is_better:
+            sign = -1.0
         return [sign * values for values in found]
 
     def _guarantee(self, race: "_Race") -> str:
@@ -221,9 +223,18 @@ class Selection(StrictTable):
                 f"none: the budget of {self.budget} missions ended with {left} design points left;"
                 " this one has the best mean of them"
             )
-        what = "it is the best" if left == 1 else f"the best is among {left} that tie, it included"
-        others = "every other" if left == 1 else "those ruled out"
-        least = "at least" if self.procedure == "kn" else "about or above"
+        if left == 1:
+            what = "it is the best"
+        else:
+            what = f"the best is among {left} that tie, it included"
+        if left == 1:
+            others = "every other"
+        else:
+            others = "those ruled out"
+        if self.procedure == "kn":
+            least = "at least"
+        else:
+            least = "about or above"
         return (
             f"with probability {least} {self.confidence:g} {what}, if the best is better than "
             f"{others} by {self.indifference:g} or more"
@@ -314,7 +325,9 @@ class _Race:
         ``reach`` has the stages from which the margins of all pairs are zero, h2 S2_il / delta^2:
         (s, s), of no meaning on the diagonal.
         """
-        self.renewal = _grow_count(stage) if self.is_bounded else np.inf
+        self.renewal = np.inf
+        if self.is_bounded:
+            self.renewal = _grow_count(stage)
         points = len(self.values)
         first = self.rule.first
         delta = self.rule.indifference

@@ -61,7 +61,9 @@ class StrictTable(BaseModel):
     @classmethod
     def _numbers_of_numpy(cls, values: Any) -> Any:
         is_table = isinstance(values, dict)
-        return {key: plain(value) for key, value in values.items()} if is_table else values
+        if is_table:
+            return {key: plain(value) for key, value in values.items()}
+        return values
 
 
 def of_its_kind(key: str, *models: type[BaseModel]) -> BeforeValidator:
@@ -208,7 +210,10 @@ class Precision(StrictTable):
         excess = np.max([self._excess(metric, sample) for metric in self.targets], axis=0)
         last_miss = self._last_miss(excess)
         stop = self._stop(last_miss)
-        enough = self.budget if stop is None else min(stop, self.budget)
+        if stop is None:
+            enough = self.budget
+        else:
+            enough = min(stop, self.budget)
         count = self.first
         while count < enough and count <= len(excess):
             # About count * excess^2 missions are needed. We ask for count * excess, which is less
@@ -246,7 +251,9 @@ class Precision(StrictTable):
     def _stop(self, last_miss: np.ndarray) -> int | None:
         counts = np.arange(1, len(last_miss) + 1)
         complete = np.flatnonzero(counts - last_miss > self.look_ahead)
-        return int(counts[complete[0]]) - self.look_ahead if complete.size else None
+        if complete.size:
+            return int(counts[complete[0]]) - self.look_ahead
+        return None
 
 
 def values_in(sample: Mapping[str, np.ndarray], metric: str) -> np.ndarray:

@@ -57,7 +57,9 @@ def engine_of(spaces: Sequence[ScenarioSpace], asked: Engine | None = None) -> E
         InputError: If the batch engine was asked for, and one of the scenarios needs the other.
     """
     if asked is None:
-        return "events" if any(space.needs_events for space in spaces) else "batch"
+        if any(space.needs_events for space in spaces):
+            return "events"
+        return "batch"
     if asked == "batch":
         check_slotted(spaces)
     return asked
@@ -74,7 +76,9 @@ CHECK = MOST
 
 
 def _by_field(values: Any) -> Any:
-    return dotted(values) if isinstance(values, dict) else values
+    if isinstance(values, dict):
+        return dotted(values)
+    return values
 
 
 # A team keeps its type, ``TypedByUser`` or plain text.
@@ -137,12 +141,16 @@ class StudyData(StrictTable):
     @property
     def first(self) -> int:
         """The number of replications of every cell, before a rule asks for more."""
-        return self.rule.first if self.rule else self.missions
+        if self.rule:
+            return self.rule.first
+        return self.missions
 
     @property
     def most(self) -> int:
         """The largest number of replications of a cell that a rule may ask for."""
-        return self.rule.budget if self.rule else self.missions
+        if self.rule:
+            return self.rule.budget
+        return self.missions
 
     @property
     def size(self) -> int:
@@ -198,12 +206,16 @@ class Study(StudyData):
         measured = {HOME, *(name for space in self.scenarios for name in measures_of(space))}
         if all(space.units for space in self.scenarios):
             measured |= {metric_of(name).in_units.column for name in measured}
-        of_bounds = {BOUND, GAP} if self.bounds else set()
+        of_bounds = set()
+        if self.bounds:
+            of_bounds = {BOUND, GAP}
         return [*metrics_in(measured | of_bounds), *([COST] if self.costs else [])]
 
     def _choose_engine(self) -> None:
         """Take the SimPy engine if the study does not say which and a design point needs it."""
-        asked = self.engine if "engine" in self.model_fields_set else None
+        asked = None
+        if "engine" in self.model_fields_set:
+            asked = self.engine
         # The model is frozen, and this is a part of its making.
         object.__setattr__(self, "engine", engine_of(self.scenarios, asked))
 
@@ -211,7 +223,10 @@ class Study(StudyData):
         if self.precision and self.selection:
             raise ValueError("precision: selection is also given; allowed: either")
         if self.rule and "missions" in self.model_fields_set:
-            rule = "precision" if self.precision else "selection"
+            if self.precision:
+                rule = "precision"
+            else:
+                rule = "selection"
             raise ValueError(f"missions: are decided by {rule}; allowed: either")
         if isinstance(self.selection, Cheapest) and not self.costs:
             raise ValueError(
@@ -269,7 +284,9 @@ class Study(StudyData):
         """The command that runs the study, if it was read by ``load_study``."""
         name, changes = self._origin
         policies = [word for team in changes.get("policies", ()) for word in ("--policy", team)]
-        missions = ["--missions", str(changes["missions"])] if "missions" in changes else []
+        missions = []
+        if "missions" in changes:
+            missions = ["--missions", str(changes["missions"])]
         return ["dess", "study", "run", name or self.name, *policies, *missions]
 
     @cached_property
@@ -289,7 +306,9 @@ class Study(StudyData):
         Raises:
             InputError: If there are too many.
         """
-        return self.design.points if self.design else (DesignPoint({}),)
+        if self.design:
+            return self.design.points
+        return (DesignPoint({}),)
 
     @cached_property
     def scenarios(self) -> tuple[ScenarioSpace, ...]:

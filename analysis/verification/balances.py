@@ -65,7 +65,10 @@ def conservation_check(studies: Mapping[str, Results]) -> Check:
     table = pd.concat(tables, ignore_index=True)
     error, bound = table.loc[(table["error"] / table["bound"]).idxmax()]
     seen = f"off by {error:.1e} of the data at most, {error / EPSILON:.0f} units of rounding"
-    some = f"{len(studies)} studies" if len(studies) > 1 else f"the study {next(iter(studies))}"
+    if len(studies) > 1:
+        some = f"{len(studies)} studies"
+    else:
+        some = f"the study {next(iter(studies))}"
     test = f"Every mission of {some}"
     return Check.exact(CONSERVATION, test, _KEPT, seen, len(table), error, float(bound))
 
@@ -77,7 +80,10 @@ def _imbalance_of_missions(results: Results) -> pd.DataFrame:
     m = missions["point"].map([space.communication_slots for space in spaces].__getitem__)
     nodes = missions["point"].map([len(space.nodes) for space in spaces].__getitem__)
     whole = missions["initial"] + missions["arrived"]
-    lost = missions["lost"] if "lost" in missions else pd.Series(np.nan, missions.index)
+    if "lost" in missions:
+        lost = missions["lost"]
+    else:
+        lost = pd.Series(np.nan, missions.index)
     error = (whole - missions["collected"] - missions["residual"] - lost.fillna(0.0)).abs()
     # Two additions per communication (node and mission), then arrivals and nodes; where data can be
     # lost, also what silent nodes hide, and each packet when it comes and when it goes.

@@ -63,7 +63,10 @@ class Check(NamedTuple):
     @classmethod
     def counted(cls, topic: str, test: str, known: str, wrong: int, n: int) -> Self:
         """An exact check of n cases, of which ``wrong`` are wrong."""
-        seen = f"otherwise {wrong:,} times" if wrong else "always"
+        if wrong:
+            seen = f"otherwise {wrong:,} times"
+        else:
+            seen = "always"
         return cls.exact(topic, test, known, seen, n, wrong)
 
     @classmethod
@@ -168,9 +171,14 @@ def checks_summary(judged: pd.DataFrame) -> str:
     if refuted:
         verdict = f"**{len(refuted)} of {n} checks do not hold**: {numbers.join_words(refuted)}."
     else:
-        others = "; the others are inconclusive." if open_tests else "."
+        if open_tests:
+            others = "; the others are inconclusive."
+        else:
+            others = "."
         verdict = f"**{len(_tests_with_verdict(judged, HOLDS))} of {n} checks hold**{others}"
-    few = f" Too few observations for: {numbers.join_words(open_tests)}." if open_tests else ""
+    few = ""
+    if open_tests:
+        few = f" Too few observations for: {numbers.join_words(open_tests)}."
     alarm = f"any of them fails for at most one seed in {1 / ALPHA:.0f}"
     return (
         f"{verdict}{few} {exact} are exact. {chance} are statistical, judged at a level of "
@@ -258,7 +266,10 @@ def poisson_fit(counts: np.ndarray, mean: float) -> Fit:
     below = law.cdf(classes)
     below[-1] = 1.0
     labels = [*map(str, classes)]
-    labels[0] += " or less" if low > 0 else ""
+    if low > 0:
+        labels[0] += " or less"
+    else:
+        labels[0] += ""
     labels[-1] += " or more"
     return _fit_of_counts(labels, observed, n * np.diff(below, prepend=0.0))
 
@@ -273,7 +284,9 @@ def uniform_fit(values: np.ndarray, low: int, high: int) -> Fit:
     fit = _fit_of_counts(
         [*map(str, classes)], observed, np.full(len(classes), len(values) / len(classes))
     )
-    return fit if fit.n == len(values) else fit._replace(p=0.0)
+    if fit.n == len(values):
+        return fit
+    return fit._replace(p=0.0)
 
 
 def chi_square(observed: np.ndarray, expected: np.ndarray, freedom: int) -> float:

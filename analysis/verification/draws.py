@@ -88,9 +88,13 @@ def _rates_check(counts: np.ndarray, rate: float) -> Check:
     slots, nodes = counts.shape
     expected = slots * rate
     totals = counts.sum(0)
-    p = chi_square(totals, np.full(nodes, expected), nodes) if expected >= LEAST else None
+    p = None
+    if expected >= LEAST:
+        p = chi_square(totals, np.full(nodes, expected), nodes)
     rates = totals / max(slots, 1)
-    seen = f"{rates.min():.4g} to {rates.max():.4g}" if slots else ""
+    seen = ""
+    if slots:
+        seen = f"{rates.min():.4g} to {rates.max():.4g}"
     test = f"Rates of the {nodes} nodes: chi-square"
     return Check(ARRIVALS, test, f"{rate:g} each", seen, int(totals.sum()), p)
 
@@ -250,9 +254,14 @@ def communication_checks(logs: Sequence[Log], seed: int) -> list[Check]:
     node with the highest SNR of those with data, and the smaller of its rate and its data.
     """
     tables = [recompute_communications(log, seed) for log in logs]
-    table = pd.concat(tables) if tables else pd.DataFrame(columns=_COMMUNICATIONS, dtype=float)
+    if tables:
+        table = pd.concat(tables)
+    else:
+        table = pd.DataFrame(columns=_COMMUNICATIONS, dtype=float)
     same = table[table["node"] == table["best"]]
-    off = float((same["value"] / same["known"] - 1).abs().max()) if len(same) else 0.0
+    off = 0.0
+    if len(same):
+        off = float((same["value"] / same["known"] - 1).abs().max())
     emptied = int((same["known"] == same["residual"]).sum())
     seen = f"off by {off:.1e} of it at most; {emptied:,} times the node was emptied"
     test, known = "Node served in a communication slot", "the best SNR among nodes with data"
@@ -333,7 +342,9 @@ def intervals_of_blocks(values: np.ndarray, size: int, share: bool) -> pd.DataFr
     whole = values[: len(values) // size * size].reshape(-1, size)
     rows = [wilson_interval(int(b.sum()), size) if share else mean_interval(b) for b in whole]
     table = pd.DataFrame(rows, columns=Interval._fields)
-    reference = whole.mean() if whole.size else np.nan
+    reference = np.nan
+    if whole.size:
+        reference = whole.mean()
     holds = (table["low"] <= reference) & (reference <= table["high"])
     return table.assign(reference=reference, holds=holds)
 

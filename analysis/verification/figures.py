@@ -87,7 +87,10 @@ def plot_slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
     box = {"boxstyle": "round", "edgecolor": style.MUTED}
     with style.new_panels(0.8 * (last + 1)) as (figure, ax):
         for number, (name, text) in enumerate([*steps, (end, "")]):
-            fill = style.ZONE if number in (0, last) else style.SEA
+            if number in (0, last):
+                fill = style.ZONE
+            else:
+                fill = style.SEA
             ax.text(0, -number, f"{name}\n{text}".strip(), va="center", fontsize=9.5,
                     bbox={**box, "facecolor": fill})  # fmt: skip
             if number:

@@ -120,7 +120,10 @@ def _judge_under_all_conditions(results: Results, policy: str, rows: pd.DataFram
     together = rows.iloc[0].copy()
     for column in _reported_metrics(results):
         less = metric_of(column).less_is_better
-        worst = rows[column].idxmax() if less else rows[column].idxmin()
+        if less:
+            worst = rows[column].idxmax()
+        else:
+            worst = rows[column].idxmin()
         ends_of = _ends_of(column)
         together[ends_of] = rows.loc[worst, ends_of]
     together[_ends_of(COST)] = rows[_ends_of(COST)].mean()
@@ -207,20 +210,27 @@ class FleetAnswer:
     def fleets(self) -> pd.DataFrame:
         """The rows of ``judge_settings`` or ``judge_fleets_everywhere`` that it was chosen from."""
         together = self.condition == ALL_CONDITIONS
-        table = judge_fleets_everywhere(self.results) if together else judge_settings(self.results)
+        if together:
+            table = judge_fleets_everywhere(self.results)
+        else:
+            table = judge_settings(self.results)
         is_asked = (table["policy"] == self.policy) & (table["condition"] == self.condition)
         return table[is_asked]
 
     @property
     def fleet(self) -> str:
         """The fleet in words; ``none`` if no fleet is known to meet the requirements."""
-        return fleets_in_words(self.results)[self.points[0]] if self.points else "none"
+        if self.points:
+            return fleets_in_words(self.results)[self.points[0]]
+        return "none"
 
     @property
     def cost(self) -> float:
         """The mean cost of the fleet over the conditions; infinite if there is none."""
         selected = self.fleets[self.fleets["selected"]]
-        return float(selected[COST].iloc[0]) if len(selected) else np.inf
+        if len(selected):
+            return float(selected[COST].iloc[0])
+        return np.inf
 
     @cached_property
     def tightest_first(self) -> list[Requirement]:
@@ -251,7 +261,10 @@ class FleetAnswer:
         """
         table = quoted_settings(self.results)
         rows = table[(table["policy"] == self.policy) & table["point"].isin(self.points)]
-        worst = rows[column].idxmax() if metric_of(column).less_is_better else rows[column].idxmin()
+        if metric_of(column).less_is_better:
+            worst = rows[column].idxmax()
+        else:
+            worst = rows[column].idxmin()
         return rows.loc[worst]
 
     # --- sentences ---
@@ -295,8 +308,14 @@ class FleetAnswer:
             texts.append(f"its success is {success} (none is required)")
         missions = f"{int(row['n']):,} missions"
         is_checked = not self.results.checks.empty
-        source = f"{missions} that check it" if is_checked else f"the {missions} of the search"
-        where = ", under the worst condition for each," if len(self.points) > 1 else ","
+        if is_checked:
+            source = f"{missions} that check it"
+        else:
+            source = f"the {missions} of the search"
+        if len(self.points) > 1:
+            where = ", under the worst condition for each,"
+        else:
+            where = ","
         text = f"In {source}{where} {numbers.join_words(texts)}."
         if len(self.tightest_first) > 1:
             text += f" The tightest requirement is the {self.tightest_first[0].metric.within}."
@@ -325,7 +344,9 @@ class FleetAnswer:
         horizon = self.results.store.manifest.settings[self.points[0]].horizon
         shifted = [requirement.shifted(rule.tolerance, horizon) for requirement in self._required]
         shown = [f"its {each.metric.within} is {each.bound_in_words}" for each in shifted]
-        where = " under every condition" if self._answer.condition is None else ""
+        where = ""
+        if self._answer.condition is None:
+            where = " under every condition"
         sure = numbers.format_level(rule.shown(policies))
         return f"With a probability of at least {sure}, {numbers.join_words(shown)}{where}."
 
@@ -345,7 +366,10 @@ class FleetAnswer:
         if not choice.done or self._answer.settled:
             return ""
         assert isinstance(rule, Cheapest)
-        enough = f"about {float(f'{choice.enough:.2g}'):,.0f}" if choice.enough else "far more"
+        if choice.enough:
+            enough = f"about {float(f'{choice.enough:.2g}'):,.0f}"
+        else:
+            enough = "far more"
         return (
             f"The budget of {rule.budget:,} missions ended before this was decided; {enough} would "
             "settle it."
@@ -500,7 +524,9 @@ def reason_sentences(results: Results) -> list[str]:
 def _length_dependent_metrics(results: Results) -> list[str]:
     """The metrics by which fleets are compared that may depend on the length of a mission."""
     asked = [requirement.column for requirement in requirements_of(results)]
-    return [*asked, COST] if pays_for_hours(results) else asked
+    if pays_for_hours(results):
+        return [*asked, COST]
+    return asked
 
 
 def cheapest_sentences(results: Results) -> list[str]:
@@ -556,7 +582,10 @@ def fleet_rows(results: Results) -> pd.DataFrame:
         ``answer`` for the answer, ``selected`` for the cheapest fleet of another policy that meets
         the requirements.
     """
-    rows = judge_fleets_everywhere(results) if has_conditions(results) else judge_settings(results)
+    if has_conditions(results):
+        rows = judge_fleets_everywhere(results)
+    else:
+        rows = judge_settings(results)
     rows = rows.sort_values(COST, kind="stable", ignore_index=True)
     best = cheapest_answer(results)
     is_answer = rows["selected"] & (rows["policy"] == best.policy)
@@ -569,7 +598,9 @@ def fleet_rows(results: Results) -> pd.DataFrame:
 def shown_rows(rows: pd.DataFrame, most: int) -> pd.DataFrame:
     """At most so many rows of ``fleet_rows``: the first ones, or those around the answer."""
     place = int(np.argmax(rows["answer"] == "answer"))
-    first = max(0, min(place - most // 2, len(rows) - most)) if place >= most else 0
+    first = 0
+    if place >= most:
+        first = max(0, min(place - most // 2, len(rows) - most))
     return rows.iloc[first : first + most]
 
 
@@ -690,10 +721,15 @@ def tightest_requirement(results: Results) -> tuple[Requirement, str]:
 
     def tightness(requirement: Requirement, part: pd.DataFrame) -> tuple[float, float]:
         keeps = requirement.margin(part[requirement.column]) >= 0
-        cheapest_cost = part[COST][keeps].min() if keeps.any() else np.inf
+        cheapest_cost = np.inf
+        if keeps.any():
+            cheapest_cost = part[COST][keeps].min()
         room = relative_spare(part, requirement)
         selected = part["point"].isin(best.points)
-        least_room = float(room[selected].iloc[0]) if selected.any() else float(room.max())
+        if selected.any():
+            least_room = float(room[selected].iloc[0])
+        else:
+            least_room = float(room.max())
         return cheapest_cost, -least_room
 
     parts: Sequence[tuple[str, pd.DataFrame]] = [*rows.groupby("condition", sort=False)]

@@ -88,8 +88,9 @@ def mean_cost_parts(results: Results) -> pd.DataFrame:
     table = missions[["policy", "point", COST]].assign(**amounts)
     means = table.groupby(["policy", "point"], sort=False, as_index=False)[[*PARTS, COST]].mean()
     is_recorded = "down" in uavs and uavs["down"].notna().all()  # results of before are not
-    count = stranded_uavs(uavs) if is_recorded else np.nan
-    number = uavs[["policy", "point"]].assign(stranded=count)
+    number = uavs[["policy", "point"]].assign(stranded=np.nan)
+    if is_recorded:
+        number["stranded"] = stranded_uavs(uavs)
     sums = number.groupby(["policy", "point"], sort=False)["stranded"].sum(min_count=1)
     per_setting = missions.groupby(["policy", "point"], sort=False).size()
     return means.join((sums / per_setting).rename("stranded"), on=["policy", "point"])
@@ -114,7 +115,9 @@ def cost_front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
     known = [*METRICS, *(requirement.column for requirement in requirements_of(results))]
     if metric not in known:
         raise InputError(f"metric: {metric!r} is unknown{one_of(metric, METRICS)}")
-    sign = -1 if metric_of(metric).less_is_better else 1
+    sign = 1
+    if metric_of(metric).less_is_better:
+        sign = -1
     generator = np.random.default_rng(results.store.manifest.seed)
     tables = []
     for _, rows in priced_settings(results).groupby("condition", sort=False):
@@ -262,7 +265,9 @@ def cost_fronts(results: Results) -> dict[str, pd.DataFrame]:
 
 def setting_cells(rows: pd.DataFrame, metrics: Iterable[str]) -> pd.DataFrame:
     """Rows of ``priced_settings`` as text: condition, fleet, policy, cost and metrics."""
-    columns = {"Condition": rows["condition"]} if rows["condition"].any() else {}
+    columns = {}
+    if rows["condition"].any():
+        columns = {"Condition": rows["condition"]}
     columns |= {"Fleet": rows["fleet"], "Policy": rows["policy"]}
     for of in map(metric_of, (COST, *metrics)):
         columns[of.name] = numbers.format_estimates(rows, of.column, of.written)

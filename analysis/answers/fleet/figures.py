@@ -62,9 +62,16 @@ def plot_costs(
                         alpha=FAINT + (1 - FAINT) * row["probability"])  # fmt: skip
         for policy, (colour, marker) in looks.items():
             ax.plot([], [], color=colour, marker=marker, linestyle="", label=policy)
-        named = table.sort_values(COST) if len(table) <= MOST_NAMES else best
+        if len(table) <= MOST_NAMES:
+            named = table.sort_values(COST)
+        else:
+            named = best
         for n, row in enumerate(named.to_dict("records") if len(named) <= MOST_NAMES else ()):
-            side = ("top", -5) if n % 2 else ("bottom", 5)  # so that neighbours do not overlap
+            # so that neighbours do not overlap
+            if n % 2:
+                side = ("top", -5)
+            else:
+                side = ("bottom", 5)
             ax.annotate(row["fleet"].replace(" and ", "\n"), (row[COST], row[metric]), va=side[0],
                         fontsize=8, xytext=(7, side[1]), textcoords="offset points",
                         **style.OUTLINED)  # fmt: skip
@@ -79,7 +86,10 @@ def plot_costs(
             ax.xaxis.set_major_formatter("{x:,g}")
         of = metric_of(metric)
         style.set_axis_unit(ax.yaxis, of.axis)
-        ylabel = of.within if of.in_percent else of.label
+        if of.in_percent:
+            ylabel = of.within
+        else:
+            ylabel = of.label
         ax.set(xlabel=f"cost [{currency}]", ylabel=ylabel)
     return figure
 
@@ -105,7 +115,10 @@ def draw_cheapest(results: Results) -> Drawing:
         f"({requirements_in_words(requirements_of(results))}); "
         "small, faint ones miss them or are open. "
     )
-    marks += "The answer is named." if is_answer.any() else "None is the answer."
+    if is_answer.any():
+        marks += "The answer is named."
+    else:
+        marks += "None is the answer."
     return _draw_costs(results, rows, requirement.column, marks)
 
 

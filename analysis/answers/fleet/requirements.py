@@ -59,7 +59,10 @@ class Requirement:
     @property
     def bound_in_words(self) -> str:
         """The bound alone, as ``at least 99 %``."""
-        side = "at most" if self.metric.less_is_better else "at least"
+        if self.metric.less_is_better:
+            side = "at most"
+        else:
+            side = "at least"
         return f"{side} {self.metric.amount(self.bound)}"
 
     def shifted(self, tolerance: float, horizon: float) -> "Requirement":
@@ -75,14 +78,18 @@ class Requirement:
 
     def margin(self, value: Any) -> Any:
         """How far a value, or each of an array, is on the right side; negative on the wrong one."""
-        return self.bound - value if self.metric.less_is_better else value - self.bound
+        if self.metric.less_is_better:
+            return self.bound - value
+        return value - self.bound
 
     def verdict(self, low: float, high: float) -> Verdict:
         """Whether a whole interval keeps the bound, breaks it, or neither."""
         margins = self.margin(low), self.margin(high)
         if min(margins) >= 0:
             return Verdict.MET
-        return Verdict.MISSED if max(margins) < 0 else Verdict.OPEN
+        if max(margins) < 0:
+            return Verdict.MISSED
+        return Verdict.OPEN
 
 
 def requirements_of(results: Results) -> list[Requirement]:

@@ -19,6 +19,7 @@ from dess.analysis.metrics import PRODUCT, Metric, metric_in_missions, metric_of
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.intervals import (
+    Interval,
     by_replication,
     column_intervals,
     level_after,
@@ -86,7 +87,9 @@ def main_effects(
             rows.insert(2, "position", rows["value"].map(ordered_values(binned).index).astype(int))
             rows["value"] = rows["value"].map(value_text)
             tables.append(rows.sort_values("position", kind="stable"))
-    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+    if tables:
+        return pd.concat(tables, ignore_index=True)
+    return pd.DataFrame()
 
 
 def fields_by_influence(effects: pd.DataFrame) -> list[str]:
@@ -151,7 +154,9 @@ def _intervals_over_points(
     for cell in range(cell_of.max() + 1):
         complete = values.loc[:, cell_of == cell].dropna().to_numpy(float)
         level = float(levels[cell])
-        ends = stratified_interval(complete, metric, level) if len(complete) else [np.nan] * 3
+        ends = Interval(np.nan, np.nan, np.nan)
+        if len(complete):
+            ends = stratified_interval(complete, metric, level)
         rows.append((*ends, len(complete)))
     return pd.DataFrame(rows, columns=["mean", "low", "high", "n"])
 

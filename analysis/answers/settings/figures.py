@@ -92,13 +92,20 @@ def plot_curves(
     of_policies = line == "policy"
     shared = {"sharex": True, "sharey": True, "squeeze": False}
     values = style.ordered_values(rows[line])
-    looks = style.policy_colours(values) if of_policies else style.graded_colours(values)
-    heading = None if of_policies else field_named(line).label
+    if of_policies:
+        looks = style.policy_colours(values)
+    else:
+        looks = style.graded_colours(values)
+    heading = None
+    if not of_policies:
+        heading = field_named(line).label
     height = 2.9 * len(parts) + 0.9
     with style.new_panels(height, len(parts), "y", 4, heading, **shared) as (figure, axes):
         for ax, (value, part) in zip(axes.flat, parts, strict=True):
             style.plot_along(part, looks, metric_of(metric).axis, ax, line)
-            title = field_named(panel).words(value) if panel else ""
+            title = ""
+            if panel:
+                title = field_named(panel).words(value)
             ax.set_title(title[:1].upper() + title[1:], fontsize=10, fontweight="normal")
         figure.suptitle(metric_of(metric).label, fontsize=11, fontweight="bold")
         axes.flat[-1].set_xlabel(field_named(x).label, parse_math=True)
@@ -133,7 +140,10 @@ def draw_heat_map(
     named = [x, y, *filter(None, [facet])]
     data = average_over_others(results, [*named[2:], x, y], metric, policy)
     values = varied_values(results)
-    panels = evenly_spaced(values[facet]) if facet else [None]
+    if facet:
+        panels = evenly_spaced(values[facet])
+    else:
+        panels = [None]
     columns = min(COLUMNS, len(panels))
     has_room = len(values[x]) * columns <= 9 and len(values[y]) * columns <= 12
     rows = data.dropna(subset="mean")
@@ -142,13 +152,20 @@ def draw_heat_map(
         column=rows[x].map(values[x].index),
         text=[_format_cell(mean, of) if has_room else "" for mean in rows["mean"]],
     )
-    best = rows["mean"].idxmin() if of.less_is_better else rows["mean"].idxmax()
+    if of.less_is_better:
+        best = rows["mean"].idxmin()
+    else:
+        best = rows["mean"].idxmax()
     scale = {"vmin": rows["mean"].min(), "vmax": rows["mean"].max(), "cmap": "YlGnBu"}
-    scale |= {"cmap": "YlGnBu_r"} if of.less_is_better else {}
+    if of.less_is_better:
+        scale["cmap"] = "YlGnBu_r"
     height = 1.2 + (1.75 if facet else 0.5 * len(values[y])) * ceil(len(panels) / columns)
     with panel_grid(min(height, 9), len(panels), columns, sharex=True) as (figure, axes):
         for ax, value in zip(axes, panels, strict=True):
-            part = rows if value is None else rows[rows[facet] == value]
+            if value is None:
+                part = rows
+            else:
+                part = rows[rows[facet] == value]
             mesh = style.plot_cells(part, (values[y], values[x]), ax, **scale)
             for row in part[part["tied"]].itertuples():
                 corner = row.column + 0.06, row.row + 0.06
@@ -156,7 +173,9 @@ def draw_heat_map(
             if best in part.index:
                 place = rows.loc[best, "column"] + 0.5, rows.loc[best, "row"] + 0.8
                 ax.plot(*place, "*", color=MARK, markersize=9, markeredgecolor="white")
-            title = "" if value is None else f"{field_named(str(facet)).tick} {value_text(value)}"
+            title = ""
+            if value is not None:
+                title = f"{field_named(str(facet)).tick} {value_text(value)}"
             ax.set_title(title, fontsize=9, parse_math=True)
         bar = figure.colorbar(mesh, ax=axes, shrink=0.9, aspect=30)
         style.set_axis_unit(bar.ax.yaxis, of.axis)
@@ -311,7 +330,9 @@ def _format_cell(value: float, metric: Metric) -> str:
     """A value as it is written in a cell."""
     if metric.in_percent:
         return f"{100 * value:.1f}"
-    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
+    if abs(value) >= 100:
+        return f"{value:,.0f}"
+    return f"{value:.3g}"
 
 
 def counted_missions(table: pd.DataFrame) -> str:

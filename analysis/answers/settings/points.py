@@ -69,7 +69,9 @@ def rows_in_words(table: pd.DataFrame) -> list[list[str]]:
 def setting_in_words(results: Results, policy: str, point: int) -> str:
     """A setting in words: ``greedy with 3 UAVs``; the policy alone if nothing varies."""
     words = points_in_words(results)[point]
-    return f"{policy} with {words}" if words else policy
+    if words:
+        return f"{policy} with {words}"
+    return policy
 
 
 def ordered_values(values: pd.Series) -> list[Any]:
@@ -126,7 +128,9 @@ def ends_sentence(
 def intervals_in_words(results: Results) -> str:
     """What the intervals of the means of a study's settings are called."""
     is_search = any(results.looks(policy).any() for policy in results.policies)
-    return f"{INTERVALS} that allow for the search" if is_search else INTERVALS
+    if is_search:
+        return f"{INTERVALS} that allow for the search"
+    return INTERVALS
 
 
 def check_metric(results: Results, metric: str) -> None:

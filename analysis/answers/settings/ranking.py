@@ -76,9 +76,9 @@ def best_settings_sentence(results: Results, table: pd.DataFrame, metric: str) -
         table: The result of ``rank_settings`` for the metric.
         metric: The metric.
     """
-    policies = (
-        other_policies_sentences(results, table, metric) if len(results.policies) == 2 else []
-    )
+    policies = []
+    if len(results.policies) == 2:
+        policies = other_policies_sentences(results, table, metric)
     return " ".join([best_setting_sentence(results, table, metric), *policies])
 
 
@@ -96,13 +96,18 @@ def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) ->
     tied = table[table["tied"]]
     value = of.written(*best[[metric, f"{metric}_low", f"{metric}_high"]])
     names = [setting_in_words(results, row.policy, row.point) for row in tied.itertuples()]
-    what = "setting" if varied_values(results) else "policy"
+    if varied_values(results):
+        what = "setting"
+    else:
+        what = "policy"
     many = len(names) - 1
     named = f" ({'; '.join(names[1:])})" * (many <= MOST_NAMES)
     if others == 1:
         rest = f"The other {what} {'may be as good' if many else 'is significantly worse'}."
     elif not many:
-        rest = f"All {others:,} others are significantly worse." if others else ""
+        rest = ""
+        if others:
+            rest = f"All {others:,} others are significantly worse."
     elif many == others:
         rest = f"All {others:,} others may be as good{named}."
     else:

@@ -177,7 +177,10 @@ def _estimate_indices(design: Saltelli, values: np.ndarray) -> pd.DataFrame:
     table = pd.DataFrame({"parameter": design.problem["names"]})
     half = ndtri(0.5 + LEVEL / 2)
     for name, share in (("first", b * (mixed - a)), ("total", (a - mixed) ** 2 / 2)):
-        indices = weights @ share / variance if varies else np.full((3, len(table)), np.nan)
+        if varies:
+            indices = weights @ share / variance
+        else:
+            indices = np.full((3, len(table)), np.nan)
         error = half * indices[1:].std(axis=0, ddof=1)
         table[name] = indices[0]
         table[f"{name}_low"] = table[name] - error
