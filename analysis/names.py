@@ -177,7 +177,7 @@ def declared_fields(space: ScenarioSpace) -> list[Declared]:
             _meaning_of_field(name)[0] + (", from the data sheet" if name in follows else ""),
             _meaning_of_field(name)[1],
             _allowed_values(space, name),
-            *(_single_value(side.plain_value(name)) for side in (default, space)),
+            *(single_value(side.plain_value(name)) for side in (default, space)),
         )
         for name in fields_of(ScenarioSpace)
     ]
@@ -202,7 +202,7 @@ def _allowed_values(space: ScenarioSpace, name: str) -> str:
     return f"{kind} {low:g}..{high:g}" + (" or [low, high]" if name in SAMPLED else "")
 
 
-def _single_value(value: Any) -> Any:
+def single_value(value: Any) -> Any:
     """A range of one value as this value."""
     is_range = isinstance(value, list) and len(value) == 2
     if is_range and value[0] == value[1]:

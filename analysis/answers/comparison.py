@@ -684,7 +684,9 @@ def decision_time_sentences(times: Times, results: Results, pair: Pair) -> str:
         ratio = medians[pair.policy] / medians[pair.baseline]
         text += f" {pair.policy} takes {ratio:,.3g} times as long as {pair.baseline}."
     missing = [policy for policy in results.policies if policy not in medians]
-    return text + f" Not timed: {numbers.join_words(missing)}." * bool(missing)
+    if missing:
+        text += f" Not timed: {numbers.join_words(missing)}."
+    return text
 
 
 def plot_decision_times(table: pd.DataFrame) -> Figure:

@@ -188,16 +188,23 @@ def short_of_pads(results: Results, margin: float) -> list[int]:
     return sorted({*fewest.index, *fewer.groupby("uavs")["pads"].idxmax()})
 
 
+def _number_with_verb(number: int) -> str:
+    """A number as ``1 is`` or ``3 are``."""
+    return f"{number} are" if number > 1 else f"{number} is"
+
+
 def enough_pads_sentence(results: Results, margin: float) -> str:
     """How many pads are enough for every fleet, by the first policy of the study."""
     found = enough_pads(results, margin)
     most = max(varied_values(results).get("pads", [0]))
     parts = []
     for row in found[found["policy"] == results.policies[0]].itertuples():
-        part = f"{row.pads} {'are' if row.pads > 1 else 'is'} enough for {row.uavs} UAVs"
+        part = f"{_number_with_verb(row.pads)} enough for {row.uavs} UAVs"
         if row.too_few:
-            part += f", {row.too_few} {'are' if row.too_few > 1 else 'is'} too few"
-        parts.append(part + f", {numbers.join_words([*map(str, row.open)])} open" * bool(row.open))
+            part += f", {_number_with_verb(row.too_few)} too few"
+        if row.open:
+            part += f", {numbers.join_words([*map(str, row.open)])} open"
+        parts.append(part)
     counted = numbers.format_span(changes_from_reference(results, "pads", most, PRODUCT)["n"])
     return (
         f"Of charging pads, {'; '.join(parts)} (policy {results.policies[0]}, at most "

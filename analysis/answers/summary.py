@@ -338,11 +338,11 @@ def worst_missions_table(results: Results, rows: pd.DataFrame) -> Table:
         "Reward": rows["reward"].map(numbers.format_quantity),
     }
     policy = rows["policy"].iloc[0]
-    point = {*rows["point"]}
-    words = ""
-    if len(point) == 1:
-        words = points_in_words(results)[point.pop()]
-    caption = f"The worst missions of {policy}{', ' * bool(words)}{words}"
+    points = rows["point"].unique()
+    caption = f"The worst missions of {policy}"
+    words = points_in_words(results)[points[0]]
+    if len(points) == 1 and words:
+        caption += f", {words}"
     return Table(pd.DataFrame(cells), caption, rows)
 
 

@@ -279,11 +279,12 @@ class WhatIf:
             f"{field_named(side.Field).words(side.Variation)} instead of {side.Baseline}"
             for side in self._fields(self._changed).itertuples()
         ]
-        parts = [
-            f"that of {row.policy} by {format_change(row)} points"
-            + " (inconclusive)" * (verdict_on_change(row) == INCONCLUSIVE)
-            for row in self._of_product()
-        ]
+        parts = []
+        for row in self._of_product():
+            part = f"that of {row.policy} by {format_change(row)} points"
+            if verdict_on_change(row) == INCONCLUSIVE:
+                part += " (inconclusive)"
+            parts.append(part)
         n = f"n = {numbers.format_span(row.n for row in self._of_product())} pairs"
         with_new = numbers.join_words(new)
         return f"With {with_new}, the product changes: {numbers.join_words(parts)}; {n}."

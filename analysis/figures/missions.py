@@ -28,8 +28,14 @@ SPREAD = 0.4
 # The size of the names of nodes, the radius of nodes, and about the width of a map [points].
 NAME_SIZE, NODE_RADIUS, MAP_WIDTH = 10.0, 5.5, 340.0
 _ARROW: dict = {
-    **{"angles": "xy", "scale_units": "xy", "units": "xy", "scale": 1, "width": 0.15},
-    **{"headwidth": 3.8, "headlength": 3.4, "headaxislength": 3.2},
+    "angles": "xy",
+    "scale_units": "xy",
+    "units": "xy",
+    "scale": 1,
+    "width": 0.15,
+    "headwidth": 3.8,
+    "headlength": 3.4,
+    "headaxislength": 3.2,
 }
 
 

@@ -272,7 +272,9 @@ def _cause_of_uav(
 def _uavs_in_words(uavs: pd.Series, first: int) -> str:
     """Several UAVs as ``UAVs 1 and 3``."""
     shown = [str(first + uav) for uav in sorted(set(uavs))]
-    return f"UAV{'s' * (len(shown) > 1)} {numbers.join_words(shown)}"
+    if len(shown) == 1:
+        return f"UAV {shown[0]}"
+    return f"UAVs {numbers.join_words(shown)}"
 
 
 _KML = """<?xml version='1.0' encoding='UTF-8'?>

@@ -366,10 +366,9 @@ class Cheapest(StrictTable):
             has_unit = isinstance(given, str)
             if not self.tolerance < share < 1 - self.tolerance or has_unit != bool(space.units):
                 if space.units:
-                    form = 'a time such as "6 h"'
+                    allowed = f'a time such as "6 h" in the horizon of {horizon:g} h'
                 else:
-                    form = "mission slots"
-                allowed = f"{form} in the horizon of {horizon:g}{' h' * bool(space.units)}"
+                    allowed = f"mission slots in the horizon of {horizon:g}"
                 raise InputError(f"{where}: {shown(given)} does not fit; allowed: {allowed}")
             if not space.age.measured:
                 raise InputError(f"{where}: is not measured; allowed: age.measured = true")

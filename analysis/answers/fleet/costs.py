@@ -25,7 +25,7 @@ from dess.analysis.answers.settings.points import (
 )
 from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of
-from dess.analysis.names import DECISIONS, field_named
+from dess.analysis.names import DECISIONS, field_named, single_value
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.verdict import front_membership, on_front
 from dess.analysis.study.costs import PARTS, PURCHASE, Costs, stranded_uavs
@@ -235,11 +235,11 @@ def fleets_in_words(results: Results) -> list[str]:
         space = results.scenario(point)
         words = []
         if prices.uav or prices.lost_uav or "uavs" in table:
-            low, high = space.uavs
-            words.append(field_named("uavs").words(low if low == high else [low, high]))
+            words.append(field_named("uavs").words(single_value([*space.uavs])))
         if prices.pad or {"pads", ZONE_PADS} & {*table}:
             for zone, pads in enumerate(space.zone_pads, 1):
-                words.append(field_named("pads").words(pads) + f" in zone {zone}" * (zone > 1))
+                number = field_named("pads").words(pads)
+                words.append(number if zone == 1 else f"{number} in zone {zone}")
         fleets.append(numbers.join_words([*words, *others]) or "the fleet of the scenario")
     return fleets
 

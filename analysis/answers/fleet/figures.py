@@ -127,6 +127,8 @@ def _draw_costs(results: Results, rows: pd.DataFrame, metric: str, marks: str) -
     bounds = {requirement.column: requirement.bound for requirement in requirements_of(results)}
     least = bounds.get(metric)
     drawing = plot_costs(rows, metric, results.manifest["study"]["costs"]["currency"], least)
-    alt = f"Cost against {metric_of(metric).within}{', ' * bool(condition)}{condition}"
+    alt = f"Cost against {metric_of(metric).within}"
+    if condition:
+        alt += f", {condition}"
     counted = f"{INTERVALS}; n = {counted_missions(rows)} missions per setting."
     return Drawing(drawing, alt, f"{alt}. {marks} Bars are {counted}", rows)

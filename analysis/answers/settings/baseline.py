@@ -96,8 +96,7 @@ def baseline_table(results: Results, point: int, metric: str) -> Table:
     cells["Difference"] = [of.change(*row) for row in top[["difference", "low", "high"]].to_numpy()]
     cells["p (Holm)"] = top["p_adjusted"].map(numbers.format_p_value)
     cells["Pairs"] = format_counts(top["n"])
-    caption = (
-        f"{of.name}: paired difference from the baseline{' in percentage points' * of.in_percent} "
-        f"with {INTERVALS}; the {len(top):,} largest of {len(rows):,} differences"
-    )
+    unit = " in percentage points" if of.in_percent else ""
+    caption = f"{of.name}: paired difference from the baseline{unit} with {INTERVALS}; "
+        f"the {len(top):,} largest of {len(rows):,} differences"
     return Table(cells, caption, data)

@@ -183,8 +183,9 @@ def draw_heat_map(
         figure.supylabel(field_named(y).tick, fontsize=10, parse_math=True)
         title = f"{of.label}: {policy}"
         figure.suptitle(title, fontsize=11, fontweight="bold", x=0.02, ha="left")
-    caption = f"Means of {policy}, {'in percent, ' * of.in_percent}n = {counted_missions(data)} "
-    caption += f"{'replications' if facet else 'missions'} per cell. "
+    unit = "in percent, " if of.in_percent else ""
+    counted = "replications" if facet else "missions"
+    caption = f"Means of {policy}, {unit}n = {counted_missions(data)} {counted} per cell. "
     if facet:
         caption += f"One panel for each value of the {field_named(facet).within}"
         caption += f"{_left_out_in_words(values[facet], panels)}. "

@@ -119,10 +119,9 @@ def ends_sentence(
     """
     values = values_of_points(results).loc[point]
     named = [f"{field_named(f).words(values[f])} is the {word}" for f, word in found.items()]
-    return (
-        f" Of the values asked for, {numbers.join_words(named)}; {better} may lie beyond."
-        * bool(named)
-    )
+    if not named:
+        return ""
+    return f" Of the values asked for, {numbers.join_words(named)}; {better} may lie beyond."
 
 
 def intervals_in_words(results: Results) -> str:

@@ -101,13 +101,17 @@ def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) ->
     else:
         what = "policy"
     many = len(names) - 1
-    named = f" ({'; '.join(names[1:])})" * (many <= MOST_NAMES)
-    if others == 1:
-        rest = f"The other {what} {'may be as good' if many else 'is significantly worse'}."
-    elif not many:
+    named = ""
+    if many <= MOST_NAMES:
+        named = f" ({'; '.join(names[1:])})"
+    if not others:
         rest = ""
-        if others:
-            rest = f"All {others:,} others are significantly worse."
+    elif others == 1 and many:
+        rest = f"The other {what} may be as good."
+    elif others == 1:
+        rest = f"The other {what} is significantly worse."
+    elif not many:
+        rest = f"All {others:,} others are significantly worse."
     elif many == others:
         rest = f"All {others:,} others may be as good{named}."
     else:
