@@ -97,6 +97,8 @@ def baseline_table(results: Results, point: int, metric: str) -> Table:
     cells["p (Holm)"] = top["p_adjusted"].map(numbers.format_p_value)
     cells["Pairs"] = format_counts(top["n"])
     unit = " in percentage points" if of.in_percent else ""
-    caption = f"{of.name}: paired difference from the baseline{unit} with {INTERVALS}; "
+    caption = (
+        f"{of.name}: paired difference from the baseline{unit} with {INTERVALS}; "
         f"the {len(top):,} largest of {len(rows):,} differences"
+    )
     return Table(cells, caption, data)
