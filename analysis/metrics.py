@@ -257,8 +257,10 @@ def metric_for_length(column: str, slots: int, units: Units | None) -> Metric:
         slots: The longest that a mission may last.
         units: What a slot is, of missions with a data sheet.
     """
-    of = metric_of(column)
-    return of.lasting(slots * size_of(of.unit, units) if units and of.is_told else slots)
+    metric = metric_of(column)
+    return metric.lasting(
+        slots * size_of(metric.unit, units) if units and metric.is_told else slots
+    )
 
 
 def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
@@ -269,18 +271,18 @@ def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
             failures cost if they have ``MOST_LOST``, as the missions of results do.
         column: The column.
     """
-    of = metric_of(column)
-    if of.kind == "cost" and MOST_LOST in missions:
-        return replace(of, failure=float(missions[MOST_LOST].max()))
+    metric = metric_of(column)
+    if metric.kind == "cost" and MOST_LOST in missions:
+        return replace(metric, failure=float(missions[MOST_LOST].max()))
     longest = metric_of(MOST_SLOTS)
-    if of.is_told:
+    if metric.is_told:
         longest = longest.in_units
-    if not of.horizons or longest.column not in missions or not len(missions):
-        return of
+    if not metric.horizons or longest.column not in missions or not len(missions):
+        return metric
     units = 1.0
-    if of.is_told:
-        units = _SIZES[longest.unit] / _SIZES[of.unit]
-    return of.lasting(float(missions[longest.column].max()) * units)
+    if metric.is_told:
+        units = _SIZES[longest.unit] / _SIZES[metric.unit]
+    return metric.lasting(float(missions[longest.column].max()) * units)
 
 
 def in_either(*columns: str) -> list[str]:
@@ -290,8 +292,9 @@ def in_either(*columns: str) -> list[str]:
 
 def column_as_told(column: str, missions: Container[str]) -> str:
     """The column in which a table of missions tells a metric: in units if there is a data sheet."""
-    if (of := _TOLD.get(column, column)) in missions:
-        return of
+    in_units = _TOLD.get(column)
+    if in_units in missions:
+        return in_units
     return column
 
 
@@ -302,14 +305,14 @@ def columns_in_units(missions: Mapping[str, Any], units: Units) -> dict[str, Any
         missions: The columns of the missions, as records have them.
         units: What a slot and a data unit are, numbers or an array of one for each mission.
     """
-    known = [m for m in (*_MEASURED, *_RECORDED) if m.told and m.column in missions]
-    return {m.in_units.column: missions[m.column] * size_of(m.told, units) for m in known}
+    metrics = [m for m in (*_MEASURED, *_RECORDED) if m.told and m.column in missions]
+    return {m.in_units.column: missions[m.column] * size_of(m.told, units) for m in metrics}
 
 
 def size_of(unit: str, units: Units) -> float:
     """A slot, a data unit or a cell in a unit of time, data or length."""
-    of = {"MB": units.data, "km": units.cell}.get(unit, units.slot)
-    return of / _SIZES[unit]
+    size = {"MB": units.data, "km": units.cell}.get(unit, units.slot)
+    return size / _SIZES[unit]
 
 
 def format_length(slots: int, units: Units | None) -> str:

@@ -232,8 +232,8 @@ def node_placing_sentence(space: ScenarioSpace) -> str:
 def value_text(value: object) -> str:
     """A value of a parameter as text: ``12.5``, ``yes``, or ``5–7.5`` for a range."""
     if isinstance(value, dict):  # a type of UAVs
-        given = {key: of_key for key, of_key in value.items() if of_key is not None}
-        return " ".join(f"{key} {value_text(of_key)}" for key, of_key in given.items())
+        settings = {key: of_key for key, of_key in value.items() if of_key is not None}
+        return " ".join(f"{key} {value_text(of_key)}" for key, of_key in settings.items())
     if isinstance(value, list | tuple):
         if any(isinstance(item, dict) for item in value):
             joint = ", "

@@ -14,8 +14,8 @@ _NAN = re.compile(r"\bnan\b")
 
 def why_nan(cells: Iterable[object]) -> str:
     """Why a table has nan, in words; empty if no cell has."""
-    found = any(_NAN.search(str(cell)) for cell in cells)
-    if found:
+    has_nan = any(_NAN.search(str(cell)) for cell in cells)
+    if has_nan:
         return "nan: the missions are too few, or too similar, to estimate it"
     return ""
 

@@ -63,8 +63,8 @@ def estimate_cells(
     """
 
     order = rows[columns].unique()
-    known = rows[rows["mean"].notna()]
-    table = numbers.estimates_as_text(known, [*index], columns, write)
+    estimated = rows[rows["mean"].notna()]
+    table = numbers.estimates_as_text(estimated, [*index], columns, write)
     table = table[[name for name in order if name in table]].fillna("").reset_index()
     for name in index:
         if name == "n":

@@ -79,10 +79,10 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
     Raises:
         InputError: If the study has fewer than two policies, or lacks a policy that is named.
     """
-    for name, given in (("learned", learned), ("heuristic", heuristic)):
-        if given is not None and given not in results.policies:
-            allowed = one_of(given, results.policies)
-            raise InputError(f"{name}: {given!r} is not in the study{allowed}")
+    for role, asked in (("learned", learned), ("heuristic", heuristic)):
+        if asked is not None and asked not in results.policies:
+            allowed = one_of(asked, results.policies)
+            raise InputError(f"{role}: {asked!r} is not in the study{allowed}")
     means = by_replication(results.missions, PRODUCT, ["policy", "point"]).mean()
     means = means.groupby("policy").mean()
     trained = sorted(
@@ -354,8 +354,8 @@ def differences_along_parameters(missions: pd.DataFrame, candidates: int = 1) ->
             part = missions[bin_of == code]
             value = names[code]
             ours, theirs = (values_within(part, PRODUCT + end, ()) for end in ("", OF_BASELINE))
-            found = compare_pairs(ours, theirs, metric=PRODUCT)
-            rows.append((field, position, value, *found[:4], found.n))
+            comparison = compare_pairs(ours, theirs, metric=PRODUCT)
+            rows.append((field, position, value, *comparison[:4], comparison.n))
     columns = ["field", "position", "value", "mean", "low", "high", "p", "n"]
     table = add_adjusted(pd.DataFrame(rows, columns=columns), "holm")
     table = for_choice(table, candidates)
@@ -458,7 +458,7 @@ def dependence_table(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFr
     lines = []
     for row in dependences[dependences["field"].isin(lead["field"])].itertuples():
         rows = lead[lead["field"] == row.field].sort_values("mean", kind="stable")
-        bins_ = [f"{_format_points(one)} at {one.value}" for one in rows.itertuples()]
+        bins_ = [f"{_format_points(bin_row)} at {bin_row.value}" for bin_row in rows.itertuples()]
         shown = numbers.format_percent(row.explained), numbers.format_p_value(row.p_adjusted)
         lines.append((field_named(row.field).name, bins_[0], bins_[-1], *shown))
     heads = ["Parameter", "Lowest difference", "Highest difference", "Variance explained"]

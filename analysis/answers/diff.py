@@ -290,9 +290,9 @@ def _rows_of_one_side(
     side: str, results: Results, missions: pd.DataFrame, others: pd.DataFrame, keys: list[str]
 ) -> pd.DataFrame:
     """What only one side has: complete policies, complete design points, or replications."""
-    known = others[keys].drop_duplicates()
-    found = missions[keys].merge(known, how="left", indicator="found")["found"]
-    rows = missions[found.to_numpy() != "both"]
+    other_keys = others[keys].drop_duplicates()
+    side_of_row = missions[keys].merge(other_keys, how="left", indicator="found")["found"]
+    rows = missions[side_of_row.to_numpy() != "both"]
     scenario = f"the scenario of study {results.study.name}"
     words = pd.Series([setting or scenario for setting in points_in_words(results)])
     points = rows["point"].map(words)

@@ -103,8 +103,8 @@ def compare_variants(last: pd.DataFrame, baseline: str) -> pd.DataFrame:
     columns = ["variant", "n", "mean", "low", "high", "new_low", "new_high"]
     columns += ["difference", "difference_low", "difference_high", "p"]
     table = pd.DataFrame(rows, columns=columns)
-    known = table["p"].notna()
-    table.loc[known, "p_adjusted"] = adjust_p_values(table.loc[known, "p"].to_numpy(), "holm")
+    has_p = table["p"].notna()
+    table.loc[has_p, "p_adjusted"] = adjust_p_values(table.loc[has_p, "p"].to_numpy(), "holm")
     return table.sort_values("mean", ascending=False, kind="stable", ignore_index=True)
 
 
@@ -520,8 +520,8 @@ def transfer_table(
         if last.low == last.high:
             difference_at_end = f"{difference_at_end.split()[0]}, the same in all trainings"
         n = "{} and {}".format(*compared.trainings)
-        found = named, verdicts[name, metric], compared.course, difference_at_end
-        rows.append((name[0].upper() + name[1:], n, *found))
+        cells = named, verdicts[name, metric], compared.course, difference_at_end
+        rows.append((name[0].upper() + name[1:], n, *cells))
     head = ["Trainings with", "n", "Metric", "Verdict", "With transfer, the mean curve"]
     return pd.DataFrame(rows, columns=[*head, "Difference at the end"])
 
@@ -563,8 +563,8 @@ def read_curves(path: Path) -> pd.DataFrame:
     pairs = pairs_in(curves).values()
     ends = [{*last_phase(averages, a).index} & {*last_phase(averages, b).index} for a, b in pairs]
     if BASELINE not in {*curves["variant"]} or not ends or not all(ends):
-        known = " and ".join(next(iter(PAIRS.values())))
-        raise InputError(f"{path}: variant: has no pair of trainings; allowed: {known}")
+        pair = " and ".join(next(iter(PAIRS.values())))
+        raise InputError(f"{path}: variant: has no pair of trainings; allowed: {pair}")
     return curves
 
 
@@ -651,7 +651,9 @@ def _policies_of_runs(results: Results) -> dict[str, list[str]]:
     if len(counts) > 1:
         raise InputError(f"trainings: {sorted(counts)}; allowed: as many of every learner")
     runs = max(counts, default=RUNS)
-    return {name: of if len(of) == runs else of * runs for name, of in algorithms.items()}
+    return {
+        name: names if len(names) == runs else names * runs for name, names in algorithms.items()
+    }
 
 
 class Trained(NamedTuple):
@@ -677,10 +679,10 @@ def trained_policies(folder: Path) -> list[Trained]:
         InputError: If a policy or a curve is damaged.
     """
     paths = paths_in(folder, "*/training.parquet")
-    found = [(path, read_description(path.parent).training) for path in paths]
+    trainings = [(path, read_description(path.parent).training) for path in paths]
     return [
         Trained(path.parent.name, config, read_curve(path))
-        for path, config in found
+        for path, config in trainings
         if not config.seas
     ]
 

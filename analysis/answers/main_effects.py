@@ -244,7 +244,10 @@ def main_effects_table(table: pd.DataFrame, changes: ByField, ratios: ByField) -
             first, last = [
                 f"{numbers.format_percent(row.mean)} at {row.value}" for row in ends.itertuples()
             ]
-            steps = [_format_total_change(of) for of in (pairs, ratios[field][policy])]
+            steps = [
+                _format_total_change(changes_of_metric)
+                for changes_of_metric in (pairs, ratios[field][policy])
+            ]
             peaks = []
             if along.words == PEAK:
                 peaks = values.loc[[*along.peaks], "value"]

@@ -309,8 +309,8 @@ def _ordering_directions(nodes: np.ndarray) -> np.ndarray:
     The order along a direction changes where two nodes have the same position on it; the returned
     directions lie between these changes.
     """
-    one, other = np.triu_indices(len(nodes), 1)
-    gaps = (nodes[other] - nodes[one])[(nodes[other] != nodes[one]).any(axis=1)]
+    first, second = np.triu_indices(len(nodes), 1)
+    gaps = (nodes[second] - nodes[first])[(nodes[second] != nodes[first]).any(axis=1)]
     turns = np.unique(np.round(np.arctan2(gaps[:, 0], -gaps[:, 1]) % np.pi, 9))
     turns = turns if turns.size else np.zeros(1)
     between = turns + np.diff(turns, append=turns[0] + np.pi) / 2

@@ -108,7 +108,7 @@ def changes_from_reference(
             f"{field}: is never {reference!r} in the study; allowed: one of its values"
         )
     rows = []
-    of = metric_in_missions(results.missions, metric)
+    measure = metric_in_missions(results.missions, metric)
     for policy, missions in results.missions.groupby("policy", sort=False):
         wide = by_replication(missions, metric, "point")
         for point, partner in _pairs_of_points(table, field, reference):
@@ -118,9 +118,9 @@ def changes_from_reference(
             if relative:
                 pairs = both[point].to_numpy(), both[partner].to_numpy()
                 plain = relative_change(*pairs)
-                change = (*relative_change(*pairs, of), (plain.high - plain.low) / 2)
+                change = (*relative_change(*pairs, measure), (plain.high - plain.low) / 2)
             else:
-                tests = column_tests(both[[point]], both[partner], of)
+                tests = column_tests(both[[point]], both[partner], measure)
                 change = tests[["difference", "low", "high", "student"]].iloc[0]
             rows.append((policy, *table.to_dict("records")[point].values(), *change, len(both)))
     return pd.DataFrame(rows, columns=["policy", *table, *_ENDS, "student", "n"])
@@ -181,8 +181,8 @@ def enough_pads(results: Results, margin: float) -> pd.DataFrame:
 def short_of_pads(results: Results, margin: float) -> list[int]:
     """The design points with one pad, and with one pad less than is enough, for every fleet."""
     table = values_of_points(results)
-    found = enough_pads(results, margin)
-    enough = found[found["policy"] == results.policies[0]].set_index("uavs")["pads"]
+    sufficient = enough_pads(results, margin)
+    enough = sufficient[sufficient["policy"] == results.policies[0]].set_index("uavs")["pads"]
     fewer = table[table["pads"] < table["uavs"].map(enough)]
     fewest = table[table["pads"] == table["pads"].min()]
     return sorted({*fewest.index, *fewer.groupby("uavs")["pads"].idxmax()})
@@ -195,10 +195,10 @@ def _number_with_verb(number: int) -> str:
 
 def enough_pads_sentence(results: Results, margin: float) -> str:
     """How many pads are enough for every fleet, by the first policy of the study."""
-    found = enough_pads(results, margin)
+    sufficient = enough_pads(results, margin)
     most = max(varied_values(results).get("pads", [0]))
     parts = []
-    for row in found[found["policy"] == results.policies[0]].itertuples():
+    for row in sufficient[sufficient["policy"] == results.policies[0]].itertuples():
         part = f"{_number_with_verb(row.pads)} enough for {row.uavs} UAVs"
         if row.too_few:
             part += f", {_number_with_verb(row.too_few)} too few"
@@ -316,8 +316,8 @@ def failures_sentence(results: Results) -> str:
 
 def format_relative_change(mean: float, low: float, high: float) -> str:
     """A relative change with its interval, as ``−46.0 % [−47.1, −44.9]``."""
-    middle, *ends = [numbers.format_minus(f"{100 * value:+.1f}") for value in (mean, low, high)]
-    return f"{middle} % [{ends[0]}, {ends[1]}]"
+    mean_text, *ends = [numbers.format_minus(f"{100 * value:+.1f}") for value in (mean, low, high)]
+    return f"{mean_text} % [{ends[0]}, {ends[1]}]"
 
 
 def count_waiting_uavs(events: pd.DataFrame) -> np.ndarray:

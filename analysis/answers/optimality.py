@@ -82,8 +82,8 @@ def in_words(results: Results, policy: str | None = None) -> str:
     """
     policy = policy or summary.best_policy(results.missions)
     table = by_fleet(results)
-    found = fleets_with_useful_bound(table)
-    rows = found[found["policy"] == policy]
+    useful = fleets_with_useful_bound(table)
+    rows = useful[useful["policy"] == policy]
     parts = [
         f"{100 * row[f'{GAP}_high']:.1f} points with {numbers.format_count(row['uavs'], 'UAV')} "
         f"(mean gap {_format_gap(*row[[GAP, f'{GAP}_low', f'{GAP}_high']])}, "

@@ -266,9 +266,9 @@ def draw_prices(results: Results, replication: int) -> Drawing:
         results: A study with bounds.
         replication: The mission; if it has no bound, the first one that has is taken.
     """
-    known = [number for _, number in results.bounds]
-    if replication not in known:
-        replication = known[0]
+    replications = [number for _, number in results.bounds]
+    if replication not in replications:
+        replication = replications[0]
     values = node_prices(results, replication)
     return Drawing(
         node_map(results.scenario(), "Price of a node's data", values, write="{:.2f}".format),

@@ -96,9 +96,10 @@ def shares_of_reference(results: Results, reference: str, by: str = ALL) -> pd.D
     """
 
     def compared(values: pd.DataFrame) -> pd.DataFrame:
-        known = values[reference].to_numpy()
+        reference_values = values[reference].to_numpy()
         changes = {
-            name: relative_change(of.to_numpy(), known, PRODUCT) for name, of in values.items()
+            name: relative_change(column.to_numpy(), reference_values, PRODUCT)
+            for name, column in values.items()
         }
         changes[reference] = Interval(0.0, 0.0, 0.0)  # of itself, which is no estimate
         return (1 + pd.DataFrame(changes, index=_ENDS).T).assign(n=len(values))

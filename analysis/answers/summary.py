@@ -64,7 +64,7 @@ def means_of_points(results: Results) -> pd.DataFrame:
         search, the intervals allow for it (``stats.intervals.level_after``).
     """
     cell = ["policy", "point"]
-    looks = {of: results.looks(of) for of in results.policies}
+    looks = {name: results.looks(name) for name in results.policies}
     if not any(of_policy.any() for of_policy in looks.values()):
         return summary(results.missions, by=cell)
     tables = [
@@ -116,8 +116,8 @@ def add_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
             missions = results.missions[results.missions["point"] == point]
             wide = by_replication(missions, str(metric), "policy")
             looks = np.array([results.looks(policy)[point] for policy in rows["policy"]])
-            of = metric_in_missions(results.missions, str(metric))
-            may_be = may_be_best(wide[rows["policy"]].to_numpy(float), of, looks)
+            measure = metric_in_missions(results.missions, str(metric))
+            may_be = may_be_best(wide[rows["policy"]].to_numpy(float), measure, looks)
             may_be &= within_reach(rows["low"], rows["high"], str(metric)).to_numpy()
             if may_be.sum() > 1:
                 best = TIED
@@ -252,7 +252,7 @@ def guard_sentences(means: pd.DataFrame) -> str:
     Args:
         means: Rows of ``dess.analysis.summary`` by policy.
     """
-    known = {*means["policy"]}
+    policies = {*means["policy"]}
     guarded_means = means[(means["metric"] == SUCCESS) & (means["policy"] != UNGUARDED)]["mean"]
     ends = dict.fromkeys(map(numbers.format_percent, (guarded_means.min(), guarded_means.max())))
     text = (
@@ -260,7 +260,7 @@ def guard_sentences(means: pd.DataFrame) -> str:
         f"{' to '.join(ends)} of the missions."
     )
     for policy, guarded in (("random", "under"), (UNGUARDED, "without")):
-        if policy in known:
+        if policy in policies:
             share = metrics_of_policy(means, policy)[SUCCESS]
             text += f" Random moves {guarded} the guard have a success of {share}."
     return text
@@ -506,7 +506,7 @@ def quantile_table(rows: pd.DataFrame, metric: str) -> Table:
         rows: Rows of ``dess.analysis.distribution``.
         metric: The metric.
     """
-    of = metric_of(metric)
+    measure = metric_of(metric)
     heads = []
     for row in rows.itertuples():
         share = numbers.format_level(row.share)
@@ -514,10 +514,10 @@ def quantile_table(rows: pd.DataFrame, metric: str) -> Table:
             f"{share} quantile" if row.view == "quantile" else f"Mean of the worst {share}"
         )
     long = rows.assign(head=heads).rename(columns={"value": "mean"})
-    cells = numbers.estimates_as_text(long, "policy", "head", of.written).reset_index(
+    cells = numbers.estimates_as_text(long, "policy", "head", measure.written).reset_index(
         names="Policy"
     )
-    return Table(cells, f"Quantiles of {of.within} over missions, with {INTERVALS}", rows)
+    return Table(cells, f"Quantiles of {measure.within} over missions, with {INTERVALS}", rows)
 
 
 def reached_precisions(results: Results) -> pd.DataFrame:
@@ -573,9 +573,9 @@ def selected_settings(results: Results) -> pd.DataFrame:
     rows = []
     for policy in results.policies:
         if (c := results.choice(policy)) is not None:
-            found = (policy, c.best, words[c.best], c.missions, len(c.survivors))
+            selected = (policy, c.best, words[c.best], c.missions, len(c.survivors))
             lies = ends_sentence(results, c.best, ends_of_point(results, c.best))
-            rows.append((*found, c.guaranteed, f"{c.guarantee}.{lies}" if lies else c.guarantee))
+            rows.append((*selected, c.guaranteed, f"{c.guarantee}.{lies}" if lies else c.guarantee))
     columns = ["policy", "point", "setting", "missions", "left", "guaranteed", "guarantee"]
     return pd.DataFrame(rows, columns=columns)
 
@@ -606,15 +606,15 @@ def plot_performance(summary: pd.DataFrame, metric: str, printed: float | None =
         printed: The paper's number.
     """
     rows = summary[summary["metric"] == metric]
-    of = metric_of(metric)
+    measure = metric_of(metric)
     with style.new_panels(1.3 + 0.42 * len(rows), values="x") as (figure, ax):
         style.plot_in_rows(rows, ax)
         for y, mean in enumerate(rows["mean"]):
-            style.note_at_right(of.write(mean), y, ax)
+            style.note_at_right(measure.write(mean), y, ax)
         if printed is not None:
-            ax.axvline(printed, **PRINTED, label=f"paper {of.write(printed)}", zorder=1)
-        ax.set(title=of.name, xlim=(-0.02, 1.02) if of.is_bounded else None)
-        style.set_axis_unit(ax.xaxis, of.axis, 5)
+            ax.axvline(printed, **PRINTED, label=f"paper {measure.write(printed)}", zorder=1)
+        ax.set(title=measure.name, xlim=(-0.02, 1.02) if measure.is_bounded else None)
+        style.set_axis_unit(ax.xaxis, measure.axis, 5)
     return figure
 
 

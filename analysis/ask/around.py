@@ -106,7 +106,9 @@ def _changed_fields(space: ScenarioSpace) -> Iterator[dict[str, Any]]:
     calm = f"{times(sheet.cruise or '', WIND)} from W"
     yield {"data_sheet.wind": times(sheet.wind, FACTOR) if sheet.wind else calm}
     yield {"data_sheet.mtbf": times(sheet.mtbf, 1 / FACTOR) if sheet.mtbf else f"{HOURS} h"}
-    doubled = [times(of, FACTOR) for of in ([rate] if isinstance(rate, str) else rate)]
+    doubled = [
+        times(rate_of_node, FACTOR) for rate_of_node in ([rate] if isinstance(rate, str) else rate)
+    ]
     yield {"data_sheet.data_rate": doubled[0] if isinstance(rate, str) else doubled}
 
 
@@ -116,13 +118,15 @@ def table_around(results: Results) -> Table:
     Args:
         results: The study that ``question_around`` was asked about.
     """
-    found = load_results(_place_of_question(results))
+    changed_results = load_results(_place_of_question(results))
     requirements = requirements_of(results)
-    start, *rows = [point.values for point in found.store.manifest.points]
+    start, *rows = [point.values for point in changed_results.store.manifest.points]
     changes = [{f: v for f, v in row.items() if v != start.get(f)} for row in rows]
-    words = ["the fleet: " + fleets_in_words(found)[0], *map(_in_words, changes)]
-    refused = [change for change in _changed_fields(found.scenario(0)) if change not in changes]
-    data = priced_settings(found)
+    words = ["the fleet: " + fleets_in_words(changed_results)[0], *map(_in_words, changes)]
+    refused = [
+        change for change in _changed_fields(changed_results.scenario(0)) if change not in changes
+    ]
+    data = priced_settings(changed_results)
     data = data.assign(
         change=[words[point] for point in data["point"]],
         lead=least_spare(data, requirements),
@@ -133,7 +137,7 @@ def table_around(results: Results) -> Table:
     cells = setting_cells(data.assign(condition="", fleet=data["change"]), columns)
     cells = cells.drop(columns="Policy").rename(columns={"Fleet": "What if"})
     cells = cells.rename(columns={"Cost": f"Cost [{currency_of(results)}]"})
-    differences = compare(found.missions, 0, columns, correction=None, of="point")
+    differences = compare(changed_results.missions, 0, columns, correction=None, of="point")
     differences = differences.set_index(["metric", "point"])[["difference", "low", "high"]]
     for metric in map(metric_of, columns):
         of_changes = differences.loc[metric.column].loc[data["point"][1:]]

@@ -77,8 +77,8 @@ class Question:
     @property
     def others(self) -> list[Path]:
         """The results folders of the other questions, whose missions are copied."""
-        found = paths_in(self.out.parent, f"*/{MANIFEST}")
-        return [path.parent for path in found if path.parent != self.out]
+        manifests = paths_in(self.out.parent, f"*/{MANIFEST}")
+        return [path.parent for path in manifests if path.parent != self.out]
 
     def plan(self, workers: int = 1) -> list[Planned]:
         """What ``ask`` would do, as ``plan_study`` says it; nothing is written."""
@@ -219,10 +219,10 @@ def sweep_question(
         decided["selection"] = _cheapest_rule(requirements, missions, study)
     if policies is None:
         if requirements:
-            each = max(ROOM, missions)
+            missions_per_point = max(ROOM, missions)
         else:
-            each = missions
-        decided["policies"] = policies_for(study.scenarios, each)
+            missions_per_point = missions
+        decided["policies"] = policies_for(study.scenarios, missions_per_point)
     study = study.model_copy(update=decided)
     if name is None:
         name = f"{'-'.join(swept)[:LONGEST] or 'sweep'}-{_question_key(study)}"
@@ -259,9 +259,9 @@ def _cheapest_rule(
         "check": missions,
     }
     try:
-        found = Cheapest.model_validate(rule)
-        found.check_age(spaces)
-        return found
+        cheapest_rule = Cheapest.model_validate(rule)
+        cheapest_rule.check_age(spaces)
+        return cheapest_rule
     except ValidationError as error:
         raise InputError(validation_line(error, "sweep: selection: cheapest", Cheapest)) from None
 

@@ -176,7 +176,7 @@ def sweep(
             policy cannot act in the scenario, or the sweep would take long.
         ChunkError: If a chunk could not be computed. It is raised after all other chunks are done.
     """
-    values = {field: values_of(field, given) for field, given in fields.items()}
+    values = {field: values_of(field, asked) for field, asked in fields.items()}
     about = scenario, policies, missions, seed, prices, requirements, name, folder
     question = sweep_question(values, *about)
     if progress is True:

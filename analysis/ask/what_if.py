@@ -80,14 +80,14 @@ def missions_of(results: Results) -> pd.DataFrame:
     missions = results.missions.join(sums, on=_MISSION)
     units = results.store.manifest.units_at(missions["point"].to_numpy())
     fillable = [name for name in _NOTHING if name in missions]
-    found = missions.fillna(dict.fromkeys(fillable, 0.0)).assign(
+    sides = missions.fillna(dict.fromkeys(fillable, 0.0)).assign(
         collected_per_uav=missions["collected"] / missions["uavs"],
         charging_per_uav=missions["slots_charging"] / missions["uavs"],
         waiting_per_uav=missions["slots_waiting"] / missions["uavs"],
     )
     if units:
-        return found.assign(**columns_in_units(found, units))
-    return found
+        return sides.assign(**columns_in_units(sides, units))
+    return sides
 
 
 def measured_columns(results: Results) -> list[str]:
@@ -144,8 +144,8 @@ def verdict_on_change(answer: Any) -> str:
     Args:
         answer: A row of ``compare_sides``.
     """
-    known = answer.low < answer.high or answer.p <= 1 - LEVEL
-    if known:
+    is_estimated = answer.low < answer.high or answer.p <= 1 - LEVEL
+    if is_estimated:
         return position_of(answer)
     return INCONCLUSIVE
 
@@ -193,11 +193,11 @@ def conclusion_in_words(answer: Any) -> str:
         BELOW: "is **lower** in the variation",
         INCONCLUSIVE: "is **inconclusive**",
     }
-    found = verdict_on_change(answer)
+    verdict = verdict_on_change(answer)
     return (
-        f"**{answer.policy}**: product {words[found]}, by {format_change(answer)} points: from "
+        f"**{answer.policy}**: product {words[verdict]}, by {format_change(answer)} points: from "
         f"{numbers.format_percent(answer.before)} to {numbers.format_percent(answer.after)}."
-        f"{_missing_in_words(answer) if found == INCONCLUSIVE else ''}"
+        f"{_missing_in_words(answer) if verdict == INCONCLUSIVE else ''}"
     )
 
 
@@ -480,8 +480,8 @@ class WhatIf:
         first.
         """
         ordered = product_differences(self.results, self.shown).sort_values(kind="stable")
-        middle = ordered.iloc[(len(ordered) - 1) // 2]
-        return Example(self, int(ordered.index[ordered == middle][0]))
+        median = ordered.iloc[(len(ordered) - 1) // 2]
+        return Example(self, int(ordered.index[ordered == median][0]))
 
     def worst(self) -> "Example":
         """The replication with the lowest product in the variation.

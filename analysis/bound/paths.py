@@ -149,9 +149,9 @@ def blocks_of(nodes: np.ndarray, size: tuple[int, int], most: int, levels: np.nd
     cells = np.moveaxis(np.indices(size), 0, -1)
     home = np.argmin(((cells[:, :, None] - nodes) ** 2).sum(axis=-1), axis=-1)
     borders = np.zeros((len(nodes), len(nodes)), np.int64)
-    for one, other in ((home[1:], home[:-1]), (home[:, 1:], home[:, :-1])):
-        np.add.at(borders, (one, other), 1)
-        np.add.at(borders, (other, one), 1)
+    for cell, neighbour in ((home[1:], home[:-1]), (home[:, 1:], home[:, :-1])):
+        np.add.at(borders, (cell, neighbour), 1)
+        np.add.at(borders, (neighbour, cell), 1)
     np.fill_diagonal(borders, 0)
     most = min(most, max(int((borders > 0).sum(axis=1).max()), 1))
     near = np.argsort(-borders, axis=1, kind="stable")[:, :most]
@@ -227,14 +227,14 @@ def bound_of_beginning(blocks, local, now, ahead, had, then_had, home, there, le
     if memory > 0:
         left = local[home, blocks.levels[later]]
     new = then_had[there] - (had[there] if level > 0 else 0.0)
-    known = local[there, blocks.levels[level]]
+    price_there = local[there, blocks.levels[level]]
     least = np.inf
     best = 0
     for q in range(local.shape[1]):
         price = local[there, q]
         value = now[q] + ahead[memory, q] + price * new
         if level > 0:
-            value += max(price - known, 0.0) * had[there]
+            value += max(price - price_there, 0.0) * had[there]
         if value < least:
             least = value
             best = q
@@ -272,8 +272,8 @@ def _bound_slot(f, to_zone, phases, data, period, blocks, local, values, waiting
     for phase in range(len(phases.deadline) - 1, -1, -1):
         if phase > 0 and f < min(phases.opens[0], slots):
             continue
-        here = ceilings[f, phase]
-        here[:] = -waiting[last_slot(phases, phase, f, len(waiting) - 1)]
+        ceiling = ceilings[f, phase]
+        ceiling[:] = -waiting[last_slot(phases, phase, f, len(waiting) - 1)]
         if f == slots:
             continue
         had = data_had(data, phases, phase, f)
@@ -289,7 +289,7 @@ def _bound_slot(f, to_zone, phases, data, period, blocks, local, values, waiting
                     if is_reached(to_zone, phases, phase, f, x, y):
                         _raise_by_acting(
                             to_zone, phases, f, phase, blocks, local, gain, then, had, then_had,
-                            begins, x, y, scratch, here[x, y],
+                            begins, x, y, scratch, ceiling[x, y],
                         )  # fmt: skip
         target = phases.after[f]
         for x in range(width):
@@ -297,7 +297,7 @@ def _bound_slot(f, to_zone, phases, data, period, blocks, local, values, waiting
                 if may_charge(to_zone, phases, phase, f, x, y):
                     new = data_had(data, phases, target, f) - had
                     _raise_by_charging(
-                        blocks, local, new, ceilings[f, target, x, y], x, y, here[x, y]
+                        blocks, local, new, ceilings[f, target, x, y], x, y, ceiling[x, y]
                     )
 
 
@@ -327,14 +327,14 @@ def _bound_beginnings(to_zone, phases, f, phase, blocks, local, gain, then, had,
                 y2 = y + STEP_Y[action]
                 if not is_reached(to_zone, phases, phase, f + 1, x2, y2):
                     continue
-                home, there = blocks.home[x, y], blocks.home[x2, y2]
-                if there == home or not is_reached(to_zone, phases, phase, f, x, y):
+                home, next_home = blocks.home[x, y], blocks.home[x2, y2]
+                if next_home == home or not is_reached(to_zone, phases, phase, f, x, y):
                     continue
                 for level in range(levels):
                     for later in range(levels):
                         begins[action, x2, y2, level, later], _ = bound_of_beginning(
                             blocks, local, gain[action, x2, y2], then[x2, y2], had, then_had,
-                            home, there, level, later, np.inf,
+                            home, next_home, level, later, np.inf,
                         )  # fmt: skip
 
 
@@ -351,13 +351,13 @@ def _raise_by_acting(
         y2 = y + STEP_Y[action]
         if not is_reached(to_zone, phases, phase, f + 1, x2, y2):
             continue
-        there = blocks.home[x2, y2]
+        next_home = blocks.home[x2, y2]
         for memory in range(len(here)):
             node, level = decode_memory(blocks, home, memory)
             if node < 0 and memory > 0:  # this block has fewer neighbours
                 break
-            if there != home:
-                begin = begins[action, x2, y2, level if node == there else 0]
+            if next_home != home:
+                begin = begins[action, x2, y2, level if node == next_home else 0]
                 for q in range(prices):
                     value = np.inf
                     for later in range(len(begin)):

@@ -259,22 +259,22 @@ class Bounds:
 
     def at(self, prices: np.ndarray) -> tuple[float, np.ndarray]:
         """The bound at prices (S, K), as a share of all data, and its derivatives (S, K)."""
-        known = self.known
+        mission = self.known
         cuts = self.cuts[:-1]
-        team = len(known.starts)
-        data = known.data
-        total = known.data[-1].sum()
+        team = len(mission.starts)
+        data = mission.data
+        total = mission.data[-1].sum()
         worth = np.maximum(1.0 - prices[::-1].cumsum(axis=0)[::-1], 0.0)
         local = worth[-1][:, None] * self.parts
         waiting = ((1.0 - prices[-1]) * data).sum(axis=1) / team
-        service = (known.nodes, known.rates, known.below)
-        step_values(worth, local, known.nodes, self.blocks.home, *service[1:], self.values)
-        before = (known.to_zone, known.phases, data, self.period, self.blocks, local)
+        service = (mission.nodes, mission.rates, mission.below)
+        step_values(worth, local, mission.nodes, self.blocks.home, *service[1:], self.values)
+        before = (mission.to_zone, mission.phases, data, self.period, self.blocks, local)
         paths.bound_paths(*before, self.values, waiting, self.ceilings)
         bound = total + (prices[:-1] * data[cuts]).sum()
         slope, takings = np.zeros(prices.shape), np.zeros(prices.shape)
         slope[:-1] = data[cuts]
-        for x, y in known.starts:
+        for x, y in mission.starts:
             most, end = add_slopes(
                 *before, self.parts, self.values, waiting, self.ceilings, x, y, worth, *service,
                 takings,
@@ -316,32 +316,32 @@ def _descend_to_minimum(
 ) -> tuple[np.ndarray, float]:
     """The prices with the lowest bound of those that the bundle method tries, and the bound."""
     points = np.empty((iterations, prices.size))
-    found = np.empty(iterations)
+    values = np.empty(iterations)
     slopes = np.empty(points.shape)
     centre = prices
     lowest = np.inf
     width = 0.0
     predicted = np.inf
     for i in range(iterations):
-        found[i], slope = bounds.at(prices)
+        values[i], slope = bounds.at(prices)
         points[i] = prices.ravel()
         slopes[i] = slope.ravel()
         if i == 0:
             width = 1.0
             if slope.any():
                 width = _FIRST_DECREASE / (slope**2).sum()
-        elif found[i] < lowest - 0.5 * (lowest - predicted):
+        elif values[i] < lowest - 0.5 * (lowest - predicted):
             width *= 2.0
-        elif found[i] > lowest + (lowest - predicted):
+        elif values[i] > lowest + (lowest - predicted):
             width *= 0.6
-        if found[i] < lowest:
+        if values[i] < lowest:
             centre = prices
-            lowest = float(found[i])
+            lowest = float(values[i])
         if lowest > 1.0 and i >= iterations // _HOPE:
             break  # a bound of 1 is known already
         if i + 1 < iterations:
             chosen, predicted = next_prices(
-                centre.ravel(), most.ravel(), lowest, points[: i + 1], found[: i + 1],
+                centre.ravel(), most.ravel(), lowest, points[: i + 1], values[: i + 1],
                 slopes[: i + 1], width,
             )  # fmt: skip
             prices = _at_most_one(chosen.reshape(prices.shape))

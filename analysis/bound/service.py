@@ -142,10 +142,10 @@ def _place_values(x, y, offset, along_x, home, worth, local, nodes, rates, below
     _levels_at(x, y, offset, along_x, nodes, rates, levels)
     count = _best_of(levels, worth, home, below, values, chances, winners, rank, order)
     for q in range(local.shape[1]):
-        own = max(worth[home] - local[home, q], 0.0)
+        home_value = max(worth[home] - local[home, q], 0.0)
         above, mass, i, total = 0.0, 0.0, 0, 0.0
         for j in range(levels.shape[1] - 1, -1, -1):
-            value = own * levels[home, j]
+            value = home_value * levels[home, j]
             while i < count and values[i] > value:
                 above += values[i] * chances[i]
                 mass += chances[i]
@@ -198,17 +198,17 @@ def _row_values(x, worth, local, nodes, block, rates, below, values):
             if x2 == width or y2 == height:
                 continue
             if along_x:
-                there, back = (EAST, WEST)
+                forward, backward = (EAST, WEST)
             else:
-                there, back = (SOUTH, NORTH)
+                forward, backward = (SOUTH, NORTH)
             between = np.zeros((2, local.shape[1]))
             homes = block[x2, y2], block[x, y]
             for way in range(2 if homes[0] != homes[1] else 1):
                 for n in range(1, m):
                     _place_values(x, y, n, along_x, homes[way], worth, local, nodes,
                                   rates, below, scratch, between[way])  # fmt: skip
-            values[there, x2, y2] += between[0]
-            values[back, x, y] += between[1 if homes[0] != homes[1] else 0]
+            values[forward, x2, y2] += between[0]
+            values[backward, x, y] += between[1 if homes[0] != homes[1] else 0]
 
 
 @kernel
@@ -224,8 +224,8 @@ def step_takings(x, y, action, worth, nodes, rates, below, takings):
     for n in range(1, m + 1):
         offset = (n - m) * (STEP_X[action] + STEP_Y[action])
         _levels_at(x, y, offset, action in (EAST, WEST), nodes, rates, rows)
-        found = _best_of(rows, worth, -1, below, values, chances, winners, rank, order)
-        for i in range(found):
+        winner_count = _best_of(rows, worth, -1, below, values, chances, winners, rank, order)
+        for i in range(winner_count):
             if winners[i] >= 0:
                 takings[winners[i]] += values[i] * chances[i] / worth[winners[i]]
 
@@ -291,10 +291,10 @@ def _choose_service(
         y2 = y + STEP_Y[action]
         if not paths.is_reached(to_zone, phases, phase, f + 1, x2, y2):
             continue
-        there = blocks.home[x2, y2]
+        next_home = blocks.home[x2, y2]
         now = values[s, action, x2, y2]
         ahead = ceilings[f + 1, phase]
-        if there == home:
+        if next_home == home:
             value, best = _ceiling_of_staying(
                 local, now, ahead[x2, y2, memory], had, then_had, home, q
             )
@@ -302,9 +302,9 @@ def _choose_service(
                 value += local[node, blocks.levels[level]] * (then_had[node] - had[node])
             kept = 0
         else:
-            known = level if node == there else 0
+            known_level = level if node == next_home else 0
             value, best, kept = _ceiling_of_leaving(
-                blocks, local, now, ahead[x2, y2], had, then_had, home, there, known, q
+                blocks, local, now, ahead[x2, y2], had, then_had, home, next_home, known_level, q
             )
         if value > most:
             most = value
@@ -361,22 +361,22 @@ def add_slopes(
         s = period[phases.clock[phase, f]]
         x = x + STEP_X[choice % 5] * (choice < 5)
         y = y + STEP_Y[choice % 5] * (choice < 5)
-        there = blocks.home[x, y]
-        if there == home:
+        next_home = blocks.home[x, y]
+        if next_home == home:
             last[home] += parts[line] * new[home] + max(parts[line] - parts[q], 0.0) * had[home]
             if memory > 0:
                 last[node] += price * new[node]
         else:
-            known = level if node == there else 0
-            memory = paths.memory_of(blocks, there, home, later)
+            known_level = level if node == next_home else 0
+            memory = paths.memory_of(blocks, next_home, home, later)
             left = 0.0
             if memory > 0:
                 left = parts[blocks.levels[later]]
             last[home] += left * new[home] + max(left - parts[q], 0.0) * had[home]
-            last[there] += parts[line] * new[there]
-            known_price = parts[blocks.levels[known]]
-            last[there] += max(parts[line] - known_price, 0.0) * had[there]
-        home = there
+            last[next_home] += parts[line] * new[next_home]
+            known_price = parts[blocks.levels[known_level]]
+            last[next_home] += max(parts[line] - known_price, 0.0) * had[next_home]
+        home = next_home
         q = line
         if choice == paths.CHARGE:
             continue

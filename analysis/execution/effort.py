@@ -40,13 +40,13 @@ def policies_for(spaces: Iterable[ScenarioSpace], missions: int) -> tuple[str, .
         missions: Number of missions of every design point.
     """
     spaces = [*spaces]
-    made = missions * sum(map(estimate_decisions, spaces))
+    decisions = missions * sum(map(estimate_decisions, spaces))
     is_small = mean(mean(space.uavs) for space in spaces) <= SMALL
     if is_small:
         ranked = OF_SMALL_FLEETS
     else:
         ranked = OF_LARGE_FLEETS
-    best = next((name for name in ranked if made * SECONDS[name] <= BUDGET), BASELINE)
+    best = next((name for name in ranked if decisions * SECONDS[name] <= BUDGET), BASELINE)
     return tuple(dict.fromkeys((best, BASELINE)))
 
 
@@ -125,11 +125,11 @@ def seconds_of(
         engine: ``batch`` or ``events``.
         workers: Number of processes or threads.
     """
-    each = [_decision_time(name) for name in team.split(",")]
+    member_times = [_decision_time(name) for name in team.split(",")]
     more = EVENTS if engine == "events" else 0.0
-    made = sum(map(estimate_decisions, spaces)) / len(spaces) / workers
-    low, high = (sum(of) / len(each) + more for of in zip(*each, strict=True))
-    return Range(missions[0] * made * low / SPREAD, missions[1] * made * high * SPREAD)
+    decisions = sum(map(estimate_decisions, spaces)) / len(spaces) / workers
+    low, high = (sum(times) / len(member_times) + more for times in zip(*member_times, strict=True))
+    return Range(missions[0] * decisions * low / SPREAD, missions[1] * decisions * high * SPREAD)
 
 
 def _decision_time(policy: str) -> tuple[float, float]:
@@ -207,8 +207,8 @@ def check_workers_memory(
     Raises:
         InputError: If they do.
     """
-    each = max(map(mission_memory, spaces)) + (WORKER_MEMORY if are_processes else 0)
-    check_memory(what, workers * each + more, CONFIRMED)
+    memory_of_worker = max(map(mission_memory, spaces)) + (WORKER_MEMORY if are_processes else 0)
+    check_memory(what, workers * memory_of_worker + more, CONFIRMED)
 
 
 def mission_memory(space: ScenarioSpace) -> float:
@@ -320,8 +320,10 @@ def check_run(
     )
     if not yes and any(planned.missing + planned.logs for planned in plan):
         check_time(what, total_time(plan, workers))
-        held = study.size * (POINT_MEMORY + study.first * teams * MISSION_MEMORY)
-        check_workers_memory(what, workers, [study.scenarios[0], study.scenarios[-1]], held)
+        needed_memory = study.size * (POINT_MEMORY + study.first * teams * MISSION_MEMORY)
+        check_workers_memory(
+            what, workers, [study.scenarios[0], study.scenarios[-1]], needed_memory
+        )
     if missing:
         _check_policies(study)
 
@@ -393,8 +395,8 @@ def _seconds_of_missing(study: Study, planned: Planned) -> Range:
     """Estimated time on one core of the missing missions and event logs, or of the bounds."""
     spaces = study.scenarios
     if planned.policy not in study.policies:
-        made = planned.missing * sum(map(estimate_decisions, spaces)) / len(spaces)
-        return Range(*(made * each for each in BOUND))
+        decisions = planned.missing * sum(map(estimate_decisions, spaces)) / len(spaces)
+        return Range(*(decisions * seconds for seconds in BOUND))
     logs = seconds_of(spaces, planned.policy, (planned.logs, planned.logs), "events")
     missions = planned.missing, planned.most - planned.present
     return seconds_of(spaces, planned.policy, missions, study.engine).plus(logs)

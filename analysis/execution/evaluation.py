@@ -185,7 +185,10 @@ def _add_to_moments(
 
 def _over_space(moments: ByFleet, space: ScenarioSpace, missions: int) -> dict[str, Moments]:
     fleets = range(space.uavs[0], space.uavs[1] + 1)
-    return {m: Moments.of_space([of.get(n) for n in fleets], missions) for m, of in moments.items()}
+    return {
+        m: Moments.of_space([by_fleet.get(n) for n in fleets], missions)
+        for m, by_fleet in moments.items()
+    }
 
 
 def _metric_values(records: Records, space: ScenarioSpace) -> dict[str, np.ndarray]:
@@ -197,7 +200,7 @@ def _metric_values(records: Records, space: ScenarioSpace) -> dict[str, np.ndarr
         values |= columns_in_units(values, space.units)
     else:
         values |= {}
-    return {metric: of.astype(float) for metric, of in values.items()}
+    return {metric: column.astype(float) for metric, column in values.items()}
 
 
 def check_evaluation(asked: Sequence[Asked], yes: bool = False) -> None:
@@ -211,30 +214,30 @@ def check_evaluation(asked: Sequence[Asked], yes: bool = False) -> None:
         InputError: If a team is unknown or cannot act in the scenario, or a number is out of range;
             if it would take long, or more memory than is available.
     """
-    for one in asked:
-        one.check()
+    for team in asked:
+        team.check()
     scenario, workers, engine = asked[0].scenario, asked[0].workers, asked[0].engine
-    missions = sum(one.missions for one in asked)
+    missions = sum(team.missions for team in asked)
     what = f"evaluate: {missions:,} missions (policies: {len(asked)}, workers: {workers:,})"
     if not yes:
         effort.check_workers_memory(what, workers, [scenario], 4 * MEMORY, engine == "events")
         times = [
-            effort.seconds_of([scenario], one.team, (one.missions, one.missions), engine, workers)
-            for one in asked
+            effort.seconds_of(
+                [scenario], team.team, (team.missions, team.missions), engine, workers
+            )
+            for team in asked
         ]
         effort.check_time(what, reduce(effort.Range.plus, times))
-    for one in asked[1:]:  # the first one is refused at its first mission
-        simulate_missions(engine, [scenario], load_team(one.team), one.seed, [0])
+    for team in asked[1:]:  # the first one is refused at its first mission
+        simulate_missions(engine, [scenario], load_team(team.team), team.seed, [0])
 
 
 def _missions_at_once(scenario: ScenarioSpace) -> int:
     """Number of missions to simulate together: a power of two whose records fit in ``MEMORY``."""
-    each = MISSION_RECORD.itemsize + scenario.uavs[1] * UAV_RECORD.itemsize
+    memory_of_mission = MISSION_RECORD.itemsize + scenario.uavs[1] * UAV_RECORD.itemsize
     if scenario.is_extended:
-        each += OPERATIONS.itemsize
-    else:
-        each += 0
-    return 2 ** ((MEMORY // each).bit_length() - 1)
+        memory_of_mission += OPERATIONS.itemsize
+    return 2 ** ((MEMORY // memory_of_mission).bit_length() - 1)
 
 
 def _simulate_pieces(

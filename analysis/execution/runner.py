@@ -133,27 +133,27 @@ class _Run:
         teams = range(len(self.study.policies))
         points = len(self.study.points)
         before = [[0] * points for _ in teams]
-        wanted = [[self.study.first] * points for _ in teams]
+        counts = [[self.study.first] * points for _ in teams]
         logs = [chunks.parts_of(manifest, team, [self.study.logged] * points) for team in teams]
         asked: chunks.Present = defaultdict(list)
-        while wanted != before:
-            of_teams = (chunks.parts_of(manifest, team, wanted[team]) for team in teams)
+        while counts != before:
+            of_teams = (chunks.parts_of(manifest, team, counts[team]) for team in teams)
             parts = new_parts(of_teams, asked)
             self._round(parts, new_parts(logs, defaultdict(list)))
-            before = wanted
+            before = counts
             logs = []
-            wanted = [self._more(team, wanted[team]) for team in teams]
-        selected = [self._select(team, wanted[team]) for team in teams]
+            counts = [self._more(team, counts[team]) for team in teams]
+        selected = [self._select(team, counts[team]) for team in teams]
         chosen = manifest.model_copy(update={"selected": selected})
         checks = [chunks.check_parts(chosen, team) for team in teams]
         self._round([part for of_team in checks for part in of_team])
         if self.study.rule and not manifest.accepted:  # files of other code may have other columns
             for team in teams:
-                all_of_team = chunks.parts_of(manifest, team, wanted[team]), checks[team]
+                all_of_team = chunks.parts_of(manifest, team, counts[team]), checks[team]
                 parts = new_parts(all_of_team, defaultdict(list))
                 self.store.merge([*chunks.split_into_chunks(parts, CHUNK[self.study.engine])])
-        self._make((BoundsJob, new_parts([chunks.bound_parts(manifest, wanted)], asked)))
-        self.store.finish(wanted, selected)
+        self._make((BoundsJob, new_parts([chunks.bound_parts(manifest, counts)], asked)))
+        self.store.finish(counts, selected)
 
     def _more(self, team: int, counts: list[int]) -> list[int]:
         """How many missions the rule needs at each point of a team, given those present."""
@@ -220,8 +220,10 @@ class _Run:
         """The number of missions of a chunk."""
         if kind is not MissionsJob:
             return BOUNDS_CHUNK if kind is BoundsJob else 1
-        own = (member.chunk for member in load_team(policy) if hasattr(member, "chunk"))
-        return min([CHUNK[self.study.engine], *own])
+        chunks_of_members = (
+            member.chunk for member in load_team(policy) if hasattr(member, "chunk")
+        )
+        return min([CHUNK[self.study.engine], *chunks_of_members])
 
     def _begin(self, count: int, present: int, work: str = "") -> None:
         """Tell that a round begins, of how many missions, and how many of them are present."""

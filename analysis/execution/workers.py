@@ -257,8 +257,8 @@ class Cluster(Pool):
         futures = []
         try:
             for job in jobs.values():
-                own = codes[job.policy]
-                futures.append(self.client.submit(_check_and_run, job, code, own, pure=False))
+                code_here = codes[job.policy]
+                futures.append(self.client.submit(_check_and_run, job, code, code_here, pure=False))
                 futures[-1].add_done_callback(done.put)
             numbers = {future.key: number for future, number in zip(futures, jobs, strict=True)}
             for _ in futures:

@@ -132,7 +132,7 @@ def plot_differences(rows: pd.DataFrame, names: pd.Series, title: str) -> Figure
 
 def central_range(values: Sequence[pd.Series], tail: float) -> tuple[float, float]:
     """The ends of an axis with 0 that leaves out a share ``tail`` of the values at each side."""
-    low = min(0.0, *(of.quantile(tail) for of in values))
-    high = max(0.0, *(of.quantile(1 - tail) for of in values))
+    low = min(0.0, *(sample.quantile(tail) for sample in values))
+    high = max(0.0, *(sample.quantile(1 - tail) for sample in values))
     room = max(0.04 * (high - low), 0.01)
     return low - room, high + room

@@ -326,11 +326,11 @@ def ignored_nodes(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
 
 def reached_nodes(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     """How many more nodes on the far edges two UAVs reach than one UAV, in the same missions."""
-    one, two = ([_left_behind(*log)[0] for log in evidence.logs(uavs)] for uavs in (1, 2))
-    more = np.array([alone - team for alone, team in zip(one, two, strict=False)])
+    with_one, with_two = ([_left_behind(*log)[0] for log in evidence.logs(uavs)] for uavs in (1, 2))
+    more = np.array([alone - team for alone, team in zip(with_one, with_two, strict=False)])
     name = "more of these nodes than by a lone UAV"
     gain = Quantity(mean_interval(more), len(more), "points", name)
-    reached = _mean_share(1 - np.array(two), "of these nodes not ignored")
+    reached = _mean_share(1 - np.array(with_two), "of these nodes not ignored")
     return Finding(judge(gain.interval), (gain, reached))
 
 
@@ -341,11 +341,11 @@ def sectors(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     if not rows:
         raise MissingError("no data was collected")
     sides, chance, most = np.transpose(rows)
-    own = Quantity.exact(float(sides.mean()), name="data collected on the own side")
+    own_side = Quantity.exact(float(sides.mean()), name="data collected on the own side")
     by_chance = Quantity.exact(float(chance.mean()), name="by chance")
     more = Quantity(mean_interval(sides - chance), len(rows), "points", "more than by chance")
     division = _mean_share(most, "data by the UAV that serves the node most")
-    return Finding(judge(more.interval, division.interval), (own, by_chance, more, division))
+    return Finding(judge(more.interval, division.interval), (own_side, by_chance, more, division))
 
 
 def _left_behind(events: pd.DataFrame, nodes: np.ndarray) -> tuple[float, float]:
@@ -440,14 +440,16 @@ def selected_uavs(judge: Judge, evidence: EvidenceOfPolicy) -> Finding:
     points = evidence.results.store.manifest.points
     if choice is None or "uavs" not in points[choice.best].values:
         raise MissingError(f"the study {evidence.study} selects no number of UAVs")
-    wanted = [n for n, point in enumerate(points) if point.values.get("uavs") == values.BEST_UAVS]
+    best_points = [
+        n for n, point in enumerate(points) if point.values.get("uavs") == values.BEST_UAVS
+    ]
     best = points[choice.best].values
     uavs = Quantity.exact(best["uavs"], choice.missions, "number", "UAVs")
     note = ", ".join(setting_in_symbols(field, value_text(value)) for field, value in best.items())
     left = {choice.best, *choice.survivors}
     fleets = sorted({points[n].values["uavs"] for n in left})
     note += f"; settings not ruled out: {len(left)}, UAVs {numbers.join_words([*map(str, fleets)])}"
-    return Finding(judge(choice, wanted), (uavs,), note)
+    return Finding(judge(choice, best_points), (uavs,), note)
 
 
 def setting_in_symbols(field: str, value: str) -> str:

@@ -200,18 +200,19 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
     def evidence(study: str, column: str) -> Any:
         if study == TRAININGS:
             return _evidence_of_trainings(trainings, column)
-        own = study + SMALLER
-        is_own = column == PAPERS_NETWORK and own in studies
-        return _evidence_of_policy(studies, own if is_own else study, column)
+        smaller_study = study + SMALLER
+        is_own = column == PAPERS_NETWORK and smaller_study in studies
+        return _evidence_of_policy(studies, smaller_study if is_own else study, column)
 
-    known = {"margin": indifference_margin(studies)}
-    words = {"margin": numbers.format_margin(known["margin"]), **_NAMED}
+    from_studies = {"margin": indifference_margin(studies)}
+    words = {"margin": numbers.format_margin(from_studies["margin"]), **_NAMED}
     return [
         Row(
             claim,
             f"{claim.basis} {claim.rule.words.format(**words)}".strip(),
             tuple(
-                _find_for_claim(claim, known, partial(evidence, claim.study, c)) for c in COLUMNS
+                _find_for_claim(claim, from_studies, partial(evidence, claim.study, c))
+                for c in COLUMNS
             ),
         )
         for claim in CLAIMS
@@ -255,7 +256,7 @@ def _evidence_of_policy(
     if column in NULLS:
         among = [name for name in results.policies if name == column]
     elif column == COLUMNS[0]:
-        among = [name for of in learners.values() for name in of]
+        among = [name for checkpoints in learners.values() for name in checkpoints]
         which = "learned policy"
     else:
         among = learners.get(column, [])
@@ -280,34 +281,35 @@ def _evidence_of_trainings(trainings: pd.DataFrame, column: str) -> measures.Evi
 
 
 def _find_for_claim(
-    claim: Claim, known: Mapping[str, Any], evidence: Callable[[], Any]
+    claim: Claim, from_studies: Mapping[str, Any], evidence: Callable[[], Any]
 ) -> measures.Finding:
     """What a policy's results say about a claim or, without results, why there are none."""
     printed = claim.printed
     judge = claim.rule.judge
+    arguments = dict(from_studies)
     if printed:
-        known = {**known, "printed": printed.interval}
-    takes = known.keys() & signature(judge).parameters.keys()
+        arguments["printed"] = printed.interval
+    takes = arguments.keys() & signature(judge).parameters.keys()
     try:
         of_study = evidence()
-        judge = partial(judge, **{name: known[name] for name in takes})
+        judge = partial(judge, **{name: arguments[name] for name in takes})
         compared = claim.compared
-        found = claim.measure(judge, of_study.pairs(**compared) if compared else of_study)
+        finding = claim.measure(judge, of_study.pairs(**compared) if compared else of_study)
     except measures.MissingError as missing:
         return measures.Finding(measures.NO_RESULTS, note=str(missing))
     except InputError:  # a study of another design
         return measures.Finding(
             measures.NO_RESULTS, note="the results come from a study of another design"
         )
-    if any(quantity.n == 1 for quantity in found.quantities):
-        found = replace(found, verdict=INCONCLUSIVE)  # one mission or training shows nothing
-    found = replace(found, policy=of_study.policy, weakness=claim.weakness)
-    first, *others = found.quantities
+    if any(quantity.n == 1 for quantity in finding.quantities):
+        finding = replace(finding, verdict=INCONCLUSIVE)  # one mission or training shows nothing
+    finding = replace(finding, policy=of_study.policy, weakness=claim.weakness)
+    first, *others = finding.quantities
     if not printed or first.unit != printed.unit or first.unit not in ("share", "points"):
-        return found
+        return finding
     beyond = rules.gap(first.interval, printed.interval)
     shown = first, measures.Quantity(beyond, 0, "points", "minus the paper's"), *others
-    return replace(found, quantities=shown, against=position_of(beyond))
+    return replace(finding, quantities=shown, against=position_of(beyond))
 
 
 def of_kind(rows: Iterable[Row], kind: str) -> list[Row]:
@@ -322,7 +324,7 @@ def scorecard_sentence(rows: Sequence[Row]) -> str:
     """
     telling, passed, undecided, weaknesses = (of_kind(rows, kind) for kind in KINDS)
     policy = policy_names(rows)[0]
-    held = sum(row.findings[0].passes for row in telling)
+    holding = sum(row.findings[0].passes for row in telling)
     short = [f"“{row.claim.text}”" for row in telling if row.findings[0].fails]
     without, undecided_held = (
         sum(row.findings[0].passes for row in rows_of_kind) for rows_of_kind in (passed, undecided)
@@ -330,7 +332,7 @@ def scorecard_sentence(rows: Sequence[Row]) -> str:
     shared = sum(row.findings[0].outcome == measures.SHARED for row in weaknesses)
     sentences = [
         f"Of {len(rows)} claims, {len(telling)} are diagnostic: {numbers.join_words(NULLS)}, as "
-        f"far as they were simulated, are shown to fail them. {policy} passes {held} of these "
+        f"far as they were simulated, are shown to fail them. {policy} passes {holding} of these "
         f"{len(telling)}."
     ]
     if short:
@@ -345,12 +347,12 @@ def scorecard_sentence(rows: Sequence[Row]) -> str:
 
 def policy_names(rows: Sequence[Row]) -> list[str]:
     """For each of ``COLUMNS`` the policy of most of its findings, or its own name."""
-    found = []
+    names = []
     for number, name in enumerate(COLUMNS):
         policies = Counter(row.findings[number].policy for row in rows)
         del policies[""]
-        found.append(policies.most_common(1)[0][0] if policies else name)
-    return found
+        names.append(policies.most_common(1)[0][0] if policies else name)
+    return names
 
 
 def count_verdicts(rows: Sequence[Row]) -> pd.DataFrame:
@@ -358,8 +360,8 @@ def count_verdicts(rows: Sequence[Row]) -> pd.DataFrame:
     table = []
     for kind in KINDS:
         for number, name in enumerate(policy_names(rows)):
-            given = Counter(row.findings[number].outcome for row in of_kind(rows, kind))
-            counted = {outcome.capitalize(): given[outcome] for outcome in measures.OUTCOMES}
+            outcomes = Counter(row.findings[number].outcome for row in of_kind(rows, kind))
+            counted = {outcome.capitalize(): outcomes[outcome] for outcome in measures.OUTCOMES}
             table.append({"Claims": kind, "Policy": name, **counted})
     frame = pd.DataFrame(table)
     return frame.loc[:, [bool(frame[column].any()) for column in frame]]

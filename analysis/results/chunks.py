@@ -114,10 +114,10 @@ def gaps_between(wanted: range, present: list[range]) -> list[range]:
     """The parts of a range that are in none of the present ranges."""
     missing = []
     begin = wanted.start
-    for there in sorted(present, key=lambda r: r.start):
-        if there.start > begin:
-            missing.append(range(begin, min(there.start, wanted.stop)))
-        begin = max(begin, there.stop)
+    for part in sorted(present, key=lambda r: r.start):
+        if part.start > begin:
+            missing.append(range(begin, min(part.start, wanted.stop)))
+        begin = max(begin, part.stop)
         if begin >= wanted.stop:
             break
     return [gap for gap in [*missing, range(begin, wanted.stop)] if len(gap)]
@@ -150,14 +150,14 @@ def rows_of(parts: Sequence[Part], stacked: pd.DataFrame) -> pd.DataFrame:
         stacked: The rows of these missions, and of others, as ``stacked`` returns them.
     """
     lengths = [len(part.replications) for part in parts]
-    wanted = pd.DataFrame(
+    keys = pd.DataFrame(
         {
             "point": np.repeat([part.cell.point for part in parts], lengths),
             "cell": np.repeat([part.cell.key for part in parts], lengths),
             "replication": np.concatenate([part.replications for part in parts]),
         }
     )
-    rows = wanted.merge(stacked, on=["cell", "replication"], how="left")
+    rows = keys.merge(stacked, on=["cell", "replication"], how="left")
     return rows[["point", *stacked]]
 
 
@@ -171,11 +171,11 @@ def stack_tables(tables: Sequence[pa.Table]) -> pd.DataFrame:
         InputError: If two tables have different rows for the same mission.
     """
     frame = pa.concat_tables(tables, promote_options="default").to_pandas().astype({"cell": str})
-    one = [name for name in ("cell", "replication", "uav") if name in frame]
-    if frame.duplicated(one).any():  # such as after files of two folders were merged
+    key = [name for name in ("cell", "replication", "uav") if name in frame]
+    if frame.duplicated(key).any():  # such as after files of two folders were merged
         hashable = frame.map(lambda v: v.tobytes() if isinstance(v, np.ndarray) else v)
         frame = frame[~hashable.duplicated()]
-        if frame.duplicated(one).any():
+        if frame.duplicated(key).any():
             raise InputError(
                 "results: two files have different records of a mission; allowed: one of them"
             )

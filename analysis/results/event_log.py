@@ -63,8 +63,8 @@ def residual_data(events: Events) -> pd.DataFrame:
     log = pd.DataFrame(events)
     flows = _node_flows(log)
     times = range(mission_length(log) + 1)
-    held = _data_held(flows).groupby([np.ceil(flows["time"]).astype(int), flows["node"]]).last()
-    table = held.unstack().reindex(index=times).ffill()
+    data = _data_held(flows).groupby([np.ceil(flows["time"]).astype(int), flows["node"]]).last()
+    table = data.unstack().reindex(index=times).ffill()
     table = table.where(table > _ROUNDING, 0.0)
     return table.rename_axis(index="time", columns="node")
 
@@ -212,20 +212,20 @@ def causes_of_failure(events: Events, scenario: Scenario, first: int = 1) -> lis
 def _cause_of_uav(
     log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int, first: int
 ) -> str:
-    own = log[log["uav"] == uav]
+    rows_of_uav = log[log["uav"] == uav]
     flown = slots[slots["uav"] == uav]
     kind = type_of(scenario.fleet, uav)
     last = flown.iloc[-1]
     quota = kind.quota or scenario.quota
     after = int(last["slot"]) + 1
-    to_go = f"{max(quota - (own['event'] == 'communication').sum(), 0)} of {quota}"
+    to_go = f"{max(quota - (rows_of_uav['event'] == 'communication').sum(), 0)} of {quota}"
     if quota:
         to_go = f"with {to_go} communication slots to go"
     else:
         to_go = "without having landed"
     name = f"UAV {first + uav}"
     cell = f"after {after} slots at ({last['x']}, {last['y']})"
-    if not (own["event"] == "battery_empty").any():
+    if not (rows_of_uav["event"] == "battery_empty").any():
         if after == scenario.max_slots:
             return f"{name} was still active at the horizon of {after} slots, {to_go}"
         return f"{name} was lost to a failure {cell}, {to_go}"
@@ -254,14 +254,16 @@ def _cause_of_uav(
     waited = flown[flown["waiting"]]
     charging = slots[slots["charging"]]
     for zone, rows in waited.groupby(zones[waited["y"], waited["x"]]):
-        there = charging["slot"].isin(rows["slot"]) & (zones[charging["y"], charging["x"]] == zone)
-        busy = f", while {_uavs_in_words(charging['uav'][there], first)} charged there"
+        in_zone = charging["slot"].isin(rows["slot"]) & (
+            zones[charging["y"], charging["x"]] == zone
+        )
+        busy = f", while {_uavs_in_words(charging['uav'][in_zone], first)} charged there"
         x, y, *_ = scenario.rectangles[zone]
         facts.append(
             f"it waited {numbers.format_count(len(rows), 'slot')} for a pad of the zone at ({x}, "
-            f"{y}), which has {scenario.zone_pads[zone]}{busy if there.any() else ''}"
+            f"{y}), which has {scenario.zone_pads[zone]}{busy if in_zone.any() else ''}"
         )
-    overruled = own[(own["event"] == "collision") & (own["other"] >= 0)]
+    overruled = rows_of_uav[(rows_of_uav["event"] == "collision") & (rows_of_uav["other"] >= 0)]
     overruled = overruled["other"][overruled["time"] >= flown["slot"].min()]
     if len(overruled):
         times = numbers.format_count(len(overruled), "time")
@@ -300,8 +302,8 @@ def paths_of(events: Events, scenario: Scenario) -> pd.DataFrame:
             cells = moves[[f"from_{axis}", axis]].to_numpy().ravel()
             first = of_uav[f"from_{axis}"].iloc[0]
             rows = table["uav"] == uav
-            there = np.interp(table["time"][rows], [0, *times], [first, *cells])
-            table.loc[rows, axis] = there
+            places = np.interp(table["time"][rows], [0, *times], [first, *cells])
+            table.loc[rows, axis] = places
     if scenario.centre:
         projection = Projection(scenario.centre, scenario.size, scenario.cell_size)
         table[["lon", "lat"]] = projection.degrees(table[["x", "y"]].to_numpy() + 0.5)
@@ -327,7 +329,7 @@ def path_text(events: Events, scenario: Scenario, kind: str) -> str:
     else:
         axes = ["x", "y"]
     others = table.columns.intersection(["time", "seconds", "battery"])
-    paths = {uav: of[[*axes, "altitude", *others]] for uav, of in table.groupby("uav")}
+    paths = {uav: rows[[*axes, "altitude", *others]] for uav, rows in table.groupby("uav")}
     return (_paths_as_kml if kind == "kml" else _paths_as_geojson)(paths)
 
 
@@ -337,10 +339,10 @@ def _paths_as_geojson(paths: dict[int, pd.DataFrame]) -> str:
     features = [
         {
             "type": "Feature",
-            "geometry": {"type": "LineString", "coordinates": of.iloc[:, :3].to_numpy().tolist()},
-            "properties": {"uav": uav} | {names[name]: [*of[name]] for name in of.columns[3:]},
+            "geometry": {"type": "LineString", "coordinates": path.iloc[:, :3].to_numpy().tolist()},
+            "properties": {"uav": uav} | {names[name]: [*path[name]] for name in path.columns[3:]},
         }
-        for uav, of in paths.items()
+        for uav, path in paths.items()
     ]
     return json.dumps({"type": "FeatureCollection", "features": features})
 
@@ -351,11 +353,11 @@ def _paths_as_kml(paths: dict[int, pd.DataFrame]) -> str:
     Without a data sheet, a mission slot is a second.
     """
     marks = []
-    for uav, of in paths.items():
-        times = pd.to_datetime(of["seconds"] if "seconds" in of else of["time"], unit="s")
+    for uav, path in paths.items():
+        times = pd.to_datetime(path["seconds"] if "seconds" in path else path["time"], unit="s")
         times = times.dt.round("s")
         track = [f"<when>{time:%Y-%m-%dT%H:%M:%SZ}</when>" for time in times]
-        track += ["<gx:coord>{} {} {}</gx:coord>".format(*at) for at in of.iloc[:, :3].to_numpy()]
+        track += ["<gx:coord>{} {} {}</gx:coord>".format(*at) for at in path.iloc[:, :3].to_numpy()]
         track.insert(0, "<altitudeMode>relativeToGround</altitudeMode>")
         mark = f"<name>UAV {uav + 1}</name><gx:Track>{''.join(track)}</gx:Track>"
         marks.append(f"<Placemark>{mark}</Placemark>")

@@ -76,7 +76,7 @@ class Manifest(provenance.Origin):
         teams = range(len(names))
         if not {p for team in teams for p in self.selected_points(team)} <= {*range(*shape[:1])}:
             raise ValueError("selected: is not a design point")
-        if study.selection is None and any(of is not None for of in self.selected):
+        if study.selection is None and any(selected is not None for selected in self.selected):
             raise ValueError("selected: the study selects nothing")
         if study.bounds != bool(self.bound_code):
             raise ValueError("bound_code: does not belong to the bounds of the study")
@@ -89,8 +89,8 @@ class Manifest(provenance.Origin):
         """A copy with other values; its cells are made again only if they may be others."""
         copy = super().model_copy(update=update)
         if {*(update or ())} <= PROGRESS:
-            known = self.__dict__.keys() - type(self).model_fields.keys()
-            copy.__dict__.update({name: self.__dict__[name] for name in known})
+            cached = self.__dict__.keys() - type(self).model_fields.keys()
+            copy.__dict__.update({name: self.__dict__[name] for name in cached})
         return copy
 
     def selected_points(self, team: int) -> list[int]:
@@ -161,11 +161,11 @@ class Manifest(provenance.Origin):
         accepted = []
         if changes:
             accepted = [provenance.Acceptance(modules=changes, missions=accepting or 0)]
-        held = {team.policy: team for team in self.policies}
+        old_teams = {team.policy: team for team in self.policies}
         update: dict[str, Any] = {
             "engine_code": self.engine_code,
             "bound_code": self.bound_code or new.bound_code,
-            "policies": [held.get(team.policy, team) for team in new.policies],
+            "policies": [old_teams.get(team.policy, team) for team in new.policies],
             "accepted": self.accepted + accepted,
         }
         if self.study == new.study and self.points == new.points:
@@ -174,14 +174,14 @@ class Manifest(provenance.Origin):
 
     def _check_extended_by(self, new: "Manifest", path: Path) -> None:
         name = new.study.name
-        held = self.study.name
+        kept_name = self.study.name
         teams = {team.policy: team.weights for team in new.policies}
         dropped = [team.policy for team in self.policies if team.policy not in teams]
         changed = [t.policy for t in self.policies if teams.get(t.policy) != t.weights]
         is_same = (self.scenario, self.points) == (new.scenario, new.points)
         foreign = not is_same and not set(self._point_keys) <= set(new._point_keys)
         complaints = {
-            f"holds study {held}, not {name}": held != name,
+            f"holds study {kept_name}, not {name}": kept_name != name,
             f"holds seed {self.seed}, not {new.seed}": self.seed != new.seed,
             f"holds other scenarios than those of study {name}": foreign,
             f"holds policy {' '.join(dropped)}, which study {name} does not have": bool(dropped),
@@ -250,7 +250,9 @@ class Manifest(provenance.Origin):
         """The cells of every team, in the order of the design points."""
         run = {"version": self.version, "code": self.engine_code, "seed": self.seed}
         members = [team.data["members"] for team in self.policies]
-        return tuple(self._cells(n, run | {"members": of}) for n, of in enumerate(members))
+        return tuple(
+            self._cells(n, run | {"members": of_team}) for n, of_team in enumerate(members)
+        )
 
     @cached_property
     def bound_cells(self) -> tuple[Cell, ...]:

@@ -230,8 +230,8 @@ File = tuple[Path, int, int, int]
 
 def _file_state(path: Path) -> File:
     """A file with its number, size and time; if they stay the same, it is not read again."""
-    found = path.stat()
-    return path, found.st_ino, found.st_size, found.st_mtime_ns
+    status = path.stat()
+    return path, status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def content_hash(path: Path) -> str:
@@ -274,8 +274,8 @@ def read(path: Path, kind: str = "events") -> pa.Table | None:
         check_size(path, file.metadata)
         table = file.read(use_threads=False)
         for name in words:
-            known = {*WORDS[name]}
-            if any({*chunk.dictionary.to_pylist()} - known for chunk in table[name].chunks):
+            word_columns = {*WORDS[name]}
+            if any({*chunk.dictionary.to_pylist()} - word_columns for chunk in table[name].chunks):
                 return None
             place = table.column_names.index(name)
             table = table.set_column(place, name, table[name].cast(pa.string()))

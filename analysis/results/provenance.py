@@ -162,12 +162,12 @@ class Origin(Document):
         teams = {confirmed(team.policy, named): team for team in self.policies}
         closed = [name for name in teams if not isinstance(name, TypedByUser)]
         teams = {name: team for name, team in teams.items() if name not in closed}
-        here = code_behind(teams, self.study.bounds)
+        code_here = code_behind(teams, self.study.bounds)
         changes = []
-        code = {name: code for name, code in self.code.items() if name in here or not closed}
+        code = {name: code for name, code in self.code.items() if name in code_here or not closed}
         if self.version != dess.__version__:
             changes.append(f"made by dess {self.version}, not {dess.__version__}")
-        elif modules := differing_modules(code, here):
+        elif modules := differing_modules(code, code_here):
             changes.append(f"made by other code of {', '.join(modules)}")
         if weights := [name for name in teams if teams[name].weights != team_of(name).weights]:
             changes.append(f"made by other weights of {', '.join(weights)}")
@@ -176,8 +176,8 @@ class Origin(Document):
                 f"made by a Python file that was not read, of policy {', '.join(closed)}"
             )
         versions = library_versions()
-        made = self.libraries
-        if others := [n for n in versions if n in made and made[n] != versions[n]]:
+        recorded = self.libraries
+        if others := [n for n in versions if n in recorded and recorded[n] != versions[n]]:
             changes.append(f"made with other versions of {', '.join(others)}")
         return changes
 
@@ -253,8 +253,8 @@ def _modules_of(policy: Policy) -> tuple[str, ...]:
     """The modules of a policy's class and of its attributes' classes, such as a network's."""
     home = type(policy).__module__
     packages = OURS | {home.partition(".")[0]}
-    held = {type(value).__module__ for value in vars(policy).values()}
-    return (home, *sorted(m for m in held - {home} if m.partition(".")[0] in packages))
+    modules = {type(value).__module__ for value in vars(policy).values()}
+    return (home, *sorted(m for m in modules - {home} if m.partition(".")[0] in packages))
 
 
 @lru_cache

@@ -155,10 +155,10 @@ class Store:
         self._clear()
         teams = range(len(self.manifest.policies))
         for kind, team in [*(("missions", team) for team in teams), ("bounds", NO_TEAM)]:
-            found = [parquet.tables_in(*place) for place in self._places(kind, team)]
-            self.damaged += [path for _, damaged in found for path in damaged]
-            for name in sorted(set.intersection(*(set(tables) for tables, _ in found))):
-                self._examine(kind, team, name, [tables[name] for tables, _ in found])
+            files = [parquet.tables_in(*place) for place in self._places(kind, team)]
+            self.damaged += [path for _, damaged in files for path in damaged]
+            for name in sorted(set.intersection(*(set(tables) for tables, _ in files))):
+                self._examine(kind, team, name, [tables[name] for tables, _ in files])
         for place, _ in (place for team in teams for place in self._places("events", team)):
             for path in parquet.files_in(place):
                 key, _, number = parquet.content_hash(path).partition("-")
@@ -249,18 +249,18 @@ class Store:
         parts = [part for chunk in large for part in chunk.parts]
         names = {c.name for c in large}
         rows = [parquet.parts_in(tables[0]) for tables in self._tables_with("missions", parts)]
-        held = {chunks.name_of(of_file): of_file for of_file in rows}
-        if held.keys() == names:
+        large_files = {chunks.name_of(of_file): of_file for of_file in rows}
+        if large_files.keys() == names:
             return
         frames = self._frames(parts)
         merged = defaultdict(list)
-        for chunk in (chunk for chunk in large if chunk.name not in held):
+        for chunk in (chunk for chunk in large if chunk.name not in large_files):
             self.keep("missions", chunk, _tables_of(chunk, frames))
         for part in parts:
             merged[part.cell.key].append(part.replications)
         gone = {
             name
-            for name, of_file in held.items()
+            for name, of_file in large_files.items()
             if not any(
                 chunks.gaps_between(range(start, stop), merged[key]) for key, start, stop in of_file
             )
@@ -370,17 +370,17 @@ class Store:
         for gap in self.missing(kind, parts)[:1]:
             whole = next(part for part in parts if part.cell == gap.cell)
             raise InputError(self._incomplete(whole, gap.replications))
-        found = [tables[table] for tables in self._tables_with(kind, parts)]
-        key = kind, table, *map(id, found)
+        frames = [tables[table] for tables in self._tables_with(kind, parts)]
+        key = kind, table, *map(id, frames)
         if key not in self._stacked:
-            self._stacked[key] = chunks.stack_tables(found)
+            self._stacked[key] = chunks.stack_tables(frames)
         rows = chunks.rows_of(parts, self._stacked[key])
         return rows.drop(columns="cell")
 
     def _tables_with(self, kind: str, parts: Iterable[chunks.Part]) -> list[Sequence[pa.Table]]:
         """The tables that contain some parts."""
-        found = (tables for part in parts for tables in self._tables[kind, part.cell.key])
-        return [*{id(tables): tables for tables in found}.values()]
+        tables_of_parts = (tables for part in parts for tables in self._tables[kind, part.cell.key])
+        return [*{id(tables): tables for tables in tables_of_parts}.values()]
 
     def _incomplete(self, part: chunks.Part, gap: range) -> str:
         team = part.cell.team
@@ -433,8 +433,10 @@ def _extended_manifest(folder: Path, manifest: Manifest, accept_code: bool) -> M
                 "allowed: a results folder, or a new or empty one"
             )
         return manifest
-    held = Manifest.read(path)
-    return held.extended_to(manifest, path, parquet.missions_in(folder) if accept_code else None)
+    existing = Manifest.read(path)
+    return existing.extended_to(
+        manifest, path, parquet.missions_in(folder) if accept_code else None
+    )
 
 
 def source_folders(folders: Iterable[Path], manifest: Manifest) -> list[Store]:

@@ -225,10 +225,10 @@ class Results:
             (points,) numbers; 0 where the number of missions does not depend on their results: in a
             study that selects nothing, and of the check of a selection.
         """
-        found = self.choice(policy) or self.cheapest(policy)
-        if found is None or self.missions is self.checks:
+        selected = self.choice(policy) or self.cheapest(policy)
+        if selected is None or self.missions is self.checks:
             return np.zeros(len(self.store.manifest.points), int)
-        return np.array(found.looks)
+        return np.array(selected.looks)
 
     def check_policy(self, policy: str) -> None:
         """Refuse a policy that is not in the study.

@@ -177,13 +177,13 @@ def difference_test(
     """
     differences = differences_of(a, b)
     rare = intervals.rare_differences(metric, a.mean(), b.mean())
-    of = metric_of(metric)
-    if rare is None or (differences.size == 1 and not of.is_bounded):
+    measure = metric_of(metric)
+    if rare is None or (differences.size == 1 and not measure.is_bounded):
         return t_test(differences, level)
     smooth, p = t_test(add_rare_pairs(differences, rare), level)
-    if of.is_outcome and np.isin(differences, (-1, 0, 1)).all():
+    if measure.is_outcome and np.isin(differences, (-1, 0, 1)).all():
         p = mcnemar_p_value(int(np.sum(differences > 0)), int(np.sum(differences < 0)))
-    limit = of.range[1] - of.range[0]
+    limit = measure.range[1] - measure.range[0]
     mean = float(differences.mean())
     return intervals.Interval(mean, max(smooth.low, -limit), min(smooth.high, limit)), p
 
@@ -221,12 +221,12 @@ def column_tests(
     present = differences.notna()
     n = differences.count()
     mean = differences.mean()
-    of = metric_of(metric)
+    measure = metric_of(metric)
     half = -differences.sem() * stdtrit(np.maximum(n - 1, 1), (1 - levels) / 2)
     ends = {"low": mean - half, "high": mean + half}
     table = pd.DataFrame({"difference": mean, **ends, "n": n, "student": half})
-    own = values.where(present).mean()
-    rare = intervals.rare_differences(metric, own, own - mean)
+    means = values.where(present).mean()
+    rare = intervals.rare_differences(metric, means, means - mean)
     if rare is None:
         t = (mean / differences.sem()).abs()
         table["p"] = 2 * stdtr(np.maximum(n - 1, 1), -t)
@@ -244,11 +244,11 @@ def column_tests(
     table["low"] = centre - half
     table["high"] = centre + half
     table["p"] = 2 * stdtr(size - 1, -(centre / error).abs())
-    limit = of.range[1] - of.range[0]
+    limit = measure.range[1] - measure.range[0]
     table[["low", "high"]] = table[["low", "high"]].clip(-limit, limit)
-    if not of.is_bounded:
+    if not measure.is_bounded:
         table.loc[n == 1, ["low", "high", "p"]] = np.nan, np.nan, 1.0
-    if of.is_outcome:
+    if measure.is_outcome:
         gains = (differences > 0).sum()
         losses = (differences < 0).sum()
         exact = (differences.isin((-1, 0, 1)) | ~present).all() & (n > 0)
@@ -361,13 +361,13 @@ def relative_change(
     mean = values.mean()
     base = reference.mean()
     n = len(values)
-    of = metric_of(metric)
+    measure = metric_of(metric)
     ratio = float(mean / base)
     if n == 1:
         return intervals.Interval(ratio - 1, np.nan, np.nan)
     residuals = values - ratio * reference
-    least, most = of.range
-    if of.has_range:
+    least, most = measure.range
+    if measure.has_range:
         more = max(most - mean, mean - ratio * least)
         less = min(least - mean, mean - ratio * most)
         residuals = add_rare_pairs(residuals, (more, less))
@@ -418,7 +418,7 @@ def compare(
     if not others:
         raise InputError(f"{of}: nothing to compare with {baseline}; allowed: two or more")
     rows = []
-    known = {metric: metric_in_missions(missions, metric) for metric in metrics}
+    measures = {metric: metric_in_missions(missions, metric) for metric in metrics}
     for name in others:
         check_same_missions(tables, name, baseline)
         for group, (a, b) in match_groups([tables[name], reference], by):
@@ -426,7 +426,7 @@ def compare(
                 measured = ~np.isnan(a[metric]) & ~np.isnan(b[metric])
                 if measured.any():
                     pairs = a[metric][measured], b[metric][measured]
-                    result = compare_pairs(*pairs, level, known[metric])
+                    result = compare_pairs(*pairs, level, measures[metric])
                     rows.append((name, baseline, *group, metric, *result))
     columns = [of, "baseline", *by, "metric", *Paired._fields]
     return add_adjusted(pd.DataFrame(rows, columns=columns), correction)

@@ -135,14 +135,14 @@ def rare_differences(metric: str | Metric, a: Any, b: Any) -> tuple[Any, Any] | 
     Returns:
         The (...) highest and the (...) lowest differences; None if they are not known.
     """
-    of = metric_of(metric)
-    if of.is_outcome:
+    measure = metric_of(metric)
+    if measure.is_outcome:
         return 0 * (a - b) + 1, 0 * (a - b) - 1
-    if of.has_range:
-        least, most = of.range
+    if measure.has_range:
+        least, most = measure.range
         return np.maximum(a - least, most - b), -np.maximum(b - least, most - a)
-    if of.failure:
-        return a - b + of.failure, a - b - of.failure
+    if measure.failure:
+        return a - b + measure.failure, a - b - measure.failure
     return None
 
 
@@ -221,27 +221,27 @@ class Moments(NamedTuple):
                 where it has none.
             missions: Number of missions; what some of them have not measured has a plain mean.
         """
-        drawn = [of for of in fleets if of]
+        drawn = [fleet for fleet in fleets if fleet]
         whole = reduce(cls.with_others, drawn)
-        counts = np.array([of.n if of else 0 for of in fleets])
+        counts = np.array([fleet.n if fleet else 0 for fleet in fleets])
         weights = weights_of_fleets(counts)
         if weights is None or whole.n < missions:
             return whole
-        mean = float(np.mean([of.mean for of in drawn]))
+        mean = float(np.mean([fleet.mean for fleet in drawn]))
         spread = weights**2 * counts / (counts - 1) * (1 - 1 / whole.n)
-        squares = float(spread @ [of.squares for of in drawn])
-        cubes = float(spread**1.5 @ [of.cubes for of in drawn])
+        squares = float(spread @ [fleet.squares for fleet in drawn])
+        cubes = float(spread**1.5 @ [fleet.cubes for fleet in drawn])
         return whole._replace(total=mean * whole.n, squares=squares, cubes=cubes)
 
     def interval(self, metric: str | Metric, level: float = LEVEL) -> Interval:
         """The mean of a metric with the interval of ``interval_of``."""
-        of = metric_of(metric)
-        if of.is_outcome and self._are_outcomes:
+        measure = metric_of(metric)
+        if measure.is_outcome and self._are_outcomes:
             return wilson_interval(int(self.total), self.n, level)
-        if of.is_bounded:
+        if measure.is_bounded:
             return self.bounded(level)
         mean, *ends = self.skewed(level)
-        return Interval(mean, *np.clip(ends, *of.range).tolist())
+        return Interval(mean, *np.clip(ends, *measure.range).tolist())
 
     @property
     def _are_outcomes(self) -> bool:
@@ -420,10 +420,10 @@ def column_intervals(
         rows = ((values.isin((0, 1)) | values.isna()).all() & (n > 0)).to_numpy()
         successes = (mean * n)[rows].round().astype(int)
         samples = [*zip(successes, n[rows], level[rows], strict=True)]
-        known = {
+        measures = {
             sample: wilson_interval(*sample)[1:] for sample in {*samples}
         }  # each takes its time
-        table.loc[rows, ["low", "high"]] = np.array([known[s] for s in samples]).reshape(-1, 2)
+        table.loc[rows, ["low", "high"]] = np.array([measures[s] for s in samples]).reshape(-1, 2)
     return table
 
 

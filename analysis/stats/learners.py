@@ -147,7 +147,7 @@ def compare_learners(
     tables = metrics_by_treatment(missions, "policy", metrics, by)
     reference = select_table(tables, "policy", baseline)
     rows = []
-    known = {metric: metric_in_missions(missions, metric) for metric in metrics}
+    measures = {metric: metric_in_missions(missions, metric) for metric in metrics}
     for learner, checkpoints in learners.items():
         if not checkpoints or len(set(checkpoints)) < len(checkpoints) or baseline in checkpoints:
             raise InputError(
@@ -160,7 +160,9 @@ def compare_learners(
         for group, (b, *parts) in match_groups([reference, *trained], by):
             for metric in metrics:
                 of_learner = np.stack([a[metric] for a in parts])
-                result, differences = _compare_learner(of_learner, b[metric], known[metric], level)
+                result, differences = _compare_learner(
+                    of_learner, b[metric], measures[metric], level
+                )
                 if len(parts) > 1:
                     about = LEARNER
                 else:

@@ -86,7 +86,7 @@ def on_front(costs: np.ndarray, values: np.ndarray) -> np.ndarray:
         (..., k) booleans. Settings that are equal in both are either all on the front, or none is.
     """
     order = np.lexsort((-values, costs), axis=-1)
-    cost, value = (np.take_along_axis(of, order, -1) for of in (costs, values))
+    cost, value = (np.take_along_axis(table, order, -1) for table in (costs, values))
     best_before = np.full_like(value, -np.inf)
     best_before[..., 1:] = np.maximum.accumulate(value, axis=-1)[..., :-1]
     # Equal settings are neighbours now; the first of them decides for all.
@@ -135,16 +135,18 @@ def front_membership(
     present = ~np.isnan(values)
     count = np.zeros(len(values))
     # Less the first one, equal costs stay equal, without rounding errors.
-    base = np.array([row[there][0] for row, there in zip(costs, present, strict=True)])
+    base = np.array([row[is_present][0] for row, is_present in zip(costs, present, strict=True)])
     excess = np.where(present, costs - base[:, None], 0.0)
-    known = np.where(present, values, 0.0)
+    observed = np.where(present, values, 0.0)
     mask = present.astype(float)
     batch = max(1, _BATCH // values.shape[1])
     for begin in range(0, draws, batch):
         size = min(batch, draws - begin)
         weights = generator.standard_exponential((size, values.shape[1]))
         # Not matrix products: their last bits would depend on the number of threads.
-        total, cost, value = (np.einsum("bn,kn->bk", weights, of) for of in (mask, excess, known))
+        total, cost, value = (
+            np.einsum("bn,kn->bk", weights, table) for table in (mask, excess, observed)
+        )
         more = np.zeros((2, 1, 1))
         if share:
             more = generator.standard_gamma(0.5, (2, size, len(values)))
@@ -208,12 +210,12 @@ def may_be_best(
     mask = present.astype(float)
     if looks is None:
         looks = np.zeros(values.shape[1], int)
-    each = (1 - LEVEL) / max(values.shape[1] - 1, 1)
+    error_of_policy = (1 - LEVEL) / max(values.shape[1] - 1, 1)
     blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
     rare = [_rare_leads(metric, means, means[block, None]) for block in blocks]
     # The missions that a pair shares end with those of the setting that has fewer.
     shared = [np.minimum(looks[block, None], looks) for block in blocks]
-    alphas = [1 - level_after(of_pairs, 1 - each) for of_pairs in shared]
+    alphas = [1 - level_after(of_pairs, 1 - error_of_policy) for of_pairs in shared]
     parts = [
         _unbeaten_settings(block, added, centred, mask, alpha)
         for block, added, alpha in zip(blocks, rare, alphas, strict=True)
@@ -245,12 +247,14 @@ def _unbeaten_settings(
     ``rare`` has the differences that are added, of the other settings minus those of the block, and
     ``alpha`` the errors of the tests.
     """
-    own = values[:, block]
-    here = mask[:, block]
-    n = here.T @ mask
-    lead = here.T @ values - own.T @ mask  # of the other settings, summed over common replications
-    squares = here.T @ values**2 + (own**2).T @ mask
-    spread = np.maximum(squares - 2 * own.T @ values, 0.0)
+    block_values = values[:, block]
+    block_mask = mask[:, block]
+    n = block_mask.T @ mask
+    lead = (
+        block_mask.T @ values - block_values.T @ mask
+    )  # of the other settings, summed over common replications
+    squares = block_mask.T @ values**2 + (block_values**2).T @ mask
+    spread = np.maximum(squares - 2 * block_values.T @ values, 0.0)
     if rare is not None:
         n = n + 2 * (n > 1)
         lead = lead + rare[0] + rare[1]

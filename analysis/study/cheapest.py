@@ -347,10 +347,10 @@ class Cheapest(StrictTable):
         Raises:
             InputError: If it has another unit than one of time.
         """
-        given = self.requirements[metric]
-        if isinstance(given, str):
-            return quantity_of(given, f"requirements.{metric}", "s") / 3600
-        return float(given)
+        required = self.requirements[metric]
+        if isinstance(required, str):
+            return quantity_of(required, f"requirements.{metric}", "s") / 3600
+        return float(required)
 
     def check_age(self, spaces: Sequence[ScenarioSpace]) -> None:
         """Check that the required age has a unit where there is a data sheet, and can be missed.
@@ -360,16 +360,16 @@ class Cheapest(StrictTable):
         """
         where = f"requirements.{AGE}"
         for space in spaces if AGE in self.requirements else ():
-            given = self.requirements["age"]
+            required = self.requirements["age"]
             horizon = horizon_of(space)
             share = self.amount("age") / horizon
-            has_unit = isinstance(given, str)
+            has_unit = isinstance(required, str)
             if not self.tolerance < share < 1 - self.tolerance or has_unit != bool(space.units):
                 if space.units:
                     allowed = f'a time such as "6 h" in the horizon of {horizon:g} h'
                 else:
                     allowed = f"mission slots in the horizon of {horizon:g}"
-                raise InputError(f"{where}: {shown(given)} does not fit; allowed: {allowed}")
+                raise InputError(f"{where}: {shown(required)} does not fit; allowed: {allowed}")
             if not space.age.measured:
                 raise InputError(f"{where}: is not measured; allowed: age.measured = true")
 
@@ -427,7 +427,7 @@ class Cheapest(StrictTable):
         points = [*zip(search.samples, search.points.counts, strict=True)]
         times = 2
         while times <= FURTHER and times * search.points.counts.sum() <= MOST_FURTHER:
-            again = [{m: np.tile(of[m][:n], times) for m in names} for of, n in points]
+            again = [{m: np.tile(sample[m][:n], times) for m in names} for sample, n in points]
             further = _Search(endless, again, search.settings)
             if further.done:
                 return int(further.points.counts.sum())
@@ -454,10 +454,10 @@ class Cheapest(StrictTable):
     def _in_words(self, shift: float) -> str:
         """The requirements in words, such as ``a mean success of at least 0.985``."""
         means = [
-            f"{metric.replace('_', ' ')} of at least {given + shift:g}"
-            if not isinstance(given, str) and metric != AGE
-            else f"{metric} of at most {given} {'-' if shift > 0 else '+'} {abs(shift):g} horizons"
-            for metric, given in self.requirements.items()
+            f"{metric.replace('_', ' ')} of at least {amount + shift:g}"
+            if not isinstance(amount, str) and metric != AGE
+            else f"{metric} of at most {amount} {'-' if shift > 0 else '+'} {abs(shift):g} horizons"
+            for metric, amount in self.requirements.items()
         ]
         return f"a mean {' and a mean '.join(means)}"
 
@@ -507,10 +507,10 @@ class _Search:
         self.questions = questions_about([setting.values for setting in settings])
         self.rounds, self.done = 1, False
         self._error = (1 - rule.confidence) / 2
-        each = self._error / (len(samples) * len(rule.requirements))
+        error_of_test = self._error / (len(samples) * len(rule.requirements))
         self._tests = [
             {
-                m: MeanTest(as_share(m, rule.amount(m), s.horizon), rule.tolerance, each)
+                m: MeanTest(as_share(m, rule.amount(m), s.horizon), rule.tolerance, error_of_test)
                 for m in rule.requirements
             }
             for s in settings
@@ -533,8 +533,8 @@ class _Search:
             looks = int(self.points.looks[both].min())
             error = self._error / (self._pairs * looks * (looks + 1))
             costs, least = (
-                np.mean([self.samples[p]["cost"][:n] for p in of], axis=0)
-                for of in (candidate, candidates[leader])
+                np.mean([self.samples[p]["cost"][:n] for p in point], axis=0)
+                for point in (candidate, candidates[leader])
             )
             excess = least - costs
             width = float(stdtrit(n - 1, 1 - error)) * excess.std(ddof=1) / np.sqrt(n)
@@ -578,5 +578,5 @@ class _Search:
             shares = as_share(metric, values, horizon)
             test.observe(shares[test.missions :])
             points.promising[point] &= shares.mean() >= test.required
-        found = {test.verdict for test in self._tests[point].values()}
-        points.verdicts[point] = min(found, key=["missed", "open", "met"].index)
+        verdicts = {test.verdict for test in self._tests[point].values()}
+        points.verdicts[point] = min(verdicts, key=["missed", "open", "met"].index)

@@ -72,9 +72,10 @@ def _are_ranges(ranges: dict[str, Any]) -> dict[str, Any]:
                 numbers = "integers"
             else:
                 numbers = "numbers"
-            given = shown(list(ends) if isinstance(ends, tuple) else ends)
+            printed = shown(list(ends) if isinstance(ends, tuple) else ends)
             raise ValueError(
-                f"{field}: {given} is not a range; allowed: [low, high], {numbers} with low <= high"
+                f"{field}: {printed} is not a range; "
+                f"allowed: [low, high], {numbers} with low <= high"
             )
     return ranges
 

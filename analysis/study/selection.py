@@ -201,8 +201,8 @@ class Selection(StrictTable):
 
     def _values(self, samples: Samples) -> list[np.ndarray]:
         """The values of the metric, negative if less is better: the best has the largest mean."""
-        found = [values_in(sample, self.metric) for sample in samples]
-        if any(np.isnan(values).any() for values in found):
+        by_point = [values_in(sample, self.metric) for sample in samples]
+        if any(np.isnan(values).any() for values in by_point):
             raise InputError(
                 f"selection.metric: {self.metric} is not measured in some missions; "
                 "allowed: a metric that every mission has"
@@ -210,7 +210,7 @@ class Selection(StrictTable):
         sign = 1.0
         if metric_of(self.metric).less_is_better:
             sign = -1.0
-        return [sign * values for values in found]
+        return [sign * values for values in by_point]
 
     def _guarantee(self, race: "_Race") -> str:
         if len(race.values) == 1:

@@ -229,9 +229,11 @@ class Precision(StrictTable):
         rows = []
         for metric, target in self.targets.items():
             means, widths = running_interval(metric, values_in(sample, metric))
-            held = len(means) - int(self._last_miss(ratios[metric])[-1]) > self.look_ahead
-            mean, width, allowed = (float(of[-1]) for of in (means, widths, target.width(means)))
-            met = stop is not None or held
+            is_met = len(means) - int(self._last_miss(ratios[metric])[-1]) > self.look_ahead
+            mean, width, allowed = (
+                float(column[-1]) for column in (means, widths, target.width(means))
+            )
+            met = stop is not None or is_met
             rows.append(Reached(point, metric, len(means), mean, width, allowed, met, stop))
         return rows
 
@@ -263,8 +265,8 @@ def values_in(sample: Mapping[str, np.ndarray], metric: str) -> np.ndarray:
         InputError: If the scenario does not measure it.
     """
     if metric not in sample:
-        known = [name for name in _METRICS if name in sample]
-        raise InputError(f"{metric}: is not measured by the scenario; allowed: {listed(known)}")
+        present = [name for name in _METRICS if name in sample]
+        raise InputError(f"{metric}: is not measured by the scenario; allowed: {listed(present)}")
     return np.asarray(sample[metric], float)
 
 

@@ -253,11 +253,11 @@ class Study(StudyData):
         else:
             return
         for space in self.scenarios:
-            known = metrics_in([HOME, *measures_of(space)])
-            if absent := sorted(asked - {*known}):
+            measured = metrics_in([HOME, *measures_of(space)])
+            if absent := sorted(asked - {*measured}):
                 raise ValueError(
                     f"{key}: {absent[0]} is not measured at every design point; allowed: "
-                    f"{listed(known)}"
+                    f"{listed(measured)}"
                 )
 
     def _check_budget(self) -> None:
@@ -324,14 +324,14 @@ class Study(StudyData):
         for point in self.points:
             if both := sorted(self.set.keys() & point.values.keys()):
                 raise InputError(f"design: {both[0]} is also in set; allowed: either")
-        found = set()
+        checked = set()
         for point, space in zip(self.points, self.scenarios, strict=True):
             # As the scenario has the values, which is the same for 1 and 1.0.
             key = frozenset((f, v if f == SEA else space.value(f)) for f, v in point.values.items())
-            if key in found and not isinstance(self.design, Sampled):  # equal integers by chance
+            if key in checked and not isinstance(self.design, Sampled):  # equal integers by chance
                 shown = _values_in_words(point.values)
                 raise InputError(f"design: {shown} is listed twice; allowed: once")
-            found.add(key)
+            checked.add(key)
 
     def _scenario_at(self, values: dict[str, Any]) -> ScenarioSpace:
         if not values.keys() & {SEA, "grid", "rows", "cell_size"}:  # these move nodes of a file
@@ -387,7 +387,7 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
             among the overrides, names a policy of a Python file, which is code.
     """
     text = str(name_or_path)
-    overrides = {name: plain(of) for name, of in overrides.items()}
+    overrides = {name: plain(value) for name, value in overrides.items()}
     where, values = _STUDIES.load(name_or_path)
     values = {"name": text if text in study_names() else Path(text).stem} | values
     scenario = values.get("scenario")

@@ -111,9 +111,9 @@ def battery_check(logs: Sequence[Log]) -> Check:
         "/".join(map(str, sorted({getattr(log.scenario, field) for log in logs})))
         for field in ("flight_cost", "charge_rate")
     )
-    known = f"−{cost} % flying, +{gain} % charging; charging begins at or below C_S, ends at C_C"
+    rule = f"−{cost} % flying, +{gain} % charging; charging begins at or below C_S, ends at C_C"
     test = "Battery of every UAV in every slot"
-    return Check.counted(ENERGY, test, known, int(wrong.sum()), wrong.size)
+    return Check.counted(ENERGY, test, rule, int(wrong.sum()), wrong.size)
 
 
 def battery_errors(log: Log) -> np.ndarray:
@@ -177,11 +177,11 @@ def _charges_rightly(log: Log, before: pd.Series) -> pd.Series:
     k = charging.groupby([table["uav"], charge]).cumsum()  # the slots of the present charge
     rate, slots = s.charge_fraction.as_integer_ratio()
     added = k * rate // slots - (k - 1) * rate // slots
-    wanted = (s.charge_complete - before).clip(upper=added).where(charging, 0)
+    expected = (s.charge_complete - before).clip(upper=added).where(charging, 0)
     gain = (table["battery"] - before).where(charging, 0)
     of_all = gain.groupby(place).transform("sum")
-    shared = wanted.groupby(place).transform("sum").clip(upper=s.charging.power or np.inf)
-    return gain.between(0, wanted) & (of_all == shared)
+    shared = expected.groupby(place).transform("sum").clip(upper=s.charging.power or np.inf)
+    return gain.between(0, expected) & (of_all == shared)
 
 
 def record_check(logs: Sequence[Log]) -> Check:
@@ -214,11 +214,11 @@ def _adds_up(log: Log) -> bool:
         "slots_charging": log.uav_slots.groupby("uav")["charging"].sum(),
         "collected": served.sum(),
     }
-    of_uavs = {name: found.reindex(uavs.index, fill_value=0) for name, found in of_uavs.items()}
+    of_uavs = {name: totals.reindex(uavs.index, fill_value=0) for name, totals in of_uavs.items()}
     return {*uavs.index[uavs["end"] == "quota"]} == filled and all(
-        np.allclose(np.asarray(record[name], float), np.asarray(known, float), rtol=1e-12)
+        np.allclose(np.asarray(record[name], float), np.asarray(stored, float), rtol=1e-12)
         for record, fields in ((log.record, of_mission), (uavs, of_uavs))
-        for name, known in fields.items()
+        for name, stored in fields.items()
     )
 
 
@@ -229,9 +229,9 @@ def realisation_checks(results: Results, logs: Sequence[Log]) -> list[Check]:
     drawn = results.missions.groupby(["point", "replication"])[[*SAMPLED, "initial"]].nunique()
     reference = {log.replication: log for log in longest_logs(logs)}
     others = sum(not _same_realisation(log, reference[log.replication]) for log in logs)
-    known, of_replication = "the same for all policies", "of a replication"
+    expectation, of_replication = "the same for all policies", "of a replication"
     return [
-        Check.counted(REALISATIONS, f"{what} {of_replication}", known, wrong, n)
+        Check.counted(REALISATIONS, f"{what} {of_replication}", expectation, wrong, n)
         for what, wrong, n in (
             ("Parameters and initial data", int((drawn > 1).any(axis=1).sum()), len(drawn)),
             ("Arrivals and start cells", others, len(logs)),

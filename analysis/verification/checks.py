@@ -147,12 +147,12 @@ def _reason_in_words(row: pd.Series) -> str:
 
 def checks_sentence(judged: pd.DataFrame) -> str:
     """How many checks hold, in a sentence."""
-    held, refuted = (len(_tests_with_verdict(judged, verdict)) for verdict in (HOLDS, REFUTED))
+    holding, refuted = (len(_tests_with_verdict(judged, verdict)) for verdict in (HOLDS, REFUTED))
     exact = judged["error"].count()
     chance = judged["p"].count()
     return (
-        f"{held} of {len(judged)} comparisons with theory hold and {refuted} do not; {exact} are "
-        f"exact, {chance} are statistical."
+        f"{holding} of {len(judged)} comparisons with theory hold and {refuted} do not; {exact} "
+        f"are exact, {chance} are statistical."
     )
 
 
@@ -268,8 +268,6 @@ def poisson_fit(counts: np.ndarray, mean: float) -> Fit:
     labels = [*map(str, classes)]
     if low > 0:
         labels[0] += " or less"
-    else:
-        labels[0] += ""
     labels[-1] += " or more"
     return _fit_of_counts(labels, observed, n * np.diff(below, prepend=0.0))
 

@@ -178,8 +178,8 @@ def initial_checks(starts: np.ndarray, totals: np.ndarray, space: ScenarioSpace)
     low, high = space.initial_data
     if low == high:
         error = np.abs(starts - low).max(initial=0.0) / (low or 1.0)
-        known = f"{low:g}"
-        return [Check.exact(DRAWS, "Initial data per node", known, known, starts.size, error)]
+        value = f"{low:g}"
+        return [Check.exact(DRAWS, "Initial data per node", value, value, starts.size, error)]
     range_of = f"U({low:g}, {high:g})"
     per_node = stats.uniform(low, high - low)
     total = closed_forms.initial_total(space)
@@ -210,8 +210,8 @@ def start_check(cells: np.ndarray, space: ScenarioSpace) -> Check:
     number = np.where(in_zone, offset @ [1, width], -1)  # -1 for a cell outside the zone
     fit = uniform_fit(number, 0, width * height - 1)
     test = "Start cell of the first UAV: chi-square"
-    known = f"uniform on {width * height} cells"
-    return Check(DRAWS, test, known, fit.range, len(cells), fit.p)
+    distribution = f"uniform on {width * height} cells"
+    return Check(DRAWS, test, distribution, fit.range, len(cells), fit.p)
 
 
 # Units in the last place by which two ways to compute a rate may differ. Each has few steps, and
@@ -223,14 +223,14 @@ _COMMUNICATIONS = ["node", "value", "best", "known", "residual"]
 def rate_check(rates: pd.DataFrame) -> Check:
     """Compare the rates of ``measurements.compare_rates`` with the integral over all shadowing."""
     test = "Mean rate of a lone UAV at each distance: chi-square"
-    known = "E[δ log₂(1 + SNR)] by integration"
+    expectation = "E[δ log₂(1 + SNR)] by integration"
     n = int(rates["n"].sum())
     off = float((rates["mean"] / rates["known"] - 1).abs().max())
     seen = f"within {100 * off:.2g} % at {len(rates)} distances"
     if not (rates["error"] > 0).all():  # without shadowing, nothing is random
-        return Check.exact(CHANNEL, test, known, seen, n, off, bound=1e-9)
+        return Check.exact(CHANNEL, test, expectation, seen, n, off, bound=1e-9)
     square = (((rates["mean"] - rates["known"]) / rates["error"]) ** 2).sum()
-    return Check(CHANNEL, test, known, seen, n, float(stats.chi2.sf(square, len(rates))))
+    return Check(CHANNEL, test, expectation, seen, n, float(stats.chi2.sf(square, len(rates))))
 
 
 def shadowing_checks(deviates: np.ndarray) -> list[Check]:
@@ -264,11 +264,11 @@ def communication_checks(logs: Sequence[Log], seed: int) -> list[Check]:
         off = float((same["value"] / same["known"] - 1).abs().max())
     emptied = int((same["known"] == same["residual"]).sum())
     seen = f"off by {off:.1e} of it at most; {emptied:,} times the node was emptied"
-    test, known = "Node served in a communication slot", "the best SNR among nodes with data"
-    choice = Check.counted(CHANNEL, test, known, len(table) - len(same), len(table))
-    test, known = "Data of a communication", "min(R, D) with the shadowing that was drawn"
+    test, rule = "Node served in a communication slot", "the best SNR among nodes with data"
+    choice = Check.counted(CHANNEL, test, rule, len(table) - len(same), len(table))
+    test, rule = "Data of a communication", "min(R, D) with the shadowing that was drawn"
     bound = _ROUNDINGS * np.finfo(float).eps
-    return [choice, Check.exact(CHANNEL, test, known, seen, len(same), off, bound)]
+    return [choice, Check.exact(CHANNEL, test, rule, seen, len(same), off, bound)]
 
 
 def recompute_communications(log: Log, seed: int) -> pd.DataFrame:
@@ -364,9 +364,9 @@ def coverage_check(metric: str, values: np.ndarray, size: int, share: bool) -> C
     missions = n * size
     hits = int(table["holds"].sum())
     if share:
-        known = closed_forms.wilson_coverage(round(values[:missions].sum()), missions, size)
+        coverage = closed_forms.wilson_coverage(round(values[:missions].sum()), missions, size)
     else:
-        known = closed_forms.t_coverage(missions, size)
+        coverage = closed_forms.t_coverage(missions, size)
     seen = f"{hits:,} of {n:,}: {format_interval(*wilson_interval(hits, n))}"
-    p = float(stats.binomtest(hits, n, min(known, 1.0)).pvalue)
-    return Check(COVERAGE, test, f"{100 * known:.1f} %", seen, n, p)
+    p = float(stats.binomtest(hits, n, min(coverage, 1.0)).pvalue)
+    return Check(COVERAGE, test, f"{100 * coverage:.1f} %", seen, n, p)

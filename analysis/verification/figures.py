@@ -59,9 +59,9 @@ def plot_rates(table: pd.DataFrame, space: ScenarioSpace) -> Figure:
         space: The scenario.
     """
     away = np.geomspace(table["distance"].min(), table["distance"].max(), 60)
-    known = [closed_forms.rate_moments(space, d).mean for d in away]
+    expected = [closed_forms.rate_moments(space, d).mean for d in away]
     with style.new_panels(4.6, **_ABOVE) as (figure, (ax, below)):
-        ax.plot(away, known, color=style.INK, linewidth=1.3, zorder=1, label="by integration")
+        ax.plot(away, expected, color=style.INK, linewidth=1.3, zorder=1, label="by integration")
         ax.scatter(table["distance"], table["mean"], s=30, color=SEEN, zorder=3, label="simulated")
         ax.set(title="Mean rate of a lone UAV", ylabel="data units per\ncommunication slot")
         ax.set(xscale="log", yscale="log")

@@ -175,8 +175,8 @@ def compare_rates(space: ScenarioSpace, means: Sequence[float]) -> pd.DataFrame:
     n = _draws_per_distance(space)
     for (dx, dy), mean in zip(offsets_of_node(space), means, strict=True):
         distance = float(closed_forms.distance_to_node(space, dx, dy))
-        known, deviation = closed_forms.rate_moments(space, distance)
-        rows.append((distance, n, mean, known, deviation / np.sqrt(n)))
+        expected, deviation = closed_forms.rate_moments(space, distance)
+        rows.append((distance, n, mean, expected, deviation / np.sqrt(n)))
     return pd.DataFrame(rows, columns=["distance", "n", "mean", "known", "error"])
 
 

@@ -343,7 +343,7 @@ class FleetAnswer:
         assert isinstance(rule, Cheapest)
         horizon = self.results.store.manifest.settings[self.points[0]].horizon
         shifted = [requirement.shifted(rule.tolerance, horizon) for requirement in self._required]
-        shown = [f"its {each.metric.within} is {each.bound_in_words}" for each in shifted]
+        shown = [f"its {bound.metric.within} is {bound.bound_in_words}" for bound in shifted]
         where = ""
         if self._answer.condition is None:
             where = " under every condition"
@@ -551,16 +551,16 @@ def selected_fleets(results: Results) -> pd.DataFrame:
         of settings that may be as good), ``guaranteed`` and ``guarantee``.
     """
     rows = []
-    for found in fleet_answers(results):
-        choice = _cheapest_choice(results, found.policy)
-        of_one = choice.answers[found.number]
+    for fleet_answer in fleet_answers(results):
+        choice = _cheapest_choice(results, fleet_answer.policy)
+        of_one = choice.answers[fleet_answer.number]
         is_point = of_one.points and of_one.condition is not None
         rows.append(
             {
-                "policy": found.policy,
-                "condition": found.condition,
+                "policy": fleet_answer.policy,
+                "condition": fleet_answer.condition,
                 "point": of_one.points[0] if is_point else None,
-                "setting": found.fleet,
+                "setting": fleet_answer.fleet,
                 "missions": choice.missions,
                 "left": len(of_one.left),
                 "guaranteed": of_one.settled,
@@ -733,6 +733,10 @@ def tightest_requirement(results: Results) -> tuple[Requirement, str]:
         return cheapest_cost, -least_room
 
     parts: Sequence[tuple[str, pd.DataFrame]] = [*rows.groupby("condition", sort=False)]
-    asked = [(each, str(name), part) for each in requirements_of(results) for name, part in parts]
+    asked = [
+        (asked_requirement, str(name), part)
+        for asked_requirement in requirements_of(results)
+        for name, part in parts
+    ]
     requirement, condition, _ = max(asked, key=lambda found: tightness(found[0], found[2]))
     return requirement, condition

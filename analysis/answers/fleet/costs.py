@@ -112,8 +112,8 @@ def cost_front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
     Raises:
         InputError: If the study has no prices, or there is no such metric.
     """
-    known = [*METRICS, *(requirement.column for requirement in requirements_of(results))]
-    if metric not in known:
+    columns = [*METRICS, *(requirement.column for requirement in requirements_of(results))]
+    if metric not in columns:
         raise InputError(f"metric: {metric!r} is unknown{one_of(metric, METRICS)}")
     sign = 1
     if metric_of(metric).less_is_better:
@@ -269,8 +269,8 @@ def setting_cells(rows: pd.DataFrame, metrics: Iterable[str]) -> pd.DataFrame:
     if rows["condition"].any():
         columns = {"Condition": rows["condition"]}
     columns |= {"Fleet": rows["fleet"], "Policy": rows["policy"]}
-    for of in map(metric_of, (COST, *metrics)):
-        columns[of.name] = numbers.format_estimates(rows, of.column, of.written)
+    for measure in map(metric_of, (COST, *metrics)):
+        columns[measure.name] = numbers.format_estimates(rows, measure.column, measure.written)
     return pd.DataFrame(columns)
 
 

@@ -84,12 +84,12 @@ def plot_costs(
             ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             ax.xaxis.set_minor_locator(NullLocator())
             ax.xaxis.set_major_formatter("{x:,g}")
-        of = metric_of(metric)
-        style.set_axis_unit(ax.yaxis, of.axis)
-        if of.in_percent:
-            ylabel = of.within
+        measure = metric_of(metric)
+        style.set_axis_unit(ax.yaxis, measure.axis)
+        if measure.in_percent:
+            ylabel = measure.within
         else:
-            ylabel = of.label
+            ylabel = measure.label
         ax.set(xlabel=f"cost [{currency}]", ylabel=ylabel)
     return figure
 

@@ -127,4 +127,6 @@ def relative_spare(fleets: pd.DataFrame, requirement: Requirement) -> pd.Series:
 
 def least_spare(fleets: pd.DataFrame, requirements: Sequence[Requirement]) -> pd.Series:
     """The ``relative_spare`` of every fleet for the requirement that it keeps by the least."""
-    return pd.concat([relative_spare(fleets, each) for each in requirements], axis=1).min(axis=1)
+    return pd.concat(
+        [relative_spare(fleets, requirement) for requirement in requirements], axis=1
+    ).min(axis=1)

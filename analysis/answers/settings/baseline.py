@@ -70,12 +70,12 @@ def compare_with_baseline(
             "policy", sort=False
         ):
             wide = by_replication(missions, metric, "point")
-            of = metric_in_missions(results.missions, metric)
+            measure = metric_in_missions(results.missions, metric)
             others = wide.drop(columns=point)
             looks = results.looks(str(policy))
             # The pairs end with the missions of the one that has fewer.
             seen = np.minimum(looks[others.columns.to_numpy()], looks[point])
-            tests = column_tests(others, wide[point], of, level_after(seen))
+            tests = column_tests(others, wide[point], measure, level_after(seen))
             tests["p"] = (tests["p"] * np.maximum(seen * (seen + 1), 1)).clip(upper=1)
             tests = tests[tests["n"] > 0].join(values_of_points(results)).reset_index()
             parts.append(tests.assign(metric=metric, policy=policy))
@@ -88,17 +88,19 @@ def compare_with_baseline(
 def baseline_table(results: Results, point: int, metric: str) -> Table:
     """Every design point compared with a baseline point."""
     data = compare_with_baseline(results, point, metrics_of_page(metric))
-    of = metric_of(metric)
+    measure = metric_of(metric)
     rows = data[data["metric"] == metric]
     order = rows["difference"].abs().sort_values(ascending=False, kind="stable").index
     top = rows.loc[order[:MOST_ROWS]].sort_values("difference", ascending=False, kind="stable")
     cells = named_cells(results, top)
-    cells["Difference"] = [of.change(*row) for row in top[["difference", "low", "high"]].to_numpy()]
+    cells["Difference"] = [
+        measure.change(*row) for row in top[["difference", "low", "high"]].to_numpy()
+    ]
     cells["p (Holm)"] = top["p_adjusted"].map(numbers.format_p_value)
     cells["Pairs"] = format_counts(top["n"])
-    unit = " in percentage points" if of.in_percent else ""
+    unit = " in percentage points" if measure.in_percent else ""
     caption = (
-        f"{of.name}: paired difference from the baseline{unit} with {INTERVALS}; "
+        f"{measure.name}: paired difference from the baseline{unit} with {INTERVALS}; "
         f"the {len(top):,} largest of {len(rows):,} differences"
     )
     return Table(cells, caption, data)

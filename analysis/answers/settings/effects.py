@@ -112,7 +112,7 @@ def _average_labelled(
     cells = labels.drop_duplicates(ignore_index=True)
     sizes = np.bincount(cell_of)
     missions = missions_with_metric(results, metric, policy)
-    of = metric_in_missions(results.missions, metric)
+    measure = metric_in_missions(results.missions, metric)
     design = results.manifest["study"]["design"] or {}
     if sampled := design.get("kind") == "saltelli":  # only its samples A and B are independent
         last = len(design["ranges"]) + 2
@@ -127,13 +127,13 @@ def _average_labelled(
             units = units[units["size"] == sizes[units.index.get_level_values("cell")]]
         wide = units["mean"].unstack("cell").reindex(columns=range(len(cells)))
         if sampled:
-            ends = column_intervals(wide, of)
+            ends = column_intervals(wide, measure)
         else:
             at_points = by_replication(part, metric, "point")
             at_points = at_points.reindex(columns=range(len(cell_of)))
-            ends = _intervals_over_points(at_points, cell_of, of, level_after(seen))
+            ends = _intervals_over_points(at_points, cell_of, measure, level_after(seen))
         table = pd.concat([cells, ends], axis=1)
-        table = table.assign(points=sizes, tied=may_be_best(wide.to_numpy(float), of, seen))
+        table = table.assign(points=sizes, tied=may_be_best(wide.to_numpy(float), measure, seen))
         table.insert(0, "policy", name)
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
@@ -174,13 +174,13 @@ def _bin_values(values: pd.Series) -> pd.Series:
 def effect_table(results: Results, metric: str) -> Table:
     """The size of the effect of every field on a metric."""
     effects = main_effects(results, metric)
-    of = metric_of(metric)
+    measure = metric_of(metric)
     rows = []
     for (field, policy), part in effects.groupby(["field", "policy"], sort=False):
         low, high = part.loc[part["mean"].idxmin()], part.loc[part["mean"].idxmax()]
-        both = [f"{of.write(row['mean'])} at {row['value']}" for row in (low, high)]
-        span = of.write(high["mean"] - low["mean"]).replace(" %", " points")
+        both = [f"{measure.write(row['mean'])} at {row['value']}" for row in (low, high)]
+        span = measure.write(high["mean"] - low["mean"]).replace(" %", " points")
         rows.append((field_named(str(field)).name, policy, *both, span))
     heads = ["Field", "Policy", "Lowest mean", "Highest mean", "Difference"]
-    caption = f"The effect of each field on {of.within}, averaged over the others"
+    caption = f"The effect of each field on {measure.within}, averaged over the others"
     return Table(pd.DataFrame(rows, columns=heads), caption, effects.drop(columns="tied"))

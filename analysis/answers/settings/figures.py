@@ -70,8 +70,8 @@ def draw_curves(
     """
     data = average_over_others(results, [x, hue] if hue else [x], metric, policy)
     drawing = plot_curves(data, x, hue or "policy", metric, "policy" if hue else None)
-    each = "dot" if hue else "point"
-    caption = f"n = {counted_missions(data)} missions per {each}; bars are {INTERVALS}."
+    mark = "dot" if hue else "point"
+    caption = f"n = {counted_missions(data)} missions per {mark}; bars are {INTERVALS}."
     alt = f"{metric_of(metric).name} against the {field_named(x).within}"
     return Drawing(drawing, alt, caption, data)
 
@@ -136,7 +136,7 @@ def draw_heat_map(
         InputError: If there is no such field, metric or policy.
     """
     policy = policy or str(rank_settings(results, metric)["policy"].iloc[0])
-    of = metric_of(metric)
+    measure = metric_of(metric)
     named = [x, y, *filter(None, [facet])]
     data = average_over_others(results, [*named[2:], x, y], metric, policy)
     values = varied_values(results)
@@ -150,14 +150,14 @@ def draw_heat_map(
     rows = rows.assign(
         row=rows[y].map(values[y].index),
         column=rows[x].map(values[x].index),
-        text=[_format_cell(mean, of) if has_room else "" for mean in rows["mean"]],
+        text=[_format_cell(mean, measure) if has_room else "" for mean in rows["mean"]],
     )
-    if of.less_is_better:
+    if measure.less_is_better:
         best = rows["mean"].idxmin()
     else:
         best = rows["mean"].idxmax()
     scale = {"vmin": rows["mean"].min(), "vmax": rows["mean"].max(), "cmap": "YlGnBu"}
-    if of.less_is_better:
+    if measure.less_is_better:
         scale["cmap"] = "YlGnBu_r"
     height = 1.2 + (1.75 if facet else 0.5 * len(values[y])) * ceil(len(panels) / columns)
     with panel_grid(min(height, 9), len(panels), columns, sharex=True) as (figure, axes):
@@ -178,12 +178,12 @@ def draw_heat_map(
                 title = f"{field_named(str(facet)).tick} {value_text(value)}"
             ax.set_title(title, fontsize=9, parse_math=True)
         bar = figure.colorbar(mesh, ax=axes, shrink=0.9, aspect=30)
-        style.set_axis_unit(bar.ax.yaxis, of.axis)
+        style.set_axis_unit(bar.ax.yaxis, measure.axis)
         figure.supxlabel(field_named(x).label, fontsize=10, parse_math=True)
         figure.supylabel(field_named(y).tick, fontsize=10, parse_math=True)
-        title = f"{of.label}: {policy}"
+        title = f"{measure.label}: {policy}"
         figure.suptitle(title, fontsize=11, fontweight="bold", x=0.02, ha="left")
-    unit = "in percent, " if of.in_percent else ""
+    unit = "in percent, " if measure.in_percent else ""
     counted = "replications" if facet else "missions"
     caption = f"Means of {policy}, {unit}n = {counted_missions(data)} {counted} per cell. "
     if facet:
@@ -192,7 +192,7 @@ def draw_heat_map(
     fields = fields_by_influence(main_effects(results, metric))
     if others := [field for field in fields if field not in named]:
         caption += f"Cells are averaged over {_fields_in_words(others)}. "
-    alt = f"{of.name} of {policy} over {_fields_in_words(named)}"
+    alt = f"{measure.name} of {policy} over {_fields_in_words(named)}"
     return Drawing(figure, alt, caption + _FRAMED, data)
 
 
@@ -224,19 +224,19 @@ def draw_main_effects(
         policy: The policy; by default all policies.
     """
     effects = main_effects(results, metric, policy)
-    of = metric_of(metric)
+    measure = metric_of(metric)
     looks = style.policy_colours(results.policies, effects["policy"])
 
     def draw(field: str, ax: Axes) -> None:
-        style.plot_along(effects[effects["field"] == field], looks, of.axis, ax)
+        style.plot_along(effects[effects["field"] == field], looks, measure.axis, ax)
 
-    drawing = _panel_per_field(fields_by_influence(effects), of, draw)
+    drawing = _panel_per_field(fields_by_influence(effects), measure, draw)
     caption = (
         "One panel for each field, the one with the largest effect first. A dot is the mean over "
         f"{_MEANT[results.design == 'saltelli']}; n = {counted_missions(effects)}; "
         f"bars are {INTERVALS}."
     )
-    alt = f"{of.name} against each field, averaged over the others"
+    alt = f"{measure.name} against each field, averaged over the others"
     return Drawing(drawing, alt, caption, effects.drop(columns="tied"))
 
 
@@ -249,7 +249,7 @@ def draw_scatter(results: Results, metric: str = PRODUCT, policy: str | None = N
         policy: The policy; by default all policies.
     """
     table = rank_settings(results, metric, policy)
-    of = metric_of(metric)
+    measure = metric_of(metric)
     looks = style.policy_colours(results.policies, table["policy"])
 
     def draw(field: str, ax: Axes) -> None:
@@ -261,15 +261,15 @@ def draw_scatter(results: Results, metric: str = PRODUCT, policy: str | None = N
         ticks = rows.drop_duplicates("position").sort_values("position")
         if len(ticks) <= style.MOST_TICKS:
             style.name_ticks(ax.xaxis, [*ticks["value"]], [*ticks["position"]])
-        style.set_axis_unit(ax.yaxis, of.axis)
+        style.set_axis_unit(ax.yaxis, measure.axis)
 
     caption = (
         f"One panel for each field. A dot is the mean of a policy at a design point, over "
         f"n = {counted_missions(table)} missions. All fields vary at once, so dots above each "
         "other differ in the other fields."
     )
-    drawing = _panel_per_field([*varied_values(results)], of, draw)
-    return Drawing(drawing, f"{of.name} at every design point", caption, table)
+    drawing = _panel_per_field([*varied_values(results)], measure, draw)
+    return Drawing(drawing, f"{measure.name} at every design point", caption, table)
 
 
 def plot_distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Drawing:
@@ -279,12 +279,12 @@ def plot_distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Drawing:
         missions: A row per mission, with ``policy`` and the metric.
         metric: The metric.
     """
-    of = metric_of(metric)
+    measure = metric_of(metric)
     by_policy = missions.groupby("policy", sort=False)
     with style.new_panels(3.9, legend=4) as (figure, ax):
         style.plot_distributions({str(name): part[metric] for name, part in by_policy}, ax)
-        ax.set_xlabel(of.label)
-        style.set_axis_unit(ax.xaxis, of.axis)
+        ax.set_xlabel(measure.label)
+        style.set_axis_unit(ax.xaxis, measure.axis)
     caption = (
         "The height of a curve is the share of the missions "
         f"(n = {numbers.format_span(by_policy.size())} per policy) with at most the value on the "
@@ -292,7 +292,7 @@ def plot_distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Drawing:
     )
     columns = ["policy", "point", "replication", metric]
     data = missions[columns].sort_values(columns[:3], kind="stable")
-    return Drawing(figure, f"Distribution of {of.within} over the missions", caption, data)
+    return Drawing(figure, f"Distribution of {measure.within} over the missions", caption, data)
 
 
 def evenly_spaced(values: Sequence[Any]) -> list[Any]:

@@ -95,15 +95,15 @@ def ends_of_point(results: Results, point: int) -> dict[str, str]:
         For each of these fields ``least`` or ``largest``.
     """
     space = results.scenario(point)
-    found = {}
+    ends = {}
     for field, values in values_of_points(results).items():
         if is_numeric_dtype(values) and field in space.numeric:
             low, high = space.limits(field)
             if values[point] == values.min() != low:
-                found[str(field)] = "least"
+                ends[str(field)] = "least"
             elif values[point] == values.max() != high:
-                found[str(field)] = "largest"
-    return found
+                ends[str(field)] = "largest"
+    return ends
 
 
 def ends_sentence(
@@ -134,9 +134,9 @@ def intervals_in_words(results: Results) -> str:
 
 def check_metric(results: Results, metric: str) -> None:
     """Raise ``InputError`` if the missions do not have the metric."""
-    known = [*metrics_in(results.missions), *([COST] if COST in results.missions else [])]
-    if metric not in known:
-        raise InputError(f"metric: {metric!r} is unknown{one_of(metric, known)}")
+    metrics = [*metrics_in(results.missions), *([COST] if COST in results.missions else [])]
+    if metric not in metrics:
+        raise InputError(f"metric: {metric!r} is unknown{one_of(metric, metrics)}")
 
 
 def missions_with_metric(results: Results, metric: str, policy: str | None) -> pd.DataFrame:

@@ -90,11 +90,11 @@ def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) ->
         table: The result of ``rank_settings`` for the metric.
         metric: The metric.
     """
-    of = metric_of(metric)
+    measure = metric_of(metric)
     best = table.iloc[0]
     others = len(table) - 1
     tied = table[table["tied"]]
-    value = of.written(*best[[metric, f"{metric}_low", f"{metric}_high"]])
+    value = measure.written(*best[[metric, f"{metric}_low", f"{metric}_high"]])
     names = [setting_in_words(results, row.policy, row.point) for row in tied.itertuples()]
     if varied_values(results):
         what = "setting"
@@ -120,7 +120,7 @@ def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) ->
             "significantly worse."
         )
     parts = [
-        f"The best {what} is {names[0]}: {of.within} {value}, n = {best['n']:,}.",
+        f"The best {what} is {names[0]}: {measure.within} {value}, n = {best['n']:,}.",
         rest,
         ends_sentence(results, best["point"], ends_of_point(results, best["point"])).strip(),
         way_home_sentence_of(results, best, metric),
@@ -237,17 +237,17 @@ def allowance_for_setting(results: Results, rows: pd.DataFrame, metric: str) -> 
         metric: The metric that ranks them.
     """
     first = rows.iloc[0]
-    of = metric_of(metric)
+    measure = metric_of(metric)
     missions = missions_with_metric(results, metric, first["policy"])
     values = missions.loc[missions["point"] == first["point"], metric].to_numpy(float)
     plain = mean_interval(values[~np.isnan(values)])
     half = (plain.high - plain.low) / 2
     wide = (first[f"{metric}_high"] - first[f"{metric}_low"]) / 2
-    if not of.is_bounded or not wide > WIDER * half:
+    if not measure.is_bounded or not wide > WIDER * half:
         return ""
     best = setting_in_words(results, first["policy"], first["point"])
     alone, allowing = (f"±{100 * end:.2g} points" for end in (half, wide))
-    return allowance_sentence(f"the {of.within} of {best}", alone, allowing, int(first["n"]))
+    return allowance_sentence(f"the {measure.within} of {best}", alone, allowing, int(first["n"]))
 
 
 def best_settings_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
@@ -271,10 +271,12 @@ def best_settings_table(results: Results, rows: pd.DataFrame, metric: str) -> Ta
 
 def best_of_policies_table(results: Results, metric: str) -> Table:
     """The best setting of every policy, and how many of its settings may be as good."""
-    own = [rank_settings(results, metric, policy) for policy in results.policies]
-    best = pd.concat([rows.head(1) for rows in own], ignore_index=True)
+    rankings = [rank_settings(results, metric, policy) for policy in results.policies]
+    best = pd.concat([rows.head(1) for rows in rankings], ignore_index=True)
     cells = _ranking_cells(results, best, metric)
-    cells["May be its best"] = [f"{rows['tied'].sum():,} of {len(rows):,} settings" for rows in own]
+    cells["May be its best"] = [
+        f"{rows['tied'].sum():,} of {len(rows):,} settings" for rows in rankings
+    ]
     caption = f"The best setting of every policy by {metric_of(metric).within}"
     return Table(cells, caption, best.drop(columns=["rank", "tied"]))
 
@@ -282,6 +284,6 @@ def best_of_policies_table(results: Results, metric: str) -> Table:
 def _ranking_cells(results: Results, rows: pd.DataFrame, metric: str) -> pd.DataFrame:
     """Rows of ``rank_settings`` as text."""
     cells = named_cells(results, rows)
-    for of in map(metric_of, with_way_home(results, metrics_of_page(metric))):
-        cells[of.name] = numbers.format_estimates(rows, of.column, of.written)
+    for measure in map(metric_of, with_way_home(results, metrics_of_page(metric))):
+        cells[measure.name] = numbers.format_estimates(rows, measure.column, measure.written)
     return cells.assign(Missions=format_counts(rows["n"]))
