@@ -292,7 +292,7 @@ def in_either(*columns: str) -> list[str]:
 
 def column_as_told(column: str, missions: Container[str]) -> str:
     """The column in which a table of missions tells a metric: in units if there is a data sheet."""
-    in_units = _TOLD.get(column)
+    in_units = _TOLD.get(column, column)
     if in_units in missions:
         return in_units
     return column

@@ -95,8 +95,8 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
     others = [policy for policy in ranked if policy not in of_learners]
     if not firsts or not others:
         firsts = others = ranked
-    asked = product([learned] if learned else firsts, [heuristic] if heuristic else others)
-    pairs = [pair for pair in asked if pair[0] != pair[1]]
+    candidates = product([learned] if learned else firsts, [heuristic] if heuristic else others)
+    pairs = [pair for pair in candidates if pair[0] != pair[1]]
     if not pairs:
         raise InputError(
             f"learned, heuristic: no two policies to compare among {', '.join(results.policies)}; "
