@@ -184,6 +184,7 @@ def sweep_question(
     prices: Mapping[str, Any] | None = None,
     requirements: Mapping[str, float | str] | None = None,
     name: str | None = None,
+    *,
     folder: str | Path = "results",
 ) -> Question:
     """Which combination of values is the best, or the cheapest that meets requirements?

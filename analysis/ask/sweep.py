@@ -137,6 +137,7 @@ def sweep(
     seed: int = 0,
     folder: str | Path = "results",
     workers: int = 1,
+    *,
     prices: Mapping[str, Any] | None = None,
     requirements: Mapping[str, float | str] | None = None,
     name: str | None = None,
@@ -177,8 +178,9 @@ def sweep(
         ChunkError: If a chunk could not be computed. It is raised after all other chunks are done.
     """
     values = {field: values_of(field, asked) for field, asked in fields.items()}
-    about = scenario, policies, missions, seed, prices, requirements, name, folder
-    question = sweep_question(values, *about)
+    question = sweep_question(
+        values, scenario, policies, missions, seed, prices, requirements, name, folder=folder
+    )
     if progress is True:
         with _progress_bar() as (bar, announce):
             return Sweep(question, question.ask(workers, bar, announce, yes))

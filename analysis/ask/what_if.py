@@ -570,6 +570,7 @@ def what_if(
     seed: int = 0,
     folder: str | Path = "results",
     workers: int = 1,
+    *,
     shown: str | None = None,
     progress: Progress | None = None,
     yes: bool = False,

@@ -242,28 +242,44 @@ def bound_of_beginning(blocks, local, now, ahead, had, then_had, home, there, le
     return least + max(left - start, 0.0) * had[home], best
 
 
-def bound_paths(to_zone, phases, data, period, blocks, local, values, waiting, ceilings):
+class Problem(NamedTuple):
+    """What the bound of a mission is computed from, at given prices.
+
+    Attributes:
+        to_zone: (W, H) cells on the shortest way from each cell to the nearest charging zone.
+        phases: The phases of the UAVs.
+        data: (T + 1, K) data [data units] that each node has had by the start of slot t.
+        period: (T + 1,) period between cuts of slot t.
+        blocks: The blocks of the nodes.
+        local: (K, Q) local prices, ascending; the first is 0.
+    """
+
+    to_zone: np.ndarray
+    phases: Phases
+    data: np.ndarray
+    period: np.ndarray
+    blocks: Blocks
+    local: np.ndarray
+
+
+def bound_paths(problem, values, waiting, ceilings):
     """Bound what a UAV can earn from every state.
 
     Args:
-        to_zone: (W, H) cells on the shortest way from each cell to the nearest charging zone.
-        phases: ``Phases``.
-        data: (T + 1, K) data [data units] that each node has had by the start of slot t.
-        period: (T + 1,) period between cuts of slot t.
-        blocks: ``Blocks``.
-        local: (K, Q) local prices, ascending; the first is 0.
+        problem: The ``Problem``.
         values: From ``step_values``.
         waiting: (T + 1,) what it costs a UAV that its last flying slot is not before slot t.
         ceilings: (F + 1, P, W, H, J, Q) worth of the future per memory and local price,
             overwritten where a UAV can be.
     """
     for f in range(len(ceilings) - 1, -1, -1):  # between two, a signal can end it
-        _bound_slot(f, to_zone, phases, data, period, blocks, local, values, waiting, ceilings)
+        _bound_slot(f, problem, values, waiting, ceilings)
 
 
 @kernel
-def _bound_slot(f, to_zone, phases, data, period, blocks, local, values, waiting, ceilings):
+def _bound_slot(f, problem, values, waiting, ceilings):
     """Bound what a UAV can earn after f flying slots, from what it can earn after f + 1."""
+    to_zone, phases, data, period, blocks, local = problem
     slots = len(ceilings) - 1
     levels = len(blocks.levels)
     width, height = to_zone.shape

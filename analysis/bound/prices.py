@@ -269,14 +269,16 @@ class Bounds:
         waiting = ((1.0 - prices[-1]) * data).sum(axis=1) / team
         service = (mission.nodes, mission.rates, mission.below)
         step_values(worth, local, mission.nodes, self.blocks.home, *service[1:], self.values)
-        before = (mission.to_zone, mission.phases, data, self.period, self.blocks, local)
-        paths.bound_paths(*before, self.values, waiting, self.ceilings)
+        problem = paths.Problem(
+            mission.to_zone, mission.phases, data, self.period, self.blocks, local
+        )
+        paths.bound_paths(problem, self.values, waiting, self.ceilings)
         bound = total + (prices[:-1] * data[cuts]).sum()
         slope, takings = np.zeros(prices.shape), np.zeros(prices.shape)
         slope[:-1] = data[cuts]
         for x, y in mission.starts:
             most, end = add_slopes(
-                *before, self.parts, self.values, waiting, self.ceilings, x, y, worth, *service,
+                problem, self.parts, self.values, waiting, self.ceilings, x, y, worth, *service,
                 takings,
             )  # fmt: skip
             bound += most

@@ -262,11 +262,9 @@ def _ceiling_of_leaving(blocks, local, now, ahead, had, then_had, home, there, l
 
 
 @kernel
-def _choose_service(
-    to_zone, phases, data, period, blocks, local, values, waiting, ceilings,
-    f, phase, x, y, memory, q,
-):  # fmt: skip
+def _choose_service(problem, values, waiting, ceilings, f, phase, x, y, memory, q):
     """What determines the ceiling of a state: the choice, its local price, the level kept."""
+    to_zone, phases, data, period, blocks, local = problem
     home = blocks.home[x, y]
     node, level = paths.decode_memory(blocks, home, memory)
     had = paths.data_had(data, phases, phase, f)
@@ -315,15 +313,11 @@ def _choose_service(
 
 
 @kernel
-def add_slopes(
-    to_zone, phases, data, period, blocks, local, parts, values, waiting, ceilings,
-    x, y, worth, nodes, rates, below, slopes,
-):  # fmt: skip
+def add_slopes(problem, parts, values, waiting, ceilings, x, y, worth, nodes, rates, below, slopes):
     """Add the derivatives of the bound of a UAV that starts at ``x, y``.
 
     Args:
-        to_zone, phases, data, period, blocks, local, values, waiting, ceilings: As in
-            ``bound_paths``.
+        problem, values, waiting, ceilings: As in ``bound_paths``.
         parts: (Q,) the local prices as parts of the worth in the last period.
         x, y: Start cell.
         worth, nodes, rates, below: As in ``step_values``.
@@ -332,6 +326,7 @@ def add_slopes(
     Returns:
         The bound of the UAV, and the earliest mission slot of its last flying slot.
     """
+    _, phases, data, period, blocks, local = problem
     phase = 0
     f = 0
     memory = 0
@@ -345,9 +340,8 @@ def add_slopes(
     takings = np.empty(len(nodes))
     while f < len(ceilings) - 1:
         choice, line, later = _choose_service(
-            to_zone, phases, data, period, blocks, local, values, waiting, ceilings,
-            f, phase, x, y, memory, q,
-        )  # fmt: skip
+            problem, values, waiting, ceilings, f, phase, x, y, memory, q
+        )
         if choice == paths.STOP:
             break
         node, level = paths.decode_memory(blocks, home, memory)

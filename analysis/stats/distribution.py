@@ -26,6 +26,7 @@ def distribution(
     tail: float = TAIL,
     worst: Worst = "lowest",
     level: float = intervals.LEVEL,
+    *,
     resamples: int = 9999,
 ) -> pd.DataFrame:
     """The distribution of a metric over groups of missions: quantiles, and the mean of the worst.

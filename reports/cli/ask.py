@@ -96,7 +96,7 @@ def sweep(
         options.parse_all_settings(map(_with_quotes, price or []), "--price", PRICE),
         options.parse_all_settings(map(_with_quotes, require or []), "--require", SHARE),
         name,
-        results,
+        folder=results,
     )
     measured = question.study.metrics
     ranking = column_as_told(ALIASES.get(metric or PRODUCT, metric or PRODUCT), measured)

@@ -44,8 +44,8 @@ from dess.reports.pages import html, study
 # %%
 sea = load_scenario(scenario)
 priced = {**prices, "currency": currency, "missions": planned}
-about = (scenario, policies, missions, seed, results, workers, priced, requirements)
-answer = sweep(*about, yes=yes, **fields)
+costs = {"prices": priced, "requirements": requirements}
+answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **costs, **fields)
 
 # %%
 found = answer.results

@@ -37,7 +37,7 @@ from dess.reports.pages import study as page
 
 # %%
 asked = what_if(
-    settings, baseline, scenario, policies, missions, seed, results, workers, shown, yes=yes
+    settings, baseline, scenario, policies, missions, seed, results, workers, shown=shown, yes=yes
 )
 found = asked.results
 
