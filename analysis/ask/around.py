@@ -56,7 +56,7 @@ def question_around(results: Results, scenario: str, missions: int = 100) -> Que
         The question, a design point for the fleet and one for every change of it. None without a
         data sheet, or if no fleet is known to meet the requirements, or its policy is a file.
     """
-    policy = cheapest.best_policy(results)
+    policy = cheapest.policy_of_cheapest_fleet(results)
     manifest = results.store.manifest
     points = cheapest.cheapest_answer(results).points
     if not points or not results.scenario(points[-1]).units or is_path(policy):
@@ -92,7 +92,7 @@ def is_known(results: Results) -> bool:
 
 def _place_of_question(results: Results) -> Path:
     """The results folder of the question, beside that of the study."""
-    about = f"{results.store.manifest.key} {cheapest.best_policy(results)}"
+    about = f"{results.store.manifest.key} {cheapest.policy_of_cheapest_fleet(results)}"
     name = f"{results.store.manifest.study.name[:LONGEST]}-around-{short_hash(about.encode())}"
     return results.store.folder.parent / name
 

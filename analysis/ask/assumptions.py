@@ -72,5 +72,5 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
 def _policy_of(results: Results, metric: str) -> str:
     """The policy of the answer: of the cheapest fleet, or of the best setting."""
     if requirements_of(results):
-        return cheapest.best_policy(results)
+        return cheapest.policy_of_cheapest_fleet(results)
     return str(rank_settings(results, metric)["policy"].iloc[0])

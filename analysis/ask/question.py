@@ -32,8 +32,8 @@ from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.provenance import engine_code, team_of
 from dess.analysis.results.tables import Results
 from dess.analysis.study.cheapest import Cheapest
-from dess.analysis.study.costs import Costs
-from dess.analysis.study.design import MAX_SIZE, Grid, Table
+from dess.analysis.study.design import MAX_SIZE, GridDesign, TableDesign
+from dess.analysis.study.prices import Costs
 from dess.analysis.study.study import Study, study_from
 from dess.base.errors import one_of, validation_line
 from dess.base.files.reading import paths_in
@@ -120,7 +120,7 @@ class Question:
         study = self.study
         design = self.study.design
         rule = self.study.selection
-        if isinstance(design, Table):
+        if isinstance(design, TableDesign):
             before, after = design.rows
             sides = {"set": after, "baseline": study.set | before}
             words = [WHAT_IF]
@@ -130,7 +130,7 @@ class Question:
                 )
             teams = list(study.policies)
         else:
-            assert isinstance(design, Grid)
+            assert isinstance(design, GridDesign)
             fixed = {field: (value,) for field, value in study.set.items()}
             words = ["sweep", *_option_per_value("set", _values_as_options(fixed | design.values))]
             teams = [",".join(study.policies)]

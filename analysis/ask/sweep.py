@@ -160,7 +160,7 @@ def sweep(
         seed: Seed of the missions.
         folder: Results are stored in ``FOLDER/sweeps/NAME``, with ``NAME.toml`` beside it.
         workers: Number of processes. Two or more take seconds to start; they help in long runs.
-        prices: Fields of ``dess.analysis.study.costs.Costs``, such as ``{"uav": 20_000}``.
+        prices: Fields of ``dess.analysis.study.prices.Costs``, such as ``{"uav": 20_000}``.
         requirements: For each required metric its lowest acceptable mean, such as ``{"success":
             0.99}``; for ``age`` its highest, such as ``{"age": "6 h"}`` with a data sheet. With
             requirements, as many missions are simulated as the search for the cheapest setting

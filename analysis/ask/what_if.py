@@ -180,7 +180,7 @@ def _meaning_of_field(field: str) -> str:
     return description.partition(";")[0].partition(":")[0]
 
 
-def best_policy(results: Results, point: int) -> str:
+def best_policy_of_side(results: Results, point: int) -> str:
     """The policy with the highest mean product on one side."""
     missions = results.missions
     return summary.best_policy(missions[missions["point"] == point])
@@ -298,7 +298,7 @@ class WhatIf:
 
     def _best(self, point: int) -> str:
         """The best policy of one side with its mean, as ``greedy, 95.3 % [94.5, 96.1]``."""
-        policy = best_policy(self.results, point)
+        policy = best_policy_of_side(self.results, point)
         mean = estimate_metric(self.results, policy, point=point)
         return f"{policy}, {numbers.format_estimate(mean)}"
 
@@ -602,4 +602,4 @@ def what_if(
     question = what_if_question(settings, baseline, scenario, policies, missions, seed, folder)
     check_shown(question, shown)
     results = question.ask(workers, progress, yes=yes)
-    return WhatIf(question, results, shown or best_policy(results, VARIATION))
+    return WhatIf(question, results, shown or best_policy_of_side(results, VARIATION))

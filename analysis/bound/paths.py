@@ -242,7 +242,7 @@ def bound_of_beginning(blocks, local, now, ahead, had, then_had, home, there, le
     return least + max(left - start, 0.0) * had[home], best
 
 
-class Problem(NamedTuple):
+class BoundProblem(NamedTuple):
     """What the bound of a mission is computed from, at given prices.
 
     Attributes:
@@ -266,7 +266,7 @@ def bound_paths(problem, values, waiting, ceilings):
     """Bound what a UAV can earn from every state.
 
     Args:
-        problem: The ``Problem``.
+        problem: The ``BoundProblem``.
         values: From ``step_values``.
         waiting: (T + 1,) what it costs a UAV that its last flying slot is not before slot t.
         ceilings: (F + 1, P, W, H, J, Q) worth of the future per memory and local price,

@@ -269,7 +269,7 @@ class Bounds:
         waiting = ((1.0 - prices[-1]) * data).sum(axis=1) / team
         service = (mission.nodes, mission.rates, mission.below)
         step_values(worth, local, mission.nodes, self.blocks.home, *service[1:], self.values)
-        problem = paths.Problem(
+        problem = paths.BoundProblem(
             mission.to_zone, mission.phases, data, self.period, self.blocks, local
         )
         paths.bound_paths(problem, self.values, waiting, self.ceilings)

@@ -14,7 +14,7 @@ from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.metrics import AGE, column_as_told, size_of
 from dess.analysis.names import DECISIONS
-from dess.analysis.study.costs import Costs
+from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, missions_needed
 from dess.analysis.study.stopping import MOST, Line, Samples, StrictTable, of_its_kind
 from dess.base.errors import shown
@@ -112,7 +112,7 @@ class Answer:
     settled: bool
 
 
-class Question:
+class CheapestQuestion:
     """The question which of some candidates is the cheapest."""
 
     def __init__(self, condition: dict[str, Any] | None, candidates: Sequence[Sequence[int]]):
@@ -179,17 +179,17 @@ class Question:
         return self.candidates[costs <= costs[promising].min(initial=np.inf) + indifference]
 
 
-def questions_about(values: Sequence[Mapping[str, Any]]) -> list[Question]:
+def questions_about(values: Sequence[Mapping[str, Any]]) -> list[CheapestQuestion]:
     """A question for each condition and, if there are several, one for all of them together."""
     conditions = group_points(values, decisions=False)
     questions = [
-        Question(json.loads(text), [[point] for point in points])
+        CheapestQuestion(json.loads(text), [[point] for point in points])
         for text, points in conditions.items()
     ]
     if len(conditions) > 1:
         everywhere = group_points(values, decisions=True).values()
         fleets = [points for points in everywhere if len(points) == len(conditions)]
-        questions.append(Question(None, fleets))
+        questions.append(CheapestQuestion(None, fleets))
     return questions
 
 

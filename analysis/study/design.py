@@ -128,7 +128,7 @@ class _Design(StrictTable):
     def _points(self) -> Iterator[DesignPoint]: ...
 
 
-class Grid(_Design):
+class GridDesign(_Design):
     """Every combination of the values, the last field varying fastest."""
 
     kind: Literal["grid"] = "grid"
@@ -165,7 +165,7 @@ class OneAtATime(_Design):
             yield from (DesignPoint({field: value}) for value in values)
 
 
-class Table(_Design):
+class TableDesign(_Design):
     """The points that the study lists one by one."""
 
     kind: Literal["table"] = "table"
@@ -303,7 +303,7 @@ def _scale_to_range(u: float, ends: tuple[Any, Any], is_integer: bool) -> Any:
 
 
 Design = Annotated[
-    Grid | OneAtATime | Table | Seas | LatinHypercube | Saltelli,
+    GridDesign | OneAtATime | TableDesign | Seas | LatinHypercube | Saltelli,
     Field(discriminator="kind"),
-    of_its_kind("kind", Grid, OneAtATime, Table, Seas, LatinHypercube, Saltelli),
+    of_its_kind("kind", GridDesign, OneAtATime, TableDesign, Seas, LatinHypercube, Saltelli),
 ]

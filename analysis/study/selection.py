@@ -43,7 +43,7 @@ from pydantic import Field, model_validator
 
 from dess import InputError
 from dess.analysis.metrics import PRODUCT, SUCCESS, metric_of
-from dess.analysis.study.stopping import MOST, Metric, Samples, StrictTable, values_in
+from dess.analysis.study.stopping import MOST, MetricName, Samples, StrictTable, values_in
 from dess.physics.section import Integer, Number
 
 # Number of stages whose sums are computed together; it does not change any result.
@@ -135,7 +135,7 @@ class Selection(StrictTable):
     procedure: Literal["kn", "kn-bounded"] = Field(
         description="kn-bounded: for metrics between 0 and 1 with rare failures; kn: for others"
     )
-    metric: Metric = Field(
+    metric: MetricName = Field(
         "collection_ratio_and_communication", description="the best has its best mean"
     )
     first: Integer = Field(

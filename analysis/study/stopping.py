@@ -46,7 +46,7 @@ def _check_metric(metric: str) -> str:
 
 
 # A metric of missions; those of ``MEASURES`` only where the scenario measures them.
-Metric = Annotated[str, AfterValidator(_check_metric)]
+MetricName = Annotated[str, AfterValidator(_check_metric)]
 # A line of text, such as a name.
 Line = Annotated[str, AfterValidator(_check_printable)]
 Text = Annotated[Line, Field(max_length=4000)]
@@ -174,7 +174,7 @@ class Precision(StrictTable):
         50, ge=0, le=MOST, description="further missions in which the targets must hold as well"
     )
     budget: Integer = Field(5000, ge=2, le=MOST, description="missions of a cell at most")
-    targets: dict[Metric, Target] = Field(
+    targets: dict[MetricName, Target] = Field(
         min_length=1, description="metric -> { absolute = ..., relative = ... }"
     )
 
@@ -237,7 +237,7 @@ class Precision(StrictTable):
             rows.append(Reached(point, metric, len(means), mean, width, allowed, met, stop))
         return rows
 
-    def _excess(self, metric: Metric, sample: Mapping[str, np.ndarray]) -> np.ndarray:
+    def _excess(self, metric: MetricName, sample: Mapping[str, np.ndarray]) -> np.ndarray:
         """Half-width / target after 1..n missions; at most 1 where the target is met."""
         means, widths = running_interval(metric, values_in(sample, metric))
         allowed = self.targets[metric].width(means)

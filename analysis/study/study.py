@@ -22,8 +22,8 @@ from dess import InputError
 from dess.analysis.bound import check_scenario
 from dess.analysis.metrics import BOUND, COST, GAP, HOME, metric_of, metrics_in
 from dess.analysis.study.cheapest import AnySelection, Cheapest
-from dess.analysis.study.costs import Costs
 from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
+from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Selection
 from dess.analysis.study.stopping import MOST, Precision, StrictTable, Text
 from dess.base.errors import cut, listed, one_of, validation_line

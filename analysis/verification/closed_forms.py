@@ -18,7 +18,7 @@ _FAR = 10.0  # standard deviations; the probability beyond is below the rounding
 _MANY = 50  # with this many nodes or more, the sum of their initial data is taken as normal
 
 
-class Moments(NamedTuple):
+class MeanAndDeviation(NamedTuple):
     """Mean and standard deviation."""
 
     mean: float
@@ -50,7 +50,7 @@ def snr_of(scenario: World, rate: Any) -> Any:
     return 10 * np.log10(np.expm1(np.asarray(rate) / length * np.log(2)))
 
 
-def rate_moments(scenario: World, distance: float) -> Moments:
+def rate_moments(scenario: World, distance: float) -> MeanAndDeviation:
     """The rate of one communication slot over all shadowing, by numerical integration.
 
     ``E[delta_n log2(1 + SNR(d, eta))]`` and its standard deviation, ``eta`` being normal [dB].
@@ -66,7 +66,7 @@ def rate_moments(scenario: World, distance: float) -> Moments:
         return float(integrate.quad(weighed, -_FAR, _FAR, limit=200, epsabs=0)[0])
 
     mean = expectation(lambda r: r)
-    return Moments(mean, float(np.sqrt(expectation(lambda r: (r - mean) ** 2))))
+    return MeanAndDeviation(mean, float(np.sqrt(expectation(lambda r: (r - mean) ** 2))))
 
 
 def initial_total(scenario: World) -> Any:

@@ -167,7 +167,7 @@ def what_if(
         dry_run: Only print the plan and the range of its time.
     """
     from dess.analysis.ask.question import what_if_question
-    from dess.analysis.ask.what_if import VARIATION, WhatIf, best_policy, check_shown
+    from dess.analysis.ask.what_if import VARIATION, WhatIf, best_policy_of_side, check_shown
 
     changes = options.parse_all_settings(settings, options.SET)
     fixed = options.parse_all_settings(baseline or [], "--baseline")
@@ -190,7 +190,7 @@ def what_if(
         render([WHAT_IF], results, out, progress, parameters)
         return out / f"{WHAT_IF}.html"
 
-    answer = WhatIf(question, results_of_pair, shown or best_policy(results_of_pair, VARIATION))
+    answer = WhatIf(question, results_of_pair, shown or best_policy_of_side(results_of_pair, VARIATION))
     show = partial(_print_measures, answer)
     tables = {"table": answer.table()}
     _print_answer(answer, answer.answers(), tables, show, render, as_json, "what-if question")

@@ -66,7 +66,7 @@ html.show_parts(
 )
 
 # %%
-policy = cheapest.best_policy(found)
+policy = cheapest.policy_of_cheapest_fleet(found)
 point = cheapest.shown_point(found)
 mission = resimulate(found, policy, point, 0)
 map_of_mission = mission_figure(mission.events, mission.scenario)

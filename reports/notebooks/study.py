@@ -259,7 +259,7 @@ worst = summary.worst_missions(study, best["policy"], point=best["point"])
 missions = cheapest.shown_missions(study)
 whose = "the fleet of the answer"
 worst = summary.worst_missions(
-    study, cheapest.best_policy(study), point=cheapest.shown_point(study)
+    study, cheapest.policy_of_cheapest_fleet(study), point=cheapest.shown_point(study)
 )
 
 # %% tags=["if-ranked"]

@@ -9,7 +9,7 @@ import tomli_w
 
 from dess.analysis import load_study
 from dess.analysis.ask.question import what_if_question
-from dess.analysis.ask.what_if import WhatIf, best_policy
+from dess.analysis.ask.what_if import WhatIf, best_policy_of_side
 from dess.analysis.study.study import Study
 
 SCENARIO: dict[str, Any] = {
@@ -68,7 +68,7 @@ def asked(folder: Path, missions: int = 12, **changes: Any) -> WhatIf:
     }
     question = what_if_question(**values | changes, folder=folder)
     results = question.ask()
-    return WhatIf(question, results, best_policy(results, 1))
+    return WhatIf(question, results, best_policy_of_side(results, 1))
 
 
 def grid(**values: Any) -> dict[str, Any]:

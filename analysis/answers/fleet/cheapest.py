@@ -443,7 +443,7 @@ def _last_answers(results: Results) -> list[FleetAnswer]:
     return [*of_policies.values()]
 
 
-def best_policy(results: Results) -> str:
+def policy_of_cheapest_fleet(results: Results) -> str:
     """The policy whose fleet is the cheapest that meets the requirements under every condition."""
     return cheapest_answer(results).policy
 
@@ -469,7 +469,7 @@ def shown_point(results: Results) -> int:
 def shown_missions(results: Results) -> pd.DataFrame:
     """The missions of the answer that pages show, those of ``shown_point``."""
     missions = results.missions
-    policy = best_policy(results)
+    policy = policy_of_cheapest_fleet(results)
     is_shown = (missions["policy"] == policy) & (missions["point"] == shown_point(results))
     return missions[is_shown]
 

@@ -28,7 +28,7 @@ from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of
 from dess.analysis.names import DECISIONS, field_named, single_value
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.verdict import front_membership, on_front
-from dess.analysis.study.costs import PARTS, PURCHASE, Costs, stranded_uavs
+from dess.analysis.study.prices import PARTS, PURCHASE, Costs, stranded_uavs
 from dess.analysis.tables import MOST_ROWS, Table
 from dess.base.errors import one_of
 from dess.scenario.fields import ZONE_PADS

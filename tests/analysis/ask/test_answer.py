@@ -197,7 +197,7 @@ def test_the_best_policy_of_each_side_is_found(answer):
     for point in (BASELINE, VARIATION):
         side = table[(table["point"] == point) & (table["metric"] == PRODUCT)]
         best = side.loc[side["mean"].idxmax(), "policy"]
-        assert found.best_policy(answer.results, point) == best
+        assert found.best_policy_of_side(answer.results, point) == best
     assert answer.shown == best
     assert answer._repr_markdown_() == answer.answer()  # what Jupyter shows
     assert [line.split(":")[0] for line in answer.answers()[1:]] == POLICIES

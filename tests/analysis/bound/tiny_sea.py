@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import norm
 
 from dess.analysis.bound import upper_bound
-from dess.analysis.bound.paths import Problem, bound_paths
+from dess.analysis.bound.paths import BoundProblem, bound_paths
 from dess.analysis.bound.prices import Bounds, Detail, known_of
 from dess.model import rules
 from dess.model.state import starts_of, state_of
@@ -241,7 +241,9 @@ def bound_of_data(space: ScenarioSpace, seed: int) -> float:
     bounds = Bounds(known, Detail(cuts=()))
     bounds.at(np.zeros((1, len(known.nodes))))  # sets the worth of the steps
     local = np.tile(bounds.parts, (len(known.nodes), 1))
-    problem = Problem(known.to_zone, known.phases, known.data, bounds.period, bounds.blocks, local)
+    problem = BoundProblem(
+        known.to_zone, known.phases, known.data, bounds.period, bounds.blocks, local
+    )
     bound_paths(problem, bounds.values, np.zeros(len(known.data)), bounds.ceilings)
     x, y = known.starts[0]
     home = bounds.blocks.home[x, y]

@@ -11,7 +11,7 @@ from dess import InputError
 from dess.analysis import load_study
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.study.cheapest import Cheapest, MeanTest, Setting, _Search
-from dess.analysis.study.costs import PARTS, Costs, stranded_uavs
+from dess.analysis.study.prices import PARTS, Costs, stranded_uavs
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 from tests.analysis.study.test_selection import check_that_interruptions_leave_no_trace
 

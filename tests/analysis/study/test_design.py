@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from scipy.stats import qmc
 
 from dess import InputError
-from dess.analysis.study.design import MAX_SIZE, Design, Grid, LatinHypercube, Saltelli
+from dess.analysis.study.design import MAX_SIZE, Design, GridDesign, LatinHypercube, Saltelli
 from dess.base.errors import validation_line
 from dess.base.files.reading import parse_toml
 from dess.physics.streams import MAX_REPLICATION, MAX_SEED
@@ -20,7 +20,7 @@ class Plan(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
-    design: Design = Grid()
+    design: Design = GridDesign()
 
 
 def plan(text):
@@ -208,7 +208,7 @@ def test_a_bad_design_gets_one_line(text):
 
 def test_a_grid_of_very_many_points_is_counted_without_making_them():
     values = {field: range(1, 1001) for field in ("quota", "max_slots", "cell_size", "altitude")}
-    design = Grid(values={field: tuple(of_field) for field, of_field in values.items()})
+    design = GridDesign(values={field: tuple(of_field) for field, of_field in values.items()})
     assert design.count == 10**12
     with pytest.raises(InputError, match="design: 1,000,000,000,000 points"):
         len(design.points)
