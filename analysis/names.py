@@ -7,10 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dess.analysis import numbers
 from dess.base.errors import form_of, kind_of
 from dess.scenario.fields import SAMPLED, ZONE_PADS, fields_of
 from dess.scenario.scenario import Scenario, ScenarioSpace
 
+RANGES = (*SAMPLED, "initial_data")  # fields that hold [low, high]
 # The description of the studies of sweeps, and the folder of their results folders.
 SWEEP, SWEEPS = "a sweep: every combination of the values", "sweeps"
 
@@ -174,8 +176,8 @@ def declared_fields(space: ScenarioSpace) -> list[Declared]:
     return [
         Declared(
             name,
-            _meaning_of_field(name)[0] + (", from the data sheet" if name in follows else ""),
-            _meaning_of_field(name)[1],
+            _meaning_and_unit(name)[0] + (", from the data sheet" if name in follows else ""),
+            _meaning_and_unit(name)[1],
             _allowed_values(space, name),
             *(single_value(side.plain_value(name)) for side in (default, space)),
         )
@@ -183,10 +185,15 @@ def declared_fields(space: ScenarioSpace) -> list[Declared]:
     ]
 
 
-def _meaning_of_field(name: str) -> tuple[str, str]:
-    """What a field is, and its unit, from its description ``meaning [unit] (symbol): form``."""
+def meaning_of_field(name: str) -> str:
+    """What a field is: its description, ``meaning [unit] (symbol): form``, without the form."""
     description = fields_of(ScenarioSpace)[name].description or ""
-    meaning = description.partition(": ")[0]
+    return description.partition(": ")[0]
+
+
+def _meaning_and_unit(name: str) -> tuple[str, str]:
+    """What a field is, and its unit."""
+    meaning = meaning_of_field(name)
     unit = re.search(r" \[([^\],]+)\]", meaning)
     if unit:
         return (meaning.replace(unit[0], ""), unit[1])
@@ -229,6 +236,28 @@ def node_placing_sentence(space: ScenarioSpace) -> str:
     return ""
 
 
+def field_in_words(space: ScenarioSpace, field: str) -> str:
+    """The value of a field in words: ``3``, ``10 to 50`` for a range, ``25 cells`` for nodes."""
+    value = value_of_field(space, field)
+    if field in RANGES:
+        return numbers.format_span(value, "{:g}")
+    if field == "nodes":
+        return f"{len(value)} cells"
+    if isinstance(value, bool):
+        return numbers.format_truth(value)
+    if isinstance(value, float):
+        return f"{value:g}"
+    return str(value).strip("()")
+
+
+def value_of_field(space: ScenarioSpace, field: str) -> Any:
+    """The value of a field; for ``pads``, the number of pads also if it follows from the zone."""
+    value = space.value(field)
+    if field == "pads":
+        return space.zone_pads[0]
+    return value
+
+
 def value_text(value: object) -> str:
     """A value of a parameter as text: ``12.5``, ``yes``, or ``5–7.5`` for a range."""
     if isinstance(value, dict):  # a type of UAVs
@@ -241,7 +270,7 @@ def value_text(value: object) -> str:
             joint = "–"
         return joint.join(map(value_text, value)) or "none"
     if isinstance(value, bool | np.bool_):
-        return "yes" if value else "no"
+        return numbers.format_truth(value)
     if isinstance(value, str):
         return value
     if value is None:

@@ -147,6 +147,16 @@ def format_count(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
+def format_truth(value: object) -> str:
+    """``yes`` or ``no``."""
+    return "yes" if value else "no"
+
+
+def format_signed(value: float, form: str = "+,.0f") -> str:
+    """A number with its sign, as ``+1,042`` or ``−12``."""
+    return format_minus(f"{value:{form}}")
+
+
 def join_words(names: Sequence[str], last: str = "and") -> str:
     """A list of names as ``a, b and c``; another word may come before the last."""
     return f" {last} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -22,7 +22,6 @@ MARKED = "▲ better, ▼ worse, ≈ inconclusive"
 CHECKED = f"The check of the selected settings: means with {INTERVALS}"
 MOST_ROWS = 25  # the largest number of rows of a table on a page; its data have all rows
 WIDER = 1.5  # times as wide as without the allowance for failures: what is explained in words
-YES = {True: "yes", False: "no"}
 _HEADS = {"policy": "Policy", "n": "Missions", **METRICS, HOME: metric_of(HOME).name}
 
 

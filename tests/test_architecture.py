@@ -30,7 +30,7 @@ ROOMS = {
         "registry",
     ),
     "analysis": (
-        *("names", "numbers", "metrics", "stats", "tables", "bound", "study", "results"),
+        *("numbers", "names", "metrics", "stats", "tables", "bound", "study", "results"),
         *("execution", "figures", "answers.settings", "answers.fleet", "answers", "paper"),
         *("verification", "ask"),
     ),

@@ -19,6 +19,7 @@ from dess.analysis import numbers
 from dess.analysis.answers.missions import FOLDER
 from dess.analysis.answers.summary import (
     correct_for_all_tests,
+    rank_learned_and_others,
     rank_policies,
     trained_policies_by_learner,
 )
@@ -89,12 +90,10 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
         trained_policies_by_learner(results).values(),
         key=lambda trainings: -means[trainings].mean(),
     )
-    ranked = rank_policies(results.missions)
-    of_learners = {*sum(trained, [])}
     firsts = [trainings[0] for trainings in trained]
-    others = [policy for policy in ranked if policy not in of_learners]
+    _, others = rank_learned_and_others(results)
     if not firsts or not others:
-        firsts = others = ranked
+        firsts = others = rank_policies(results.missions)
     candidates = product([learned] if learned else firsts, [heuristic] if heuristic else others)
     pairs = [pair for pair in candidates if pair[0] != pair[1]]
     if not pairs:
@@ -288,7 +287,7 @@ def outcome_table(missions: pd.DataFrame, results: Results, pair: Pair) -> pd.Da
     for policy, end in ((pair.policy, ""), (pair.baseline, OF_BASELINE)):
         ends = _count_mission_ends(results, policy, table["replication"])
         ended_well = [f"{count} of {n}" for count, n in ends[["quota", "all"]].to_numpy()]
-        columns[policy, "Success"] = table[SUCCESS + end].map({1: "yes", 0: "no"})
+        columns[policy, "Success"] = table[SUCCESS + end].map(numbers.format_truth)
         columns[policy, done] = pd.Series(ended_well, dtype=object)
         columns[policy, "Collected"] = table[RATIO + end].map(numbers.format_percent)
     return pd.DataFrame(columns)

@@ -527,7 +527,7 @@ def transfer_table(
 
 
 def _format_rewards(*ends: float) -> str:
-    return numbers.with_ends(lambda value: numbers.format_minus(f"{value:+.0f}"), *ends)
+    return numbers.with_ends(lambda value: numbers.format_signed(value, "+.0f"), *ends)
 
 
 def _moving_average(values: pd.Series) -> pd.Series:

@@ -176,14 +176,9 @@ def leading_policies(
     for name in (learned, heuristic):
         if name is not None:
             results.check_policy(name)
-    trained = {
-        policy
-        for names in summary.trained_policies_by_learner(results).values()
-        for policy in names
-    }
-    ranked = summary.rank_policies(results.missions)
-    learned = learned or next((policy for policy in ranked if policy in trained), None)
-    heuristic = heuristic or next((policy for policy in ranked if policy not in trained), None)
+    all_learned, others = summary.rank_learned_and_others(results)
+    learned = learned or next(iter(all_learned), None)
+    heuristic = heuristic or next(iter(others), None)
     return [policy for policy in (learned, heuristic) if policy]
 
 

@@ -216,7 +216,7 @@ def _mission_outcome(mission: Mission) -> dict[str, Any]:
     collected, _, total, *_ = mission.collected.split()
     return {
         "UAVs": row["uavs"],
-        "Success": "yes" if row["success"] else "no",
+        "Success": numbers.format_truth(row["success"]),
         "UAVs that can fly home": f"{len(mission.uavs) - stranded_uavs(mission)} of {row['uavs']}",
         "Collected": numbers.format_percent(row[RATIO]),
         "Mission slots": row["slots"],

@@ -41,7 +41,6 @@ from dess.analysis.tables import (
     MARKED,
     MOST_ROWS,
     WIDER,
-    YES,
     Table,
     allowance_sentence,
     comparison_cells,
@@ -293,6 +292,17 @@ def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> s
     return rank_policies(missions, among)[0]
 
 
+def rank_learned_and_others(results: Results) -> tuple[list[str], list[str]]:
+    """The learned policies of a study and its other policies, the best of each first."""
+    trained = trained_policies_by_learner(results).values()
+    learned = {policy for trainings in trained for policy in trainings}
+    ranked = rank_policies(results.missions)
+    return (
+        [policy for policy in ranked if policy in learned],
+        [policy for policy in ranked if policy not in learned],
+    )
+
+
 def worst_missions(
     results: Results,
     policy: str,
@@ -333,7 +343,7 @@ def worst_missions_table(results: Results, rows: pd.DataFrame) -> Table:
     """
     cells = {
         "Replication": rows["replication"],
-        "Success": rows["success"].astype(bool).map(YES),
+        "Success": rows["success"].map(numbers.format_truth),
         "Collection ratio": rows["collection_ratio"].map(numbers.format_percent),
         "Reward": rows["reward"].map(numbers.format_quantity),
     }
@@ -421,12 +431,10 @@ def compare_learned_with_heuristic(results: Results) -> pd.DataFrame:
         the policies different missions.
     """
     trained = trained_policies_by_learner(results)
-    learned = {policy for checkpoints in trained.values() for policy in checkpoints}
-    heuristics = [policy for policy in results.policies if policy not in learned]
+    _, heuristics = rank_learned_and_others(results)
     if not trained or not heuristics or not _same_missions(results):
         return pd.DataFrame()
-    baseline = best_policy(results.missions, heuristics)
-    table = compare_learners(results.missions, trained, baseline, [*METRICS], correction=None)
+    table = compare_learners(results.missions, trained, heuristics[0], [*METRICS], correction=None)
     return correct_for_all_tests(results, table)
 
 

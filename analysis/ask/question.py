@@ -21,13 +21,12 @@ from pydantic import ValidationError
 
 import dess
 from dess import InputError
-from dess.analysis import numbers
 from dess.analysis.execution.effort import BASELINE as ANY_POLICY
 from dess.analysis.execution.effort import Planned, check_run, plan_study, policies_for
 from dess.analysis.execution.jobs import Progress
 from dess.analysis.execution.runner import Round, run_study
 from dess.analysis.metrics import AGE, ALIASES, METRICS
-from dess.analysis.names import SWEEP, SWEEPS
+from dess.analysis.names import SWEEP, SWEEPS, field_in_words, value_of_field
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.provenance import engine_code, team_of
 from dess.analysis.results.tables import Results
@@ -39,11 +38,10 @@ from dess.base.errors import one_of, validation_line
 from dess.base.files.reading import paths_in
 from dess.base.files.writing import toml_value, write_file
 from dess.policies.registry import typed
-from dess.scenario.fields import SAMPLED, dotted, fields_of
+from dess.scenario.fields import dotted, fields_of
 from dess.scenario.scenario import ScenarioSpace, is_scenario_name, load_scenario
 
 WHAT_IF = "what-if"
-RANGES = (*SAMPLED, "initial_data")  # fields that hold [low, high]
 _LENGTHS = {"initial_data": 2, "zone": 4}  # of fields whose value is a list of numbers
 LONGEST = 60  # largest number of characters for the fields in a name
 
@@ -316,9 +314,9 @@ def what_if_question(
 def _check_changes(before: ScenarioSpace, after: ScenarioSpace, changed: Iterable[str]) -> None:
     """Refuse a variation that changes nothing, or sets a field to its value in the baseline."""
     for field in changed:
-        if _value_of_field(before, field) == _value_of_field(after, field):
+        if value_of_field(before, field) == value_of_field(after, field):
             raise InputError(
-                f"settings: {field} is {value_in_words(before, field)} in the baseline already; "
+                f"settings: {field} is {field_in_words(before, field)} in the baseline already; "
                 "allowed: another value"
             )
     if not changed:
@@ -331,28 +329,6 @@ def _fields_to_measure(values: Iterable[str]) -> dict[str, bool]:
     sections = {section for section, dot, _ in (field.partition(".") for field in values) if dot}
     measuring = fields_of(ScenarioSpace).keys() & {f"{section}.measured" for section in sections}
     return dict.fromkeys(sorted(measuring - {*values}), True)
-
-
-def value_in_words(space: ScenarioSpace, field: str) -> str:
-    """The value of a field in words: ``3``, ``10 to 50`` for a range, ``25 cells`` for nodes."""
-    value = _value_of_field(space, field)
-    if field in RANGES:
-        return numbers.format_span(value, "{:g}")
-    if field == "nodes":
-        return f"{len(value)} cells"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:g}"
-    return str(value).strip("()")
-
-
-def _value_of_field(space: ScenarioSpace, field: str) -> Any:
-    """The value of a field; for ``pads``, the number of pads also if it follows from the zone."""
-    value = space.value(field)
-    if field == "pads":
-        return space.zone_pads[0]
-    return value
 
 
 def values_of(field: str, given: Any) -> tuple[Any, ...]:

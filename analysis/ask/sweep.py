@@ -13,8 +13,7 @@ from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.fleet.costs import priced_settings, prices_in_words
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import (
-    best_setting_sentence,
-    other_policies_sentences,
+    best_settings_sentences,
     rank_settings,
 )
 from dess.analysis.ask.question import Question, strip_markdown, sweep_question, values_of
@@ -97,8 +96,7 @@ class Sweep:
         if self.question.study.selection:
             return [*map(strip_markdown, cheapest.cheapest_sentences(self.results))]
         ranked = rank_settings(self.results, metric)
-        best = best_setting_sentence(self.results, ranked, metric)
-        lines = [best, *other_policies_sentences(self.results, ranked, metric)]
+        lines = best_settings_sentences(self.results, ranked, metric)
         if self.question.study.costs:
             lines.append(prices_in_words(self.results))
         return lines

@@ -16,10 +16,8 @@ from dess.analysis.answers import summary
 from dess.analysis.answers.missions import estimate_metric, fate_in_words
 from dess.analysis.answers.settings.home import with_way_home
 from dess.analysis.ask.question import (
-    RANGES,
     Question,
     strip_markdown,
-    value_in_words,
     what_if_question,
 )
 from dess.analysis.execution.jobs import Progress
@@ -34,15 +32,13 @@ from dess.analysis.metrics import (
     measured_in,
     metric_of,
 )
-from dess.analysis.names import field_named
+from dess.analysis.names import RANGES, field_in_words, field_named, meaning_of_field
 from dess.analysis.results.resimulate import resimulate
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import LEVEL, by_replication
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position_of
 from dess.base.errors import one_of
-from dess.scenario.fields import fields_of
-from dess.scenario.scenario import ScenarioSpace
 
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.figure import Figure
@@ -174,10 +170,9 @@ def product_differences(results: Results, policy: str) -> pd.Series:
     return sides[VARIATION] - sides[BASELINE]
 
 
-def _meaning_of_field(field: str) -> str:
-    """The first part of a field's description, without details."""
-    description = fields_of(ScenarioSpace)[field].description or ""
-    return description.partition(";")[0].partition(":")[0]
+def _brief_meaning(field: str) -> str:
+    """What a field is, without details, which follow after a semicolon."""
+    return meaning_of_field(field).partition(";")[0]
 
 
 def best_policy_of_side(results: Results, point: int) -> str:
@@ -382,7 +377,7 @@ class WhatIf:
         """Fields of the scenario in the baseline and in the variation, as a table to print."""
         sides = [self.results.scenario(point) for point in (BASELINE, VARIATION)]
         rows = [
-            (name, _meaning_of_field(name), *(value_in_words(side, name) for side in sides))
+            (name, _brief_meaning(name), *(field_in_words(side, name) for side in sides))
             for name in names
         ]
         return pd.DataFrame(rows, columns=["Field", "Meaning", "Baseline", "Variation"])

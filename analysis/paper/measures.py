@@ -222,17 +222,13 @@ class Quantity(NamedTuple):
                 return f"{text} points"
             case "reward":
                 if spread:
-                    return numbers.with_ends(_format_reward, value, low, high)
-                return _format_reward(value)
+                    return numbers.with_ends(numbers.format_signed, value, low, high)
+                return numbers.format_signed(value)
             case "steps":
                 return f"{value:,.0f} steps"
             case "p":
                 return numbers.format_p_value(value)
         return f"{value:g}"
-
-
-def _format_reward(value: float) -> str:
-    return f"{value:+,.0f}".replace("-", "−")
 
 
 @dataclass(frozen=True)

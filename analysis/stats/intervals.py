@@ -274,13 +274,19 @@ class Moments(NamedTuple):
         return Interval(self.mean, *map(float, ends))
 
 
+def wilson_half_width(successes: Any, n: Any, level: float = LEVEL) -> Any:
+    """Half the length of the Wilson score interval of a share of successes, or of an array."""
+    share = successes / n
+    z = ndtri(0.5 + 0.5 * level)
+    return z / (2 * (n + z**2)) * np.sqrt(4 * n * share * (1 - share) + z**2)
+
+
 def wilson_interval(successes: int, n: int, level: float = LEVEL) -> Interval:
     """Share of successes with its Wilson score interval, which holds near 0 and 1 as well."""
     share = successes / n
     z = ndtri(0.5 + 0.5 * level)
-    width = 2 * (n + z**2)
-    centre = (2 * n * share + z**2) / width
-    half = z / width * np.sqrt(4 * n * share * (1 - share) + z**2)
+    centre = (2 * n * share + z**2) / (2 * (n + z**2))
+    half = wilson_half_width(successes, n, level)
     low = 0.0
     if successes:
         low = float(centre - half)

@@ -14,11 +14,17 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
-from scipy.special import ndtri, stdtrit
+from scipy.special import stdtrit
 
 from dess import InputError
 from dess.analysis.metrics import ALWAYS, MEASURES, metric_of
-from dess.analysis.stats.intervals import LEVEL, bounded_ends, ends_by_quantile, skewness_of
+from dess.analysis.stats.intervals import (
+    LEVEL,
+    bounded_ends,
+    ends_by_quantile,
+    skewness_of,
+    wilson_half_width,
+)
 from dess.base.errors import listed, one_of, shown, validation_line
 from dess.physics.section import Integer, Number, plain
 
@@ -288,11 +294,9 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
         place = np.cumsum(present)
         return np.append(0.0, means)[place], np.append(np.inf, widths)[place]
     counts = np.arange(1, len(sample) + 1)
-    if metric == "success":
+    if metric_of(metric).is_outcome:
         successes = np.cumsum(sample)
-        z = ndtri((1 + LEVEL) / 2)
-        spread = successes * (counts - successes) / counts
-        return successes / counts, z * np.sqrt(spread + z**2 / 4) / (counts + z**2)
+        return successes / counts, wilson_half_width(successes, counts)
     # The values are shifted by the first one, so that equal values give a width of exactly 0.
     shifted = sample - sample[:1]
     means = np.cumsum(shifted) / counts

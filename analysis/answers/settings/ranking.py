@@ -46,7 +46,7 @@ from dess.analysis.stats.intervals import (
     mean_interval,
 )
 from dess.analysis.stats.verdict import may_be_best, within_reach
-from dess.analysis.tables import MOST_ROWS, WIDER, YES, Table, allowance_sentence, format_counts
+from dess.analysis.tables import MOST_ROWS, WIDER, Table, allowance_sentence, format_counts
 
 MOST_NAMES = 3  # the largest number of settings that are named because they may be as good
 
@@ -76,10 +76,22 @@ def best_settings_sentence(results: Results, table: pd.DataFrame, metric: str) -
         table: The result of ``rank_settings`` for the metric.
         metric: The metric.
     """
-    policies = []
+    sentences = best_settings_sentences(results, table, metric)
     if len(results.policies) == 2:
-        policies = other_policies_sentences(results, table, metric)
-    return " ".join([best_setting_sentence(results, table, metric), *policies])
+        return " ".join(sentences)
+    return sentences[0]
+
+
+def best_settings_sentences(results: Results, table: pd.DataFrame, metric: str) -> list[str]:
+    """The best setting, then what each other policy would have found.
+
+    Args:
+        results: The study.
+        table: The result of ``rank_settings`` for the metric.
+        metric: The metric.
+    """
+    best = best_setting_sentence(results, table, metric)
+    return [best, *other_policies_sentences(results, table, metric)]
 
 
 def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) -> str:
@@ -261,7 +273,7 @@ def best_settings_table(results: Results, rows: pd.DataFrame, metric: str) -> Ta
     top = rows.head(MOST_ROWS)
     cells = _ranking_cells(results, top, metric)
     cells.insert(0, "Rank", top["rank"])
-    cells.insert(1, "May be the best", top["tied"].map(YES))
+    cells.insert(1, "May be the best", top["tied"].map(numbers.format_truth))
     caption = (
         f"The first {len(top)} of {len(rows):,} settings by {metric_of(metric).within}: "
         f"means with {intervals_in_words(results)}"
