@@ -190,7 +190,9 @@ def what_if(
         render([WHAT_IF], results, out, progress, parameters)
         return out / f"{WHAT_IF}.html"
 
-    answer = WhatIf(question, results_of_pair, shown or best_policy_of_side(results_of_pair, VARIATION))
+    answer = WhatIf(
+        question, results_of_pair, shown or best_policy_of_side(results_of_pair, VARIATION)
+    )
     show = partial(_print_measures, answer)
     tables = {"table": answer.table()}
     _print_answer(answer, answer.answers(), tables, show, render, as_json, "what-if question")
