@@ -43,7 +43,8 @@ def test_the_pair_is_the_best_learned_policy_and_the_best_other(
     means = results.missions.groupby("policy")[PRODUCT].mean()
     ranked = means.sort_values(ascending=False).index.tolist()
     taught = {f"learner {n}": [ranked[k] for k in of] for n, of in enumerate(learners)}
-    monkeypatch.setattr(comparison, "trained_policies_by_learner", lambda results: taught)
+    for module in (comparison, summary):
+        monkeypatch.setattr(module, "trained_policies_by_learner", lambda results: taught)
     asked = {name: ranked[k] for name, k in named.items()}
     policy, baseline, candidates = pair
     assert comparison.pair_of(results, **asked) == Pair(
