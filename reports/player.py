@@ -59,7 +59,7 @@ class Shown(NamedTuple):
     """A mission that a player shows.
 
     Attributes:
-        events: The event log (a data frame, or the columns, of ``dess.model.record.EventLog``).
+        events: The event log (a data frame, or the columns, of ``dess.model.events.EventLog``).
         scenario: The scenario of the mission.
         title: The text above the map.
         choice: The text of the mission where several can be chosen from.
@@ -299,7 +299,7 @@ def write_animation(
     """Write a mission as an animation; the same mission gives the same bytes of a GIF.
 
     Args:
-        events: The event log (a data frame, or the columns, of ``dess.model.record.EventLog``).
+        events: The event log (a data frame, or the columns, of ``dess.model.events.EventLog``).
         scenario: The mission's scenario.
         file: The file to write, whatever its suffix.
         kind: ``GIF`` or ``MP4``.
@@ -368,7 +368,7 @@ class Film:
     All that stays is drawn once, and what moves is drawn on it for every slot.
 
     Args:
-        events: The event log (a data frame, or the columns, of ``dess.model.record.EventLog``).
+        events: The event log (a data frame, or the columns, of ``dess.model.events.EventLog``).
         scenario: The mission's scenario.
         title: The text above all.
 

@@ -19,8 +19,8 @@ FLOORS = ("dess", "policies", "analysis", "reports")  # from the ground up
 ROOMS = {
     "dess": (
         *("base", "physics", "scenario"),
-        *("model.state", "model.channel", "model.rules", "model.record", "model.packets"),
-        *("model.view", "model.guard", "model.batch", "model.mission"),
+        *("model.state", "model.channel", "model.rules", "model.events", "model.record"),
+        *("model.packets", "model.view", "model.guard", "model.batch", "model.mission"),
         *("envs.observations", "envs", "envs.integrations"),
     ),
     "policies": (

@@ -20,7 +20,8 @@ from dess import load_scenario, policies
 from dess.analysis import load_study, numbers
 from dess.analysis.paper import values
 from dess.model.channel import world_of
-from dess.model.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
+from dess.model.events import EVENT_NAMES, EventLog
+from dess.model.record import MISSION_RECORD, UAV_RECORD
 from dess.reports import cli
 from dess.reports.cli import commands, options
 from docs import hooks, pictures

@@ -1,7 +1,7 @@
 """Figures of one mission: its map, batteries, residual data, age, charging zone; mean courses.
 
 Each function of a panel takes the event log of the mission (a data frame, or the columns, of
-``dess.model.record.EventLog``), its ``dess.Scenario`` and the axes to draw on; ``mission_figure``
+``dess.model.events.EventLog``), its ``dess.Scenario`` and the axes to draw on; ``mission_figure``
 puts them together. Nothing touches pyplot's state.
 """
 

@@ -190,7 +190,7 @@ def causes_of_failure(events: Events, scenario: Scenario, first: int = 1) -> lis
     """A sentence per UAV that did not fill its quota, or did not land, without a full stop.
 
     Args:
-        events: The event log (a data frame, or the columns, of ``dess.model.record.EventLog``).
+        events: The event log (a data frame, or the columns, of ``dess.model.events.EventLog``).
         scenario: The scenario of the mission.
         first: The number of the first UAV, as in what stands beside the sentences.
     """
@@ -317,7 +317,7 @@ def path_text(events: Events, scenario: Scenario, kind: str) -> str:
     """The paths in a file.
 
     Args:
-        events: The event log (a data frame, or the columns, of ``dess.model.record.EventLog``).
+        events: The event log (a data frame, or the columns, of ``dess.model.events.EventLog``).
         scenario: The scenario of the mission.
         kind: ``csv``, ``geojson``, with cells where the sea has no degrees, or ``kml``.
     """

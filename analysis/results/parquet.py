@@ -25,14 +25,8 @@ from dess.analysis.results.chunks import Chunk, name_of, short_hash
 from dess.base.files.reading import paths_in, read_bytes
 from dess.base.files.tables import LIMIT, check_size, parquet_of
 from dess.base.files.writing import write_file
-from dess.model.record import (
-    EVENT_COLUMNS,
-    EVENT_NAMES,
-    MISSION_RECORD,
-    OPERATIONS,
-    UAV_RECORD,
-    Records,
-)
+from dess.model.events import EVENT_COLUMNS, EVENT_NAMES
+from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.model.state import END_NAMES
 from dess.physics.streams import MAX_REPLICATION
 from dess.scenario.fields import MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS

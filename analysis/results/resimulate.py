@@ -38,7 +38,7 @@ class Mission:
         record: The metrics of the mission as attributes: a row of ``Results.missions`` or, if it
             was simulated again, a ``MissionRecord``.
         uavs: The records of its UAVs, a row each.
-        events: The event log, with the columns of ``dess.model.record.EventLog``.
+        events: The event log, with the columns of ``dess.model.events.EventLog``.
     """
 
     policy: str

@@ -153,7 +153,7 @@ class Results:
         return self.store.manifest.scenarios[point]
 
     def events(self, policy: str, point: int = 0, replication: int = 0) -> pd.DataFrame:
-        """The event log of a mission, with the columns of ``dess.model.record.EventLog``.
+        """The event log of a mission, with the columns of ``dess.model.events.EventLog``.
 
         Raises:
             InputError: If it has not been stored.

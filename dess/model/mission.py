@@ -1,31 +1,39 @@
-"""The SimPy model: one mission as processes and events.
-
-This module decides when things happen; ``rules.py`` decides what they change. One SimPy process,
-the mission clock, opens each mission slot t, runs its communication slots at the times t + n/m, and
-adds the arrivals at its end. A charging zone is a ``simpy.Resource`` (``ChargingZone``): a UAV that
-may charge asks for a pad, and gives it back when it may not any more.
+"""The SimPy model: a mission as processes that wait for each other.
 
     record = simulate(load_scenario("paper"), dess.policies.load("greedy"), seed=1, events=True)
     record.success, record.collection_ratio, record.events.columns()
 
-Several things happen at the start of a slot, at the same simulation time, in this order, which
-``docs/concepts/model.md`` also shows as a drawing:
+The processes decide when things happen; ``rules.py`` decides what they change. Time is counted in
+mission slots. The processes of a mission are:
 
-1. the policies decide, and the safety controller resolves the moves;
-2. in index order, UAVs that now may charge ask for a pad, and UAVs that may not any more (charged,
-   moved on or out of the mission) give back their pad or leave the queue;
-3. free pads are granted to the next UAVs in the queue, and charging starts.
+- the *clock* opens and closes the slots, and lets the policies decide for all UAVs together;
+- each *UAV* flies slot by slot, or waits for a pad of its charging zone and charges on it;
+- the *radio* serves all flying UAVs m times in a slot, at the times t + n/m;
+- the *arrivals* bring new data to the nodes;
+- the *failures* strike UAVs, pads and nodes; each *pad* has a process that holds it while it is out
+  of order.
 
-A slot in which no UAV asks for a pad or gives one back has neither 2 nor 3, unless pads may fail.
+A charging zone is a ``simpy.PriorityResource``, and its pads are the capacity of the resource.
+Slot t, from the time t to the time t + 1, is:
+
+1. The policies decide, and the safety controller resolves the moves (``decide_moves``).
+2. The UAVs take their turns at the pads, one after the other (``give_turns``): those that leave the
+   queue, those that ask for a pad, and then those that give theirs back. Pads that have been
+   repaired come last. All this happens at the time t.
+3. The batteries lose or gain what the slot takes or adds, and the UAVs depart (``depart``).
+4. The radio serves the UAVs at t + 1/m, ..., t + 1 (``run_radio``).
+5. New data arrive (``bring_data``), UAVs whose quota is filled or whose battery is empty end
+   (``settle``), and things fail or are repaired (``run_failures``). All this happens at t + 1.
+
+``docs/concepts/processes.md`` explains the processes by the lines that matter.
 
 For numba, a numpy record as an argument takes longer (3 us) than the arrays of the whole state, so
-the compiled functions here take the arrays and hand their first records to the rules. A tuple of
-arrays takes longer (1 us) than its arrays one by one.
+the compiled functions that are called in every slot take the arrays and hand their first records to
+the rules. A tuple of arrays takes longer (1 us) than its arrays one by one.
 """
 
-from collections import namedtuple
 from collections.abc import Generator, Sequence
-from math import inf, nan
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -35,104 +43,25 @@ from simpy.resources.resource import Request
 from dess.base.kernels import kernel
 from dess.model import channel, rules
 from dess.model.channel import empty_scratch, world_of
+from dess.model.events import Listener, LogWriter
 from dess.model.packets import Packets
-from dess.model.record import (
-    PARAMETER_EVENTS,
-    EventLog,
-    MissionRecord,
-    empty_records,
-    write_records,
-)
-from dess.model.state import (
-    BATTERY,
-    LANDED,
-    LOST,
-    QUOTA,
-    State,
-    check_seed,
-    spaces_of,
-    starts_of,
-    state_of,
-)
+from dess.model.record import MissionRecord, empty_records, write_records
+from dess.model.state import LOST, check_seed, spaces_of, starts_of, state_of
 from dess.model.view import decide, team_of
-from dess.physics import fleet
+from dess.physics.charging import queue_key
 from dess.physics.chart import Chart
-from dess.physics.failures import strike
+from dess.physics.failures import strike_nodes, strike_pads, strike_uavs
+from dess.physics.landing import is_over
 from dess.physics.wind import ways_home
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
 
-
-class ChargingZone(simpy.Resource):
-    """The pads of a charging zone, granted in the order of the scenario (``rules.grant_pads``).
-
-    The UAVs of a slot ask one after the other at the same time. Pads are granted when all have
-    asked, so that the order of asking does not matter. A pad out of order is not granted.
-
-    Attributes:
-        requests: For each UAV its request, waiting or granted, or None.
-    """
-
-    def __init__(self, env: simpy.Environment, mission: np.void, uavs: np.ndarray, zone: int = 0):
-        pads = mission["zone_pads"]
-        super().__init__(env, int(pads[zone]))
-        self._mission, self._uavs = mission, uavs
-        self._pads = slice(int(pads[:zone].sum()), int(pads[: zone + 1].sum()))
-        self.requests: list[Request | None] = [None] * int(mission["uavs"])
-
-    @property
-    def capacity(self) -> int:
-        """The number of pads that work."""
-        pads = self._pads
-        return pads.stop - pads.start - int(self._mission["pads_out"][pads].sum())
-
-    def _do_put(self, event: Request) -> None:
-        """Let a request wait until ``grant``."""
-
-    def ask(self, uav: int) -> None:
-        """Put a UAV into the queue."""
-        self.leave(uav)
-        self.requests[uav] = self.request()
-
-    def leave(self, uav: int) -> None:
-        """Take a UAV out of the queue, or take back its pad."""
-        request, self.requests[uav] = self.requests[uav], None
-        if request is not None:
-            request.cancel()  # of no effect if the pad has been granted
-            self.release(request)
-
-    def holds_pad(self, uav: int) -> bool:
-        """Whether a UAV has been granted a pad and has not left it."""
-        request = self.requests[uav]
-        return request is not None and request.triggered
-
-    def grant(self) -> list[int]:
-        """Grant the free pads to the first UAVs in the queue; return these UAVs."""
-        waiting = [i for i, r in enumerate(self.requests) if r is not None and not r.triggered]
-        waiting.sort(key=self._order)
-        granted = waiting[: max(self.capacity - self.count, 0)]
-        for uav in granted:
-            request = self.requests[uav]
-            assert request is not None
-            self.put_queue.remove(request)
-            super()._do_put(request)
-        return granted
-
-    def _order(self, uav: int) -> tuple[int, int, int]:
-        """The place of a UAV in the queue (``charging.is_before``)."""
-        u = self._uavs[uav]
-        battery = int(u["battery"]) if self._mission["lowest_battery_first"] else 0
-        return battery, int(u["pad_request"]), uav
-
-
-_NOBODY = np.zeros(0, np.int64)
 Process = Generator[simpy.Event, Any, None]
-# The fields of a UAV that the event log is written from.
-_LOGGED = [
-    *("x", "y", "from_x", "from_y", "battery", "communications", "quota", "end", "active"),
-    *("slots_per_cell", "slots_left", "action", "overruled", "overruled_by", "charging"),
-    *("served", "amount", "snr"),
-]
-_Uav: Any = namedtuple("_Uav", _LOGGED)  # type: ignore[misc]
+
+# Why a UAV is interrupted while it waits for a pad or charges.
+LEAVES_QUEUE = "its policy has something else for it to do"
+PAD_FAILED = "its pad is out of order"
+# The place in the queue of a pad that is out of order: before all UAVs.
+BEFORE_ALL_UAVS: Any = (-inf,)
 
 
 def simulate(
@@ -162,13 +91,38 @@ def simulate(
         ValueError: If a policy does not return actions.
     """
     check_seed(seed, replication)
-    log = EventLog() if events else None
     space = spaces_of([scenario])[0]
-    return MissionModel(space, team_of(policy, [space]), seed, replication, log).run()
+    return Mission(space, team_of(policy, [space]), seed, replication, events=events).run()
 
 
-class MissionModel:
-    """The SimPy model of one mission: a clock, and charging zones with their requests for pads."""
+class Signal:
+    """An event that happens again and again."""
+
+    def __init__(self, env: simpy.Environment):
+        self._env = env
+        self._next = env.event()
+
+    def wait(self) -> simpy.Event:
+        """The next time that it happens, for a process to wait for."""
+        return self._next
+
+    def send(self, value: Any = None) -> None:
+        """Let it happen now, and wake the processes that wait for it."""
+        event = self._next
+        self._next = self._env.event()
+        event.succeed(value)
+
+
+class Mission:
+    """The SimPy model of one mission.
+
+    Attributes:
+        env: The SimPy environment; its time is in mission slots.
+        state: The state of the mission, which the rules change.
+        zones: The charging zones, whose capacity is the number of their pads.
+        packets: The packets, where data arrive in continuous time.
+        listener: Is told what happens; it may write the event log.
+    """
 
     def __init__(
         self,
@@ -176,213 +130,270 @@ class MissionModel:
         team: Sequence[Any],
         seed: int,
         replication: int,
-        log: EventLog | None,
+        *,
+        events: bool = False,
     ):
         self.is_extended = scenario.is_extended
-        self.team, self.log, self.world = team, log, world_of(scenario)
+        self.team = team
+        self.world = world_of(scenario)
+        self.shown_world = self.world.shown()  # what policies may see of it
         self.state = state_of([scenario], 1)
-        self.scratch = empty_scratch(scenario.uavs[1], len(scenario.nodes))
-        self.arrivals = np.zeros(len(scenario.nodes), np.int64)
         rules.launch(self.state, 0, starts_of([scenario], seed), 0, replication)
         self.mission = self.state.missions[0]
-        self.uavs, self.residual = self.state.uavs[0], self.state.residual[0]
-        self.sensors, self.teeth = self.state.sensors[0], self.state.teeth[0]
-        self.packets = Packets(scenario, self.state, log) if scenario.needs_events else None
+        self.uavs = self.state.uavs[0]
+        self.residual = self.state.residual[0]
+        self.sensors = self.state.sensors[0]
         self.fleet = range(int(self.mission["uavs"]))
-        self.logged = self.uavs[_LOGGED][: len(self.fleet)]  # of the same memory
+        self.may_charge_bits = 0  # bit i tells whether UAV i may charge in this slot
+        self.arrivals = np.zeros(len(scenario.nodes), np.int64)
+        self.scratch = empty_scratch(scenario.uavs[1], len(scenario.nodes))
+        self.listener = LogWriter(self.state, self.world.nodes) if events else Listener()
+        self.packets: Packets | None = None
+        if scenario.needs_events:
+            self.packets = Packets(scenario, self.state, self.listener)
+
         self.env = simpy.Environment()
-        self.zones = [
-            ChargingZone(self.env, self.mission, self.uavs, zone)
-            for zone in range(len(scenario.rectangles))
-        ]
+        self.zones = [simpy.PriorityResource(self.env, pads) for pads in scenario.zone_pads]
+        self.zone_of_pad = [zone for zone in self.zones for _ in range(int(zone.capacity))]
+        self.turns = [Signal(self.env) for _ in self.fleet]
+        self.slot_opens = Signal(self.env)
+        self.uavs_are_served = Signal(self.env)
+        self.data_are_due = Signal(self.env)
+        self.failures_are_due = Signal(self.env)
+        self.slot_closes = Signal(self.env)
+        self.repaired_pads_return = Signal(self.env)
+        self.pad_fails: list[Signal] = []
 
     def run(self) -> MissionRecord:
         """Run the mission to its end."""
-        self._log_state("mission_start")
-        if self.packets is not None:
-            self.env.process(self._arrivals(self.packets))
-        self.env.run(self.env.process(self._clock()))
-        self._log_state("mission_end")
+        env = self.env
+        self.uav_processes = [env.process(self.fly_mission(uav)) for uav in self.fleet]
+        env.process(self.run_radio())
+        if self.packets is None:
+            env.process(self.bring_data())
+        else:
+            env.process(self.bring_packets(self.packets))
+        if self.mission["has_failures"]:
+            env.process(self.run_failures())
+        if self.mission["pad_rate"] > 0:
+            self.pad_fails = [Signal(env) for _ in self.zone_of_pad]
+            for pad, zone in enumerate(self.zone_of_pad):
+                env.process(self.take_out_of_order(pad, zone))
+        clock = env.process(self.run_clock())
+
+        self.listener.note_start(self.packets.initial_packets() if self.packets else {})
+        env.run(until=clock)
+        self.listener.note_end()
+        return self.write_record()
+
+    # --- the clock ---
+
+    def run_clock(self) -> Process:
+        """Open the slots and close them, until the mission is over."""
+        while not _is_over(self.state.missions):
+            self.decide_moves()
+            yield from self.give_turns()
+            self.depart()
+            self.slot_opens.send()
+            yield self.uavs_are_served.wait()
+            yield from self.announce(self.data_are_due)
+            self.settle()
+            if self.mission["has_failures"]:
+                yield from self.announce(self.failures_are_due)
+            yield from self.announce(self.slot_closes)
+
+    def announce(self, signal: Signal) -> Process:
+        """Send a signal, and wait until all that follows from it at this time has happened."""
+        signal.send()
+        while self.env.peek() <= self.env.now:
+            yield self.env.timeout(0)
+
+    def decide_moves(self) -> None:
+        """Let the policies decide for all UAVs together, and the safety controller resolve."""
+        decide(self.team, self.state, self.shown_world)
+        self.may_charge_bits = _resolve(self.state.missions, self.state.uavs, *self.world.chart)
+
+    def give_turns(self) -> Process:
+        """Let each UAV take its turn in this slot, one after the other.
+
+        First those that leave the queue are interrupted, which comes before all other events of the
+        same time. Then those ask that may charge, in the order of the queue, since the first gets
+        the pad that is free. Then come those that give their pads back, and all others.
+        """
+        asking = []
+        others = []
+        for uav in self.fleet:
+            if self.waits_for_pad(uav):
+                if not self.may_charge(uav):
+                    self.uav_processes[uav].interrupt(LEAVES_QUEUE)
+            elif self.may_charge(uav) and not self.is_charging(uav):
+                asking.append(uav)
+            else:
+                others.append(uav)
+        asking.sort(key=self.place_in_queue)
+        for uav in asking + others:
+            self.turns[uav].send()
+        yield from self.announce(self.repaired_pads_return)
+
+    def depart(self) -> None:
+        """Charge and discharge the batteries for this slot, and let the UAVs set out."""
+        _depart(
+            self.state.missions, self.state.uavs, self.world.nodes, self.world.mean_snr,
+            self.world.order, self.world.means, *self.world.chart, self.scratch.search,
+        )  # fmt: skip
+        self.listener.note_moves()
+
+    def settle(self) -> None:
+        """Set rewards, and end the missions of UAVs that are done or whose battery is empty."""
+        _settle(self.state.missions, self.state.uavs)
+        self.listener.note_close(self.arrivals)
+
+    # --- the UAVs ---
+
+    def fly_mission(self, uav: int) -> Process:
+        """A UAV's mission: in every slot it flies, waits for a pad or charges, until it ends."""
+        while self.is_active(uav):
+            yield self.turns[uav].wait()
+            while self.may_charge(uav):
+                yield from self.charge(uav)
+            yield self.uavs_are_served.wait()  # it flies, and collects data on its way
+            yield self.slot_closes.wait()
+
+    def charge(self, uav: int) -> Process:
+        """Wait for a pad and charge on it, both over many slots.
+
+        It ends when the UAV has its turn in a slot: fully charged, or called out of the queue. It
+        also ends if the pad has failed; then the UAV may ask again.
+        """
+        zone = self.zones[self.uavs[uav]["zone"]]
+        self.note_request(uav)
+        try:
+            with zone.request(priority=self.place_in_queue(uav)) as pad:
+                yield pad
+                self.start_charging(uav)
+                while self.is_charging(uav):
+                    yield self.turns[uav].wait()
+        except simpy.Interrupt as interrupt:
+            if interrupt.cause == PAD_FAILED:
+                yield self.turns[uav].wait()
+            if not self.may_charge(uav):
+                self.note_withdrawal(uav)
+
+    def note_request(self, uav: int) -> None:
+        """Note that a UAV asks for a pad, or that one whose pad has failed asks again."""
+        if self.uavs[uav]["pad_request"] < 0:
+            self.uavs[uav]["pad_request"] = self.mission["slot"]
+            self.mission["pad_requests"] += 1
+            self.listener.note_request(uav)
+
+    def note_withdrawal(self, uav: int) -> None:
+        """Note that a UAV does not ask for a pad any more."""
+        self.uavs[uav]["pad_request"] = -1
+        self.listener.note_withdrawal(uav)
+
+    def start_charging(self, uav: int) -> None:
+        """Connect a UAV to the pad that it has been granted."""
+        _start_charging(self.state.missions, self.state.uavs, uav)
+        self.listener.note_charging(uav)
+
+    def is_active(self, uav: int) -> bool:
+        """Whether the mission of a UAV has not ended."""
+        return bool(self.uavs[uav]["active"])
+
+    def is_charging(self, uav: int) -> bool:
+        """Whether a UAV is on a pad and not yet charged."""
+        return bool(self.uavs[uav]["charging"])
+
+    def may_charge(self, uav: int) -> bool:
+        """Whether a UAV meets the charging condition in this slot."""
+        return bool(self.may_charge_bits >> uav & 1)
+
+    def waits_for_pad(self, uav: int) -> bool:
+        """Whether a UAV is in the queue of a zone."""
+        return isinstance(self.uav_processes[uav].target, Request)
+
+    def place_in_queue(self, uav: int) -> tuple[int, int, int]:
+        """What a UAV is sorted by in the queue of its zone; the lowest is given the next pad."""
+        return queue_key(self.mission, self.uavs[uav], uav)
+
+    # --- the radio, the data and the failures ---
+
+    def run_radio(self) -> Process:
+        """Serve all flying UAVs in the communication slots 1..m of every slot."""
+        m = int(self.mission["communication_slots"])
+        arrays = (*self.state, self.world.order, self.world.means, *self.scratch)
+        while True:
+            yield self.slot_opens.wait()
+            slot = int(self.mission["slot"])
+            for n in range(1, m + 1):
+                time = slot + n / m
+                yield self.env.timeout(time - self.env.now)
+                _communicate(*arrays, n)
+                self.listener.note_communications(n)
+                if self.packets is not None:
+                    self.packets.deliver(time)
+            self.uavs_are_served.send()
+
+    def bring_data(self) -> Process:
+        """Let new data arrive at the nodes at the end of every slot."""
+        _, _, residual, sensors, _ = self.state
+        while True:
+            yield self.data_are_due.wait()
+            _arrive(self.state.missions, residual, sensors, self.arrivals, *self.scratch)
+
+    def bring_packets(self, packets: Packets) -> Process:
+        """Let packets arrive, each at its own time."""
+        time, node = packets.next()
+        while time < inf:
+            yield self.env.timeout(max(time - self.env.now, 0.0))
+            packets.arrive(node)
+            time, node = packets.next()
+
+    def run_failures(self) -> Process:
+        """Let UAVs, pads and nodes fail and be repaired at the end of every slot."""
+        while True:
+            yield self.failures_are_due.wait()
+            strike_uavs(self.mission, self.uavs, LOST)
+            self.strike_pads()
+            strike_nodes(self.mission, self.residual, self.sensors)
+            self.listener.note_failures()
+            if self.packets is not None:
+                self.packets.fall_silent(float(self.mission["slot"]))
+
+    def strike_pads(self) -> None:
+        """Let pads fail and be repaired; tell those that fail which UAV is on them."""
+        were_out = self.mission["pads_out"].copy()
+        were_charging = self.uavs["charging"].copy()
+        strike_pads(self.mission, self.uavs)
+        (stopped,) = np.nonzero(were_charging & ~self.uavs["charging"])
+        uav_on = dict(zip(self.uavs["pad"][stopped].tolist(), stopped.tolist(), strict=True))
+        for pad in np.nonzero(self.mission["pads_out"] > were_out)[0].tolist():
+            self.pad_fails[pad].send(uav_on.get(pad))
+
+    def take_out_of_order(self, pad: int, zone: simpy.PriorityResource) -> Process:
+        """Hold a pad whenever it has failed, until it is repaired."""
+        while True:
+            uav = yield self.pad_fails[pad].wait()
+            with zone.request(priority=BEFORE_ALL_UAVS) as outage:
+                if uav is not None:
+                    self.uav_processes[uav].interrupt(PAD_FAILED)
+                yield outage
+                while self.mission["pads_out"][pad]:
+                    yield self.repaired_pads_return.wait()
+
+    def write_record(self) -> MissionRecord:
+        """The record of the mission."""
         records = empty_records(1, len(self.fleet), self.is_extended)
         ways = ways_home(self.state.missions, self.world.chart)
         write_records(np.zeros(1, np.int64), self.state, ways, records)
         if self.packets is not None:
             self.packets.write(records.operations[0])
-        return records.mission(0, self.log)
+        return records.mission(0, self.listener.log)
 
-    def _clock(self) -> Process:
-        """Open every mission slot, run its communication slots and close it."""
-        env, missions, uavs = self.env, *self.state[:2]
-        nodes, mean_snr, order, means, chart = self.world
-        opening = (nodes, mean_snr, order, means, *chart, self.scratch.search)
-        arrays, packets = (*self.state, order, means, *self.scratch), self.packets
-        shown = self.world.shown()
-        m = int(self.mission["communication_slots"])
-        has_failures = bool(self.mission["has_failures"])
-        pads_fail = bool(self.mission["pad_rate"] > 0)
-        # Without a quota, data arrive and things fail until the horizon, though no UAV is active.
-        shortest = 0 if self.mission["quota"] else int(self.mission["max_slots"])
-        slot, active, allowed = 0, len(self.fleet), 0
-        while active or slot < shortest:
-            decide(self.team, self.state, shown)
-            may_charge, granted = _resolve(missions, uavs, *chart), _NOBODY
-            if may_charge != allowed or pads_fail:
-                allowed = may_charge
-                self._request_pads(slot, may_charge)
-                granted = self._grant_pads(slot)
-            _depart(missions, uavs, granted, *opening)
-            self._log_moves(slot)
-            for n in range(1, m + 1):
-                yield env.timeout(slot + n / m - env.now)
-                _communicate(*arrays, n)
-                self._log_communications(slot, n, m)
-                if packets is not None:
-                    packets.deliver(slot + n / m)
-            before = self._team() if self.log is not None else []
-            active = _close(*self.state[:4], self.arrivals, *self.scratch)
-            slot += 1
-            self._log_close(slot, before)
-            if has_failures:
-                active = self._fail(slot)
 
-    def _arrivals(self, packets: Packets) -> Process:
-        """Let packets arrive, each at its own time."""
-        time, k = packets.next()
-        while time < inf:
-            yield self.env.timeout(max(time - self.env.now, 0.0))
-            packets.arrive(k)
-            time, k = packets.next()
-
-    def _request_pads(self, slot: int, may_charge: int) -> None:
-        """Ask for pads and give them back; bit i of ``may_charge`` tells if UAV i may charge."""
-        for i in self.fleet:
-            u = self.uavs[i]
-            asked = next((zone for zone in self.zones if zone.requests[i] is not None), None)
-            if may_charge >> i & 1:
-                if asked is None:
-                    self.zones[u["zone"]].ask(i)
-                    u["pad_request"] = slot
-                    self.mission["pad_requests"] += 1
-                    self._log_uav("charge_request", slot, i)
-            elif asked is not None:
-                if not asked.holds_pad(i):
-                    self._log_uav("charge_withdrawal", slot, i)
-                asked.leave(i)
-                u["pad_request"] = -1
-
-    def _grant_pads(self, slot: int) -> np.ndarray:
-        """Grant the free pads; return the UAVs that charge from this slot on, in their order."""
-        granted = [i for zone in self.zones for i in zone.grant()]
-        for i in granted:
-            self._log_uav("charge_start", slot, i)
-        return np.array(granted, np.int64)
-
-    def _fail(self, slot: int) -> int:
-        """Let things fail and be repaired; return the number of UAVs that are still active."""
-        before = State(*(array.copy() for array in self.state))
-        strike(self.mission, self.uavs, self.residual, self.sensors, LOST)
-        self._log_failures(float(slot), before)
-        for i in self.fleet:
-            if before.uavs[0, i]["charging"] and not self.uavs[i]["charging"]:  # its pad has failed
-                self._log_uav("charge_end", slot, i)
-                self._log_uav("charge_request", slot, i)
-                self.zones[self.uavs[i]["zone"]].ask(i)
-        if self.packets is not None:
-            self.packets.fall_silent(float(slot))
-        return int(self.mission["active"])
-
-    def _team(self) -> list[Any]:
-        """The UAVs as plain values, which Python reads faster than the fields of a record."""
-        return [_Uav(*values) for values in self.logged.tolist()]
-
-    def _log_uav(
-        self, event: str, time: float, i: int, value: float | None = None, other: int = -1
-    ) -> None:
-        """Log an event of a UAV; its value is by default the battery."""
-        if self.log is not None:
-            u: Any = _Uav(*self.logged[i].item())
-            value = u.battery if value is None else value
-            self.log.add(float(time), event, i, -1, value, u.x, u.y, u.battery, other)
-
-    def _log_state(self, event: str) -> None:
-        if self.log is None:
-            return
-        time, is_start = int(self.mission["slot"]), event == "mission_start"
-        for i in self.fleet:
-            self._log_uav(event, time, i)
-        for k, (x, y) in enumerate(self.world.nodes):
-            waiting = self.packets.buffers.queues[k] if is_start and self.packets else ()
-            packet, born = (waiting[0], 0.0) if waiting else (-1, nan)
-            self.log.add(
-                float(time), event, -1, k, self.residual[k], x, y, packet=packet, generated=born
-            )
-        for name in PARAMETER_EVENTS if is_start else ():
-            self.log.add(0.0, name, -1, -1, self.mission[name.removeprefix("mission_")])
-
-    def _log_moves(self, slot: int) -> None:
-        if self.log is None:
-            return
-        for i, u in enumerate(self._team()):
-            if u.active:
-                if u.overruled:
-                    self._log_uav("collision", slot, i, u.action, u.overruled_by)
-                self._log_uav("move", slot, i)
-
-    def _log_communications(self, slot: int, n: int, m: int) -> None:
-        if self.log is None:
-            return
-        for i, u in enumerate(self._team()):
-            if u.active and u.served >= 0:
-                share = fleet.share_of_move(m, u, n)
-                x = u.from_x + (u.x - u.from_x) * share
-                y = u.from_y + (u.y - u.from_y) * share
-                self.log.add(
-                    slot + n / m, "communication", i, u.served, u.amount, x, y, u.battery, snr=u.snr
-                )
-                if self.mission["landing"] and u.communications == u.quota:
-                    self._log_uav("quota_filled", slot + n / m, i, u.communications)
-
-    def _log_close(self, time: int, before: list[Any]) -> None:
-        """Log new data, and the charging sessions and the UAVs that ended with a slot."""
-        if self.log is None:
-            return
-        if self.mission["arrival_rate"] > 0:
-            for k in np.nonzero(self.arrivals)[0].tolist():
-                x, y = self.world.nodes[k]
-                self.log.add(float(time), "arrival", -1, k, self.arrivals[k], x, y)
-        for i, (was, u) in enumerate(zip(before, self._team(), strict=True)):
-            if was.charging and not u.charging:
-                self._log_uav("charge_end", time, i)
-            if was.active and u.end == QUOTA:
-                self._log_uav("quota_filled", time, i, u.communications)
-            if was.active and u.end == BATTERY:
-                self._log_uav("battery_empty", time, i)
-            if was.active and u.end == LANDED:
-                self._log_uav("landing", time, i)
-
-    def _log_failures(self, time: float, before: State) -> None:
-        """Log what has failed or was repaired since a copy of the state at the end of the slot."""
-        log, mission, nodes = self.log, self.mission, self.world.nodes
-        if log is None:
-            return
-        for i, (was, u) in enumerate(zip(before.uavs[0], self.uavs, strict=True)):
-            where = u["x"], u["y"], u["battery"]
-            if u["grounded"] > was["grounded"] or u["end"] == LOST != was["end"]:
-                log.add(time, "uav_failure", i, -1, u["battery"], *where)
-            if u["grounded"] < was["grounded"]:
-                log.add(time, "uav_repair", i, -1, u["battery"], *where)
-            if u["collected"] < was["collected"]:
-                log.add(time, "data_lost", i, -1, was["collected"], *where)
-        change = mission["pads_out"] - before.missions[0]["pads_out"]
-        for pad in np.nonzero(change)[0].tolist():
-            log.add(time, "pad_failure" if change[pad] > 0 else "pad_repair", -1, -1, pad)
-        silent, held = self.sensors["silent"], before.residual[0]
-        for k in np.nonzero(silent != before.sensors[0]["silent"])[0].tolist():
-            event, data = ("node_failure", held) if silent[k] else ("node_repair", self.residual)
-            log.add(time, event, -1, k, data[k], *nodes[k])
-        if mission["node_data_lost"] and not mission["continuous"]:
-            for k in np.nonzero(silent & (held > 0))[0].tolist():
-                log.add(time, "data_lost", -1, k, held[k], *nodes[k])
+@kernel
+def _is_over(missions):
+    return is_over(missions[0])
 
 
 @kernel
@@ -398,18 +409,21 @@ def _resolve(missions, uavs, zones, parking, sizes, nearest, ways, rows):
 
 
 @kernel
+def _start_charging(missions, uavs, i):
+    rules.start_charging(missions[0], uavs[0], i)
+
+
+@kernel
 def _depart(
-    missions, uavs, granted, nodes, mean_snr, order, means,
+    missions, uavs, nodes, mean_snr, order, means,
     zones, parking, sizes, nearest, ways, rows, search,
 ):  # fmt: skip
-    """Let the UAVs that were granted pads begin to charge, update the batteries, and open the slot.
+    """Update the batteries, and open the slot for the search of the best nodes.
 
     The slot is opened here, since the functions of communication slots, which are called more
     often, then take fewer arguments.
     """
     chart = Chart(zones, parking, sizes, nearest, ways, rows)
-    for i in granted:
-        rules.start_charging(missions[0], uavs[0], i)
     rules.spend(missions[0], uavs[0])
     channel.open_slot(missions[0], uavs[0], nodes, mean_snr, order, means, chart, search)
 
@@ -425,8 +439,10 @@ def _communicate(
 
 
 @kernel
-def _close(missions, uavs, residual, sensors, arrivals, batches, search):
-    """Add the arrivals and settle the slot; return the number of UAVs that are still active."""
+def _arrive(missions, residual, sensors, arrivals, batches, search):
     rules.arrive(missions[0], residual[0], sensors[0], arrivals, batches, search)
+
+
+@kernel
+def _settle(missions, uavs):
     rules.settle(missions[0], uavs[0])
-    return missions[0].active

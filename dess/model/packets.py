@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from dess.model.record import EventLog
+from dess.model.events import Listener
 from dess.physics.age import age_of_teeth
 from dess.physics.arrivals import draw_arrival, factors_of, sources_of
 
@@ -159,15 +159,16 @@ class Packets:
         buffers: The buffers of the nodes.
     """
 
-    def __init__(self, scenario: Any, state: Any, log: EventLog | None):
+    def __init__(self, scenario: Any, state: Any, listener: Listener):
         """Begin a mission.
 
         Args:
             scenario: The ``ScenarioSpace``.
             state: The ``State`` of one mission that has been launched.
-            log: Its event log.
+            listener: Is told what becomes of the packets.
         """
-        self._log, self._nodes, self._missions = log, scenario.nodes, state.missions
+        self._listener = listener
+        self._missions = state.missions
         self._mission, self._uavs = state.missions[0], state.uavs[0]
         self._residual, self._sensors = state.residual[0], state.sensors[0]
         arrivals, nodes = scenario.arrivals, len(scenario.nodes)
@@ -179,6 +180,12 @@ class Packets:
             if self._residual[k] > 0.0:
                 self.buffers.store(k, 0.0, float(self._residual[k]))
             draw_arrival(self._missions, self._sources, *self._factors, k)
+
+    def initial_packets(self) -> dict[int, int]:
+        """The numbers of the packets of the initial data, by their nodes."""
+        return {
+            packet.node: n for n, packet in enumerate(self.buffers.all) if packet.generated == 0
+        }
 
     def next(self) -> tuple[float, int]:
         """The time of the next arrival [slots], infinite if there is none, and its node."""
@@ -206,8 +213,8 @@ class Packets:
         else:
             self._residual[k] += gained
         draw_arrival(self._missions, self._sources, *self._factors, k)
-        self._log_events("arrival", [len(b.all) - 1])
-        self._log_events("loss", [lost] if lost >= 0 else [])
+        self._tell("arrival", [len(b.all) - 1])
+        self._tell("loss", [lost] if lost >= 0 else [])
 
     def deliver(self, time: float) -> None:
         """Take what the UAVs collected at a time from the packets, in the order of the UAVs."""
@@ -226,28 +233,21 @@ class Packets:
             if generated > sensor["newest"]:
                 self._mission["newest"] += generated - sensor["newest"]
                 sensor["newest"] = generated
-        self._log_events("delivery", b.delivered[before:])
+        self._tell("delivery", b.delivered[before:])
 
     def fall_silent(self, time: float) -> None:
         """Lose the packets of silent nodes, if the data of a silent node are lost."""
         if self._mission["node_data_lost"]:
             for k in np.nonzero(self._sensors["silent"])[0].tolist():
-                self._log_events("loss", self.buffers.lose(k, time))
+                self._tell("loss", self.buffers.lose(k, time))
 
-    def _log_events(self, event: str, numbers: Iterable[int]) -> None:
-        """Log the arrival, the delivery or the loss of packets."""
-        if self._log is None:
-            return
+    def _tell(self, event: str, numbers: Iterable[int]) -> None:
+        """Tell the listener of the arrival, the delivery or the loss of packets."""
         for number in numbers:
             p = self.buffers.all[number]
             time = p.generated if event == "arrival" else p.left
             value = {"arrival": 1.0, "delivery": p.left - p.generated, "loss": p.remaining}[event]
-            x, y = self._nodes[p.node]
-            battery = self._uavs[p.uav]["battery"] if p.uav >= 0 else -1
-            self._log.add(
-                time, event, p.uav, p.node, value, x, y, battery,
-                packet=number, generated=p.generated,
-            )  # fmt: skip
+            self._listener.note_packet(event, time, number, p.node, p.uav, value, p.generated)
 
     def write(self, out: np.void) -> None:
         """Write what was measured in the mission into an ``OPERATIONS`` record."""

@@ -1,12 +1,13 @@
 """The record of a mission: a row of metrics, a row per UAV and, on demand, the event log."""
 
 from dataclasses import dataclass
-from math import isnan, nan
+from math import isnan
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dess.base.kernels import inlined, kernel
+from dess.model.events import EventLog
 from dess.model.rules import data_left
 from dess.model.state import BATTERY, END_NAMES, LANDED, LOST, QUOTA, fields
 from dess.physics.age import write_age
@@ -73,45 +74,6 @@ def measures_of(space: Constants) -> list[str]:
     return [name for names, is_measured in measured.items() if is_measured for name in names]
 
 
-class Event(NamedTuple):
-    """A row of the event log; ``docs/reference/event-log.md`` says what its columns mean."""
-
-    time: float
-    event: str
-    uav: int
-    node: int
-    value: float
-    x: float = -1.0
-    y: float = -1.0
-    battery: int = -1
-    other: int = -1
-    snr: float = nan
-    packet: int = -1
-    generated: float = nan
-
-
-# Columns of the event log, and the types of their arrays.
-_TYPES = {float: np.float64, int: np.int64, str: object}
-EVENT_COLUMNS = {name: _TYPES[kind] for name, kind in Event.__annotations__.items()}
-FAILURE_EVENTS = (
-    *("uav_failure", "uav_repair", "pad_failure", "pad_repair"),
-    *("node_failure", "node_repair", "data_lost"),
-)
-# Parameters of the mission, a row each.
-PARAMETER_EVENTS = (
-    *("mission_seed", "mission_replication", "mission_flying_time"),
-    *("mission_charge_start", "mission_charge_complete"),
-)
-# What becomes of packets in continuous time, besides ``arrival``.
-PACKET_EVENTS = ("delivery", "loss")
-EVENT_NAMES = (
-    *("mission_start", *PARAMETER_EVENTS, "move", "collision"),
-    *("charge_request", "charge_start", "charge_end", "charge_withdrawal"),
-    *("communication", "arrival", "quota_filled", "battery_empty", "landing"),
-    *(*FAILURE_EVENTS, *PACKET_EVENTS, "mission_end"),
-)
-
-
 class Records(NamedTuple):
     """The records of N missions with up to I UAVs.
 
@@ -125,7 +87,7 @@ class Records(NamedTuple):
     uavs: np.ndarray
     operations: np.ndarray = np.zeros(0, OPERATIONS)
 
-    def mission(self, row: int, events: "EventLog | None" = None) -> "MissionRecord":
+    def mission(self, row: int, events: EventLog | None = None) -> "MissionRecord":
         """The record of one mission, with its event log if there is one."""
         metrics = self.missions[row]
         operations = self.operations[row] if len(self.operations) else None
@@ -215,34 +177,6 @@ def empty_records(missions: int, uavs: int, is_extended: bool = False) -> Record
     return Records(
         np.zeros(missions, MISSION_RECORD), np.zeros((missions, uavs), UAV_RECORD), operations
     )
-
-
-class EventLog(list[Event]):
-    """The events of one mission, in the order in which they happened.
-
-    Every column is also an attribute, as in ``log.time``.
-    """
-
-    def __repr__(self) -> str:
-        return f"EventLog of {len(self)} events"
-
-    def add(self, *values: Any, **others: Any) -> None:
-        """Append one event; the arguments are those of ``Event``."""
-        self.append(Event(*values, **others))
-
-    def __getattr__(self, name: str) -> list:
-        """A column as a list, as in ``log.event``."""
-        if name not in EVENT_COLUMNS:
-            raise AttributeError(name)
-        return [getattr(row, name) for row in self]
-
-    def columns(self) -> dict[str, np.ndarray]:
-        """The log as named columns."""
-        columns = zip(*self, strict=True) if self else ([] for _ in EVENT_COLUMNS)
-        return {
-            name: np.array(column, kind)
-            for (name, kind), column in zip(EVENT_COLUMNS.items(), columns, strict=True)
-        }
 
 
 @dataclass(frozen=True)

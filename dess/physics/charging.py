@@ -55,6 +55,27 @@ def is_before(mission, u, other):
     return u.pad_request < other.pad_request
 
 
+def queue_key(mission: np.void, u: np.void, uav: int) -> tuple[int, int, int]:
+    """What UAVs are sorted by in the queue for the pads of a zone, in the order of ``is_before``.
+
+    The key of a UAV is the same in every slot of its wait. The battery is that in slot 0, had the
+    UAV waited since then, as waiting costs ``flight_cost`` a slot in the air and nothing on ground.
+
+    Args:
+        mission: ``MISSION`` record.
+        u: ``UAV`` record.
+        uav: Index of the UAV.
+    """
+    slot = int(mission["slot"])
+    request = int(u["pad_request"])
+    if request < 0:  # it asks in this slot
+        request = slot
+    if not mission["lowest_battery_first"]:
+        return 0, request, uav
+    cost = 0 if mission["landing"] else int(mission["flight_cost"])
+    return int(u["battery"]) + cost * slot, request, uav
+
+
 # The largest denominator of a rate: sums of as many slots as a mission has are 64-bit integers.
 _MOST_SLOTS = 10**11
 

@@ -60,27 +60,43 @@ class Failures(Section):
 
 @for_sections
 def strike_if_on(mission, uavs, residual, sensors, lost):
-    """``strike``, if the section is on."""
+    """Let UAVs, pads and nodes fail and be repaired at the end of a slot, after it is settled."""
     if mission.has_failures:
-        strike(mission, uavs, residual, sensors, lost)
+        strike_uavs(mission, uavs, lost)
+        strike_pads(mission, uavs)
+        strike_nodes(mission, residual, sensors)
 
 
 @kernel
-def strike(mission, uavs, residual, sensors, lost):
-    """Let UAVs, pads and nodes fail and be repaired at the end of a slot, after it is settled.
+def strike_uavs(mission, uavs, lost):
+    """Let UAVs fail and be repaired.
 
     Args:
         mission: ``MISSION`` record.
         uavs: (I,) ``UAV`` records.
-        residual: (K,) residual data that UAVs can collect [data units]; 0 at a silent node.
-        sensors: (K,) ``SENSOR`` records.
         lost: How the mission of a lost UAV ended, ``state.LOST``.
     """
     for i in range(mission.uavs):
         _strike_uav(mission, uavs[i], i, lost)
+
+
+@kernel
+def strike_pads(mission, uavs):
+    """Let pads fail and be repaired."""
     if mission.pad_rate > 0.0:
         for j in range(mission.pads):
             _strike_pad(mission, uavs, j)
+
+
+@kernel
+def strike_nodes(mission, residual, sensors):
+    """Let nodes fall silent and answer again.
+
+    Args:
+        mission: ``MISSION`` record.
+        residual: (K,) residual data that UAVs can collect [data units]; 0 at a silent node.
+        sensors: (K,) ``SENSOR`` records.
+    """
     if mission.node_rate > 0.0:
         for k in range(mission.nodes):
             _strike_node(mission, residual, sensors[k], k)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.model.mission import MissionModel, simulate
+from dess.model.mission import Mission, simulate
 from dess.model.view import View, decide
 from dess.policies.planner.fluid import (
     MOST_SLOTS,
@@ -77,8 +77,8 @@ def first_plan(
         A course per UAV.
     """
     watched = _Watched(planner or Planner())
-    model = MissionModel(scenario, [watched], seed, replication, None)
-    decide(model.team, model.state, model.world.shown())
+    model = Mission(scenario, [watched], seed, replication)
+    decide(model.team, model.state, model.shown_world)
     return watched.plans[0]
 
 

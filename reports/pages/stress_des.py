@@ -20,7 +20,7 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.numbers import format_level
 from dess.analysis.stats.intervals import LEVEL
-from dess.model.record import EVENT_NAMES
+from dess.model.events import EVENT_NAMES
 from dess.reports.pages.html import Marked, escape_text, fill_markdown, format_code, load_template
 from dess.scenario.fields import SAMPLED, fields_of
 from dess.scenario.scenario import Scenario, ScenarioSpace

@@ -31,7 +31,7 @@ from dess.analysis.results.resimulate import (
 from dess.analysis.results.store import Store
 from dess.analysis.results.tables import Results, results_of
 from dess.base.files.reading import paths_in
-from dess.model.record import PARAMETER_EVENTS
+from dess.model.events import PARAMETER_EVENTS
 from dess.policies.registry import Policy, confirmed, load_team
 from dess.reports.pages.page import ALLOWED, LIMIT, Page
 from dess.scenario.scenario import ScenarioSpace

@@ -11,7 +11,7 @@ import typer
 from click.testing import CliRunner
 
 from dess.analysis.results import parquet
-from dess.model.record import EVENT_COLUMNS
+from dess.model.events import EVENT_COLUMNS
 from dess.reports.cli.commands import app
 from tests.pins.pinned import pinned
 from tests.reports.cli.conftest import dess, dess_json, unrendered

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dess.mission import simulate
-from dess.scenario import ScenarioSpace
+from dess.model.mission import simulate
+from dess.scenario.scenario import ScenarioSpace
 from tests.drawn import Commuter, Fidget, Script, Wanderer
 from tests.pins.pinned import pinned
 

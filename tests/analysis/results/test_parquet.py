@@ -18,7 +18,7 @@ from dess.analysis import load_results, run_study
 from dess.analysis.results import event_log, parquet
 from dess.analysis.results.chunks import name_of, short_hash
 from dess.analysis.results.store import Store
-from dess.model.record import PARAMETER_EVENTS
+from dess.model.events import PARAMETER_EVENTS
 from dess.reports.cli import main
 from tests.analysis.small import files_of, small_study
 

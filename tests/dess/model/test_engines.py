@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from dess.model import batch
 from dess.model.batch import BATCH_SIZE, MOST_WORK, simulate_batch
+from dess.model.events import EVENT_NAMES, FAILURE_EVENTS, PACKET_EVENTS
 from dess.model.mission import simulate
-from dess.model.record import EVENT_NAMES, FAILURE_EVENTS, PACKET_EVENTS, Records
+from dess.model.record import Records
 from dess.model.state import BATTERY, HOVER, LANDED, QUOTA, TRUNCATED, sample_scenario
 from dess.model.view import View
 from dess.policies import load

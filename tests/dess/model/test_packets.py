@@ -8,7 +8,7 @@ from scipy import stats
 
 from dess import InputError, parallel_env
 from dess.model.batch import simulate_batch
-from dess.model.mission import MissionModel
+from dess.model.mission import Mission
 from dess.model.packets import Buffers
 from dess.model.state import constants_of
 from dess.model.view import View
@@ -28,7 +28,7 @@ ABOVE: dict[str, Any] = {
 def _above(policy: Any = HOVER, **values: Any) -> tuple[Buffers, Any]:
     """The packets of a mission above a node, and its record."""
     space = ScenarioSpace.of(Scenario.of(**(ABOVE | values)))
-    model = MissionModel(space, [policy], 5, 0, None)
+    model = Mission(space, [policy], 5, 0)
     record = model.run()
     assert model.packets is not None
     return model.packets.buffers, record

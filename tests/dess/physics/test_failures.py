@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from dess.model.mission import simulate
-from dess.model.state import BATTERY, LOST, QUOTA, TRUNCATED, constants_of, state_of
+from dess.model.state import BATTERY, QUOTA, TRUNCATED, constants_of, state_of
 from dess.model.view import View
-from dess.physics.failures import strike
+from dess.physics.failures import strike_nodes
 from dess.scenario.scenario import ScenarioSpace
 from tests.dess.model.flights import CHANNEL, Case, check
 from tests.drawn import Commuter, extended_spaces, failures, replications, seeds
@@ -96,7 +96,7 @@ def test_the_times_to_failure_and_to_repair_are_geometric():
     failed, repaired = np.zeros(1000, int), np.zeros(1000, int)
     for slot in range(1, 400):
         state.missions["slot"] = slot
-        strike(state.missions[0], state.uavs[0], state.residual[0], state.sensors[0], LOST)
+        strike_nodes(state.missions[0], state.residual[0], state.sensors[0])
         silent = state.sensors[0]["silent"]
         failed[silent & (failed == 0)] = slot
         repaired[~silent & (failed > 0) & (repaired == 0)] = slot

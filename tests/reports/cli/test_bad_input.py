@@ -6,7 +6,7 @@ All checks of a command come before its first mission.
 import pytest
 
 from dess.analysis.execution import evaluation, runner
-from dess.model.mission import MissionModel
+from dess.model.mission import Mission
 
 SWEEP = "sweep --scenario small.toml --set uavs=1,2 --missions 3"
 STUDY = "study run trial.toml --out trial"
@@ -86,7 +86,7 @@ def test_bad_input_gets_one_line_and_leaves_nothing(arguments, refusal, monkeypa
 
     monkeypatch.setattr(runner.Here, "run", mission)
     monkeypatch.setattr(evaluation, "estimate_means", mission)
-    monkeypatch.setattr(MissionModel, "run", mission)
+    monkeypatch.setattr(Mission, "run", mission)
     line = refusal(*arguments.split(" "))
     for part in BAD[arguments]:
         assert part in line

@@ -18,7 +18,7 @@ import pytest
 from dess import load_scenario
 from dess.analysis import load_results
 from dess.analysis.figures.missions import sea_figure
-from dess.model.record import EventLog
+from dess.model.events import EventLog
 from dess.scenario.places import Projection
 from tests.analysis.small import files_of
 
