@@ -10,13 +10,16 @@ Changes of comments and line numbers do not count.
 import gc
 import inspect
 import math
+import secrets
 from collections.abc import Callable
 from functools import lru_cache, partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numba import config, njit
+from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
@@ -25,6 +28,11 @@ from numba.extending import overload
 
 from dess.base.errors import InputError
 from dess.base.sources import code_of, combined
+
+# The names of compiled functions have numbers, which numba counts from 1 in each process. Functions
+# that two processes have compiled for different types could have one name, and a process that loads
+# both from the cache would run one of them for both.
+FunctionIdentity._unique_ids = count(secrets.randbits(40))
 
 
 class _Code(JITCodeLibrary):

@@ -53,6 +53,28 @@ def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(tmp_path, monk
         assert done.stdout.strip() == printed
 
 
+NAMED = """
+from dess.base.kernels import kernel
+
+@kernel
+def successor(x):
+    return x + 1
+
+successor(1)
+(compiled,) = successor.overloads.values()
+print(compiled.fndesc.mangled_name)
+"""
+
+
+def test_two_processes_name_compiled_functions_differently():
+    """A process that loads both from the cache would run one of two with the same name twice."""
+    names = {
+        subprocess.run([sys.executable, "-c", NAMED], capture_output=True, text=True).stdout
+        for _ in range(2)
+    }
+    assert len(names) == 2
+
+
 def test_without_compilation_there_is_no_simulator(monkeypatch):
     monkeypatch.setattr(config, "DISABLE_JIT", 1)
     with pytest.raises(InputError, match="NUMBA_DISABLE_JIT: the simulator runs only compiled"):
