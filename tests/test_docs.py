@@ -5,6 +5,7 @@ import re
 import shlex
 import tomllib
 from pathlib import Path
+from textwrap import indent
 from typing import Any
 
 import numpy as np
@@ -270,6 +271,15 @@ def test_snippets_run(source, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     exec(compile(source, "snippet", "exec"), {})
     assert capsys.readouterr().out
+
+
+def test_the_code_on_the_page_of_the_processes_is_that_of_the_model():
+    source = (ROOT / "dess" / "model" / "mission.py").read_text("utf-8")
+    quoted = blocks(PAGES["docs/concepts/processes.md"], "python")
+    assert quoted
+    for block in quoted:
+        is_current = indent(block, " " * 4) in source
+        assert is_current, f"another one now; copy it anew: {block.splitlines()[0]}"
 
 
 def test_the_policy_of_the_how_to_page_collects(outside):

@@ -13,31 +13,33 @@ mission slots. The processes of a mission are:
 - the *failures* strike UAVs, pads and nodes; each *pad* has a process that holds it while it is out
   of order.
 
-A charging zone is a ``simpy.PriorityResource``, and its pads are the capacity of the resource.
+A charging zone is a ``simpy.PriorityResource``, and its pads are the capacity of the resource. A
+``Signal`` is an event that happens again and again.
+
 Slot t, from the time t to the time t + 1, is:
 
 1. The policies decide, and the safety controller resolves the moves (``decide_moves``).
-2. The UAVs take their turns at the pads, one after the other (``give_turns``): those that leave the
-   queue, those that ask for a pad, and then those that give theirs back. Pads that have been
-   repaired come last. All this happens at the time t.
+2. The UAVs take their turns at the pads, one after the other (``give_turns``).
 3. The batteries lose or gain what the slot takes or adds, and the UAVs depart (``depart``).
 4. The radio serves the UAVs at t + 1/m, ..., t + 1 (``run_radio``).
 5. New data arrive (``bring_data``), UAVs whose quota is filled or whose battery is empty end
-   (``settle``), and things fail or are repaired (``run_failures``). All this happens at t + 1.
+   (``settle``), and things fail or are repaired (``run_failures``).
 
-``docs/concepts/processes.md`` explains the processes by the lines that matter.
+1 to 3 happen at the time t, and 5 happens at the time t + 1. ``docs/concepts/processes.md`` shows
+the lines that matter.
 
 For numba, a numpy record as an argument takes longer (3 us) than the arrays of the whole state, so
 the compiled functions that are called in every slot take the arrays and hand their first records to
 the rules. A tuple of arrays takes longer (1 us) than its arrays one by one.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from math import inf
 from typing import Any
 
 import numpy as np
 import simpy
+from simpy.events import ProcessGenerator
 from simpy.resources.resource import Request
 
 from dess.base.kernels import kernel
@@ -55,12 +57,10 @@ from dess.physics.landing import is_over
 from dess.physics.wind import ways_home
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
 
-Process = Generator[simpy.Event, Any, None]
-
 # Why a UAV is interrupted while it waits for a pad or charges.
-LEAVES_QUEUE = "its policy has something else for it to do"
-PAD_FAILED = "its pad is out of order"
-# The place in the queue of a pad that is out of order: before all UAVs.
+CALLED_AWAY = "it may not charge any more"
+PAD_FAILED = "its pad has failed"
+# The place of a failed pad in the queue of its zone.
 BEFORE_ALL_UAVS: Any = (-inf,)
 
 
@@ -118,8 +118,11 @@ class Mission:
 
     Attributes:
         env: The SimPy environment; its time is in mission slots.
-        state: The state of the mission, which the rules change.
+        state: The state of the mission, as arrays that the rules change; ``mission``, ``uavs``,
+            ``residual`` and ``sensors`` are parts of it.
+        fleet: The numbers of the UAVs.
         zones: The charging zones, whose capacity is the number of their pads.
+        turns: Tell each UAV that a slot opens.
         packets: The packets, where data arrive in continuous time.
         listener: Is told what happens; it may write the event log.
     """
@@ -152,6 +155,7 @@ class Mission:
         if scenario.needs_events:
             self.packets = Packets(scenario, self.state, self.listener)
 
+        # The zones, and what the processes wait for.
         self.env = simpy.Environment()
         self.zones = [simpy.PriorityResource(self.env, pads) for pads in scenario.zone_pads]
         self.zone_of_pad = [zone for zone in self.zones for _ in range(int(zone.capacity))]
@@ -167,6 +171,7 @@ class Mission:
     def run(self) -> MissionRecord:
         """Run the mission to its end."""
         env = self.env
+        # The clock comes last: when it opens the first slot, all others wait for it.
         self.uav_processes = [env.process(self.fly_mission(uav)) for uav in self.fleet]
         env.process(self.run_radio())
         if self.packets is None:
@@ -178,7 +183,7 @@ class Mission:
         if self.mission["pad_rate"] > 0:
             self.pad_fails = [Signal(env) for _ in self.zone_of_pad]
             for pad, zone in enumerate(self.zone_of_pad):
-                env.process(self.take_out_of_order(pad, zone))
+                env.process(self.hold_failed_pad(pad, zone))
         clock = env.process(self.run_clock())
 
         self.listener.note_start(self.packets.initial_packets() if self.packets else {})
@@ -188,7 +193,7 @@ class Mission:
 
     # --- the clock ---
 
-    def run_clock(self) -> Process:
+    def run_clock(self) -> ProcessGenerator:
         """Open the slots and close them, until the mission is over."""
         while not _is_over(self.state.missions):
             self.decide_moves()
@@ -202,7 +207,7 @@ class Mission:
                 yield from self.announce(self.failures_are_due)
             yield from self.announce(self.slot_closes)
 
-    def announce(self, signal: Signal) -> Process:
+    def announce(self, signal: Signal) -> ProcessGenerator:
         """Send a signal, and wait until all that follows from it at this time has happened."""
         signal.send()
         while self.env.peek() <= self.env.now:
@@ -213,19 +218,20 @@ class Mission:
         decide(self.team, self.state, self.shown_world)
         self.may_charge_bits = _resolve(self.state.missions, self.state.uavs, *self.world.chart)
 
-    def give_turns(self) -> Process:
-        """Let each UAV take its turn in this slot, one after the other.
+    def give_turns(self) -> ProcessGenerator:
+        """Let each UAV take its turn in this slot, one after the other; pads are granted.
 
-        First those that leave the queue are interrupted, which comes before all other events of the
-        same time. Then those ask that may charge, in the order of the queue, since the first gets
-        the pad that is free. Then come those that give their pads back, and all others.
+        First, UAVs are called away from the queues: an interrupt comes before all other events of
+        the same time. Then UAVs ask for pads, in the order of the queue, since a pad that is free
+        goes to the first who asks. Then come those who give a pad back, with all others, and at
+        last the pads that have been repaired.
         """
         asking = []
         others = []
         for uav in self.fleet:
             if self.waits_for_pad(uav):
                 if not self.may_charge(uav):
-                    self.uav_processes[uav].interrupt(LEAVES_QUEUE)
+                    self.uav_processes[uav].interrupt(CALLED_AWAY)
             elif self.may_charge(uav) and not self.is_charging(uav):
                 asking.append(uav)
             else:
@@ -250,23 +256,24 @@ class Mission:
 
     # --- the UAVs ---
 
-    def fly_mission(self, uav: int) -> Process:
+    def fly_mission(self, uav: int) -> ProcessGenerator:
         """A UAV's mission: in every slot it flies, waits for a pad or charges, until it ends."""
         while self.is_active(uav):
             yield self.turns[uav].wait()
-            while self.may_charge(uav):
+            while self.may_charge(uav):  # again, if its pad has failed
                 yield from self.charge(uav)
-            yield self.uavs_are_served.wait()  # it flies, and collects data on its way
+            yield self.uavs_are_served.wait()  # it flies its move; the radio serves it on the way
             yield self.slot_closes.wait()
 
-    def charge(self, uav: int) -> Process:
-        """Wait for a pad and charge on it, both over many slots.
+    def charge(self, uav: int) -> ProcessGenerator:
+        """Wait for a pad and charge on it, both over as many slots as it takes.
 
-        It ends when the UAV has its turn in a slot: fully charged, or called out of the queue. It
-        also ends if the pad has failed; then the UAV may ask again.
+        A UAV that is charged gives its pad back at its next turn, and flies in that slot. So does
+        one that is called away from the queue. One whose pad has failed leaves it at once, and may
+        ask again at its next turn.
         """
         zone = self.zones[self.uavs[uav]["zone"]]
-        self.note_request(uav)
+        self.join_queue(uav)
         try:
             with zone.request(priority=self.place_in_queue(uav)) as pad:
                 yield pad
@@ -277,17 +284,17 @@ class Mission:
             if interrupt.cause == PAD_FAILED:
                 yield self.turns[uav].wait()
             if not self.may_charge(uav):
-                self.note_withdrawal(uav)
+                self.leave_queue(uav)
 
-    def note_request(self, uav: int) -> None:
-        """Note that a UAV asks for a pad, or that one whose pad has failed asks again."""
+    def join_queue(self, uav: int) -> None:
+        """Note the slot in which a UAV asks for a pad; after a failure of its pad, it is kept."""
         if self.uavs[uav]["pad_request"] < 0:
             self.uavs[uav]["pad_request"] = self.mission["slot"]
             self.mission["pad_requests"] += 1
             self.listener.note_request(uav)
 
-    def note_withdrawal(self, uav: int) -> None:
-        """Note that a UAV does not ask for a pad any more."""
+    def leave_queue(self, uav: int) -> None:
+        """Forget that a UAV has asked for a pad."""
         self.uavs[uav]["pad_request"] = -1
         self.listener.note_withdrawal(uav)
 
@@ -318,7 +325,7 @@ class Mission:
 
     # --- the radio, the data and the failures ---
 
-    def run_radio(self) -> Process:
+    def run_radio(self) -> ProcessGenerator:
         """Serve all flying UAVs in the communication slots 1..m of every slot."""
         m = int(self.mission["communication_slots"])
         arrays = (*self.state, self.world.order, self.world.means, *self.scratch)
@@ -334,14 +341,14 @@ class Mission:
                     self.packets.deliver(time)
             self.uavs_are_served.send()
 
-    def bring_data(self) -> Process:
+    def bring_data(self) -> ProcessGenerator:
         """Let new data arrive at the nodes at the end of every slot."""
         _, _, residual, sensors, _ = self.state
         while True:
             yield self.data_are_due.wait()
             _arrive(self.state.missions, residual, sensors, self.arrivals, *self.scratch)
 
-    def bring_packets(self, packets: Packets) -> Process:
+    def bring_packets(self, packets: Packets) -> ProcessGenerator:
         """Let packets arrive, each at its own time."""
         time, node = packets.next()
         while time < inf:
@@ -349,7 +356,7 @@ class Mission:
             packets.arrive(node)
             time, node = packets.next()
 
-    def run_failures(self) -> Process:
+    def run_failures(self) -> ProcessGenerator:
         """Let UAVs, pads and nodes fail and be repaired at the end of every slot."""
         while True:
             yield self.failures_are_due.wait()
@@ -370,8 +377,11 @@ class Mission:
         for pad in np.nonzero(self.mission["pads_out"] > were_out)[0].tolist():
             self.pad_fails[pad].send(uav_on.get(pad))
 
-    def take_out_of_order(self, pad: int, zone: simpy.PriorityResource) -> Process:
-        """Hold a pad whenever it has failed, until it is repaired."""
+    def hold_failed_pad(self, pad: int, zone: simpy.PriorityResource) -> ProcessGenerator:
+        """Hold a pad, like a UAV that charges on it, from when it fails until it is repaired.
+
+        A UAV on the pad leaves after the pad has asked, so that no other UAV gets its place.
+        """
         while True:
             uav = yield self.pad_fails[pad].wait()
             with zone.request(priority=BEFORE_ALL_UAVS) as outage:

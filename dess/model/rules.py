@@ -5,13 +5,13 @@ the environments call these functions, which use no random generator object and 
 The batch engine runs a slot in the order of Section III-C (see ``advance``):
 
     resolve(mission, uavs, chart)        # moves, safety controller
-    grant_pads(mission, uavs)            # the SimPy engine has a simpy.Resource instead
+    grant_pads(mission, uavs)            # the SimPy engine has a PriorityResource instead
     spend(mission, uavs)                 # energy
     channel.open_slot(mission, uavs, ...)
     communicate(mission, uavs, ..., n)   # for each communication slot n = 1..m
     arrive(mission, residual, ...)       # new data
     settle(mission, uavs)                # rewards, operational status
-    strike(mission, uavs, ...)           # failures and repairs (dess.physics.failures)
+    strike_if_on(mission, uavs, ...)     # failures and repairs of UAVs, pads and nodes
 
 With ``quota = 0`` a mission lasts until ``max_slots``: after its last UAV has ended, only the last
 three go on (see ``advance_without_uavs``).
