@@ -176,7 +176,7 @@ def _choose_action(
     charge = must_charge(mission, u, left)
     home = stays(u)
     if charge:
-        home = parking_cell(mission, team, i, chart, memory, reach)
+        home = parking_cell(mission, team, i, left, chart, memory, reach)
     safe = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
     goal_x, goal_y = home.x, home.y
     node = _choose_goal(

@@ -138,7 +138,7 @@ def _fill(missions, uavs, residual, guarded, chart, reach, out_missions, out_uav
             if not u.active:
                 continue
             row[MUST_CHARGE] = must_charge(mission, u, data)
-            home = parking_cell(mission, team, i, chart, memory, reach)
+            home = parking_cell(mission, team, i, data, chart, memory, reach)
             battery = battery_home(mission, team, i, chart, None, u.x, u.y, home, reach)
             row[HOME] = min(battery, _MOST)
             if may_act(u):

@@ -5,11 +5,12 @@ import numpy as np
 from dess.base.kernels import inlined, kernel
 from dess.model.guard.battery import lasts, margin, must_charge, slots_left, will_charge
 from dess.model.guard.parking import parking_cell, parking_memory, stays
+from dess.model.guard.queues import waits_in_zone
 from dess.model.guard.ways import battery_home, is_parked
 from dess.model.rules import data_left
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
-from dess.physics.chart import in_zone, is_open
+from dess.physics.chart import distance, in_zone, is_open
 from dess.physics.landing import lands
 from dess.physics.wind import is_calm, move_surcharge, reach_of
 
@@ -32,12 +33,13 @@ def contests(mission, uavs, i):
             continue
         parked = is_parked(mission, o)
         goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
+        remains = parked or waits_in_zone(mission, o)
         for action in range(5):
             slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
             level = 0
             if slots == 0:
                 level = 3 if parked else 2 if goes_first else 1
-            elif slots == 1 and goes_first and not parked:
+            elif slots == 1 and goes_first and not remains:
                 level = 2
             levels += max(level - contest(levels, action), 0) << 2 * action
     return levels
@@ -98,8 +100,8 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
         # Teammates fly around a parked UAV, so it need not leave its cell for any.
-        stays = action == HOVER and is_parked(mission, u)
-        contested = 0 if stays else contest(levels, action)
+        remains = action == HOVER and is_parked(mission, u)
+        contested = 0 if remains else contest(levels, action)
         gives_way = charge and home.gives_way == 1 and action == HOVER
         if not is_open(chart, x, y) or contested == 3 or gives_way:
             continue
@@ -107,12 +109,14 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         if charge:
             needed = battery_home(mission, uavs, i, chart, planned, x, y, home, reach)
             needed += 1 if is_calm(reach) else _cost(mission, u, chart, action, x, y)
-            # The cheapest way in wind may lead through a parked teammate; a move must do as well.
-            if lands(mission) and not is_calm(reach) and home.cells > 0:
+            kept = reserve
+            if not is_calm(reach) and home.cells > 0:
+                # The cheapest way may lead through a parked teammate; a move must do as well.
                 needed = max(needed, fewest + 1) if action == HOVER else needed
                 fewest = min(fewest, needed)
+                kept = max(kept, _wait(mission, u, chart, action, x, y, home))
             # One slot is the charging slot itself; the battery must not be depleted before it.
-            late = max(needed + 1 + reserve - slots_left(mission, u), 0)
+            late = max(needed + 1 + kept - slots_left(mission, u), 0)
         bit = 1 << action
         if contested < 2:
             clear |= bit
@@ -137,6 +141,18 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
 
 
 @inlined
+def _wait(mission, u, chart, action, x, y, home):
+    """The battery [%] that a UAV keeps in wind for its wait for a pad if it comes after an action.
+
+    In still air, it may as well fly about until its turn comes. In wind, this costs more than the
+    slots that it takes, and so does a detour of two cells around a parked teammate.
+    """
+    slots = 1 if action == HOVER else u.slots_per_cell
+    arrives = slots + distance(chart, x, y, home.x, home.y) * u.slots_per_cell
+    return home.begins - arrives + 2 * mission.wind_most if home.begins > arrives else 0
+
+
+@inlined
 def _cost(mission, u, chart, action, x, y):
     """The battery [%] for an action of a UAV that leads to a cell, in wind or at a low speed."""
     if action == HOVER:
@@ -153,10 +169,11 @@ def _mask(missions, uavs, residual, rows_mission, rows_uav, chart, reach):
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         mission, team = missions[b], uavs[b]
-        charge = must_charge(mission, team[i], data_left(mission, residual[b]))
+        data = data_left(mission, residual[b])
+        charge = must_charge(mission, team[i], data)
         home = stays(team[i])
         if charge:
-            home = parking_cell(mission, team, i, chart, memory, reach)
+            home = parking_cell(mission, team, i, data, chart, memory, reach)
         safe = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
         for action in range(5):
             masks[row, action] = safe >> action & 1

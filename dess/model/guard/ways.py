@@ -38,17 +38,21 @@ def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
 
     Those are parked ones, and if ``planned`` is given, as in ``Parking``, those who will be.
     """
-    length, between = distance(chart, x, y, to_x, to_y), 0
+    length, between, beside = distance(chart, x, y, to_x, to_y), 0, 0
     for j in range(mission.uavs):
         closed_x, closed_y = _closed(mission, uavs, i, j, chart, planned)
         if closed_x >= 0:
             before = distance(chart, x, y, closed_x, closed_y)
-            between += before + distance(chart, closed_x, closed_y, to_x, to_y) == length
+            more = before + distance(chart, closed_x, closed_y, to_x, to_y) - length
+            between += more == 0
+            beside += more == 2  # it may close the way around the one between
     if between == 0:
         return length
-    if between == 1 and chart.ways.size == 0 and not ends_soon(mission, uavs[i]):
+    is_line = x == to_x or y == to_y
+    is_simple = between == 1 and chart.ways.size == 0 and not (is_line and beside > 0)
+    if is_simple and not ends_soon(mission, uavs[i]):
         # without no-fly cells, a way that does not follow a line has others of the same length
-        return length + 2 if x == to_x or y == to_y else length
+        return length + 2 if is_line else length
     return _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y)
 
 

@@ -132,45 +132,7 @@ def test_hardly_any_guarded_uav_runs_dry_among_islands_and_no_lone_one_does(sea)
 
 # --- pads ---
 
-# C_S 30, C_C 80, 10 % per slot. UAV 0 is two cells from the zone and asks for a pad in two slots.
 QUEUE: dict[str, Any] = {"charge_start": 30, "charge_complete": 80, "pads": 1}
-OFF: dict[str, Any] = {"charging": {"plan_waits": False}}
-
-
-@pytest.mark.parametrize(
-    ("batteries", "asked", "scenario", "slots"),
-    [
-        ([32, 30, 32], [1], OFF, 0),
-        ([32, 30, 32], [1], OFF | {"failures": {"pad_rate": 0.1}}, 3),
-        ([32, 30, 40], [1], {"charging": {"measured": True}}, 3),
-        ([32, 30, 40], [1], {}, 3),  # 50 % in 5 slots
-        ([50, 30, 60], [1], {}, 0),  # it may ask in 20 slots
-        ([32, 70, 70], [], {}, 0),  # it comes first
-        # 60 % in 6 slots, then another 6 as 31 - 6 % are left; its own cell is 3 slots away
-        ([32, 20, 31], [1], {}, 9),
-        # On a tie the lower index, its own, comes first; the other must be charged after it.
-        ([32, 20, 32], [1], {}, 8),
-        ([32, 36, 50], [], {}, 4),  # 8 slots to charge, and the next battery lasts for 4 more
-        ([32, 32, 32], [], {}, 16),
-        ([32, 32, 32], [], {"pads": 2}, 8),  # only the third waits for it
-        ([32, 20, 10], [1, 2], {"pads": 2}, 4),
-        ([32, 20, 20], [1], {"pads": 3}, 0),
-        ([32, 20, 20], [1, 2], {"charging": {"power": 5}}, 25),  # 12 slots, and 15 for 72 %
-        ([32, 20, 20], [1, 2], {"charging": {"power": 1}}, 29),  # C_S - 1 at most
-        ([20, 20, 20], [0, 1], {}, 0),  # it has asked
-        ([32, 31, 31], [], {"quota": 40}, 0),  # they need not charge
-        ([32, 30, 40], [1], {"zones": [{"cells": [0, 0, 9, 9]}]}, 3),  # too far off
-        ([32, 30, 32], [1], {"zones": [{"cells": [24, 8, 1, 1]}]}, 0),  # 4 slots, not 2 + 3
-    ],
-)
-def test_the_time_that_a_uav_expects_to_wait(batteries, asked, scenario, slots):
-    uavs = [
-        {"battery": b, "pad_request": -1, "communications": 0, "x": 24, "y": 4} for b in batteries
-    ]
-    for i in asked:
-        uavs[i] |= {"pad_request": 0, "x": 26 + i, "y": 2, "latch": True}
-    state, chart = placed(uavs, **QUEUE | scenario)
-    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[3] == slots
 
 
 def test_two_parked_teammates_side_by_side_are_flown_around():
