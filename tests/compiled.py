@@ -77,7 +77,7 @@ def parking_cell(mission, uavs, i, chart, reach=None, data=1e6):
 
 def plan_of_pads(mission, uavs, i, chart, reach=None, data=1e6):
     """The plan, and what UAV ``i`` must keep for waits, when it charges, and if it gives way."""
-    plan = queues.queue_memory(len(uavs))
+    plan = queues.plan_memory(len(uavs))
     return plan, queues.plan_pads(mission, uavs, i, data, chart, plan, reach)
 
 

@@ -33,13 +33,12 @@ def contests(mission, uavs, i):
             continue
         parked = is_parked(mission, o)
         goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
-        remains = parked or waits_in_zone(mission, o)
         for action in range(5):
             slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
             level = 0
             if slots == 0:
                 level = 3 if parked else 2 if goes_first else 1
-            elif slots == 1 and goes_first and not remains:
+            elif slots == 1 and goes_first and not parked and not waits_in_zone(mission, o):
                 level = 2
             levels += max(level - contest(levels, action), 0) << 2 * action
     return levels

@@ -5,12 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel
-from dess.model.guard.queues import Queues, may_wait, plan_pads, queue_memory, waits_in_zone
+from dess.model.guard.queues import QUEUE, TURN, Plan, may_wait, plan_pads, waits_in_zone
 from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
 from dess.physics.chart import distance
 from dess.physics.failures import working_pads
 from dess.physics.section import for_sections
 from dess.physics.wind import is_calm
+from dess.scenario.fields import MOST_ZONES
 
 
 class Parking(NamedTuple):
@@ -20,13 +21,13 @@ class Parking(NamedTuple):
         taken: (zone cells,) whether a teammate takes the cell.
         planned: (I,) the zone cell of each teammate that chooses before the UAV, or -1.
         order: (I,) the UAVs in the order in which they choose.
-        queues: The plan of pads; its zones are -1 where nobody may have to wait for a pad.
+        plan: The plan of pads; its zones are -1 where nobody may have to wait for a pad.
     """
 
     taken: np.ndarray
     planned: np.ndarray
     order: np.ndarray
-    queues: Queues
+    plan: Plan
 
 
 class Home(NamedTuple):
@@ -56,7 +57,7 @@ def parking_memory(chart, uavs):
         np.empty(len(chart.parking), np.bool_),
         np.empty(uavs, np.int64),
         np.empty(uavs, np.int64),
-        queue_memory(uavs),
+        Plan(np.empty(uavs, TURN), np.empty(MOST_ZONES, QUEUE)),
     )
 
 
@@ -92,10 +93,11 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
     if mission.active == 1 and is_calm(reach) and mission.zones == 1 and mission.pad_rate == 0.0:
         memory.planned[:] = -1
         return _nearest(uavs[i], chart)
-    memory.queues.zone[:] = -1
+    for j in range(mission.uavs):
+        memory.plan.turns[j].zone = -1
     if not may_wait(mission, uavs, data):
         return _choose(mission, uavs, i, chart, memory, reach)
-    wait, begins, gives_way = plan_pads(mission, uavs, i, data, chart, memory.queues, reach)
+    wait, begins, gives_way = plan_pads(mission, uavs, i, data, chart, memory.plan, reach)
     home = _choose(mission, uavs, i, chart, memory, reach)
     return Home(home.x, home.y, home.cells, wait, begins, gives_way)
 
@@ -109,14 +111,14 @@ def _nearest(u, chart):
 
 
 @inlined
-def _sort(mission, uavs, queues, order):
+def _sort(mission, uavs, turns, order):
     """Sort the active UAVs in the order in which they choose. How many there are."""
     count = 0
     for j in range(mission.uavs):
         if not uavs[j].active:
             continue
         place = count
-        while place > 0 and _chooses_before(uavs, j, order[place - 1], queues):
+        while place > 0 and _chooses_before(uavs, j, order[place - 1], turns):
             order[place] = order[place - 1]
             place -= 1
         order[place] = j
@@ -125,13 +127,14 @@ def _sort(mission, uavs, queues, order):
 
 
 @inlined
-def _chooses_before(uavs, j, other, queues):
+def _chooses_before(uavs, j, other, turns):
     """Whether UAV ``j`` chooses before another with a lower index.
 
     In the plan of pads, who can ask sooner comes sooner, and needs the cell that it can reach then.
     """
-    if queues.zone[j] >= 0 and queues.zone[other] >= 0 and queues.asks[j] != queues.asks[other]:
-        return queues.asks[j] < queues.asks[other]
+    are_planned = turns[j].zone >= 0 and turns[other].zone >= 0
+    if are_planned and turns[j].asks != turns[other].asks:
+        return turns[j].asks < turns[other].asks
     return uavs[j].battery < uavs[other].battery
 
 
@@ -161,7 +164,7 @@ def _choose(mission, uavs, i, chart, memory, reach):
         keeps = is_parked(mission, o) or waits_in_zone(mission, o)
         if o.active and o.zone >= 0 and (j == i or keeps or not is_crowded(mission, chart, o.zone)):
             taken[chart.nearest[o.y, o.x]] = True
-    for place in range(_sort(mission, uavs, memory.queues, memory.order)):
+    for place in range(_sort(mission, uavs, memory.plan.turns, memory.order)):
         j = memory.order[place]
         o = uavs[j]
         if j != i and (o.grounded or is_parked(mission, o)):
@@ -183,7 +186,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
 
     It is in the zone that the plan of pads tells, unless this is full.
     """
-    u, zone = uavs[i], memory.queues.zone[i]
+    u, zone = uavs[i], memory.plan.turns[i].zone
     # The nearest cell of all is free most of the time, so this one is tried first.
     cell = np.int64(chart.nearest[u.y, u.x])
     x, y = chart.parking[cell, 0], chart.parking[cell, 1]

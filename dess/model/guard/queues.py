@@ -45,49 +45,41 @@ KEPT = 2
 _AS_ASKED, _URGENT_FIRST, _BY_DEADLINE = range(3)
 
 
-class Queues(NamedTuple):
-    """Working memory of ``plan_pads``, and the plan. Slots are counted from now.
+# The turn of one UAV at a pad. Slots are counted from now.
+TURN = np.dtype(
+    [
+        ("zone", np.int64),  # the zone where it will charge, -1 if it need not
+        # The slots to the nearest cell of each zone, and the battery [%] that this takes.
+        ("way", np.int64, MOST_ZONES),
+        ("spent", np.int64, MOST_ZONES),
+        ("asks", np.int64),  # when it can ask for a pad, before now if it has asked
+        ("deadline", np.int64),  # when it must begin to charge at the latest
+        ("begins", np.int64),  # when it begins, -1 if it is charging or has not been planned yet
+        ("pad", np.int64),  # the pad of its zone that it is given, -1 if it has not been planned
+        # Not of the UAV, but of the pad with its number: when this is free.
+        ("free", np.int64),
+    ]
+)
+
+# The queue of one zone: the order in which it charges UAVs, and what its plan costs.
+QUEUE = np.dtype([("order", np.int64), ("price", np.int64)])
+
+
+class Plan(NamedTuple):
+    """Working memory of ``plan_pads``, and its plan.
 
     Attributes:
-        zone: (I,) the zone where a UAV will charge, -1 if it need not.
-        way: (Z, I) the slots to the nearest cell of a zone.
-        spent: (Z, I) the battery that this takes [%].
-        asks: (I,) when a UAV can ask for a pad; before now if it has asked.
-        deadline: (I,) when it must begin to charge at the latest.
-        begins: (I,) when it begins to charge; -1 if it is charging, or waits to be planned.
-        pad: (I,) the pad of its zone that it is given.
-        free: (I,) when each pad of the zone in question is free.
-        order: (Z,) the order in which each zone charges UAVs.
-        price: (Z,) the price of each zone's plan.
+        turns: (I,) ``TURN`` records.
+        queues: (Z,) ``QUEUE`` records.
     """
 
-    zone: np.ndarray
-    way: np.ndarray
-    spent: np.ndarray
-    asks: np.ndarray
-    deadline: np.ndarray
-    begins: np.ndarray
-    pad: np.ndarray
-    free: np.ndarray
-    order: np.ndarray
-    price: np.ndarray
+    turns: np.ndarray
+    queues: np.ndarray
 
 
-@kernel
-def queue_memory(uavs):
+def plan_memory(uavs: int) -> Plan:
     """Working memory for missions with so many UAVs."""
-    return Queues(
-        np.empty(uavs, np.int64),
-        np.empty((MOST_ZONES, uavs), np.int64),
-        np.empty((MOST_ZONES, uavs), np.int64),
-        np.empty(uavs, np.int64),
-        np.empty(uavs, np.int64),
-        np.empty(uavs, np.int64),
-        np.empty(uavs, np.int64),
-        np.empty(uavs, np.int64),
-        np.empty(MOST_ZONES, np.int64),
-        np.empty(MOST_ZONES, np.int64),
-    )
+    return Plan(np.zeros(uavs, TURN), np.zeros(MOST_ZONES, QUEUE))
 
 
 @inlined
@@ -119,6 +111,8 @@ def may_wait(mission, uavs, data):
     fewest = mission.uavs
     for zone in range(mission.zones):
         fewest = min(fewest, working_pads(mission, zone))
+    if fewest == mission.uavs:
+        return False
     count = 0
     for j in range(mission.uavs):
         count += _needs_pad(mission, uavs[j], data)
@@ -132,7 +126,7 @@ def _needs_pad(mission, u, data):
 
 
 @kernel
-def plan_pads(mission, uavs, i, data, chart, queues, reach):
+def plan_pads(mission, uavs, i, data, chart, plan, reach):
     """Plan where and when all UAVs charge that must; see the text of the module.
 
     Args:
@@ -141,7 +135,7 @@ def plan_pads(mission, uavs, i, data, chart, queues, reach):
         i: Index of the UAV that asks.
         data: Residual data of all nodes together [data units].
         chart: ``Chart``.
-        queues: ``queue_memory``; the plan is written into it.
+        plan: ``plan_memory``; the plan is written into it.
         reach: The table of ``reach_of``.
 
     Returns:
@@ -149,188 +143,192 @@ def plan_pads(mission, uavs, i, data, chart, queues, reach):
         charge; and 1 if it must not ask for a pad in this slot, else 0.
     """
     for j in range(mission.uavs):
-        queues.zone[j] = -1
-        u = uavs[j]
+        u, turn = uavs[j], plan.turns[j]
+        turn.zone = -1
         if not _needs_pad(mission, u, data):
             continue
         if u.pad_request >= 0:
-            queues.zone[j], queues.way[u.zone, j], queues.spent[u.zone, j] = u.zone, 0, 0
+            turn.zone = u.zone
+            turn.way[u.zone] = 0
+            turn.spent[u.zone] = 0
         else:
-            _find_ways(mission, u, j, chart, queues, reach)
-    _choose_zones(mission, uavs, chart, queues)
-    zone = queues.zone[i]
+            _find_ways(mission, u, turn, chart, reach)
+    _choose_zones(mission, uavs, chart, plan)
+    zone = plan.turns[i].zone
     if zone < 0 or uavs[i].pad_request >= 0:
         return np.int64(0), np.int64(0), np.int64(0)
-    _serve(mission, uavs, zone, queues.order[zone], queues)
-    kept = queues.deadline[i] - _latest(mission, uavs, i, queues)
+    _serve(mission, uavs, zone, plan.queues[zone].order, plan)
+    kept = plan.turns[i].deadline - _latest(mission, uavs, i, plan)
     # It can ask no earlier than at C_S.
     kept = max(min(kept, mission.charge_start - 1), 0)
-    gives_way = np.int64(_gives_way(mission, uavs, i, queues))
-    return np.int64(kept), queues.begins[i], gives_way
+    gives_way = np.int64(_gives_way(mission, uavs, i, plan))
+    return np.int64(kept), plan.turns[i].begins, gives_way
 
 
 @inlined
-def _find_ways(mission, u, j, chart, queues, reach):
-    """Write the ways of UAV ``j`` to all zones, and choose the one that takes the least battery."""
+def _find_ways(mission, u, turn, chart, reach):
+    """Write the ways of a UAV to all zones, and choose the one that takes the least battery."""
     for zone in range(mission.zones):
-        queues.spent[zone, j] = -1
+        turn.spent[zone] = -1
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
         cells = distance(chart, u.x, u.y, x, y)
         spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach) + u.slots_left
         slots = cells * u.slots_per_cell + u.slots_left
-        least, way = queues.spent[zone, j], queues.way[zone, j]
-        if least < 0 or spent < least or (spent == least and slots < way):
-            queues.spent[zone, j], queues.way[zone, j] = spent, slots
-    best = 0
+        least = turn.spent[zone]
+        if least < 0 or spent < least or (spent == least and slots < turn.way[zone]):
+            turn.spent[zone] = spent
+            turn.way[zone] = slots
+    turn.zone = 0
     for zone in range(1, mission.zones):
-        if queues.spent[zone, j] < queues.spent[best, j]:
-            best = zone
-    queues.zone[j] = best
+        if turn.spent[zone] < turn.spent[turn.zone]:
+            turn.zone = zone
 
 
 @inlined
-def _choose_zones(mission, uavs, chart, queues):
+def _choose_zones(mission, uavs, chart, plan):
     """Let UAVs fly to other zones than those of their cheapest ways while this lowers the price."""
     total = 0
     for zone in range(mission.zones):
-        queues.price[zone] = _price(mission, uavs, chart, zone, queues)
-        total += queues.price[zone]
+        plan.queues[zone].price = _price(mission, uavs, chart, zone, plan)
+        total += plan.queues[zone].price
     while total > 0 and mission.zones > 1:
         who, where, least, farther = -1, -1, total, 0
         for j in range(mission.uavs):
-            now = queues.zone[j]
-            if now < 0 or uavs[j].pad_request >= 0 or queues.price[now] == 0:
+            now = plan.turns[j].zone
+            if now < 0 or uavs[j].pad_request >= 0 or plan.queues[now].price == 0:
                 continue
             for zone in range(mission.zones):
                 if zone == now:
                     continue
-                queues.zone[j] = zone
-                price = total - queues.price[now] - queues.price[zone]
-                price += _price(mission, uavs, chart, now, queues)
-                price += _price(mission, uavs, chart, zone, queues)
-                more = queues.spent[zone, j] - queues.spent[now, j]
+                plan.turns[j].zone = zone
+                price = total - plan.queues[now].price - plan.queues[zone].price
+                price += _price(mission, uavs, chart, now, plan)
+                price += _price(mission, uavs, chart, zone, plan)
+                more = plan.turns[j].spent[zone] - plan.turns[j].spent[now]
                 if price < least or (price == least and who >= 0 and more < farther):
                     who, where, least, farther = j, zone, price, more
-                queues.zone[j] = now
+                plan.turns[j].zone = now
         if who < 0:
             break
-        left = queues.zone[who]
-        queues.zone[who], total = where, least
-        queues.price[left] = _price(mission, uavs, chart, left, queues)
-        queues.price[where] = _price(mission, uavs, chart, where, queues)
+        left = plan.turns[who].zone
+        plan.turns[who].zone, total = where, least
+        plan.queues[left].price = _price(mission, uavs, chart, left, plan)
+        plan.queues[where].price = _price(mission, uavs, chart, where, plan)
     for zone in range(mission.zones):
-        _price(mission, uavs, chart, zone, queues)
+        _price(mission, uavs, chart, zone, plan)
 
 
 @kernel
-def _price(mission, uavs, chart, zone, queues):
+def _price(mission, uavs, chart, zone, plan):
     """The price of the best order in which a zone can charge its UAVs, which is written down."""
     count, asked = 0, True
     for j in range(mission.uavs):
-        if queues.zone[j] != zone:
+        u, turn = uavs[j], plan.turns[j]
+        if turn.zone != zone:
             continue
-        u = uavs[j]
-        way, spent = queues.way[zone, j], queues.spent[zone, j]
         count += 1
-        queues.deadline[j] = u.battery - 1 - (spent - way)
+        way, spent = turn.way[zone], turn.spent[zone]
+        turn.deadline = u.battery - 1 - (spent - way)
         if u.pad_request >= 0:
-            queues.asks[j] = u.pad_request - mission.slot
+            turn.asks = u.pad_request - mission.slot
             continue
         asked = False
-        queues.asks[j] = way if u.latch else way + max(u.battery - spent - mission.charge_start, 0)
-    queues.order[zone] = _AS_ASKED
-    least = _serve(mission, uavs, zone, _AS_ASKED, queues)
+        turn.asks = way
+        if not u.latch:
+            turn.asks += max(u.battery - spent - mission.charge_start, 0)
+    plan.queues[zone].order = _AS_ASKED
+    least = _serve(mission, uavs, zone, _AS_ASKED, plan)
     if asked or count < 2:
         return least
     for order in (_URGENT_FIRST, _BY_DEADLINE):
         if least >= LACKING:
-            price = _serve(mission, uavs, zone, order, queues)
+            price = _serve(mission, uavs, zone, order, plan)
             if price < least:
-                least, queues.order[zone] = price, order
+                least, plan.queues[zone].order = price, order
     return least + LACKING * max(count - chart.sizes[zone], 0)
 
 
 @inlined
-def _serve(mission, uavs, zone, order, queues):
+def _serve(mission, uavs, zone, order, plan):
     """Play the queue of a zone forward in an order; the price is returned."""
     pads = min(working_pads(mission, zone), mission.uavs)
     left = busy = 0
     for j in range(mission.uavs):
-        if queues.zone[j] != zone:
+        if plan.turns[j].zone != zone:
             continue
-        queues.begins[j], queues.pad[j] = -1, -1
+        plan.turns[j].begins, plan.turns[j].pad = -1, -1
         if uavs[j].charging and busy < pads:
-            queues.free[busy] = _charging_time(mission, uavs[j], zone, uavs[j].battery)
-            queues.pad[j] = busy
+            plan.turns[busy].free = _charging_time(mission, uavs[j], zone, uavs[j].battery)
+            plan.turns[j].pad = busy
             busy += 1
         else:
             left += 1
     for pad in range(busy, pads):
-        queues.free[pad] = 0
+        plan.turns[pad].free = 0
     price = 0
     while left > 0:
         pad = -1
         for other in range(pads):
-            if pad < 0 or queues.free[other] < queues.free[pad]:
+            if pad < 0 or plan.turns[other].free < plan.turns[pad].free:
                 pad = other
-        free = queues.free[pad] if pad >= 0 else mission.max_slots
-        j = _next(mission, uavs, zone, order, free, queues)
-        begins = max(queues.asks[j], free)
-        queues.begins[j], queues.pad[j] = begins, pad
+        free = plan.turns[pad].free if pad >= 0 else mission.max_slots
+        j = _next(mission, uavs, zone, order, free, plan)
+        begins = max(plan.turns[j].asks, free)
+        plan.turns[j].begins, plan.turns[j].pad = begins, pad
         if pad >= 0:
-            queues.free[pad] = begins + _time_on_pad(mission, uavs, j, begins, queues)
-        lacks = begins - queues.deadline[j]
+            plan.turns[pad].free = begins + _time_on_pad(mission, uavs, j, begins, plan)
+        lacks = begins - plan.turns[j].deadline
         price += LACKING * max(lacks, 0) + max(lacks + SPARE, 0)
         left -= 1
     return price
 
 
 @inlined
-def _next(mission, uavs, zone, order, free, queues):
+def _next(mission, uavs, zone, order, free, plan):
     """The UAV that a zone charges next, when a pad is free at so many slots from now."""
     soonest = mission.max_slots + free
     for j in range(mission.uavs):
-        if _is_planned(uavs, j, zone, queues):
-            soonest = min(soonest, queues.asks[j])
+        if _is_planned(uavs, j, zone, plan):
+            soonest = min(soonest, plan.turns[j].asks)
     soonest = max(soonest, free)
     best = -1
     for j in range(mission.uavs):
-        if not _is_planned(uavs, j, zone, queues):
+        if not _is_planned(uavs, j, zone, plan):
             continue
-        if best < 0 or _is_next(mission, uavs, j, best, order, soonest, queues):
+        if best < 0 or _is_next(mission, uavs, j, best, order, soonest, plan):
             best = j
     return best
 
 
 @inlined
-def _is_planned(uavs, j, zone, queues):
+def _is_planned(uavs, j, zone, plan):
     """Whether UAV ``j`` waits in the plan of a zone for its turn."""
-    return queues.zone[j] == zone and queues.begins[j] < 0 and queues.pad[j] < 0
+    return plan.turns[j].zone == zone and plan.turns[j].begins < 0 and plan.turns[j].pad < 0
 
 
 @inlined
-def _is_next(mission, uavs, j, other, order, time, queues):
+def _is_next(mission, uavs, j, other, order, time, plan):
     """Whether UAV ``j`` is charged before another by an order, if a pad is free at this time."""
     if uavs[j].pad_request >= 0 and uavs[other].pad_request >= 0:
         return is_before(mission, uavs[j], uavs[other])
     if uavs[j].pad_request >= 0 or uavs[other].pad_request >= 0:
         return uavs[j].pad_request >= 0
     if order != _BY_DEADLINE:
-        is_there, other_is_there = queues.asks[j] <= time, queues.asks[other] <= time
+        is_there, other_is_there = plan.turns[j].asks <= time, plan.turns[other].asks <= time
         if is_there != other_is_there:
             return is_there
         if not is_there or (order == _AS_ASKED and not mission.lowest_battery_first):
-            return queues.asks[j] < queues.asks[other]
-    return queues.deadline[j] < queues.deadline[other]
+            return plan.turns[j].asks < plan.turns[other].asks
+    return plan.turns[j].deadline < plan.turns[other].deadline
 
 
 @inlined
-def _time_on_pad(mission, uavs, j, begins, queues):
+def _time_on_pad(mission, uavs, j, begins, plan):
     """The slots for which UAV ``j`` charges if it begins so many slots from now."""
-    empty = queues.deadline[j] + 1 - begins  # what is left of its battery then
-    return _charging_time(mission, uavs[j], queues.zone[j], max(empty, 0))
+    empty = plan.turns[j].deadline + 1 - begins  # what is left of its battery then
+    return _charging_time(mission, uavs[j], plan.turns[j].zone, max(empty, 0))
 
 
 @inlined
@@ -345,41 +343,42 @@ def _charging_time(mission, u, zone, battery):
 
 
 @inlined
-def _latest(mission, uavs, i, queues):
+def _latest(mission, uavs, i, plan):
     """When UAV ``i`` must begin to charge, so that it and those after it on its pad are in time."""
-    latest = queues.deadline[i] - KEPT
+    latest = plan.turns[i].deadline - KEPT
     before, charging = i, 0
     while True:
-        following = _following(mission, before, queues)
+        following = _following(mission, before, plan)
         if following < 0:
             return latest
-        charging += _time_on_pad(mission, uavs, before, queues.begins[before], queues)
-        latest = min(latest, queues.deadline[following] - KEPT - charging)
+        charging += _time_on_pad(mission, uavs, before, plan.turns[before].begins, plan)
+        latest = min(latest, plan.turns[following].deadline - KEPT - charging)
         before = following
 
 
 @inlined
-def _following(mission, j, queues):
+def _following(mission, j, plan):
     """The UAV that the plan charges after UAV ``j`` on the same pad, or -1."""
     best = -1
     for other in range(mission.uavs):
-        if other == j or queues.zone[other] != queues.zone[j] or queues.pad[other] != queues.pad[j]:
+        turn, earlier = plan.turns[other], plan.turns[j]
+        is_later = turn.begins > earlier.begins
+        if turn.zone != earlier.zone or turn.pad != earlier.pad:
             continue
-        is_later = queues.begins[other] > queues.begins[j]
-        if is_later and (best < 0 or queues.begins[other] < queues.begins[best]):
+        if is_later and (best < 0 or plan.turns[other].begins < plan.turns[best].begins):
             best = other
     return best
 
 
 @inlined
-def _gives_way(mission, uavs, i, queues):
+def _gives_way(mission, uavs, i, plan):
     """Whether UAV ``i`` must not ask now: a UAV that the plan has before it would come after it."""
-    zone = queues.zone[i]
-    if queues.order[zone] == _AS_ASKED or queues.asks[i] > 0 or uavs[i].zone != zone:
+    zone = plan.turns[i].zone
+    if plan.queues[zone].order == _AS_ASKED or plan.turns[i].asks > 0 or uavs[i].zone != zone:
         return False
     for j in range(mission.uavs):
-        begins_first = queues.zone[j] == zone and queues.begins[j] < queues.begins[i]
-        asks_after = queues.asks[j] > 0 or (j > i and not mission.lowest_battery_first)
+        begins_first = plan.turns[j].zone == zone and plan.turns[j].begins < plan.turns[i].begins
+        asks_after = plan.turns[j].asks > 0 or (j > i and not mission.lowest_battery_first)
         if begins_first and asks_after:
             return True
     return False

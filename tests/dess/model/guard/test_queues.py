@@ -67,7 +67,7 @@ CHARGING = {"pad_request": 5, "charging": True, "charge_slots": 3, "latch": True
     ],
 )
 def test_when_each_uav_begins_to_charge(uavs, scenario, begins):
-    assert _plan(uavs, **scenario)[0].begins.tolist() == begins
+    assert _plan(uavs, **scenario)[0].turns["begins"].tolist() == begins
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_a_uav_that_comes_in_the_same_slot_as_one_with_less_battery_gives_way_to
     ],
 )
 def test_in_which_zone_each_uav_charges(uavs, zones):
-    assert _plan(uavs, **BOTH_ENDS)[0].zone.tolist() == zones
+    assert _plan(uavs, **BOTH_ENDS)[0].turns["zone"].tolist() == zones
 
 
 def test_a_uav_leaves_the_near_zone_to_two_that_come_before_it_with_more_battery():
@@ -142,17 +142,17 @@ def test_a_uav_leaves_the_near_zone_to_two_that_come_before_it_with_more_battery
 def test_no_pad_is_given_to_two_uavs_at_once(team):
     """And nobody is charged before it has come, nor asks above C_S."""
     uavs = [_uav(cells, battery) for cells, battery in team]
-    plan, _ = _plan(uavs, **BOTH_ENDS)
-    assert (plan.begins >= plan.asks).all()
+    turns = _plan(uavs, **BOTH_ENDS)[0].turns
+    assert (turns["begins"] >= turns["asks"]).all()
     for zone in (0, 1):
-        members = np.flatnonzero(plan.zone == zone)
-        for j in members:
-            left = plan.deadline[j] + 1 - plan.begins[j]
-            until = plan.begins[j] - (-(80 - max(left, 0)) // 10)
-            later = plan.begins[members][plan.begins[members] > plan.begins[j]]
-            assert (later >= until).all() and (plan.begins[members] == plan.begins[j]).sum() == 1
-    came = np.array([u["battery"] for u in uavs]) - plan.asks
-    assert (came <= 20).all()
+        begins = turns["begins"][turns["zone"] == zone]
+        assert len({*begins}) == len(begins)
+        for turn in turns[turns["zone"] == zone]:
+            left = max(turn["deadline"] + 1 - turn["begins"], 0)
+            until = turn["begins"] + -(-(80 - left) // 10)
+            assert (begins[begins > turn["begins"]] >= until).all()
+    batteries = np.array([battery for _, battery in team])
+    assert (batteries - turns["asks"] <= 20).all()
 
 
 def test_hardly_any_uav_is_lost_to_the_wind_with_a_pad_for_two():
