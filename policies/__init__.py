@@ -8,7 +8,7 @@ actions = policy.act(view)
 from pathlib import Path
 
 from dess.policies import registry
-from dess.policies.registry import Policy, TypedByUser, names
+from dess.policies.registry import Policy, names
 
 __all__ = ["load", "load_team", "names"]
 
@@ -23,7 +23,7 @@ def load(name: str | Path) -> Policy:
     Raises:
         InputError: If the policy does not exist or cannot be loaded.
     """
-    return registry.load(TypedByUser(name))
+    return registry.load(name, run_files=True)
 
 
 def load_team(text: str) -> list[Policy]:
@@ -32,7 +32,7 @@ def load_team(text: str) -> list[Policy]:
     Raises:
         InputError: If one of them does not exist or cannot be loaded.
     """
-    return registry.load_team(TypedByUser(text))
+    return registry.load_team(text, run_files=True)
 
 
 def __dir__() -> list[str]:

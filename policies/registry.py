@@ -78,14 +78,6 @@ _OTHERS = (
 )
 
 
-class TypedByUser(str):
-    """A policy or a team that a user has typed, in a command or in Python.
-
-    It may name classes of Python files, which are code that runs. Names that were read from data,
-    such as results, studies and pages, are plain ``str``, and ``load`` runs no file for them.
-    """
-
-
 def names() -> list[str]:
     """All policies by name, the shipped ones first."""
     shipped = [*CLASSES, *trained_names()]
@@ -108,20 +100,20 @@ def describe_policies() -> dict[str, str]:
     return {name: (outside | shipped)[name] for name in names()}
 
 
-def load(name: str | Path) -> Policy:
+def load(name: str | Path, *, run_files: bool = False) -> Policy:
     """Load a policy by its name, from the folder of a trained policy, or from a Python file.
 
     Args:
-        name: One of ``names()``; a folder that ``dess train`` has written; or ``FILE.py:CLASS``,
-            which must be ``TypedByUser``. The folder of such a file is added to ``sys.path``, so
-            the file can import those beside it. A file that was changed is loaded again only by a
-            new process.
+        name: One of ``names()``; a folder that ``dess train`` has written; or ``FILE.py:CLASS``.
+            The folder of such a file is added to ``sys.path``, so the file can import those beside
+            it. A file that was changed is loaded again only by a new process.
+        run_files: Whether a Python file may be run, since a user has typed its name. A name that
+            was read from data, such as results, studies and pages, runs none.
 
     Raises:
         InputError: If the policy does not exist, cannot be loaded, or is a class of a Python file
-            that no user has typed.
+            that may not be run.
     """
-    is_typed = isinstance(name, TypedByUser)
     name = str(name)
     if name in CLASSES:
         shipped = CLASSES[name]
@@ -134,7 +126,7 @@ def load(name: str | Path) -> Policy:
             policy.name = name
         return policy
     if file := FILE.fullmatch(name):
-        if not is_typed:
+        if not run_files:
             raise InputError(
                 f"policy: {shown(name)} is a Python file, which is run only if you name it; "
                 "allowed: --policy FILE.py:CLASS, if you trust the file"
@@ -217,19 +209,19 @@ def _import_name(path: Path) -> str:
     return path.stem
 
 
-def load_team(text: str, uavs: int | None = None) -> list[Policy]:
+def load_team(text: str, uavs: int | None = None, *, run_files: bool = False) -> list[Policy]:
     """Load the policies of ``"P"`` or ``"P,P,..."``: UAV i gets number ``i % len(team)``.
 
     Args:
         text: The team.
         uavs: The size of the largest fleet, if the policies that never act in it are to be left
             out, as at some design points of a study; all are loaded by default.
+        run_files: Whether Python files may be run, as for ``load``.
 
     Raises:
         InputError: If one of them is unknown.
     """
-    kind = type(text)
-    return [load(kind(name.strip())) for name in text.split(",")[:uavs]]
+    return [load(name.strip(), run_files=run_files) for name in text.split(",")[:uavs]]
 
 
 def python_files_in(team: str) -> list[str]:
@@ -241,11 +233,11 @@ def python_files_in(team: str) -> list[str]:
     return [name for name in names if FILE.fullmatch(name) and not folder_of(name)]
 
 
-def typed(teams: Any) -> Any:
-    """The teams that a user has typed; what is no list of text is left as it is, to be refused."""
+def list_teams(teams: Any) -> Any:
+    """Teams as a list; what is no list of text is left as it is, to be refused."""
     if isinstance(teams, str | Mapping) or not isinstance(teams, Iterable):
         return teams
-    return [TypedByUser(team) if isinstance(team, str) else team for team in teams]
+    return [*teams]
 
 
 def is_path(name: str) -> bool:
@@ -253,15 +245,15 @@ def is_path(name: str) -> bool:
     return name not in names() and bool(FILE.fullmatch(name) or folder_of(name))
 
 
-def confirmed(team: str, named: Iterable[str]) -> str:
-    """A team that data name, as typed by the user if all Python files in it were.
+def is_confirmed(team: str, named: Iterable[str]) -> bool:
+    """Whether a user has named all Python files of a team that data name, so that they may be run.
 
     Args:
         team: The team.
         named: The teams that the user has typed.
     """
     confirmed_files = {file for text in named for file in python_files_in(text)}
-    return TypedByUser(team) if confirmed_files.issuperset(python_files_in(team)) else team
+    return confirmed_files.issuperset(python_files_in(team))
 
 
 def _describe_registered(point: EntryPoint) -> str:
@@ -313,13 +305,17 @@ class About(NamedTuple):
     card: str
 
 
-def describe_policy(name: str) -> About:
-    """What there is to know about a policy that a user asks for.
+def describe_policy(name: str, *, run_files: bool = False) -> About:
+    """What there is to know about a policy.
+
+    Args:
+        name: The policy.
+        run_files: Whether a Python file may be run, as for ``load``.
 
     Raises:
         InputError: If it does not exist or cannot be loaded.
     """
-    policy = load(TypedByUser(name))
+    policy = load(name, run_files=run_files)
     folder = folder_of(name)
     described = read_description(folder) if folder else None
     requires = described.layout.model_dump() if described and described.layout else {}

@@ -54,23 +54,25 @@ FOREIGN |= {"stable_baselines3", "supersuit", "tensordict", "torchrl"}
 # What a plain `dess --help` must not wait for.
 HEAVY = {"torch", "numba", "numpy", "pandas", "pyarrow", "pydantic", "scipy", "matplotlib"}
 HEAVY |= {"gymnasium"}
-# What makes a name that may be a Python file, which is code that runs, and the modules that use it.
-# These are the types and functions of the registry, and the functions to which users give names.
+# The modules that let Python files of policies be run, which is code: commands, and functions of
+# Python that take names from users. Others hand on what these say, or run no file.
+RUN_FILES = {
+    *("dess.policies", "dess.analysis.execution.evaluation", "dess.analysis.ask.question"),
+    *("dess.reports.cli.evaluate", "dess.reports.cli.lists", "dess.reports.cli.simulate"),
+}
+# What decides it by what users have named: a study whose policies are typed, and what they confirm.
+DECIDE = {
+    "dess.analysis.study.study": {"'policies' in overrides", "_may_run_files(info.context)"},
+    "dess.analysis.results.provenance": {"True", "run_files"},  # for confirmed teams alone
+    "dess.reports.pages.verify": {
+        f"is_confirmed({name}, sampling.named)" for name in ("name", "policy")
+    },
+    "dess.reports.cli.simulate": {"True", "bool(named)"},
+}
+# The functions to which users give names, and the modules that use them.
 MAY_RUN_FILES = {
-    "dess.policies.registry.TypedByUser": {
-        *("dess.policies", "dess.analysis.execution.evaluation"),
-        *("dess.analysis.results.provenance", "dess.reports.cli.simulate"),
-    },
-    "dess.policies.registry.typed": {
-        *("dess.analysis.study.study", "dess.analysis.ask.question", "dess.reports.cli.evaluate"),
-    },
-    "dess.policies.registry.confirmed": {
-        "dess.analysis.results.provenance",
-        "dess.reports.pages.verify",
-    },
     "dess.policies.load": set(),
     "dess.policies.load_team": {"dess.api"},  # what a user gives as a policy
-    "dess.policies.registry.describe_policy": {"dess.reports.cli.lists"},
     "dess.analysis.execution.evaluation.evaluate": {"dess.analysis"},
     **{
         f"dess.analysis.ask.question.{name}_question": {
@@ -221,6 +223,21 @@ def _takes(tree: ast.Module, module: str, name: str) -> bool:
         if module in imported:
             of_module.add(imported[module].asname or imported[module].name)
     return any(f"{of}.{name}" in attributes for of in of_module)
+
+
+def run_files_in(name: str) -> set[str]:
+    """What a module passes as ``run_files``, in its words."""
+    calls = (node for node in ast.walk(LIBRARY[name]) if isinstance(node, ast.Call))
+    words = (word for call in calls for word in call.keywords if word.arg == "run_files")
+    return {ast.unparse(word.value) for word in words}
+
+
+def test_only_commands_and_public_functions_let_python_files_be_run():
+    """All other modules load policies by plain names, or hand on what they were told."""
+    handed_on = {"run_files", "self.run_files", "study.run_files", "self.study.run_files"}
+    for name in LIBRARY:
+        allowed = DECIDE.get(name, {"True"} if name in RUN_FILES else set())
+        assert run_files_in(name) <= allowed | handed_on, name
 
 
 @pytest.mark.parametrize("door", MAY_RUN_FILES)

@@ -569,7 +569,7 @@ def measure_decision_times(
     costs = []
     for done, policy in enumerate(results.policies, 1):
         try:
-            team = load_team(str(policy))  # for plain text, no file is run
+            team = load_team(policy)  # a policy of a Python file is not run
         except InputError:
             team = []
         if team:

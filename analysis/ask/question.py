@@ -37,7 +37,7 @@ from dess.analysis.study.study import Study, study_from
 from dess.base.errors import one_of, validation_line
 from dess.base.files.reading import paths_in
 from dess.base.files.writing import toml_value, write_file
-from dess.policies.registry import typed
+from dess.policies.registry import list_teams
 from dess.scenario.fields import dotted, fields_of
 from dess.scenario.scenario import ScenarioSpace, is_scenario_name, load_scenario
 
@@ -166,7 +166,10 @@ def _question_key(study: Study) -> str:
     about = {
         "version": dess.__version__,
         "engine": engine_code(),
-        "teams": [team_of(policy).model_dump(mode="json") for policy in study.policies],
+        "teams": [
+            team_of(policy, run_files=study.run_files).model_dump(mode="json")
+            for policy in study.policies
+        ],
         "base": load_scenario(study.scenario, **study.set).model_dump(mode="json"),
         "study": data | {"scenario": Path(study.scenario).name},
     }
@@ -199,6 +202,8 @@ def sweep_question(
         )
     swept = {field: of_field for field, of_field in values.items() if len(of_field) > 1}
     load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
+    if isinstance(policies, str):
+        policies = [policies]
     data = {
         "name": "sweep" if name is None else name,
         "description": SWEEP,
@@ -206,12 +211,12 @@ def sweep_question(
         "set": {field: values[field][0] for field in values if field not in swept}
         | ({"age.measured": True} if AGE in (requirements or ()) else {}),
         "design": {"kind": "grid", "values": swept},
-        "policies": typed([policies] if isinstance(policies, str) else policies or [ANY_POLICY]),
+        "policies": list_teams(policies or [ANY_POLICY]),
         "seed": seed,
         **({"costs": dict(prices)} if prices else {}),
         **({} if requirements else {"missions": missions}),
     }
-    study = study_from(data, "sweep")
+    study = study_from(data, "sweep", run_files=True)
     # What is decided by the design points, so once the study is known to be valid.
     decided: dict[str, Any] = {}
     if requirements:
@@ -303,11 +308,11 @@ def what_if_question(
         "scenario": str(scenario),
         "set": {field: value for field, value in fixed.items() if field not in changed},
         "design": {"kind": "table", "rows": [before, changed]},
-        "policies": typed(policies_for(sides, missions) if policies is None else policies),
+        "policies": list_teams(policies_for(sides, missions) if policies is None else policies),
         "missions": missions,
         "seed": seed,
     }
-    study = study_from(data, "question")
+    study = study_from(data, "question", run_files=True)
     return Question(study, Path(folder) / WHAT_IF / _question_key(study))
 
 

@@ -338,7 +338,8 @@ def _check_policies(study: Study) -> None:
     Errors other than ``InputError`` are ignored here, because the run records them as failures.
     """
     places = {(s.size, s.rectangles, s.no_fly, s.nodes): s for s in study.scenarios}
-    loaded = cache(partial(load_team, uavs=max(space.uavs[1] for space in places.values())))
+    largest = max(space.uavs[1] for space in places.values())
+    loaded = cache(partial(load_team, uavs=largest, run_files=study.run_files))
     first, *others = places.values()
     by_size = sorted(others, key=lambda space: len(space.nodes) * math.prod(space.size))
     for number, space in enumerate([first, *by_size[-1:]]):

@@ -29,7 +29,7 @@ from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.model.state import check_seed, spaces_of
 from dess.model.view import check_team
 from dess.physics.streams import MAX_REPLICATION
-from dess.policies.registry import TypedByUser, load_team
+from dess.policies.registry import Policy, load_team
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
 
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
@@ -48,6 +48,7 @@ class Asked(NamedTuple):
         seed: Seed of the missions.
         engine: ``batch`` or ``events``.
         workers: Threads of the batch engine, processes of the event engine.
+        run_files: Whether Python files of the team may be run, since a user has typed it.
     """
 
     scenario: ScenarioSpace
@@ -56,6 +57,11 @@ class Asked(NamedTuple):
     seed: int = 0
     engine: str = "batch"
     workers: int = 1
+    run_files: bool = False
+
+    def load_policies(self) -> list[Policy]:
+        """The policies of the team."""
+        return load_team(self.team, run_files=self.run_files)
 
     def check(self) -> None:
         """Refuse numbers that are out of range, and teams that are unknown or too large."""
@@ -64,7 +70,7 @@ class Asked(NamedTuple):
             allowed = f"allowed: 1..{MAX_REPLICATION + 1:,}"
             raise InputError(f"missions: {self.missions} is out of range; {allowed}")
         check_seed(self.seed, self.missions - 1)
-        check_team(len(load_team(self.team)), [self.scenario])
+        check_team(len(self.load_policies()), [self.scenario])
 
 
 class Evaluation(NamedTuple):
@@ -117,7 +123,7 @@ def evaluate(
     """
     check_type("policy", team, str, "a name such as greedy, or names such as greedy,tour")
     (space,) = spaces_of([scenario])
-    asked = Asked(space, TypedByUser(team), missions, seed, engine, workers)
+    asked = Asked(space, team, missions, seed, engine, workers, run_files=True)
     return _evaluate_in_parts(asked, missions, progress)
 
 
@@ -229,7 +235,7 @@ def check_evaluation(asked: Sequence[Asked], yes: bool = False) -> None:
         ]
         effort.check_time(what, reduce(effort.Range.plus, times))
     for team in asked[1:]:  # the first one is refused at its first mission
-        simulate_missions(engine, [scenario], load_team(team.team), team.seed, [0])
+        simulate_missions(engine, [scenario], team.load_policies(), team.seed, [0])
 
 
 def _missions_at_once(scenario: ScenarioSpace) -> int:
@@ -244,7 +250,7 @@ def _simulate_pieces(
     asked: Asked, pieces: Iterable[range], progress: Progress | None
 ) -> Iterator[tuple[Records, float]]:
     """The records of each piece of the replications, and the time of the simulation alone [s]."""
-    policies = load_team(asked.team)
+    policies = asked.load_policies()
     pool = Here(asked.workers)
     about = (asked.scenario, policies, asked.seed)
     if asked.engine == "batch":
@@ -267,7 +273,8 @@ def _event_jobs(asked: Asked, replications: range) -> list[Job]:
     """Jobs of the event engine."""
     chunks = split_into_chunks([Part(Cell(0, 0, "", 0), replications)], CHUNK["events"])
     spaces = (asked.scenario,)
-    return [MissionsJob(chunk, spaces, asked.team, asked.seed, "events") for chunk in chunks]
+    about = (asked.team, asked.seed, "events", asked.run_files)
+    return [MissionsJob(chunk, spaces, *about) for chunk in chunks]
 
 
 def _results_in_order(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) -> Records:

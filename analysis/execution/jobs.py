@@ -74,6 +74,7 @@ class Job(ABC):
         policy: The team of the chunk.
         seed: Seed of the missions.
         engine: ``batch`` or ``events``, for the records.
+        run_files: Whether Python files of the team may be run, since a user has typed it.
         kind: The kind of work, as in ``store.TABLES``.
         work: What is made in place of records, in words.
     """
@@ -83,6 +84,7 @@ class Job(ABC):
     policy: str
     seed: int
     engine: str
+    run_files: bool = False
     kind: ClassVar[str]
     work: ClassVar[str] = ""
 
@@ -118,7 +120,7 @@ class Job(ABC):
     @property
     def code(self) -> list[Member] | str:
         """The code, beside that of the engines, on which the result depends."""
-        return members_of(self.policy)
+        return members_of(self.policy, run_files=self.run_files)
 
 
 class MissionsJob(Job):
@@ -128,7 +130,8 @@ class MissionsJob(Job):
 
     def run(self, progress: Progress | None = None) -> Records:
         """Simulate the missions; ``progress`` gets the number of missions since its last call."""
-        team = load_team(self.policy, max(space.uavs[1] for space in self.spaces))
+        largest = max(space.uavs[1] for space in self.spaces)
+        team = load_team(self.policy, largest, run_files=self.run_files)
         spaces, _, replications = zip(*self.each, strict=True)
         return simulate_missions(self.engine, spaces, team, self.seed, replications, progress)
 
@@ -152,7 +155,7 @@ class LogJob(Job):
     def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
         """Simulate the mission with the SimPy engine."""
         ((space, _, replication),) = self.each
-        team = load_team(self.policy, space.uavs[1])
+        team = load_team(self.policy, space.uavs[1], run_files=self.run_files)
         log = simulate(space, team, self.seed, replication, events=True).events
         assert log is not None
         return log.columns()

@@ -214,15 +214,14 @@ class _Run:
                 if missing := tuple(self.store.missing(kind.kind, chunk.parts)):
                     spaces = tuple(study.scenarios[part.cell.point] for part in missing)
                     kept = chunks.Chunk(team, missing)
-                    yield kind(kept, spaces, policy, study.seed, study.engine)
+                    yield kind(kept, spaces, policy, study.seed, study.engine, study.run_files)
 
     def _size(self, kind: type[Job], policy: str) -> int:
         """The number of missions of a chunk."""
         if kind is not MissionsJob:
             return BOUNDS_CHUNK if kind is BoundsJob else 1
-        chunks_of_members = (
-            member.chunk for member in load_team(policy) if hasattr(member, "chunk")
-        )
+        team = load_team(policy, run_files=self.study.run_files)
+        chunks_of_members = (member.chunk for member in team if hasattr(member, "chunk"))
         return min([CHUNK[self.study.engine], *chunks_of_members])
 
     def _begin(self, count: int, present: int, work: str = "") -> None:

@@ -110,7 +110,7 @@ class Manifest(provenance.Origin):
         return cls(
             schema_version=SCHEMA_VERSION,
             version=dess.__version__,
-            code=provenance.code_behind(study.policies, study.bounds),
+            code=provenance.code_behind(study.policies, study.bounds, run_files=study.run_files),
             engine_code=provenance.engine_code(),
             accepted=[],
             commit=provenance.commit_of_source(),
@@ -118,7 +118,9 @@ class Manifest(provenance.Origin):
             seed=study.seed,
             study=StudyData.model_validate(data),
             scenario=base.model_dump(mode="json"),
-            policies=[provenance.team_of(policy) for policy in study.policies],
+            policies=[
+                provenance.team_of(policy, run_files=study.run_files) for policy in study.policies
+            ],
             points=points,
             missions=[[study.first] * len(points)] * len(study.policies),
             selected=[None] * len(study.policies),

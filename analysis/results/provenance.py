@@ -30,7 +30,7 @@ from dess.analysis.study.study import StudyData, change_scenario
 from dess.base.errors import validation_line
 from dess.base.files.documents import Document, Sha256
 from dess.base.sources import OURS, code_of, combined
-from dess.policies.registry import Policy, TypedByUser, confirmed, load_team
+from dess.policies.registry import Policy, is_confirmed, load_team
 from dess.scenario.scenario import SEA, ScenarioSpace, scenario_at
 
 ENGINES = ("dess.model.batch", "dess.model.mission")
@@ -159,17 +159,18 @@ class Origin(Document):
         Raises:
             InputError: If a policy cannot be loaded.
         """
-        teams = {confirmed(team.policy, named): team for team in self.policies}
-        closed = [name for name in teams if not isinstance(name, TypedByUser)]
-        teams = {name: team for name, team in teams.items() if name not in closed}
-        code_here = code_behind(teams, self.study.bounds)
+        names = [team.policy for team in self.policies]
+        closed = [name for name in names if not is_confirmed(name, named)]
+        teams = {team.policy: team for team in self.policies if team.policy not in closed}
+        code_here = code_behind(teams, self.study.bounds, run_files=True)
         changes = []
         code = {name: code for name, code in self.code.items() if name in code_here or not closed}
         if self.version != dess.__version__:
             changes.append(f"made by dess {self.version}, not {dess.__version__}")
         elif modules := differing_modules(code, code_here):
             changes.append(f"made by other code of {', '.join(modules)}")
-        if weights := [name for name in teams if teams[name].weights != team_of(name).weights]:
+        present_teams = {name: team_of(name, run_files=True) for name in teams}
+        if weights := [n for n in teams if teams[n].weights != present_teams[n].weights]:
             changes.append(f"made by other weights of {', '.join(weights)}")
         if closed:
             changes.append(
@@ -182,14 +183,14 @@ class Origin(Document):
         return changes
 
 
-def team_of(policy: str) -> Team:
+def team_of(policy: str, *, run_files: bool = False) -> Team:
     """A team with the identities of its policies, as this process has them."""
-    return Team(policy=policy, members=members_of(policy))
+    return Team(policy=policy, members=members_of(policy, run_files=run_files))
 
 
-def members_of(team: str) -> list[Member]:
+def members_of(team: str, *, run_files: bool = False) -> list[Member]:
     """The identities of a team's policies, as this process has them."""
-    return [_member_identity(policy) for policy in load_team(team)]
+    return [_member_identity(policy) for policy in load_team(team, run_files=run_files)]
 
 
 def _member_identity(policy: Policy) -> Member:
@@ -216,11 +217,14 @@ def bound_code() -> str:
     return combined(_code_hashes(BOUND))
 
 
-def code_behind(teams: Iterable[str], bounds: bool = False) -> dict[str, str]:
+def code_behind(
+    teams: Iterable[str], bounds: bool = False, *, run_files: bool = False
+) -> dict[str, str]:
     """Hashes of the modules that the records of teams, and bounds, depend on, by name."""
     hashes = _code_hashes(ENGINES) | (_code_hashes(BOUND) if bounds else {})
-    for policy in (policy for team in teams for policy in load_team(team)):
-        hashes |= _code_hashes(_modules_of(policy))
+    for team in teams:
+        for policy in load_team(team, run_files=run_files):
+            hashes |= _code_hashes(_modules_of(policy))
     return dict(sorted(hashes.items()))
 
 

@@ -13,7 +13,7 @@ from pydantic import (
     Field,
     PrivateAttr,
     ValidationError,
-    WrapValidator,
+    ValidationInfo,
     field_validator,
     model_validator,
 )
@@ -32,7 +32,7 @@ from dess.model.batch import check_slotted
 from dess.model.record import measures_of
 from dess.physics.section import Integer, plain, tuples
 from dess.physics.streams import MAX_SEED
-from dess.policies.registry import load_team, typed
+from dess.policies.registry import list_teams, load_team
 from dess.scenario.fields import dotted, merged
 from dess.scenario.scenario import (
     SEA,
@@ -81,10 +81,6 @@ def _by_field(values: Any) -> Any:
     return values
 
 
-# A team keeps its type, ``TypedByUser`` or plain text.
-_Team = Annotated[Text, WrapValidator(lambda team, validated: type(team)(validated(team)))]
-
-
 class StudyData(StrictTable):
     """The fields of a study and their limits, as study files and results have them.
 
@@ -109,7 +105,7 @@ class StudyData(StrictTable):
         description="the design points: a table with the kind of the design; without one, the "
         "scenario is the only point",
     )
-    policies: Annotated[tuple[_Team, ...], BeforeValidator(tuples)] = Field(
+    policies: Annotated[tuple[Text, ...], BeforeValidator(tuples)] = Field(
         min_length=1, description='teams: "P" or "P,P,..."'
     )
     missions: Integer = Field(
@@ -170,15 +166,23 @@ class Study(StudyData):
     """
 
     _origin: tuple[str, dict[str, Any]] = PrivateAttr(("", {}))
+    _run_files: bool = PrivateAttr(False)
+
+    @property
+    def run_files(self) -> bool:
+        """Whether Python files may be run as its policies, since a user has typed them."""
+        return self._run_files
+
+    def model_post_init(self, context: Any) -> None:
+        """Keep whether Python files may be run, which is no part of the data."""
+        self._run_files = _may_run_files(context)
 
     @field_validator("policies")
     @classmethod
-    def _are_known(cls, teams: tuple[str, ...]) -> tuple[str, ...]:
-        teams = tuple(
-            type(team)(",".join(name.strip() for name in team.split(","))) for team in teams
-        )
+    def _are_known(cls, teams: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        teams = tuple(",".join(name.strip() for name in team.split(",")) for team in teams)
         for team in teams:
-            load_team(team)
+            load_team(team, run_files=_may_run_files(info.context))
             if teams.count(team) > 1:
                 raise ValueError(f"{team} is listed twice; allowed: distinct teams")
         return teams
@@ -361,14 +365,24 @@ def change_scenario(scenario: str, values: str) -> ScenarioSpace:
     return validated(ScenarioSpace, merged(json.loads(scenario), json.loads(values)), "scenario")
 
 
-def study_from(data: Mapping[str, Any], what: str) -> Study:
+def _may_run_files(context: dict[str, Any] | None) -> bool:
+    """Whether what validates a study says that Python files may be run."""
+    return bool(context and context["run_files"])
+
+
+def study_from(data: Mapping[str, Any], what: str, *, run_files: bool = False) -> Study:
     """The study with these fields.
+
+    Args:
+        data: The fields.
+        what: What the fields are of, for messages.
+        run_files: Whether Python files may be run as policies, since a user has typed them.
 
     Raises:
         InputError: If they are not valid; ``what`` is named before the reason.
     """
     try:
-        return Study.model_validate(data)
+        return Study.model_validate(data, context={"run_files": run_files})
     except ValidationError as error:
         raise InputError(validation_line(error, what, Study)) from None
 
@@ -394,13 +408,13 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
     if isinstance(scenario, str) and not is_scenario_name(scenario):
         values["scenario"] = str(Path(text).parent / scenario)
     if "policies" in overrides:
-        overrides["policies"] = typed(overrides["policies"])
+        overrides["policies"] = list_teams(overrides["policies"])
     values |= _with_fewer_logs(values, overrides)
     if unknown := sorted(values.keys() - Study.model_fields.keys()):
         raise InputError(
             f"{where}: {unknown[0]}: unknown key{one_of(unknown[0], Study.model_fields)}"
         )
-    study = study_from(values, where)
+    study = study_from(values, where, run_files="policies" in overrides)
     study._origin = (text, overrides)
     return study
 

@@ -47,10 +47,9 @@ def evaluate(
     from dess.analysis.metrics import metric_for_length
     from dess.analysis.study.study import engine_of
     from dess.model.record import measures_of
-    from dess.policies.registry import typed
 
     space = options.load_space(scenario, settings)
-    policy = typed(policy)
+
     engine = engine_of([space], engine)
     if out:
         study: dict[str, Any] = {"scenario": scenario, "policies": policy, "missions": missions}
@@ -61,7 +60,9 @@ def evaluate(
         }
         evaluations = _evaluate_as_study(study, out, workers, yes)
     else:
-        asked = [Asked(space, team, missions, seed, engine, workers) for team in policy]
+        asked = [
+            Asked(space, team, missions, seed, engine, workers, run_files=True) for team in policy
+        ]
         with console.compile_notice():
             check_evaluation(asked, yes)
         with (
@@ -106,7 +107,7 @@ def _evaluate_as_study(
 
     name = re.sub(r"[^A-Za-z0-9._-]+|^[._-]+", "-", out.absolute().name).lstrip("-")
     data |= {"name": name[:MOST_CHARACTERS] or "evaluation", "description": "an evaluation"}
-    study = study_from(data, "evaluate")
+    study = study_from(data, "evaluate", run_files=True)
     with console.compile_notice():
         check_run(study, out, workers, yes=yes)
     options.note_departures(study.policies, study.scenarios)

@@ -77,7 +77,7 @@ def simulate(
     from dess.analysis.execution.effort import check_missions
     from dess.base.files.writing import writable
     from dess.model.state import check_seed, sample_scenario
-    from dess.policies.registry import TypedByUser, load_team
+    from dess.policies.registry import load_team
 
     if of:
         _refuse_given(context, "scenario", "settings", "seed")
@@ -86,8 +86,9 @@ def simulate(
         raise InputError("--point: belongs to a study; allowed: with --of DIR")
     else:
         space = options.load_space(scenario, settings)
-        policy = TypedByUser(policy or "greedy")
-        asked = _Asked(space, policy, load_team(policy), seed, replication or 0, scenario)
+        policy = policy or "greedy"
+        team = load_team(policy, run_files=True)
+        asked = _Asked(space, policy, team, seed, replication or 0, scenario)
     if not yes:
         check_missions("simulate", [asked.space])
     check_seed(asked.seed, asked.replication)
@@ -169,17 +170,16 @@ def _read_study(
     """What a results folder says of a mission; a line on stderr if it may be another one now."""
     from dess.analysis.results.chunks import MANIFEST
     from dess.analysis.results.manifest import Manifest
-    from dess.policies.registry import TypedByUser, load_team
+    from dess.policies.registry import load_team
 
     manifest = Manifest.read(folder / MANIFEST)
     policies = [team.policy for team in manifest.policies]
     named = [policy] if policy else []
-    typed = TypedByUser(policy) if policy else None
-    policy = _choose_of_study("policy", typed, policies, ", ".join(policies))
+    policy = _choose_of_study("policy", policy or None, policies, ", ".join(policies))
     points = range(len(manifest.points))
     point = _choose_of_study("point", point, points, f"0..{len(points) - 1}")
     space = manifest.scenarios[point]
-    team = load_team(policy, space.uavs[1])
+    team = load_team(policy, space.uavs[1], run_files=bool(named))
     if changes := manifest.changes_here(named):
         line = f"note: {folder}: {'; '.join(changes)}: the mission may be another one now"
         console.print_text(line, sys.stderr)

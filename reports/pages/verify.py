@@ -32,7 +32,7 @@ from dess.analysis.results.store import Store
 from dess.analysis.results.tables import Results, results_of
 from dess.base.files.reading import paths_in
 from dess.model.events import PARAMETER_EVENTS
-from dess.policies.registry import Policy, confirmed, load_team
+from dess.policies.registry import Policy, is_confirmed, load_team
 from dess.reports.pages.page import ALLOWED, LIMIT, Page
 from dess.scenario.scenario import ScenarioSpace
 
@@ -184,7 +184,7 @@ def _draw_missions(evidence: Evidence, sampling: _Sampling) -> _Drawn:
     """The missions of a study that are simulated again, with their scenarios and teams."""
     study = f"study {evidence.study.name}"
     names = (team.policy for team in evidence.policies)
-    teams = {name: load_team(confirmed(name, sampling.named)) for name in names}
+    teams = {name: load_team(name, run_files=is_confirmed(name, sampling.named)) for name in names}
     sample = sampling.draw_missions(evidence.sample)
     spaces = [evidence.space(mission.values) for mission in sample]
     sampling.refuse_long_checks(study, spaces)
@@ -215,8 +215,8 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
     sampling.refuse_long_checks(what, [manifest.scenarios[cell.point] for cell, _ in logged])
     for cell, replication in logged:
         space = manifest.scenarios[cell.point]
-        policy = confirmed(manifest.policies[cell.team].policy, sampling.named)
-        team = load_team(policy, space.uavs[1])
+        policy = manifest.policies[cell.team].policy
+        team = load_team(policy, space.uavs[1], run_files=is_confirmed(policy, sampling.named))
         log = simulate(space, team, manifest.seed, replication, events=True).events
         stored = store.load_log(cell, replication)
         assert log is not None and stored is not None

@@ -8,7 +8,6 @@ from dess import InputError, ScenarioSpace
 from dess.analysis.results.provenance import team_of
 from dess.envs.observations.observer import KINDS
 from dess.policies.adapter import Adapter
-from dess.policies.registry import TypedByUser
 
 QUICK = ScenarioSpace.of(uavs=[1, 3], flying_time=[5, 30], quota=60, max_slots=40)
 
@@ -76,11 +75,11 @@ def test_results_tell_the_weights_apart(tmp_path):
     members = []
     for content in (b"old", b"new", b"old"):
         weights.write_bytes(content)
-        members += team_of(TypedByUser(f"{code}:Own")).members
+        members += team_of(f"{code}:Own", run_files=True).members
     old, new, again = members
     assert old == again != new
     assert old.weights != new.weights and old.code == new.code
     assert Adapter("none", arbitrary).weights == ""
     weights.unlink()
     with pytest.raises(InputError, match="weights.bin: no such file"):
-        team_of(TypedByUser(f"{code}:Own"))
+        team_of(f"{code}:Own", run_files=True)

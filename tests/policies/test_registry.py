@@ -15,7 +15,7 @@ from dess.policies import registry, shipped
 from dess.policies.heuristics import Greedy
 from dess.policies.learner.config import validate_config
 from dess.policies.learner.trained import expected_weights, make_observation, save_policy
-from dess.policies.registry import CLASSES, Policy, TypedByUser, describe_policy
+from dess.policies.registry import CLASSES, Policy, describe_policy
 from dess.scenario.scenario import Scenario, load_scenario, scenario_names
 from tests.outside import install_package
 from tests.policies.learner.tiny import refusal_of
@@ -166,7 +166,7 @@ def test_files_without_such_a_policy_are_named(file, name, complaint):
 
 def test_an_edited_file_has_another_fingerprint(file):
     script = "from dess.analysis.results.provenance import team_of as t; "
-    script += f"from dess.policies.registry import TypedByUser as T; m = t(T('{file}:Eager'))"
+    script += f"m = t('{file}:Eager', run_files=True)"
     command = [sys.executable, "-c", script + ".members[0]; print(m.name, m.class_, m.code)"]
 
     def identity() -> str:
@@ -189,7 +189,7 @@ def test_what_a_policy_is_and_can_simulate(file):
     assert ddqn.card.startswith("# ddqn")
     assert greedy.code == "dess.policies.heuristics:Greedy"
     assert greedy.origin == f"shipped with dess {dess.__version__}"
-    assert describe_policy(f"{file}:Eager").origin == f"the file {file}"
+    assert describe_policy(f"{file}:Eager", run_files=True).origin == f"the file {file}"
 
 
 def test_which_policies_are_python_files_is_known_without_running_them(tmp_path, monkeypatch):
@@ -199,9 +199,10 @@ def test_which_policies_are_python_files_is_known_without_running_them(tmp_path,
     for team in ("trap.py:Trap", "greedy, trap.py:Trap", "no_such_file.py:X"):
         assert registry.python_files_in(team) == [team.rpartition(" ")[2]]
         for named in (["another.py:X", "greedy"], []):
-            with pytest.raises(InputError, match=r"is a Python file.*; allowed: --policy"):
-                registry.load_team(registry.confirmed(team, named))
-        assert isinstance(registry.confirmed(team, [f"greedy, {team}"]), TypedByUser)
+            assert not registry.is_confirmed(team, named)
+        with pytest.raises(InputError, match=r"is a Python file.*; allowed: --policy"):
+            registry.load_team(team)
+        assert registry.is_confirmed(team, [f"greedy, {team}"])
     for team in ("greedy", "ddqn,tour", "data.py:Trap", "greedy, ./data.py:Trap", "unknown", ""):
         assert registry.python_files_in(team) == []
     assert "trap" not in sys.modules

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from dess import InputError, load_scenario
 from dess.analysis import load_study, run_study
 from dess.analysis.study.study import Study
-from dess.policies.registry import TypedByUser, load_team
+from dess.policies.registry import load_team
 from tests.analysis.small import grid, small_study, write_scenario
 
 
@@ -142,7 +142,8 @@ def test_a_study_takes_what_was_typed_to_its_workers_and_leaves_it_out_of_its_da
     study = small_study(tmp_path, policies=["greedy", "greedy , typed_words.py:Greedy"])
     sent = pickle.loads(pickle.dumps(study))
     assert sent.policies == ("greedy", "greedy,typed_words.py:Greedy")
-    assert {type(team) for team in sent.policies} == {TypedByUser}
-    assert [policy.name for policy in load_team(sent.policies[1])] == ["greedy", "greedy"]
+    members = load_team(sent.policies[1], run_files=sent.run_files)
+    assert [policy.name for policy in members] == ["greedy", "greedy"]
+    assert "run_files" not in study.model_dump_json()
     with pytest.raises(ValidationError, match="is a Python file, which is run only if you name it"):
         Study.model_validate_json(study.model_dump_json())
