@@ -86,13 +86,13 @@ def cut(text: str, length: int) -> str:
 
 def listed(names: Iterable[str]) -> str:
     """Names as a message lists them: of many only the first, and the number of the others."""
-    known = [*names]
+    listed_names = [*names]
     length = 0
-    for number, name in enumerate(known):
+    for number, name in enumerate(listed_names):
         length += len(name) + 2
         if length > _NAMES and number:
-            return f"{', '.join(known[:number])} and {len(known) - number} others"
-    return ", ".join(known)
+            return f"{', '.join(listed_names[:number])} and {len(listed_names) - number} others"
+    return ", ".join(listed_names)
 
 
 def one_of(name: object, names: Iterable[str], also: str = "") -> str:
@@ -106,14 +106,14 @@ def one_of(name: object, names: Iterable[str], also: str = "") -> str:
         names: The known names. Of many, only those that are close are printed, if there are some.
         also: What else is allowed, such as ``a TOML file``.
     """
-    known = list(dict.fromkeys(names))
-    lower = {other.lower(): other for other in reversed(known)}
+    distinct = list(dict.fromkeys(names))
+    lower = {other.lower(): other for other in reversed(distinct)}
     asked = name[:_QUOTED].lower() if isinstance(name, str) else shown(name)
     close = [lower[match] for match in get_close_matches(asked, lower, cutoff=0.7)]
     meant = f" (did you mean {' or '.join(close)}?)" if close else ""
-    text = listed(known)
-    if close and len(known) > _CLOSE:
-        text = f"{', '.join(close)} and {len(known) - len(close)} others"
+    text = listed(distinct)
+    if close and len(distinct) > _CLOSE:
+        text = f"{', '.join(close)} and {len(distinct) - len(close)} others"
     allowed = ", or ".join(part for part in (text, also) if part)
     return f"{meant}; allowed: {allowed or 'none'}"
 
@@ -169,13 +169,13 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
     if kind == "extra_forbidden":
         return f"{place}: unknown key{one_of(loc[-1], fields)}"
     if kind == "literal_error":
-        known = [word.strip("'") for word in re.split(", | or ", first["ctx"]["expected"])]
-        return f"{place}: {shown(value)} is unknown{one_of(value, known)}"
+        choices = [word.strip("'") for word in re.split(", | or ", first["ctx"]["expected"])]
+        return f"{place}: {shown(value)} is unknown{one_of(value, choices)}"
     if kind == "union_tag_invalid":
-        known = re.findall("'([^']*)'", first["ctx"]["expected_tags"])
+        choices = re.findall("'([^']*)'", first["ctx"]["expected_tags"])
         named = first["ctx"]["discriminator"].strip("'")
         tag = first["ctx"]["tag"]
-        return f"{place}.{named}: {shown(tag)} is unknown{one_of(tag, known)}"
+        return f"{place}.{named}: {shown(tag)} is unknown{one_of(tag, choices)}"
     allowed = form_of(field) if field else f"a table of {listed(fields)}"
     if kind == "value_error":
         line = f"{place}: {first['msg'].removeprefix('Value error, ')}"

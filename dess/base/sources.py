@@ -97,14 +97,14 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 @cache
 def path_of(module: str) -> Path | None:
     """The source file of a module, looked for once, or None; its packages are not imported."""
-    found = None
+    spec = None
     places = None
     names = module.split(".")
     for end in range(len(names)):
-        found = PathFinder.find_spec(".".join(names[: end + 1]), places)
-        if found is None:
+        spec = PathFinder.find_spec(".".join(names[: end + 1]), places)
+        if spec is None:
             return None
         imported = sys.modules.get(".".join(names[: end + 1]))  # may have added a folder
-        places = getattr(imported, "__path__", None) or found.submodule_search_locations or []
-    origin = found.origin if found else None
+        places = getattr(imported, "__path__", None) or spec.submodule_search_locations or []
+    origin = spec.origin if spec else None
     return Path(origin) if origin and origin.endswith(".py") else None

@@ -89,8 +89,8 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         Raises:
             InputError: If one of the arguments is not allowed.
         """
-        given = {"render_mode": render_mode or _MODES[0], "mask": mask, "ended": ended}
-        for name, value in given.items():
+        chosen = {"render_mode": render_mode or _MODES[0], "mask": mask, "ended": ended}
+        for name, value in chosen.items():
             check_known(name, value, _CHOICES[name])
         self.render_mode = render_mode
         self._mask_in_info = mask == "info"
@@ -237,8 +237,8 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
                 info["action_mask"] = mask
         else:
             observed = [
-                {"observation": own, "action_mask": mask}
-                for own, mask in zip(observed, masks, strict=True)
+                {"observation": observation, "action_mask": mask}
+                for observation, mask in zip(observed, masks, strict=True)
             ]
         return self._of_agents(observed), self._of_agents(infos)
 

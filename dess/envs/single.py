@@ -77,9 +77,9 @@ class HarvestSingleEnv(gymnasium.Env[Any, SupportsInt]):
         self.mission.close()
 
     def _own(self, parts: tuple[dict[str, Any], ...]) -> Any:
-        own = tuple(part[_UAV] for part in parts)
-        self._mask = own[-1]["action_mask"].astype(bool)
-        return own
+        of_uav = tuple(part[_UAV] for part in parts)
+        self._mask = of_uav[-1]["action_mask"].astype(bool)
+        return of_uav
 
 
 single_env = HarvestSingleEnv

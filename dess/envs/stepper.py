@@ -101,8 +101,8 @@ class MissionStepper:
                 f"seed: there are {len(seeds)}; allowed: an integer, or a list of "
                 f"{len(self.indices)}, one for each mission in progress"
             )
-        for one in seeds:
-            check_seed(one, replication)
+        for seed_of_mission in seeds:
+            check_seed(seed_of_mission, replication)
         self._seeds = np.array(seeds, np.uint64)
         self._next = np.full(len(seeds), replication, np.int64)
 
@@ -164,10 +164,10 @@ class MissionStepper:
 def _launch(state, environments, starts, seeds, following):
     """Start the next replications of the seeds, of which there is one, or one per environment."""
     for b in environments:
-        own = b % len(seeds)
-        starts.constants[0].seed = seeds[own]
-        rules.launch(state, b, starts, 0, following[own])
-        following[own] += 1
+        number = b % len(seeds)
+        starts.constants[0].seed = seeds[number]
+        rules.launch(state, b, starts, 0, following[number])
+        following[number] += 1
 
 
 @kernel

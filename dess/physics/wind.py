@@ -71,12 +71,12 @@ def moves_in(wind: float, direction: float, cruise: float) -> Moves:
         wind, cruise: Speeds [m/s]; the wind must not be above ``largest_wind``.
         direction: Where the wind comes from [degrees from north, clockwise].
     """
-    found = []
+    extra_slots = []
     for course in (0, 90, 180, 270):
         angle = math.radians(direction - course)
         ground = math.sqrt(cruise**2 - (wind * math.sin(angle)) ** 2) - wind * math.cos(angle)
-        found.append(max(cruise / ground - 1, 0.0))
-    north, east, south, west = found
+        extra_slots.append(max(cruise / ground - 1, 0.0))
+    north, east, south, west = extra_slots
     return north, east, south, west
 
 

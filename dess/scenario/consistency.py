@@ -60,10 +60,10 @@ def _titles(
     verbs: tuple[str, str] = ("is", "are"),
 ) -> str:
     """Some of these cells, with their names if they have some, and the verb."""
-    known = [
+    titles = [
         f"{names[n]} at {[*cells[n]]}" if len(names) > n else f"{[*cells[n]]}" for n in numbers
     ]
-    return f"{listed(known)} {verbs[len(known) > 1]}"
+    return f"{listed(titles)} {verbs[len(titles) > 1]}"
 
 
 def _too_large(c: Fields) -> Iterator[str]:

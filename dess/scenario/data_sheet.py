@@ -197,7 +197,7 @@ class DataSheet(Section):
         full = 100 - math.ceil(self.number("reserve") - 1e-9)
         self._slots("charging", 10_000)
         gain = self.charge_rate
-        found: dict[str, Any] = {
+        following: dict[str, Any] = {
             **{"cell_size": self.units.cell, "slot_length": 1.0, "landing": True, "quota": 0},
             **{"flying_time": full, "charge_start": 30, "charge_complete": full},
             "charge_rate": int(gain) if gain.denominator == 1 else float(gain),
@@ -205,18 +205,18 @@ class DataSheet(Section):
             **self._radio(),
         }
         if self.horizon:
-            found["max_slots"] = int(self._slots("horizon", 100_000) + 1e-9)
+            following["max_slots"] = int(self._slots("horizon", 100_000) + 1e-9)
         if self.wind:
-            found["wind.moves"] = self._wind(*measured(self.wind, "m/s from deg"))
+            following["wind.moves"] = self._wind(*measured(self.wind, "m/s from deg"))
         if self.mtbf:
-            found["failures.uav_rate"] = 1 / self._slots("mtbf")
-            found["failures.uav_repair"] = self._slots("repair", 1e6) if self.repair else 0.0
-        return found
+            following["failures.uav_rate"] = 1 / self._slots("mtbf")
+            following["failures.uav_repair"] = self._slots("repair", 1e6) if self.repair else 0.0
+        return following
 
     def origin(self, field: str) -> str:
         """From what in the sheet a field of the scenario follows, as it was typed."""
-        given = {name: getattr(self, name) for name in _ORIGINS.get(field, ())}
-        named = [f"{name} {shown(value)}" for name, value in given.items() if value]
+        values = {name: getattr(self, name) for name in _ORIGINS.get(field, ())}
+        named = [f"{name} {shown(value)}" for name, value in values.items() if value]
         return ", ".join(named) or "the data sheet"
 
     def _refuse(self, name: str, problem: str, allowed: str) -> NoReturn:
@@ -236,22 +236,22 @@ class DataSheet(Section):
 
     def _data(self) -> dict[str, Any]:
         """New data and initial data [data units]."""
-        found: dict[str, Any] = {"initial_data": (0.0, 0.0)}
+        fields: dict[str, Any] = {"initial_data": (0.0, 0.0)}
         if self.data_rate:
-            mean, own = self._of_nodes("data_rate", self.number("bandwidth"))
-            found |= {"arrival_rate": mean, "arrivals.rates": own}
+            mean, of_nodes = self._of_nodes("data_rate", self.number("bandwidth"))
+            fields |= {"arrival_rate": mean, "arrivals.rates": of_nodes}
         if self.backlog:
-            mean, own = self._of_nodes("backlog", self.units.data)
-            found |= {"initial_data": (mean, mean), "arrivals.initial": own}
-        return found
+            mean, of_nodes = self._of_nodes("backlog", self.units.data)
+            fields |= {"initial_data": (mean, mean), "arrivals.initial": of_nodes}
+        return fields
 
     def _of_nodes(self, name: str, size: float) -> tuple[float, tuple[float, ...]]:
         """The mean of a field of the nodes in units of a size, and each if they are listed."""
-        given = getattr(self, name)
+        amount = getattr(self, name)
         units = self.extra(name)["units"]
-        texts = (given,) if isinstance(given, str) else given
+        texts = (amount,) if isinstance(amount, str) else amount
         values = tuple(measured(text, units)[0] / size for text in texts)
-        return sum(values) / len(values), () if isinstance(given, str) else values
+        return sum(values) / len(values), () if isinstance(amount, str) else values
 
     def _radio(self) -> dict[str, Any]:
         """The SNR at a distance, the range and the largest rate."""

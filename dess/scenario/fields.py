@@ -251,8 +251,8 @@ class Fields(Strict):
     def charge_fraction(self) -> Fraction:
         """The battery gained in a charging slot [%], exactly as it or the data sheet was typed."""
         sheet = self.data_sheet
-        given = sheet.charge_rate if sheet.is_on else Fraction(str(self.charge_rate))
-        return charge_fraction(given)
+        rate = sheet.charge_rate if sheet.is_on else Fraction(str(self.charge_rate))
+        return charge_fraction(rate)
 
     @property
     def is_extended(self) -> bool:
@@ -333,7 +333,7 @@ def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
     result: dict[str, Any] = {}
     below = dotted(base)
     above = dotted(values)
-    replaced = {each for for_all, each in _EACH.items() if for_all in above}
+    replaced = {pads_of_zones for for_all, pads_of_zones in _EACH.items() if for_all in above}
     if "nodes" in values:  # the names are those of others
         replaced |= {"names", "moved"}
     below = {name: value for name, value in below.items() if name not in replaced}
@@ -347,11 +347,13 @@ def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
     if ZONE_PADS in result:
         pads = tuples(result.pop(ZONE_PADS))
         zones = result.get("zones") or ()
-        each = pads if isinstance(pads, list | tuple) else [pads] * len(zones)
-        if not zones or len(each) != len(zones):
+        pads_of_zones = pads if isinstance(pads, list | tuple) else [pads] * len(zones)
+        if not zones or len(pads_of_zones) != len(zones):
             allowed = f"a number, or a list of {len(zones)}" if zones else "with further zones"
             raise InputError(f"{ZONE_PADS}: {shown(pads)} does not fit; allowed: {allowed}")
-        result["zones"] = [{**zone, "pads": n} for zone, n in zip(zones, each, strict=True)]
+        result["zones"] = [
+            {**zone, "pads": n} for zone, n in zip(zones, pads_of_zones, strict=True)
+        ]
     return result
 
 
@@ -369,13 +371,13 @@ def dotted(values: dict[str, Any]) -> dict[str, Any]:
 @cache
 def fields_of(model: type[Fields]) -> dict[str, FieldInfo]:
     """The fields of a kind of scenario; those of sections are named as ``failures.uav_rate``."""
-    found: dict[str, FieldInfo] = {}
+    fields: dict[str, FieldInfo] = {}
     for name, field in model.model_fields.items():
         kind = field.annotation
         if isinstance(kind, type) and issubclass(kind, Section):
-            found |= {f"{name}.{part}": inner for part, inner in kind.model_fields.items()}
+            fields |= {f"{name}.{part}": inner for part, inner in kind.model_fields.items()}
         else:
-            found[name] = field
+            fields[name] = field
         if name == "zones":
-            found[ZONE_PADS] = Zone.model_fields["pads"]
-    return found
+            fields[ZONE_PADS] = Zone.model_fields["pads"]
+    return fields

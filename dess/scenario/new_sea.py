@@ -50,16 +50,16 @@ class NewScenario:
         self.nodes = NodesFound.read(nodes, NodesFile.model_validate({"file": nodes.name}))
         self.answers: dict[str, str] = {}
 
-    def questions(self, given: Iterable[str] = ()) -> dict[str, tuple[str, str | None]]:
+    def questions(self, answered: Iterable[str] = ()) -> dict[str, tuple[str, str | None]]:
         """What is asked: the meaning, and a default or None.
 
         Args:
             given: The names of what is answered already. Who gives a part of a link budget is asked
                 for the rest of it, in place of the SNR.
         """
-        given = {*given}
-        link = LINK_BUDGET if given & {*LINK_BUDGET, "free_space"} else ("snr",)
-        needed = [*_NEEDED, *link, *(["mtbf"] if "repair" in given else [])]
+        answered = {*answered}
+        link = LINK_BUDGET if answered & {*LINK_BUDGET, "free_space"} else ("snr",)
+        needed = [*_NEEDED, *link, *(["mtbf"] if "repair" in answered else [])]
         if self.nodes.has_amounts(RATES):
             needed.remove("data_rate")
         asked: dict[str, tuple[str, str | None]]
@@ -73,9 +73,9 @@ class NewScenario:
         Raises:
             InputError: If it is of another kind, or there is no such question.
         """
-        known = (*DataSheet.model_fields, *_BEYOND)
-        if name not in known:
-            raise InputError(f"--set: {name}: unknown key{one_of(name, known)}")
+        allowed = (*DataSheet.model_fields, *_BEYOND)
+        if name not in allowed:
+            raise InputError(f"--set: {name}: unknown key{one_of(name, allowed)}")
         if name in DataSheet.model_fields:
             with _told(name):
                 DataSheet.check(name, answer or None)
@@ -128,7 +128,7 @@ class NewScenario:
         sheet = {"charging": sheet["endurance"], **_UNANSWERED, **sheet}
         if any(sheet.get(name) for name in LINK_BUDGET) and not answers.get("snr"):
             examples = {name: DataSheet.example(name)[0] for name in LINK_BUDGET}
-            sheet = examples | {name: of for name, of in sheet.items() if name != "snr"}
+            sheet = examples | {name: answer for name, answer in sheet.items() if name != "snr"}
         if "repair" in sheet:
             sheet.setdefault("mtbf", DataSheet.example("mtbf")[0])
         cell = validated(DataSheet, sheet, "data_sheet").units.cell

@@ -78,10 +78,10 @@ def zones_in(path: Path, size: Size) -> list[Rectangle]:
 
     red, _, blue = np.moveaxis(places.reader(path, {".png": _pixels})(path, size), 2, 0)
     is_blue = (blue > 127) & (red < 128)
-    found = ndimage.find_objects(ndimage.label(is_blue)[0])
-    if not found or not all(is_blue[part].all() for part in found):
+    rectangles = ndimage.find_objects(ndimage.label(is_blue)[0])
+    if not rectangles or not all(is_blue[part].all() for part in rectangles):
         raise InputError(f"{path}: has no zones; allowed: one blue rectangle or more")
-    return [(x.start, y.start, x.stop - x.start, y.stop - y.start) for y, x in found]
+    return [(x.start, y.start, x.stop - x.start, y.stop - y.start) for y, x in rectangles]
 
 
 def _of_text(path: Path, size: Size, _: Projection | None, source: NoFlyFile) -> np.ndarray:
@@ -107,11 +107,11 @@ def _of_picture(path: Path, size: Size, _: Projection | None, source: NoFlyFile)
     pixels = _pixels(path, size)
     closed = (pixels[..., 0] > 127) & (pixels[..., 2] < 128)
     if source.colours:
-        wanted = [[int(colour[n : n + 2], 16) for n in (1, 3, 5)] for colour in source.colours]
-        closed = (pixels[:, :, None] == np.array(wanted)).all(3).any(2)
+        colours = [[int(colour[n : n + 2], 16) for n in (1, 3, 5)] for colour in source.colours]
+        closed = (pixels[:, :, None] == np.array(colours)).all(3).any(2)
     if not closed.any():
-        there = np.unique(pixels.reshape(-1, 3), axis=0).tolist()
-        names = listed(f"#{bytes(colour).hex()}" for colour in there)
+        present = np.unique(pixels.reshape(-1, 3), axis=0).tolist()
+        names = listed(f"#{bytes(colour).hex()}" for colour in present)
         _note(f"{path} closes no cell; its colours are {names}: colours says which do")
     return closed
 
@@ -125,21 +125,21 @@ def _pixels(path: Path, size: Size) -> np.ndarray:
     buffer = io.BytesIO(read_bytes(path, TEXT_LIMIT, "a picture"))
     try:
         with Image.open(buffer) as image:
-            there = image.size
-            pixels = np.array(image.convert("RGB") if there == size else ())
+            actual = image.size
+            pixels = np.array(image.convert("RGB") if actual == size else ())
     except (OSError, SyntaxError):
         raise InputError(f"{path}: is no picture; allowed: a PNG file") from None
-    if there != size:
+    if actual != size:
         allowed = f"{size[0]} x {size[1]}, as grid and rows say"
-        raise InputError(f"{path}: has {there[0]} x {there[1]} pixels; allowed: {allowed}")
+        raise InputError(f"{path}: has {actual[0]} x {actual[1]} pixels; allowed: {allowed}")
     return pixels
 
 
 def _of_places(
     path: Path, size: Size, projection: Projection | None, source: NoFlyFile
 ) -> np.ndarray:
-    is_geographic, found = places.reader(path, places.READERS)(path)
-    if not found:
+    is_geographic, features = places.reader(path, places.READERS)(path)
+    if not features:
         raise InputError(f"{path}: has no places; allowed: one or more")
     if is_geographic and projection is None:
         raise InputError(
@@ -148,7 +148,7 @@ def _of_places(
         )
     closed = np.zeros(size[::-1], np.bool_)
     unseen = []
-    chosen = source.chosen(found)
+    chosen = source.chosen(features)
     if not is_geographic and any(_has_radius(place) for place in chosen):
         _note(f"{path}: the column radius is not used, since its places are cells and no degrees")
     for place in chosen:
@@ -191,11 +191,11 @@ def notes_after() -> Iterator[None]:
 
 def _note(line: str) -> None:
     """Tell once what a user should know, or keep it for the end of ``notes_after``."""
-    held = _held.get()
-    if held is None:
+    notes = _held.get()
+    if notes is None:
         _tell(line)
     else:
-        held.append(line)
+        notes.append(line)
 
 
 @cache
@@ -216,17 +216,17 @@ def _radius(place: Place, path: Path) -> float:
     Raises:
         InputError: If it is none.
     """
-    given = place.property("", _RADIUS)
-    if given is None or all(kind != places.POINT for kind, _ in place.shapes):
+    value = place.property("", _RADIUS)
+    if value is None or all(kind != places.POINT for kind, _ in place.shapes):
         return 0.0
     where = f"{path}: {place.where}: radius"
     try:
-        radius = float(str(given))
+        radius = float(str(value))
     except ValueError:
-        radius = quantity_of(str(given), where, "m")
+        radius = quantity_of(str(value), where, "m")
     if not 0 <= radius <= MOST_METRES:
         allowed = f"metres from 0 to {MOST_METRES:,}, or a distance with its unit"
-        raise InputError(f"{where}: {shown(given)} is out of range; allowed: {allowed}")
+        raise InputError(f"{where}: {shown(value)} is out of range; allowed: {allowed}")
     return radius
 
 

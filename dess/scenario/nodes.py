@@ -92,10 +92,10 @@ class NodesFound(NamedTuple):
         Raises:
             InputError: If the file cannot be read or has no nodes.
         """
-        is_geographic, found = places.reader(path, places.READERS)(path)
+        is_geographic, features = places.reader(path, places.READERS)(path)
         points = [
             (place, ring[0])
-            for place in source.chosen(found)
+            for place in source.chosen(features)
             for kind, (ring, *_) in place.shapes
             if kind == places.POINT
         ]
@@ -132,29 +132,31 @@ class NodesFound(NamedTuple):
         spots = self.spots + 0.5
         if projection and self.is_geographic:
             spots = projection.cells(self.spots)
-        own: list[Cell] = [(int(x), int(y)) for x, y in np.floor(spots)]
-        self._check_on_grid(own, size, is_cell_fixed)
+        cells_of_rows: list[Cell] = [(int(x), int(y)) for x, y in np.floor(spots)]
+        self._check_on_grid(cells_of_rows, size, is_cell_fixed)
         moved: list[int] = []
         if self.source.place == "nearest":
-            own, moved = _nearest_free(own, spots, closed)
+            cells_of_rows, moved = _nearest_free(cells_of_rows, spots, closed)
         groups: dict[Cell, list[int]] = {}
-        for number, cell in enumerate(own):
+        for number, cell in enumerate(cells_of_rows):
             groups.setdefault(cell, []).append(number)
-        if self.source.place == "own" and len(groups) < len(own):
+        if self.source.place == "own" and len(groups) < len(cells_of_rows):
             self._refuse_shared(groups, projection, is_cell_fixed)
         if len(groups) > MAX_NODES:
             raise InputError(f"{self.path}: has {len(groups):,} nodes; allowed: 1..{MAX_NODES}")
-        names = [*map(self._name, range(len(own)))]
+        names = [*map(self._name, range(len(cells_of_rows)))]
         members = [*groups.values()]
-        found = {
+        arrivals = {
             "nodes": [*groups],
             "moved": moved,
             "names": [_joined([names[n] for n in group]) for group in members if any(names)],
-            "arrivals.merged": [len(group) for group in members if len(groups) < len(own)],
+            "arrivals.merged": [
+                len(group) for group in members if len(groups) < len(cells_of_rows)
+            ],
         }
         for kind in amounts:
-            found[kind.field] = self._sums(members, kind)
-        return {field: values for field, values in found.items() if values}
+            arrivals[kind.field] = self._sums(members, kind)
+        return {field: values for field, values in arrivals.items() if values}
 
     def has_amounts(self, known: Sequence[str]) -> bool:
         """Whether every node has one in a column of these names."""
@@ -183,11 +185,11 @@ class NodesFound(NamedTuple):
             if kind.asked not in columns:
                 raise InputError(f"{self.path}: has no {kind.asked}{one_of(kind.asked, columns)}")
             return kind.asked if kind.asked in filled else ""
-        found = [name for name in filled if name.lower() in kind.known]
-        if len({name.lower() for name in found}) > 1:
-            both = f"the columns {' and '.join(found)}"
+        matching = [name for name in filled if name.lower() in kind.known]
+        if len({name.lower() for name in matching}) > 1:
+            both = f"the columns {' and '.join(matching)}"
             raise InputError(f"{self.path}: has {both} for one field; allowed: one of them")
-        return found[0] if found else ""
+        return matching[0] if matching else ""
 
     def _is_filled(self, column: str) -> bool:
         return any(row.property("", [column.lower()]) is not None for row in self.rows)
@@ -237,8 +239,8 @@ class NodesFound(NamedTuple):
         parted = "distinct cells, "
         if projection:
             parted = "" if is_cell_fixed else self._finer(projection)
-        known = 'place = "merge", place = "nearest" beside the file'
-        raise InputError(f"{self.path}: {cells}; allowed: {parted}{known}")
+        ways_out = 'place = "merge", place = "nearest" beside the file'
+        raise InputError(f"{self.path}: {cells}; allowed: {parted}{ways_out}")
 
     def _finer(self, projection: Projection) -> str:
         """The smallest cells that the largest grid allows, if they part all nodes."""

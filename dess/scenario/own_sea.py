@@ -35,8 +35,8 @@ class ZonePlace(Strict):
 
 def unread(values: Mapping[str, Any]) -> dict[str, Any]:
     """The fields that name files or degrees, each with what stands for it."""
-    found = {key: of for key, of in _UNREAD.items() if _is_named(values.get(key))}
-    return found | ({"zones": []} if _are_places(values.get("zones")) else {})
+    files = {key: kind for key, kind in _UNREAD.items() if _is_named(values.get(key))}
+    return files | ({"zones": []} if _are_places(values.get("zones")) else {})
 
 
 def _is_named(value: Any) -> bool:
@@ -48,7 +48,7 @@ def _is_named(value: Any) -> bool:
 def _are_places(zones: Any) -> bool:
     """Whether a further zone has degrees in the place of cells."""
     tables = zones if isinstance(zones, list | tuple) else []
-    return any(isinstance(of, dict) and isinstance(of.get("cells"), dict) for of in tables)
+    return any(isinstance(table, dict) and isinstance(table.get("cells"), dict) for table in tables)
 
 
 class OwnSea(NamedTuple):
@@ -76,25 +76,27 @@ class OwnSea(NamedTuple):
         Raises:
             InputError: If a file cannot be read, or does not fit.
         """
-        found = None
+        nodes_found = None
         projection = None
         about = (self.grid.size, self.grid.cell_size)
         if _is_named(of_nodes):
             source = self._file(NodesFile, of_nodes, "nodes")
-            found = NodesFound.read(self.beside("nodes", source.file), source)
-            projection = found.projection(*about)
+            nodes_found = NodesFound.read(self.beside("nodes", source.file), source)
+            projection = nodes_found.projection(*about)
         if self.grid.centre:
             projection = Projection(self.grid.centre, *about)
         placed = self._zones(values, projection) | self._no_fly(values, projection)
         placed |= {"centre": projection.centre} if projection else {}
-        if found and values["nodes"] is of_nodes:
+        if nodes_found and values["nodes"] is of_nodes:
             closed = np.zeros(self.grid.size[::-1], np.bool_)
             for x, y in placed.get("no_fly", self.grid.no_fly):
                 closed[y : y + 1, x : x + 1] = True  # none for a cell that is refused later
-            amounts = [kind for kind in self._amounts(found.source) if not self._replaces(kind)]
+            amounts = [
+                kind for kind in self._amounts(nodes_found.source) if not self._replaces(kind)
+            ]
             is_cell_fixed = self.grid.data_sheet.is_on
             size = self.grid.size
-            placed |= found.fields(size, projection, closed, amounts, is_cell_fixed)
+            placed |= nodes_found.fields(size, projection, closed, amounts, is_cell_fixed)
         return placed
 
     def _replaces(self, kind: Amounts) -> bool:
@@ -130,11 +132,11 @@ class OwnSea(NamedTuple):
 
     def _no_fly(self, values: Mapping[str, Any], projection: Projection | None) -> dict[str, Any]:
         """The no-fly cells, row by row."""
-        if not _is_named(of := values.get("no_fly")):
+        if not _is_named(tables := values.get("no_fly")):
             return {}
         closed = np.zeros(self.grid.size[::-1], np.bool_)
-        for one in of if isinstance(of, list) else [of]:
-            source = self._file(NoFlyFile, one, "no_fly")
+        for table in tables if isinstance(tables, list) else [tables]:
+            source = self._file(NoFlyFile, table, "no_fly")
             path = self.beside("no_fly", source.file)
             closed |= no_fly_in(path, self.grid.size, projection, source)
         return {"no_fly": [(x, y) for y, x in np.argwhere(closed).tolist()]}
@@ -150,12 +152,12 @@ class OwnSea(NamedTuple):
             zone = self._rectangle(zone, "zone", projection)
         if zones and _are_places(zones):
             zones = [
-                of | {"cells": self._rectangle(of["cells"], f"zones.{n}.cells", projection)}
-                if _are_places([of])
-                else of
-                for n, of in enumerate(zones)
+                table | {"cells": self._rectangle(table["cells"], f"zones.{n}.cells", projection)}
+                if _are_places([table])
+                else table
+                for n, table in enumerate(zones)
             ]
-        return {key: of for key, of in (("zone", zone), ("zones", zones)) if of}
+        return {key: table for key, table in (("zone", zone), ("zones", zones)) if table}
 
     def _rectangle(self, of: Any, key: str, projection: Projection | None) -> Rectangle:
         """The cells of a charging zone about a place."""
@@ -164,8 +166,8 @@ class OwnSea(NamedTuple):
         if projection is None:
             allowed = "[x, y, width, height], nodes from a file with degrees, or centre"
             raise InputError(f"{where}: has degrees, and the nodes are cells; allowed: {allowed}")
-        [middle] = projection.cells(np.array([[place.lon, place.lat]]))
-        x, y = np.round(middle - np.array([place.width, place.height]) / 2).astype(int).tolist()
+        [centre] = projection.cells(np.array([[place.lon, place.lat]]))
+        x, y = np.round(centre - np.array([place.width, place.height]) / 2).astype(int).tolist()
         return x, y, place.width, place.height
 
     def _file(self, model: type[BaseModel], of: Any, key: str) -> Any:

@@ -139,8 +139,8 @@ class Place(NamedTuple):
         if name and name not in self.properties:
             raise InputError(f"{self.where}: has no {name}{one_of(name, self.properties)}")
         lower = {str(key).lower(): value for key, value in self.properties.items()}
-        found = [self.properties[name]] if name else [lower.get(key) for key in known]
-        return next((value for value in found if value not in (None, "")), None)
+        values = [self.properties[name]] if name else [lower.get(key) for key in known]
+        return next((value for value in values if value not in (None, "")), None)
 
 
 class Places(NamedTuple):
@@ -198,18 +198,18 @@ def read_table(path: Path) -> Places:
     except csv.Error as error:
         raise InputError(f"{path}: is not a CSV file: {error}; allowed: CSV with commas") from None
     axes = {axis: [c for c in columns if c.lower() in COLUMNS[axis]] for axis in COLUMNS}
-    found = [pair for pair in LIMITS if all(len(axes[axis]) == 1 for axis in pair)]
-    if len(found) != 1:
-        there = ", ".join(columns) or "none"
-        raise InputError(f"{path}: has columns {there}; allowed: x and y, or lon and lat")
-    is_geographic = found == [GEOGRAPHIC]
+    pairs = [pair for pair in LIMITS if all(len(axes[axis]) == 1 for axis in pair)]
+    if len(pairs) != 1:
+        present = ", ".join(columns) or "none"
+        raise InputError(f"{path}: has columns {present}; allowed: x and y, or lon and lat")
+    is_geographic = pairs == [GEOGRAPHIC]
     places = []
     for line, texts in rows:
         filled = zip(columns, map(str.strip, texts), strict=False)
         values = dict.fromkeys(columns, "") | dict(filled)
         numbers = [
             _number(values[axes[axis][0]], f"{path}: {line}: {axis}", most, is_geographic)
-            for axis, most in zip(found[0], LIMITS[found[0]], strict=True)
+            for axis, most in zip(pairs[0], LIMITS[pairs[0]], strict=True)
         ]
         places.append(Place(line, values, [(POINT, [np.array([numbers])])]))
     return Places(is_geographic, places)
@@ -326,17 +326,17 @@ def _line(value: Any, place: str) -> np.ndarray:
 def _positions(value: Any, place: str) -> np.ndarray:
     """The (K, 2) degrees of a list of positions."""
     try:
-        found = np.array([position[:2] for position in value], float).reshape(len(value), 2)
+        positions = np.array([position[:2] for position in value], float).reshape(len(value), 2)
     except (TypeError, ValueError, OverflowError, KeyError):
         raise InputError(f"{place}: has not two numbers; allowed: [lon, lat]") from None
     most = np.array(LIMITS[GEOGRAPHIC])
-    for number, axis in np.argwhere(~(np.abs(found) <= most + _ROUNDING)):
-        where = f"{place}.{number}" if len(found) > 1 else place
+    for number, axis in np.argwhere(~(np.abs(positions) <= most + _ROUNDING)):
+        where = f"{place}.{number}" if len(positions) > 1 else place
         name = GEOGRAPHIC[axis]
         limit = most[axis]
-        line = f"{name} is {found[number, axis]:g}; allowed: -{limit}..{limit}"
+        line = f"{name} is {positions[number, axis]:g}; allowed: -{limit}..{limit}"
         raise InputError(f"{where}: {line}")
-    return np.clip(found, -most, most)
+    return np.clip(positions, -most, most)
 
 
 READERS = {".csv": read_table, ".tsv": read_table, ".geojson": read_geojson, ".json": read_geojson}

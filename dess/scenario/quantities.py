@@ -145,11 +145,11 @@ def _number(text: str, unit: str, units: str) -> Fraction:
     text = " ".join(text.split())
     if unit == "deg" and text.upper() in POINTS:
         return Fraction(POINTS.index(text.upper()) * 360, len(POINTS))
-    found = _NUMBER.fullmatch(text)
-    if not found:
+    match = _NUMBER.fullmatch(text)
+    if not match:
         refuse(text, "is not a number and a unit", units)
-    number = found[1]
-    name = re.sub(" ?/ ?", "/", found[2].strip())
+    number = match[1]
+    name = re.sub(" ?/ ?", "/", match[2].strip())
     if not name:
         refuse(text, "has no unit", units)
     size = _sizes(unit).get(name)
@@ -184,8 +184,8 @@ def _refuse_unit(text: str, name: str, unit: str, units: str) -> NoReturn:
     if kinds:
         refuse(text, "has a unit of another kind", units)
     is_rate = unit in _OVER_TIME
-    known = _sizes(unit) if is_rate and "/" in name else _single(unit)
-    close = one_of(name, known).partition("; allowed: ")[0]
+    names = _sizes(unit) if is_rate and "/" in name else _single(unit)
+    close = one_of(name, names).partition("; allowed: ")[0]
     refuse(text, f"has an unknown unit{close}", units)
 
 
@@ -215,9 +215,9 @@ def spellings(unit: str) -> Iterator[tuple[str, ...]]:
 def times(text: str, factor: float) -> str:
     """A quantity, or the first of two, times a factor: ``5 m/s from SW`` as ``10 m/s from SW``."""
     amount, *others = re.split(r"(?= from | at )", " ".join(text.split()), maxsplit=1)
-    found = _NUMBER.fullmatch(amount)
-    assert found
-    return f"{float(found[1].replace(',', '.')) * factor:g} {found[2]}{''.join(others)}"
+    match = _NUMBER.fullmatch(amount)
+    assert match
+    return f"{float(match[1].replace(',', '.')) * factor:g} {match[2]}{''.join(others)}"
 
 
 def refuse(value: object, problem: str, units: str, allowed: str = "") -> NoReturn:

@@ -66,17 +66,20 @@ class Constants(Fields):
         """Add the fields that follow from the data sheet, which may not be given as well."""
         sheet = values.get("data_sheet") if isinstance(values, dict) else None
         try:
-            found = DataSheet.model_validate(sheet) if sheet else None
+            data_sheet = DataSheet.model_validate(sheet) if sheet else None
         except ValidationError:  # it is told where the field is validated
             return values
-        if not (found and found.is_on):
+        if not (data_sheet and data_sheet.is_on):
             return values
-        values = {n: dict(of) if isinstance(of, Section) else of for n, of in values.items()}
-        following = found.fields()
+        values = {
+            n: dict(given_value) if isinstance(given_value, Section) else given_value
+            for n, given_value in values.items()
+        }
+        following = data_sheet.fields()
         for name in sorted(following.keys() & dotted(values).keys() - {*OPEN}):
             raise InputError(f"{name}: follows from the data sheet; allowed: without this field")
         for name, value in following.items():
-            _check_following(found, name, value)
+            _check_following(data_sheet, name, value)
         return merged(following, values)
 
     @model_serializer(mode="wrap")
@@ -95,12 +98,14 @@ class Constants(Fields):
             for name, value in self.data_sheet.fields().items()
             if self.value(name) in (value, (value, value))
         }
-        return merged({n: of for n, of in dotted(values).items() if n not in follows}, {})
+        return merged(
+            {n: remaining for n, remaining in dotted(values).items() if n not in follows}, {}
+        )
 
     @model_validator(mode="after")
     def _is_consistent(self, info: ValidationInfo) -> Self:
-        found = chain(problems(self), _out_of_range(self))
-        for problem in () if info.context == DRAFT else found:
+        all_problems = chain(problems(self), _out_of_range(self))
+        for problem in () if info.context == DRAFT else all_problems:
             raise ValueError(problem)
         return self
 
@@ -234,11 +239,13 @@ def _of_values(
     if named := unread(read) | unread(values):
         draft = validated(ScenarioSpace, values | named, where, DRAFT)
         beside = partial(_SCENARIOS.beside, name_or_path)
-        own = OwnSea(where, beside, draft, dotted(overrides).keys())
-        given = {field: of for field, of in values.items() if field not in unread(values)}
-        placed = own.placed(values, read.get("nodes"))
+        own_sea = OwnSea(where, beside, draft, dotted(overrides).keys())
+        read_values = {
+            field: value for field, value in values.items() if field not in unread(values)
+        }
+        placed = own_sea.placed(values, read.get("nodes"))
         of_nodes = {field: placed.pop(field) for field in AMOUNTS if field in placed}
-        values = merged(placed, given)
+        values = merged(placed, read_values)
         values = merged(values, of_nodes)
     return validated(ScenarioSpace, values, where, context)
 
@@ -276,8 +283,8 @@ def scenario_at(base: str | Path, values: Mapping[str, Any], /, **overrides: Any
     """
     name = values.get(SEA, base)
     if SEA in values and not (isinstance(name, str) and is_scenario_name(name)):
-        known = [*scenario_names(), *scenario_families()]
-        raise InputError(f"{SEA}: {shown(name)} is unknown{one_of(name, known)}")
+        seas = [*scenario_names(), *scenario_families()]
+        raise InputError(f"{SEA}: {shown(name)} is unknown{one_of(name, seas)}")
     fields = {field: value for field, value in values.items() if field != SEA}
     return load_scenario(name, **overrides, **fields)
 
@@ -339,13 +346,13 @@ def _check_following(sheet: DataSheet, name: str, value: Any) -> None:
 def _out_of_range(c: Constants) -> Iterator[str]:
     """The sampled parameters lie within their limits, and C_S is below C_C."""
     values = {name: getattr(c, name) for name in SAMPLED}
-    ends = {name: (of, of) if is_number(of) else of for name, of in values.items()}
+    ends = {name: (value, value) if is_number(value) else value for name, value in values.items()}
     for name, (low, high) in ends.items():
         least, most = c.limits(name)
         if not least <= low <= high <= most:
-            given = low if low == high else [low, high]
+            setting = low if low == high else [low, high]
             reason = f" (cells of the zone, at most {MOST_UAVS})" if name == "uavs" else ""
-            yield f"{name}: {given} is out of range; allowed: {least}..{most}{reason}"
+            yield f"{name}: {setting} is out of range; allowed: {least}..{most}{reason}"
     start = ends["charge_start"][1]
     complete = ends["charge_complete"][0]
     if start >= complete:

@@ -60,9 +60,11 @@ class Document(BaseModel):
             if not isinstance(data, dict):
                 raise InputError(f"{where}: is not an object; allowed: an object of JSON")
             for key, value in fixed.items():
-                held = data.get(key, value)
-                if type(held) is not type(value) or held != value:
-                    line = f"{where}: has {key} {shown(held)}, not {shown(value)}; allowed: {value}"
+                present = data.get(key, value)
+                if type(present) is not type(value) or present != value:
+                    line = (
+                        f"{where}: has {key} {shown(present)}, not {shown(value)}; allowed: {value}"
+                    )
                     raise Outdated(_refused(line, allowed))
             return cls.model_validate_json(text, strict=True)
         except ValidationError as error:

@@ -100,10 +100,10 @@ def _opened(path: Path, limit: int, allowed: str) -> Iterator[BinaryIO]:
     """A regular file of at most ``limit`` bytes; nothing blocks, whatever is in its place."""
     try:
         with open(path, "rb", opener=_open_at_once) as file:
-            found = os.fstat(file.fileno())
-            if not stat.S_ISREG(found.st_mode):
-                raise OSError(None, f"it is {kind_of(found)}")
-            if found.st_size > limit:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise OSError(None, f"it is {kind_of(status)}")
+            if status.st_size > limit:
                 raise _too_large(path, limit)
             yield file
     except InputError:

@@ -31,8 +31,8 @@ def toml_value(value: Any) -> str:
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(toml_value, value))}]"
     if isinstance(value, dict):
-        given = {key: inner for key, inner in value.items() if inner is not None}
-        return f"{{{', '.join(f'{key} = {toml_value(inner)}' for key, inner in given.items())}}}"
+        present = {key: inner for key, inner in value.items() if inner is not None}
+        return f"{{{', '.join(f'{key} = {toml_value(inner)}' for key, inner in present.items())}}}"
     return json.dumps(value, ensure_ascii=False)
 
 
@@ -155,11 +155,11 @@ def _check_place(path: Path) -> None:
     """Refuse to replace anything but a regular file, or a link to one."""
     _check_name(path)
     try:
-        found = path.stat()
+        status = path.stat()
     except FileNotFoundError:
         return
-    if not stat.S_ISREG(found.st_mode):
-        raise InputError(f"{path}: is {kind_of(found)}; allowed: a file")
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError(f"{path}: is {kind_of(status)}; allowed: a file")
     if path.is_symlink() and Path("/dev") in path.absolute().parents:  # such as /dev/stdout
         raise InputError(f"{path}: is a device; allowed: a file")
 
@@ -177,7 +177,7 @@ def _sweep(folder: Path) -> None:
     """Delete the temporary files that processes have left which were killed, once per process."""
     with suppress(OSError):
         for path in folder.iterdir():
-            if (found := _TEMPORARY.fullmatch(path.name)) and not pid_exists(int(found[1])):
+            if (match := _TEMPORARY.fullmatch(path.name)) and not pid_exists(int(match[1])):
                 path.unlink(missing_ok=True)
 
 
@@ -203,9 +203,9 @@ def check_folder(path: Path) -> None:
     """
     _check_name(path)
     # A link that leads nowhere is there: no folder can be made in its place.
-    there = next(above for above in (path, *path.absolute().parents) if os.path.lexists(above))
-    if not there.is_dir() or not os.access(there, os.W_OK):
-        reason = "Permission denied" if there.is_dir() else "Not a directory"
+    nearest = next(above for above in (path, *path.absolute().parents) if os.path.lexists(above))
+    if not nearest.is_dir() or not os.access(nearest, os.W_OK):
+        reason = "Permission denied" if nearest.is_dir() else "Not a directory"
         raise InputError(f"{path}: cannot be written: {reason}; allowed: another path")
 
 

@@ -44,14 +44,14 @@ class HarvestMultiAgentEnv(MultiAgentEnv):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start the next mission; see ``HarvestEnv.reset``."""
         observations, infos = self.env.reset(seed, options)
-        return {agent: _renamed(own) for agent, own in observations.items()}, infos
+        return {agent: _renamed(observation) for agent, observation in observations.items()}, infos
 
     def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
         """Run one mission slot; see ``HarvestEnv.step``."""
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
         terminated["__all__"] = not self.env.agents
         truncated["__all__"] = False
-        seen = {agent: _renamed(own) for agent, own in observations.items()}
+        seen = {agent: _renamed(observation) for agent, observation in observations.items()}
         return seen, rewards, terminated, truncated, infos
 
 

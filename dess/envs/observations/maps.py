@@ -54,10 +54,10 @@ class Maps:
             The local maps (R, 4, l, l), the global maps (R, 4, w, w) and the own batteries
             / 100 (R, 1), all float32.
         """
-        local, far, own = (np.zeros((len(missions), *s), np.float32) for s in self.shapes)
+        local, far, scalars = (np.zeros((len(missions), *s), np.float32) for s in self.shapes)
         rows = np.asarray(missions, np.int64), np.asarray(uavs, np.int64)
-        _encode(states, self.layout, *rows, local, far, own)
-        return local, far, own
+        _encode(states, self.layout, *rows, local, far, scalars)
+        return local, far, scalars
 
 
 @kernel
@@ -65,7 +65,7 @@ def _encode(states, layout, missions, uavs, local, far, own):
     """Write the maps of all rows into zeroed arrays."""
     zone, nodes = layout.zone, layout.nodes
     centre = layout.grid - 1
-    middle = CROP // 2
+    middle_cell = CROP // 2
     for r in range(len(missions)):
         if uavs[r] < 0:
             continue
@@ -74,7 +74,7 @@ def _encode(states, layout, missions, uavs, local, far, own):
         x, y = team[uavs[r], column.X], team[uavs[r], column.Y]
         own[r, 0] = team[uavs[r], column.BATTERY] / np.float32(BATTERY_SCALE)
         # All positions below are relative to the UAV's cell.
-        _mark_zone(local[r, ZONE], middle, 1, zone[0] - x, zone[1] - y, zone[2], zone[3])
+        _mark_zone(local[r, ZONE], middle_cell, 1, zone[0] - x, zone[1] - y, zone[2], zone[3])
         _mark_zone(far[r, ZONE], centre, POOL, zone[0] - x, zone[1] - y, zone[2], zone[3])
         for k in range(len(nodes)):
             data = residual[k] / np.float32(DATA_SCALE)

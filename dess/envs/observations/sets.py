@@ -240,30 +240,30 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
     count = len(data)
     by_node, least, sums = memory
     free, crowd, near_0, near_1, near_2, beyond_1, beyond_2 = by_node
-    here = tables.ways[places[HOVER]]
+    ways_from_here = tables.ways[places[HOVER]]
     x = np.int64(me[column.X])
     y = np.int64(me[column.Y])
     least[:] = 1000
     by_node[1:] = 0.0
     for j in range(len(team)):
         if j != i and team[j, column.ACTIVE] and not team[j, column.CHARGING]:
-            there = tables.ways[team[j, column.Y] * columns + team[j, column.X]]
+            ways_of_mate = tables.ways[team[j, column.Y] * columns + team[j, column.X]]
             for k in range(count):
-                least[k] = min(least[k], there[k])
-                crowd[k] += tables.near[there[k], 1]
+                least[k] = min(least[k], ways_of_mate[k])
+                crowd[k] += tables.near[ways_of_mate[k], 1]
     for k in range(count):
-        mine = tables.near[here[k], 1] + np.float32(1e-9)
+        mine = tables.near[ways_from_here[k], 1] + np.float32(1e-9)
         crowd[k] = mine / (mine + crowd[k])
         free[k] = data[k] * crowd[k]
     for j in range(count):
         if data[j] > 0.0:
             around = tables.around[j]
             full = data[j]
-            own = free[j]
+            share = free[j]
             for k in range(count):
-                near_0[k] += own * around[0, k]
-                near_1[k] += own * around[1, k]
-                near_2[k] += own * around[2, k]
+                near_0[k] += share * around[0, k]
+                near_1[k] += share * around[1, k]
+                near_2[k] += share * around[2, k]
                 beyond_1[k] += full * around[1, k]
                 beyond_2[k] += full * around[2, k]
     needed = np.int64(me[column.NEEDED])
@@ -275,7 +275,7 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
     sums[:] = 0.0
     for k in range(count):
         line = lines[k]
-        way = np.int64(here[k])
+        way = np.int64(ways_from_here[k])
         units = data[k]
         home = np.int64(tables.node_home[k])
         lead = np.int64(least[k]) - way
@@ -307,13 +307,13 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
         line[22] = np.float32(min(abs(dx), abs(dy))) * tables.shares[way]
         line[23] = _share(home - own_home, 20)
         for move in range(4):
-            nearer = np.float32(tables.ways[places[move], k] < here[k])
+            nearer = np.float32(tables.ways[places[move], k] < ways_from_here[k])
             moves[move, k] = nearer
             full = nearer * data[k]
-            own = nearer * free[k]
+            share = nearer * free[k]
             for s in range(4):
                 sums[move, s] += full * near[s]
-                sums[move, 4 + s] += own * near[s]
+                sums[move, 4 + s] += share * near[s]
         for s in range(4):
             sums[HOVER, s] += data[k] * near[s]
             sums[HOVER, 4 + s] += free[k] * near[s]
@@ -448,11 +448,11 @@ def _mates(team, i, columns, tables, lines, moves):
 def _zones(team, i, sea, tables, places, columns, lines, moves):
     """Write the charging zones, seen from UAV ``i``."""
     me = team[i]
-    here = tables.zone_ways[places[HOVER]]
+    ways_from_here = tables.zone_ways[places[HOVER]]
     nearest = tables.home[places[HOVER]]
     for zone in range(len(sea.pads)):
         line = lines[zone]
-        way = np.int64(here[zone])
+        way = np.int64(ways_from_here[zone])
         charging = waiting = coming = 0
         for j in range(len(team)):
             mate = team[j]

@@ -46,8 +46,8 @@ class Vector:
         self._nearness = exp(-slots / SCALES[1])
         self._around = _around(slots)
         self._home = layout.zone_slots(layout.nodes)
-        own = _OWN + 2 * layout.grid + _NODE * len(layout.nodes)
-        self.shapes = ((own + 5 * (2 * len(SCALES) + 2) + MATES * _MATE,),)
+        own_columns = _OWN + 2 * layout.grid + _NODE * len(layout.nodes)
+        self.shapes = ((own_columns + 5 * (2 * len(SCALES) + 2) + MATES * _MATE,),)
 
     def encode(
         self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
@@ -134,11 +134,11 @@ def _encode(
             if data[k] == 0.0:
                 continue
             # data that no teammate is nearer to
-            own = data[k] if lead >= 0 else np.float32(0.3 * data[k])
+            share = data[k] if lead >= 0 else np.float32(0.3 * data[k])
             entry = (slots * 3 + (dx > 0) - (dx < 0) + 1) * 3 + (dy > 0) - (dy < 0) + 1
             for j in range(_WIDTH):
                 near[j] += data[k] * around[entry, j]
-                free[j] += own * around[entry, j]
+                free[j] += share * around[entry, j]
         at = _actions(team, i, near, free, line, at + _NODE * count)
         _mates(team, i, line, at)
 
