@@ -100,7 +100,9 @@ def load_policies(policy: Any) -> list[Any]:
     check_floors()
     from dess.policies import load_team
 
-    members = policy if isinstance(policy, list | tuple) else [policy]
+    members: Sequence[Any] = [policy]
+    if isinstance(policy, list | tuple):
+        members = policy
     team: list[Any] = []
     for member in members:
         if isinstance(member, str | Path):

@@ -73,7 +73,9 @@ def printable(text: str) -> str:
 
 
 def _escape(number: int) -> str:
-    return f"\\u{number:04x}" if number < 0x10000 else f"\\U{number:08x}"
+    if number < 0x10000:
+        return f"\\u{number:04x}"
+    return f"\\U{number:08x}"
 
 
 def cut(text: str, length: int) -> str:
@@ -110,7 +112,9 @@ def one_of(name: object, names: Iterable[str], also: str = "") -> str:
     lower = {other.lower(): other for other in reversed(distinct)}
     asked = name[:_QUOTED].lower() if isinstance(name, str) else shown(name)
     close = [lower[match] for match in get_close_matches(asked, lower, cutoff=0.7)]
-    meant = f" (did you mean {' or '.join(close)}?)" if close else ""
+    meant = ""
+    if close:
+        meant = f" (did you mean {' or '.join(close)}?)"
     text = listed(distinct)
     if close and len(distinct) > _CLOSE:
         text = f"{', '.join(close)} and {len(distinct) - len(close)} others"
@@ -165,7 +169,9 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
     fields, field, is_whole = _field_at(model, loc)
     is_short = kind == "missing" and not is_whole  # an item of a list is missing
     path = [cut(str(part), _QUOTED) for part in loc[: -1 if is_short else None] if part != "[key]"]
-    place = f"{where}: {'.'.join(path)}" if path else where
+    place = where
+    if path:
+        place = f"{where}: {'.'.join(path)}"
     if kind == "extra_forbidden":
         return f"{place}: unknown key{one_of(loc[-1], fields)}"
     if kind == "literal_error":
@@ -180,7 +186,9 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
     if kind == "value_error":
         line = f"{place}: {first['msg'].removeprefix('Value error, ')}"
         is_complete = isinstance(first["ctx"]["error"], InputError) or "; allowed: " in line
-        return line if is_complete else f"{line}; allowed: {allowed}"
+        if is_complete:
+            return line
+        return f"{line}; allowed: {allowed}"
     if kind == "missing" and field and is_whole:
         return f"{place}: is missing; allowed: {form_of(field, described=True)}"
     problem = "is too short" if is_short else _problem(kind)
@@ -207,9 +215,13 @@ def form_of(field: "FieldInfo", described: bool = False) -> str:
     single = bool(kind_of(field) or choices_of(field))
     if (form := description.partition(": ")[2]) and not single:
         length = _length(field.metadata)
-        return f"{form} ({length.strip()})" if length else form
+        if length:
+            return f"{form} ({length.strip()})"
+        return form
     text = _form(field.annotation, field.metadata)
-    return f"{text} ({description})" if description and (described or not single) else text
+    if description and (described or not single):
+        return f"{text} ({description})"
+    return text
 
 
 def _form(annotation: Any, metadata: Sequence[Any]) -> str:
@@ -243,18 +255,24 @@ def _form(annotation: Any, metadata: Sequence[Any]) -> str:
 def kind_of(field: "FieldInfo") -> str:
     """The type of a single value in words, such as ``a number``; empty for all others."""
     kinds = [kind for kind in _leaves(field.annotation) if kind is not NoneType]
-    return _WORDS.get(kinds[0], "") if len(kinds) == 1 else ""
+    if len(kinds) == 1:
+        return _WORDS.get(kinds[0], "")
+    return ""
 
 
 def choices_of(field: "FieldInfo") -> list[str]:
     """The words that the value of a field may be; empty if it is no choice of words."""
     is_choice = get_origin(field.annotation) is Literal
-    return [*map(str, get_args(field.annotation))] if is_choice else []
+    if is_choice:
+        return [*map(str, get_args(field.annotation))]
+    return []
 
 
 def _length(metadata: Sequence[Any]) -> str:
     limits = _limits(metadata, "min_length", "max_length")
-    return f" of length {limits}" if limits else ""
+    if limits:
+        return f" of length {limits}"
+    return ""
 
 
 def _limits(metadata: Sequence[Any], least: str, most: str) -> str:
@@ -288,7 +306,9 @@ def _field_at(
         if is_whole:
             field = fields[str(part)]
             tables = [kind for kind in _leaves(field.annotation) if hasattr(kind, "model_fields")]
-            fields = _keys(tables[0]) if len(tables) == 1 else {}
+            fields = {}
+            if len(tables) == 1:
+                fields = _keys(tables[0])
     return fields, field, is_whole
 
 

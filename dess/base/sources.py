@@ -58,7 +58,9 @@ def read(path: Path, module: str) -> tuple[str, tuple[str, ...]]:
     modules.
     """
     tree = ast.parse(path.read_bytes())
-    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    package = module
+    if path.name != "__init__.py":
+        package = module.rpartition(".")[0]
     imports = tuple(dict.fromkeys(_imports(tree, package)))
     return sha256(_outline(tree).encode()).hexdigest(), imports
 
@@ -70,7 +72,9 @@ def _imports(tree: ast.Module, package: str) -> Iterator[str]:
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             parents = package.split(".")
-            above = parents[: len(parents) - node.level + 1] if node.level else []
+            above = []
+            if node.level:
+                above = parents[: len(parents) - node.level + 1]
             base = ".".join([*above, *([node.module] if node.module else [])])
             members = [f"{base}.{alias.name}" for alias in node.names]
             yield from (name for name in members if path_of(name))
@@ -106,5 +110,9 @@ def path_of(module: str) -> Path | None:
             return None
         imported = sys.modules.get(".".join(names[: end + 1]))  # may have added a folder
         places = getattr(imported, "__path__", None) or spec.submodule_search_locations or []
-    origin = spec.origin if spec else None
-    return Path(origin) if origin and origin.endswith(".py") else None
+    origin = None
+    if spec:
+        origin = spec.origin
+    if origin and origin.endswith(".py"):
+        return Path(origin)
+    return None

@@ -98,7 +98,9 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         self._stepper = MissionStepper(scenario, 1, seed)
         self._observer = Observer(self._stepper.space, observation, guarded)
         self._components = Components(self._stepper.space)
-        self._window = Window() if render_mode == "human" else None
+        self._window = None
+        if render_mode == "human":
+            self._window = Window()
         fleet = self._stepper.space.uavs[1]
         self.possible_agents = [f"uav_{i}" for i in range(fleet)]
         space = self._observer.space

@@ -138,7 +138,9 @@ def team_of(policy: Any, spaces: Sequence[ScenarioSpace]) -> list[Any]:
         InputError: If there are no policies, or more than UAVs in the largest fleet of all
             scenarios; if something is not a policy.
     """
-    team = [*policy] if isinstance(policy, list | tuple) else [policy]
+    team = [policy]
+    if isinstance(policy, list | tuple):
+        team = [*policy]
     for member in team:
         _check_policy(member)
     if not team:

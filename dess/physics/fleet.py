@@ -39,7 +39,9 @@ Fleet = Sequence[UavType]
 
 def type_of(fleet: Fleet, uav: int) -> UavType:
     """The type of a UAV by its index."""
-    return fleet[uav % len(fleet)] if fleet else UavType.off()
+    if fleet:
+        return fleet[uav % len(fleet)]
+    return UavType.off()
 
 
 def slowest(fleet: Fleet) -> int:

@@ -40,7 +40,9 @@ def tuples(value: Any) -> Any:
     value = plain(value)
     if isinstance(value, dict):
         return {key: tuples(item) for key, item in value.items()}
-    return tuple(tuples(item) for item in value) if isinstance(value, list | tuple) else value
+    if isinstance(value, list | tuple):
+        return tuple(tuples(item) for item in value)
+    return value
 
 
 class Strict(BaseModel):
@@ -81,7 +83,9 @@ def for_sections(function: Callable) -> Any:
     """
 
     def choose(mission: Any, *_: Any) -> Callable:
-        return function if "is_extended" in mission.fields else _nothing
+        if "is_extended" in mission.fields:
+            return function
+        return _nothing
 
     return inlined(function, choose)
 

@@ -32,7 +32,9 @@ def _off_the_grid(c: Fields) -> Iterator[str]:
     columns, rows = c.size
     cells: Counter[Cell] = Counter()
     for number, (x, y, width, height) in enumerate(c.rectangles):
-        name = f"zones.{number - 1}.cells" if number else "zone"
+        name = "zone"
+        if number:
+            name = f"zones.{number - 1}.cells"
         if min(x, y) < 0 or min(width, height) < 1 or x + width > columns or y + height > rows:
             yield (
                 f"{name}: {[x, y, width, height]} does not lie on the {columns} x {rows} grid; "
@@ -43,7 +45,9 @@ def _off_the_grid(c: Fields) -> Iterator[str]:
     for cell, count in cells.items():
         if count > 1:
             yield f"zones: two zones have the cell {[*cell]}; allowed: zones without common cells"
-    size = f"0 <= x < {columns}, 0 <= y < {rows}" if c.rows else f"0 <= x, y < {columns}"
+    size = f"0 <= x, y < {columns}"
+    if c.rows:
+        size = f"0 <= x < {columns}, 0 <= y < {rows}"
     for name, names in (("nodes", c.names), ("no_fly", ())):
         places = getattr(c, name)
         beyond = [n for n, (x, y) in enumerate(places) if not (0 <= x < columns and 0 <= y < rows)]
@@ -105,8 +109,12 @@ def _unreachable(c: Fields) -> Iterator[str]:
         cut = [n for n, cell in enumerate(cells) if ways[cell[::-1]] == FAR]
         closed = [n for n in cut if zones[cells[n][::-1]] == NO_FLY]
         lost = [n for n in cut if n not in closed and zones[y, x] != NO_FLY]
-        kind = "a no-fly cell" if len(closed) == 1 else "no-fly cells"
-        problems = [f"{_titles(closed, cells, names)} {kind}"] if closed else []
+        kind = "no-fly cells"
+        if len(closed) == 1:
+            kind = "a no-fly cell"
+        problems = []
+        if closed:
+            problems = [f"{_titles(closed, cells, names)} {kind}"]
         if lost:
             problems.append(f"{_titles(lost, cells, names, ('cannot', 'cannot'))} be reached")
         if problems:
@@ -135,7 +143,9 @@ def _unfit(c: Fields) -> Iterator[str]:
     for number, ((*_, width, height), pads) in enumerate(
         zip(c.rectangles, c.zone_pads, strict=True)
     ):
-        name = f"zones.{number - 1}.pads" if number else "pads"
+        name = "pads"
+        if number:
+            name = f"zones.{number - 1}.pads"
         cells = width * height
         if pads > cells:
             yield f"{name}: {pads} is more than the zone has cells; allowed: 1..{cells}"

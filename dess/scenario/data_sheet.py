@@ -186,7 +186,9 @@ class DataSheet(Section):
     def number(self, name: str, missing: float = 0.0) -> float:
         """The first number of a field in SI units, bits, percent or decibels."""
         text = getattr(self, name)
-        return measured(text, self.extra(name)["units"])[0] if text else missing
+        if text:
+            return measured(text, self.extra(name)["units"])[0]
+        return missing
 
     def fields(self) -> dict[str, Any]:
         """The fields of a scenario that follow, those of sections dotted.
@@ -210,7 +212,9 @@ class DataSheet(Section):
             following["wind.moves"] = self._wind(*measured(self.wind, "m/s from deg"))
         if self.mtbf:
             following["failures.uav_rate"] = 1 / self._slots("mtbf")
-            following["failures.uav_repair"] = self._slots("repair", 1e6) if self.repair else 0.0
+            following["failures.uav_repair"] = 0.0
+            if self.repair:
+                following["failures.uav_repair"] = self._slots("repair", 1e6)
         return following
 
     def origin(self, field: str) -> str:
@@ -249,7 +253,9 @@ class DataSheet(Section):
         """The mean of a field of the nodes in units of a size, and each if they are listed."""
         amount = getattr(self, name)
         units = self.extra(name)["units"]
-        texts = (amount,) if isinstance(amount, str) else amount
+        texts = amount
+        if isinstance(amount, str):
+            texts = (amount,)
         values = tuple(measured(text, units)[0] / size for text in texts)
         return sum(values) / len(values), () if isinstance(amount, str) else values
 

@@ -161,7 +161,9 @@ def sea_of(name: str) -> dict[str, Any]:
     if family not in FAMILIES:
         raise InputError(f"{name}: no such family of seas{one_of(family, FAMILIES)}")
     if not re.fullmatch("0|[1-9][0-9]{0,8}", seed):
-        wrong = f"has the seed {shown(seed)}" if seed else "has no seed"
+        wrong = "has no seed"
+        if seed:
+            wrong = f"has the seed {shown(seed)}"
         raise InputError(f"{family}: {wrong}; allowed: {family}:0..{family}:{MOST_SEED}")
     return dict(_fields_of(family, int(seed)))
 
@@ -290,7 +292,9 @@ def _attempt(draws: Draws, family: Family, seed: int) -> dict[str, Any]:
     sea = family.sea(draws)
     most_uavs = 2 + 2 * (seed % 3)
     rows, columns = sea.land.shape
-    least = _LEAST_FAR if rows + columns > _FAR else _LEAST
+    least = _LEAST
+    if rows + columns > _FAR:
+        least = _LEAST_FAR
     reach = 2 * least // 5  # as far as nodes may be: there and back with a fifth to spare
     zones = _zones(draws, sea.land, most_uavs, reach)
     if not zones:

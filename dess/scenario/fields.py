@@ -54,7 +54,9 @@ def is_number(value: Any) -> bool:
 
 def _whole(value: float) -> float:
     """A number without a fraction as an integer: compiled code has one type for all of them."""
-    return int(value) if value == int(value) else value
+    if value == int(value):
+        return int(value)
+    return value
 
 
 # Lets a single number stand for a range of one element.
@@ -222,13 +224,17 @@ class Fields(Strict):
     @property
     def chart(self) -> Chart:
         """The zones, the no-fly cells and the ways between cells."""
-        nodes = self.nodes if self.size[0] * self.size[1] > MOST_CHARTED else ()
+        nodes: tuple[Cell, ...] = ()
+        if self.size[0] * self.size[1] > MOST_CHARTED:
+            nodes = self.nodes
         return chart_at(*self.size, self.rectangles, self.no_fly, nodes)
 
     @property
     def aim(self) -> str:
         """What every UAV of a successful mission has done, in words."""
-        return "landed" if self.landing else "filled their quota"
+        if self.landing:
+            return "landed"
+        return "filled their quota"
 
     @property
     def zone_cells(self) -> int:
@@ -262,12 +268,16 @@ class Fields(Strict):
     @property
     def units(self) -> Units | None:
         """What a slot, a cell and a data unit are; None without a data sheet."""
-        return self.data_sheet.units if self.data_sheet.is_on else None
+        if self.data_sheet.is_on:
+            return self.data_sheet.units
+        return None
 
     def has(self, section: str) -> bool:
         """Whether a section is on."""
         value = getattr(self, section)
-        return value.is_on if isinstance(value, Section) else bool(value)
+        if isinstance(value, Section):
+            return value.is_on
+        return bool(value)
 
     @property
     def needs_events(self) -> bool:
@@ -339,7 +349,9 @@ def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
     below = {name: value for name, value in below.items() if name not in replaced}
     for name, value in (below | above).items():
         section, _, part = name.partition(".")
-        table = result.setdefault(section, {}) if part and section in SECTIONS else None
+        table = None
+        if part and section in SECTIONS:
+            table = result.setdefault(section, {})
         if isinstance(table, dict):
             table[part] = value
         else:
@@ -349,7 +361,9 @@ def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
         zones = result.get("zones") or ()
         pads_of_zones = pads if isinstance(pads, list | tuple) else [pads] * len(zones)
         if not zones or len(pads_of_zones) != len(zones):
-            allowed = f"a number, or a list of {len(zones)}" if zones else "with further zones"
+            allowed = "with further zones"
+            if zones:
+                allowed = f"a number, or a list of {len(zones)}"
             raise InputError(f"{ZONE_PADS}: {shown(pads)} does not fit; allowed: {allowed}")
         result["zones"] = [
             {**zone, "pads": n} for zone, n in zip(zones, pads_of_zones, strict=True)

@@ -58,7 +58,9 @@ class NewScenario:
                 for the rest of it, in place of the SNR.
         """
         answered = {*answered}
-        link = LINK_BUDGET if answered & {*LINK_BUDGET, "free_space"} else ("snr",)
+        link: tuple[str, ...] = ("snr",)
+        if answered & {*LINK_BUDGET, "free_space"}:
+            link = LINK_BUDGET
         needed = [*_NEEDED, *link, *(["mtbf"] if "repair" in answered else [])]
         if self.nodes.has_amounts(RATES):
             needed.remove("data_rate")
@@ -100,7 +102,9 @@ class NewScenario:
         swapped = [y, x]
         is_swappable = abs(y) <= most_x and abs(x) <= most_y
         if abs(x) > most_x or abs(y) > most_y:
-            hint = f": {y:g}, {x:g}?" if is_swappable else ""
+            hint = ""
+            if is_swappable:
+                hint = f": {y:g}, {x:g}?"
             allowed = f"longitude -180..180, then latitude -90..90{hint}"
             raise InputError(f"base: {shown(answer)} is no place on the Earth; allowed: {allowed}")
         away = self._away([x, y])

@@ -281,7 +281,8 @@ def _covered(
     shape = shapely.make_valid(shapely.geometry.shape({"type": kind, "coordinates": coordinates}))
     edge = reach + 1  # what is further away has no effect
     shape = shapely.clip_by_rect(shape, -edge, -edge, size[0] + edge, size[1] + edge)
-    shape = shape.buffer(reach) if reach else shape
+    if reach:
+        shape = shape.buffer(reach)
     shapely.prepare(shape)
     if touched or (kind == places.LINE and not reach):
         cells = shapely.box(x, y, x + 1, y + 1)

@@ -106,7 +106,9 @@ class NodesFound(NamedTuple):
 
     def projection(self, size: Size, cell_size: float) -> Projection | None:
         """The projection about these places; none if they are cells."""
-        return Projection.about(self.spots, size, cell_size) if self.is_geographic else None
+        if self.is_geographic:
+            return Projection.about(self.spots, size, cell_size)
+        return None
 
     def fields(
         self,
@@ -175,7 +177,9 @@ class NodesFound(NamedTuple):
             raise InputError(f"{self.path}: has the column {column}, and {both}; allowed: one")
         values = [self._amount(row, column, kind) for row in self.rows]
         sums = [sum(values[number] for number in group) for group in groups]
-        return [f"{total!r} {kind.unit}" for total in sums] if kind.unit else sums
+        if kind.unit:
+            return [f"{total!r} {kind.unit}" for total in sums]
+        return sums
 
     def _column(self, kind: Amounts) -> str:
         """The column of amounts, as the file calls it; empty if it has none that is filled."""
@@ -184,12 +188,16 @@ class NodesFound(NamedTuple):
         if kind.asked:
             if kind.asked not in columns:
                 raise InputError(f"{self.path}: has no {kind.asked}{one_of(kind.asked, columns)}")
-            return kind.asked if kind.asked in filled else ""
+            if kind.asked in filled:
+                return kind.asked
+            return ""
         matching = [name for name in filled if name.lower() in kind.known]
         if len({name.lower() for name in matching}) > 1:
             both = f"the columns {' and '.join(matching)}"
             raise InputError(f"{self.path}: has {both} for one field; allowed: one of them")
-        return matching[0] if matching else ""
+        if matching:
+            return matching[0]
+        return ""
 
     def _is_filled(self, column: str) -> bool:
         return any(row.property("", [column.lower()]) is not None for row in self.rows)
@@ -200,7 +208,9 @@ class NodesFound(NamedTuple):
         text = row.property("", [column.lower()])
         if text is not None:
             read: Callable[[str, str], float]
-            read = partial(quantity_of, unit=kind.unit) if kind.unit else places.amount_of
+            read = places.amount_of
+            if kind.unit:
+                read = partial(quantity_of, unit=kind.unit)
             amount = read(str(text), where)
             least, most = kind.limits
             if not least <= amount <= most:
@@ -208,7 +218,9 @@ class NodesFound(NamedTuple):
                 raise InputError(f"{where}: {shown(text)} is out of range; allowed: {limits}")
             return amount
         if kind.otherwise is None:
-            allowed = form_of(kind.unit) if kind.unit else "a number"
+            allowed = "a number"
+            if kind.unit:
+                allowed = form_of(kind.unit)
             raise InputError(f"{where}: is empty; allowed: {allowed}, or one in {kind.for_all}")
         return kind.otherwise
 
@@ -216,13 +228,17 @@ class NodesFound(NamedTuple):
         """Where a node stands in the file, and its name."""
         name = self._name(number)
         where = self.rows[number].where
-        return f"{where} ({name})" if name else where
+        if name:
+            return f"{where} ({name})"
+        return where
 
     def _check_on_grid(self, own: list[Cell], size: Size, is_cell_fixed: bool) -> None:
         beyond = [number for number, cell in enumerate(own) if not places.is_on_grid(cell, size)]
         if beyond:
             names = listed(f"{self._title(number)} at {[*own[number]]}" for number in beyond)
-            verb = "are" if beyond[1:] else "is"
+            verb = "is"
+            if beyond[1:]:
+                verb = "are"
             enough = _enough(own, size, self.is_geographic, is_cell_fixed)
             line = f"{names} {verb} off the grid of {size[0]} x {size[1]} cells"
             raise InputError(f"{self.path}: {line}; allowed: {enough}")
@@ -256,7 +272,9 @@ class NodesFound(NamedTuple):
 
 def _joined(names: list[str]) -> str:
     """The name of a node that stands for several."""
-    return names[0] if len(names) == 1 else f"{names[0]} +{len(names) - 1}"
+    if len(names) == 1:
+        return names[0]
+    return f"{names[0]} +{len(names) - 1}"
 
 
 def _nearest_free(
@@ -289,8 +307,12 @@ def _enough(cells: list[Cell], size: Size, is_geographic: bool, is_cell_fixed: b
     needed = [n + b * (1 + is_geographic) for n, b in zip(size, beyond, strict=True)]
     if size[0] == size[1]:
         needed = [max(needed)] * 2
-    coarser = "UAVs that fly further in a slot" if is_cell_fixed else "a larger cell_size"
+    coarser = "a larger cell_size"
+    if is_cell_fixed:
+        coarser = "UAVs that fly further in a slot"
     if max(needed) > MAX_GRID or (not is_geographic and min(map(min, cells)) < 0):
-        return coarser if is_geographic else f"0 <= x, y < {MAX_GRID}"
+        if is_geographic:
+            return coarser
+        return f"0 <= x, y < {MAX_GRID}"
     enough = f"grid = {needed[0]}" + (f", rows = {needed[1]}" if needed[0] != needed[1] else "")
     return f"{enough} or more" + (f", or {coarser}" if is_geographic else "")

@@ -5,7 +5,7 @@ no_fly = "land.geojson"
 zone = {lon = 8.70, lat = 53.87, width = 4, height = 3}
 """
 
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,13 +41,17 @@ def unread(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def _is_named(value: Any) -> bool:
     """Whether a field, or an item of it, names a file or degrees."""
-    items = value if isinstance(value, list | tuple) else [value]
+    items: Sequence[Any] = [value]
+    if isinstance(value, list | tuple):
+        items = value
     return any(isinstance(item, str | dict) for item in items)
 
 
 def _are_places(zones: Any) -> bool:
     """Whether a further zone has degrees in the place of cells."""
-    tables = zones if isinstance(zones, list | tuple) else []
+    tables: Sequence[Any] = []
+    if isinstance(zones, list | tuple):
+        tables = zones
     return any(isinstance(table, dict) and isinstance(table.get("cells"), dict) for table in tables)
 
 
@@ -110,7 +114,9 @@ class OwnSea(NamedTuple):
         data = (source.data, DATA)
         if not sheet.is_on:
             low, high = self.grid.initial_data
-            amount = low if low == high else None
+            amount = None
+            if low == high:
+                amount = low
             most = (0, MOST_AMOUNT)
             rate = self.grid.arrival_rate
             has_rates = bool(arrivals.rates)

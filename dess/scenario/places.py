@@ -283,8 +283,10 @@ def read_geojson(path: Path) -> Places:
     features = Features.load(path, absent=_GEOJSON, limit=TEXT_LIMIT).features
     for number, feature in enumerate(features):
         where = f"features.{number}"
-        shapes = _shapes(feature.geometry, f"{path}: {where}.geometry") if feature.geometry else ()
-        places.append(Place(where, {"id": feature.id} | (feature.properties or {}), [*shapes]))
+        shapes = []
+        if feature.geometry:
+            shapes = [*_shapes(feature.geometry, f"{path}: {where}.geometry")]
+        places.append(Place(where, {"id": feature.id} | (feature.properties or {}), shapes))
     return Places(True, places)
 
 
@@ -300,7 +302,9 @@ def _shapes(geometry: _Geometry, place: str) -> Iterator[Shape]:
         parts = {f"{place}.{n}": part for n, part in enumerate(geometry.coordinates)}
     for where, part in parts.items():
         if part and kind == POLYGON:
-            rings = part if isinstance(part, list) else [part]
+            rings = [part]
+            if isinstance(part, list):
+                rings = part
             yield kind, [_ring(ring, f"{where}.{n}") for n, ring in enumerate(rings)]
         elif part and kind == LINE:
             yield kind, [_line(part, where)]
@@ -331,7 +335,9 @@ def _positions(value: Any, place: str) -> np.ndarray:
         raise InputError(f"{place}: has not two numbers; allowed: [lon, lat]") from None
     most = np.array(LIMITS[GEOGRAPHIC])
     for number, axis in np.argwhere(~(np.abs(positions) <= most + _ROUNDING)):
-        where = f"{place}.{number}" if len(positions) > 1 else place
+        where = place
+        if len(positions) > 1:
+            where = f"{place}.{number}"
         name = GEOGRAPHIC[axis]
         limit = most[axis]
         line = f"{name} is {positions[number, axis]:g}; allowed: -{limit}..{limit}"

@@ -126,7 +126,9 @@ def exactly(text: str, units: str) -> tuple[Fraction, ...]:
         InputError: If it has no unit, or one of another kind.
     """
     unit, *others = units.split(" ")
-    texts = re.split(rf"\s+{others[0]}\s+", text) if others else [text]
+    texts = [text]
+    if others:
+        texts = re.split(rf"\s+{others[0]}\s+", text)
     if len(texts) != len(units.split(" ")[::2]):
         refuse(text, f"is not {KINDS[units][0]}", units)
     return tuple(_number(*part, units) for part in zip(texts, (unit, *others[1:]), strict=True))

@@ -64,9 +64,13 @@ class Constants(Fields):
     @classmethod
     def _follow_the_data_sheet(cls, values: Any) -> Any:
         """Add the fields that follow from the data sheet, which may not be given as well."""
-        sheet = values.get("data_sheet") if isinstance(values, dict) else None
+        sheet = None
+        if isinstance(values, dict):
+            sheet = values.get("data_sheet")
         try:
-            data_sheet = DataSheet.model_validate(sheet) if sheet else None
+            data_sheet = None
+            if sheet:
+                data_sheet = DataSheet.model_validate(sheet)
         except ValidationError:  # it is told where the field is validated
             return values
         if not (data_sheet and data_sheet.is_on):
@@ -116,7 +120,9 @@ class Constants(Fields):
         Raises:
             InputError: For unknown names and keys, wrong types and values out of range.
         """
-        base = loaded(scenario).model_dump() if scenario is not None else {}
+        base = {}
+        if scenario is not None:
+            base = loaded(scenario).model_dump()
         return validated(cls, merged(base, values), "scenario")
 
     def limits(self, field: str) -> tuple[float, float]:
@@ -262,7 +268,9 @@ def loaded(scenario: AnyScenario) -> Constants:
         InputError: If there is no such scenario, or this is neither a scenario nor a name.
     """
     check_type("scenario", scenario, AnyScenario, f"{_NAMED}, Scenario or ScenarioSpace")
-    return load_scenario(scenario) if isinstance(scenario, str | Path) else scenario
+    if isinstance(scenario, str | Path):
+        return load_scenario(scenario)
+    return scenario
 
 
 def scenario_names() -> list[str]:
@@ -350,8 +358,12 @@ def _out_of_range(c: Constants) -> Iterator[str]:
     for name, (low, high) in ends.items():
         least, most = c.limits(name)
         if not least <= low <= high <= most:
-            setting = low if low == high else [low, high]
-            reason = f" (cells of the zone, at most {MOST_UAVS})" if name == "uavs" else ""
+            setting = [low, high]
+            if low == high:
+                setting = low
+            reason = ""
+            if name == "uavs":
+                reason = f" (cells of the zone, at most {MOST_UAVS})"
             yield f"{name}: {setting} is out of range; allowed: {least}..{most}{reason}"
     start = ends["charge_start"][1]
     complete = ends["charge_complete"][0]

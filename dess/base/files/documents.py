@@ -103,4 +103,6 @@ class Document(BaseModel):
 
 def _refused(line: str, allowed: str) -> str:
     """The line, with other words for what is allowed, if there are some."""
-    return f"{line.partition('; allowed:')[0]}; allowed: {allowed}" if allowed else line
+    if allowed:
+        return f"{line.partition('; allowed:')[0]}; allowed: {allowed}"
+    return line

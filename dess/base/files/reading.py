@@ -200,7 +200,9 @@ def _reason(error: Exception) -> str:
         return "it is not text in UTF-8"
     if isinstance(error, json.JSONDecodeError | tomllib.TOMLDecodeError):
         return str(error)
-    return "a number has too many digits" if "digits" in str(error) else str(error)
+    if "digits" in str(error):
+        return "a number has too many digits"
+    return str(error)
 
 
 # The largest TOML file that is read [bytes].

@@ -57,7 +57,9 @@ def read_table(path: Path, schema: pa.Schema | None = None) -> pa.Table:
     except InputError:
         raise
     except (OSError, KeyError, ValueError, pa.ArrowException):  # what pyarrow raises
-        wrong = f"has no sound column {place}" if place else "damaged, or no parquet file"
+        wrong = "damaged, or no parquet file"
+        if place:
+            wrong = f"has no sound column {place}"
         raise InputError(f"{path}: {wrong}; allowed: a parquet file") from None
 
 

@@ -205,7 +205,9 @@ def check_folder(path: Path) -> None:
     # A link that leads nowhere is there: no folder can be made in its place.
     nearest = next(above for above in (path, *path.absolute().parents) if os.path.lexists(above))
     if not nearest.is_dir() or not os.access(nearest, os.W_OK):
-        reason = "Permission denied" if nearest.is_dir() else "Not a directory"
+        reason = "Not a directory"
+        if nearest.is_dir():
+            reason = "Permission denied"
         raise InputError(f"{path}: cannot be written: {reason}; allowed: another path")
 
 

@@ -74,7 +74,9 @@ class Observer:
         if kind == "state":
             boxes = [spaces.Box(*component_bounds(scenario), dtype=np.float32)]
         named = self._named(boxes)
-        self.space: spaces.Space = spaces.Dict(named) if isinstance(named, dict) else named
+        self.space: spaces.Space = named
+        if isinstance(named, dict):
+            self.space = spaces.Dict(named)
 
     def observe(
         self, state: State, missions: np.ndarray, uavs: np.ndarray
@@ -100,7 +102,9 @@ class Observer:
     def _named(self, parts: Sequence[Any]) -> Any:
         """The parts by their names, or the only one."""
         names = _PARTS.get(self.kind)
-        return dict(zip(names, parts, strict=True)) if names else parts[0]
+        if names:
+            return dict(zip(names, parts, strict=True))
+        return parts[0]
 
     def observe_all(self, state: State, shown: np.ndarray) -> tuple[Observation, np.ndarray]:
         """The observations and masks of all B x I UAVs, row by row of ``shown``.

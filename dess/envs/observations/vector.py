@@ -75,7 +75,9 @@ def _around(slots: np.ndarray) -> np.ndarray:
     for east, south in np.ndindex(3, 3):  # 0 for a node to the west or north, 2 for the opposite
         for action in range(5):
             nearer = (STEP_X[action], STEP_Y[action]) in ((east - 1, 0), (0, south - 1))
-            after = slots if action == HOVER else slots + (-1 if nearer else 1)
+            after = slots
+            if action != HOVER:
+                after = slots + (-1 if nearer else 1)
             column = action * len(SCALES)
             # Some numbers of slots are impossible in some directions; these rows are not used.
             table[:, east, south, column : column + len(SCALES)] = near[
