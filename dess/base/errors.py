@@ -182,7 +182,9 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
         named = first["ctx"]["discriminator"].strip("'")
         tag = first["ctx"]["tag"]
         return f"{place}.{named}: {shown(tag)} is unknown{one_of(tag, choices)}"
-    allowed = form_of(field) if field else f"a table of {listed(fields)}"
+    allowed = f"a table of {listed(fields)}"
+    if field:
+        allowed = form_of(field)
     if kind == "value_error":
         line = f"{place}: {first['msg'].removeprefix('Value error, ')}"
         is_complete = isinstance(first["ctx"]["error"], InputError) or "; allowed: " in line
@@ -191,7 +193,9 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
         return f"{line}; allowed: {allowed}"
     if kind == "missing" and field and is_whole:
         return f"{place}: is missing; allowed: {form_of(field, described=True)}"
-    problem = "is too short" if is_short else _problem(kind)
+    problem = _problem(kind)
+    if is_short:
+        problem = "is too short"
     return f"{place}: {shown(value)} {problem}; allowed: {allowed}"
 
 

@@ -77,7 +77,9 @@ def _quantity(
     second: tuple[float, float] | None = None,
 ) -> Any:
     """A field in units of ``KINDS``, with the limits of its first number and of the second one."""
-    limits = [(least, most), *([second] if second else [])]
+    limits = [(least, most)]
+    if second:
+        limits.append(second)
     extra: dict[str, Any] = {"units": units, "limits": limits}
     examples = [example or KINDS[units][1]]
     return Field(None, description=description, examples=examples, json_schema_extra=extra)
@@ -135,7 +137,10 @@ class DataSheet(Section):
             InputError: If it has no unit or another one, or is out of range.
         """
         units, limits = cls.extra(name)["units"], cls.extra(name)["limits"]
-        for item in value if isinstance(value, list | tuple) else (value,):
+        items: Any = (value,)
+        if isinstance(value, list | tuple):
+            items = value
+        for item in items:
             if isinstance(item, bool | int | float):
                 refuse(item, "has no unit", units)
             if isinstance(item, str):
@@ -151,8 +156,12 @@ class DataSheet(Section):
             has_budget = any(getattr(self, name) for name in LINK_BUDGET)
             if has_budget and self.snr:
                 raise InputError("snr: follows from tx_power; allowed: one of both")
-            needed = (*_NEEDED, *(LINK_BUDGET if has_budget else ("snr",)))
-            for name in (*needed, "mtbf") if self.repair else needed:
+            needed = [*_NEEDED, "snr"]
+            if has_budget:
+                needed = [*_NEEDED, *LINK_BUDGET]
+            if self.repair:
+                needed.append("mtbf")
+            for name in needed:
                 if getattr(self, name) is None:
                     raise InputError(f"{name}: is missing; allowed: {self.form_of(name)}")
             self.fields()
@@ -200,8 +209,13 @@ class DataSheet(Section):
         self._slots("charging", 10_000)
         gain = self.charge_rate
         following: dict[str, Any] = {
-            **{"cell_size": self.units.cell, "slot_length": 1.0, "landing": True, "quota": 0},
-            **{"flying_time": full, "charge_start": 30, "charge_complete": full},
+            "cell_size": self.units.cell,
+            "slot_length": 1.0,
+            "landing": True,
+            "quota": 0,
+            "flying_time": full,
+            "charge_start": 30,
+            "charge_complete": full,
             "charge_rate": int(gain) if gain.denominator == 1 else float(gain),
             **self._data(),
             **self._radio(),

@@ -257,8 +257,9 @@ class Fields(Strict):
     def charge_fraction(self) -> Fraction:
         """The battery gained in a charging slot [%], exactly as it or the data sheet was typed."""
         sheet = self.data_sheet
-        rate = sheet.charge_rate if sheet.is_on else Fraction(str(self.charge_rate))
-        return charge_fraction(rate)
+        if sheet.is_on:
+            return charge_fraction(sheet.charge_rate)
+        return charge_fraction(Fraction(str(self.charge_rate)))
 
     @property
     def is_extended(self) -> bool:

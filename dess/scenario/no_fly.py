@@ -88,7 +88,10 @@ def _of_text(path: Path, size: Size, _: Projection | None, source: NoFlyFile) ->
     text = read_text(path, TEXT_LIMIT, "utf-8-sig", "a map")
     rows = [(number, line.rstrip()) for number, line in enumerate(text.splitlines(), 1)]
     if text.startswith("type"):  # the header of a map of the MAPF benchmark
-        rows = rows[[line for _, line in rows].index("map") + 1 :] if "map" in text.split() else []
+        begin = len(rows)
+        if "map" in text.split():
+            begin = [line for _, line in rows].index("map") + 1
+        rows = rows[begin:]
     filled = [place for place, (_, line) in enumerate(rows) if line]
     rows = rows[filled[0] : filled[-1] + 1] if filled else []
     allowed = f"allowed: {size[1]} lines of {size[0]} cells, as grid and rows say"
@@ -154,7 +157,8 @@ def _of_places(
     for place in chosen:
         if is_geographic and projection:
             cells, is_near = _cells_of(place, projection, source, _radius(place, path))
-            unseen += [place.where] if is_near and not cells.any() else []
+            if is_near and not cells.any():
+                unseen.append(place.where)
         else:
             cells = np.zeros_like(closed)
             cell = place.shapes[0][1][0][0].astype(int)

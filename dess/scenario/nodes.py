@@ -288,7 +288,8 @@ def _nearest_free(
     cells = [*own]
     moved = []
     for number, (x, y) in enumerate(own):
-        moved += [] if is_free[y, x] else [number]
+        if not is_free[y, x]:
+            moved.append(number)
         is_free[y, x] = False
     for number in moved:
         free = np.argwhere(is_free)[:, ::-1]

@@ -36,7 +36,9 @@ class ZonePlace(Strict):
 def unread(values: Mapping[str, Any]) -> dict[str, Any]:
     """The fields that name files or degrees, each with what stands for it."""
     files = {key: kind for key, kind in _UNREAD.items() if _is_named(values.get(key))}
-    return files | ({"zones": []} if _are_places(values.get("zones")) else {})
+    if _are_places(values.get("zones")):
+        files["zones"] = []
+    return files
 
 
 def _is_named(value: Any) -> bool:
@@ -90,7 +92,8 @@ class OwnSea(NamedTuple):
         if self.grid.centre:
             projection = Projection(self.grid.centre, *about)
         placed = self._zones(values, projection) | self._no_fly(values, projection)
-        placed |= {"centre": projection.centre} if projection else {}
+        if projection:
+            placed["centre"] = projection.centre
         if nodes_found and values["nodes"] is of_nodes:
             closed = np.zeros(self.grid.size[::-1], np.bool_)
             for x, y in placed.get("no_fly", self.grid.no_fly):
@@ -141,7 +144,9 @@ class OwnSea(NamedTuple):
         if not _is_named(tables := values.get("no_fly")):
             return {}
         closed = np.zeros(self.grid.size[::-1], np.bool_)
-        for table in tables if isinstance(tables, list) else [tables]:
+        if not isinstance(tables, list):
+            tables = [tables]
+        for table in tables:
             source = self._file(NoFlyFile, table, "no_fly")
             path = self.beside("no_fly", source.file)
             closed |= no_fly_in(path, self.grid.size, projection, source)
@@ -157,12 +162,11 @@ class OwnSea(NamedTuple):
         elif isinstance(zone, dict):
             zone = self._rectangle(zone, "zone", projection)
         if zones and _are_places(zones):
-            zones = [
-                table | {"cells": self._rectangle(table["cells"], f"zones.{n}.cells", projection)}
-                if _are_places([table])
-                else table
-                for n, table in enumerate(zones)
-            ]
+            zones = [*zones]
+            for n, table in enumerate(zones):
+                if _are_places([table]):
+                    cells = self._rectangle(table["cells"], f"zones.{n}.cells", projection)
+                    zones[n] = table | {"cells": cells}
         return {key: table for key, table in (("zone", zone), ("zones", zones)) if table}
 
     def _rectangle(self, of: Any, key: str, projection: Projection | None) -> Rectangle:
@@ -178,4 +182,6 @@ class OwnSea(NamedTuple):
 
     def _file(self, model: type[BaseModel], of: Any, key: str) -> Any:
         """A file that a field names, by its name or in a table."""
-        return validated(model, {"file": of} if isinstance(of, str) else of, f"{self.where}: {key}")
+        if isinstance(of, str):
+            of = {"file": of}
+        return validated(model, of, f"{self.where}: {key}")

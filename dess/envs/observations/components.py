@@ -41,13 +41,17 @@ def _beyond_the_paper(space: ScenarioSpace) -> list[list[str]]:
     nodes = range(len(space.nodes))
     failures = space.failures
     mates = [f"mate_{j}_grounded" for j in range(1, space.uavs[1])]
-    return [
-        ["grounded", *mates] if failures.uav_rate > 0 else [],
-        ["pads_out"] if failures.pad_rate > 0 else [],
-        [f"silent_{k}" for k in nodes] if failures.node_rate > 0 else [],
-        [f"wind_{name}" for name in ACTION_NAMES[:HOVER]] if space.wind.is_on else [],
-        [f"age_{k}" for k in nodes] if space.age.is_on else [],
+    groups = [
+        (failures.uav_rate > 0, ["grounded", *mates]),
+        (failures.pad_rate > 0, ["pads_out"]),
+        (failures.node_rate > 0, [f"silent_{k}" for k in nodes]),
+        (space.wind.is_on, [f"wind_{name}" for name in ACTION_NAMES[:HOVER]]),
+        (space.age.is_on, [f"age_{k}" for k in nodes]),
     ]
+    for has_group, names in groups:
+        if not has_group:
+            names.clear()
+    return [names for _, names in groups]
 
 
 def component_bounds(scenario: Scenario | ScenarioSpace) -> tuple[np.ndarray, np.ndarray]:
