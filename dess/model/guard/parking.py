@@ -21,7 +21,7 @@ class Parking(NamedTuple):
         taken: (zone cells,) whether a teammate takes the cell.
         planned: (I,) the zone cell of each teammate that chooses before the UAV, or -1.
         order: (I,) the UAVs in the order in which they choose.
-        plan: The plan of pads; its zones are -1 where nobody may have to wait for a pad.
+        plan: The plan of pads; its zones are -1 where no UAV may have to wait for a pad.
     """
 
     taken: np.ndarray

@@ -86,7 +86,7 @@ def plan_memory(uavs: int) -> Plan:
 def waits_in_zone(mission, u):
     """Whether a UAV hovers in a zone with few pads, where it waits until it may ask for one.
 
-    It hardly ever moves on, so it keeps its cell, and nobody out of the cells beside it.
+    It hardly ever moves on, so it keeps its cell, and keeps no teammate out of the cells beside it.
     """
     if not u.active or u.zone < 0 or u.executed != HOVER or lands(mission):
         return False

@@ -45,7 +45,7 @@ CHARGING = {"pad_request": 5, "charging": True, "charge_slots": 3, "latch": True
     [
         # Who comes first is charged first. It has 16 % then and needs 7 slots for 64 %.
         ([_uav(5, 20), _uav(3, 19)], {}, [10, 3]),
-        # Above C_S nobody can ask, and a UAV that comes later with less battery is before it.
+        # Above C_S no UAV can ask, and a UAV that comes later with less battery is before it.
         ([_uav(2, 30), _uav(6, 19)], {}, [13, 6]),
         # The pad is taken for 3 slots, then a UAV has asked for it, which needs 8 slots for 71 %.
         ([_uav(2, 20), _uav(0, 12, pad_request=7), _uav(1, 50, x=0, **CHARGING)], {}, [11, 3, -1]),
@@ -140,7 +140,7 @@ def test_a_uav_leaves_the_near_zone_to_two_that_come_before_it_with_more_battery
 
 @given(st.lists(st.tuples(st.integers(0, 35), st.integers(1, 60)), min_size=2, max_size=6))
 def test_no_pad_is_given_to_two_uavs_at_once(team):
-    """And nobody is charged before it has come, nor asks above C_S."""
+    """And no UAV is charged before it has come, nor asks above C_S."""
     uavs = [_uav(cells, battery) for cells, battery in team]
     turns = _plan(uavs, **BOTH_ENDS)[0].turns
     assert (turns["begins"] >= turns["asks"]).all()
