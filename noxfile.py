@@ -21,9 +21,10 @@ STUDIES = {
     "fig5": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
     "comparison failures": "--missions 400",
     "sweet-spot": "--policy ddqn --policy greedy",
-    "explorer age": "--missions 30",
+    "explorer": "--missions 30",
+    "age": "",
     "planning": "",
-    "gap": "--missions 30 --policy greedy --policy ddqn --policy planner",
+    "gap": "--missions 20 --policy greedy --policy ddqn --policy planner",
     "seas": "--missions 1 --policy any --policy greedy --policy planner-short",
     "seas-landing seas-horizon": "--missions 1 --policy any --policy greedy",
 }

@@ -16,11 +16,11 @@
 # %% tags=["parameters"]
 results = "../../results"  # folder in which the sweep is kept
 scenario = "bay"  # the sea: a TOML file, or this shipped example
-fields = {"uavs": [2, 3], "pads": [1, 2, 3], "arrival_rate": [0.01, 0.03], "landing": True}
-policies = None  # the best that five minutes allow, and greedy
-prices = {"uav": 20_000, "pad": 3_000, "charge": 2, "hour": 100, "slot_seconds": 60}
-currency, planned = "EUR", 500  # currency of the prices; number of missions planned for the fleet
-requirements = {"success": 0.99, "collection_ratio": 0.66}  # the lowest acceptable means
+fields = {"uavs": [1, 2, 3], "pads": [1, 2], "arrival_rate": [0.01, 0.03], "landing": True}
+policies = ["any", "greedy"]  # None: the best that five minutes allow, and greedy
+prices = {"uav": 20_000, "pad": 10_000, "charge": 2, "hour": 100, "slot_seconds": 60}
+currency, planned = "EUR", 200  # currency of the prices; number of missions planned for the fleet
+requirements = {"success": 0.99, "collection_ratio": 0.6}  # the lowest acceptable means
 missions = 300  # additional missions that check each selected setting
 seed = 0  # seed of the missions
 workers = 1  # processes
