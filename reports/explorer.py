@@ -17,6 +17,7 @@ from IPython.display import HTML
 from dess import InputError
 from dess.analysis import metrics, names, numbers
 from dess.analysis.answers import summary
+from dess.analysis.answers.settings.home import with_way_home
 from dess.analysis.answers.settings.points import points_in_words, values_of_points, varied_values
 from dess.analysis.figures import style
 from dess.analysis.results.tables import Results
@@ -60,15 +61,25 @@ class Grid:
         return int(self._places.index[(self._places == middle_places).all(axis=1)][0])
 
     @cached_property
+    def metrics(self) -> dict[str, str]:
+        """The metrics that are shown, with their names: the paper's, and home beside success."""
+        shown = with_way_home(self.results, metrics.METRICS)
+        return {metric: metrics.metric_of(metric).name for metric in shown}
+
+    @cached_property
     def means(self) -> pd.DataFrame:
-        """The means of the paper's metrics, by design point, policy and metric.
+        """The means of the metrics, by design point, policy and metric.
 
         Design points are in the order of the sliders; the value of the last slider varies fastest.
         """
         table = summary.means_of_points(self.results)
-        table = table[table["metric"].isin([*metrics.METRICS])]
-        order = {point: number for number, point in enumerate(self._places.index)}
-        return table.sort_values("point", key=lambda p: p.map(order), kind="stable")
+        table = table[table["metric"].isin([*self.metrics])]
+        orders = {
+            "point": {point: number for number, point in enumerate(self._places.index)},
+            "policy": {policy: number for number, policy in enumerate(self.results.policies)},
+            "metric": {metric: number for number, metric in enumerate(self.metrics)},
+        }
+        return table.sort_values([*orders], key=lambda column: column.map(orders[column.name]))
 
     def at_start(self) -> pd.DataFrame:
         """The rows of ``means`` of the design point ``start``."""
@@ -99,7 +110,7 @@ class Grid:
 
 
 def make_explorer(results: Results) -> HTML:
-    """Sliders, a choice of policies, the three metrics of each, and a curve along a slider.
+    """Sliders, a choice of policies, the metrics of each, and a curve along a slider.
 
     Args:
         results: The results of a study whose design is a grid.
@@ -136,7 +147,7 @@ def make_explorer(results: Results) -> HTML:
             for *ends, n in grid.means[columns].itertuples(index=False)
         ],
     }
-    shown = {"fields": fields, "policies": looks, "metrics": metrics.METRICS, "texts": texts}
+    shown = {"fields": fields, "policies": looks, "metrics": grid.metrics, "texts": texts}
     return render_part("explorer.html", data=data, **shown)
 
 

@@ -22,13 +22,16 @@ from dess.analysis.ask.question import (
 )
 from dess.analysis.execution.jobs import Progress
 from dess.analysis.metrics import (
+    HOME,
     METRICS,
+    MOST_SLOTS,
     PRODUCT,
     RATIO,
     SUCCESS,
     column_as_told,
     columns_in_units,
     format_length,
+    in_either,
     measured_in,
     metric_of,
 )
@@ -118,9 +121,12 @@ def compare_sides(results: Results) -> pd.DataFrame:
         *measured_columns(results),
         *(column_as_told(name, missions) for name in MEASURES),
     ]
+    # Without a quota, all missions last until their horizon.
+    has_quota = any(space.quota for space in results.store.manifest.scenarios)
+    fixed = [] if has_quota else [column_as_told("slots", missions)]
     tables = []
     for policy, rows in missions.groupby("policy", sort=False):
-        table = compare(rows, BASELINE, metrics, correction=None, of="point")
+        table = _compare_with_baseline(rows, metrics, fixed)
         table = table.set_index("metric").reindex(metrics).rename_axis("metric").reset_index()
         table["n"] = table["n"].fillna(0).astype(int)
         sides = pd.DataFrame({m: by_replication(rows, m, "point").mean() for m in metrics})
@@ -129,6 +135,27 @@ def compare_sides(results: Results) -> pd.DataFrame:
         table["after"] = table["metric"].map(sides.loc[VARIATION])
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
+
+
+def _compare_with_baseline(
+    rows: pd.DataFrame, metrics: Sequence[str], fixed: Sequence[str]
+) -> pd.DataFrame:
+    """The variation compared with the baseline by some metrics, as ``dess.analysis.compare``.
+
+    Args:
+        rows: The missions of a policy.
+        metrics: The metrics.
+        fixed: Those that no rare failure can change: their range does not count.
+    """
+    without_range = rows.drop(columns=in_either(MOST_SLOTS), errors="ignore")
+    tables = [
+        compare(missions, BASELINE, names, correction=None, of="point")
+        for missions, names in (
+            (rows, [name for name in metrics if name not in fixed]),
+            (without_range, fixed),
+        )
+    ]
+    return pd.concat([table for table in tables if len(table)], ignore_index=True)
 
 
 def verdict_on_change(answer: Any) -> str:
@@ -282,7 +309,24 @@ class WhatIf:
             parts.append(part)
         n = f"n = {numbers.format_span(row.n for row in self._of_product())} pairs"
         with_new = numbers.join_words(new)
-        return f"With {with_new}, the product changes: {numbers.join_words(parts)}; {n}."
+        changes = f"With {with_new}, the product changes: {numbers.join_words(parts)}; {n}."
+        return f"{changes} {self._way_home()}".strip()
+
+    def _way_home(self) -> str:
+        """In how many missions of both sides all UAVs could fly home; empty without need."""
+        table = self.table()
+        shares = table[table["metric"] == HOME]
+        if shares.empty:
+            return ""
+        parts = [
+            f"with {row.policy} in {numbers.format_percent(row.before)} of the missions before and "
+            f"in {numbers.format_percent(row.after)} after"
+            for row in shares.itertuples()
+        ]
+        return (
+            f"All UAVs end with the battery for the way home {numbers.join_words(parts)}. "
+            "With landing = true, missions end on the ground."
+        )
 
     def answers(self) -> list[str]:
         """What the variation changes, and then the conclusion on every policy, in sentences."""

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from dess.analysis.figures import style
-from dess.analysis.metrics import BOUND, METRICS, PRODUCT, metric_of
+from dess.analysis.metrics import BOUND, HOME, METRICS, PRODUCT, metric_of
 from dess.analysis.numbers import format_count
 
 TAIL = 0.05  # share of the missions beyond each end of the second panel of a difference
@@ -67,9 +67,9 @@ def plot_gains(answers: pd.DataFrame) -> Figure:
     """The paired differences of the metrics of every policy, with intervals.
 
     Args:
-        answers: Rows of ``ask.what_if.compare_sides``.
+        answers: Rows of ``ask.what_if.compare_sides``; the way home is shown if they have it.
     """
-    names = {metric: name.replace(" and ", "\nand ") for metric, name in METRICS.items()}
+    names = METRICS | {HOME: "Battery for\nthe way home"}
     rows = answers[answers["metric"].isin([*names])]
     return plot_differences(rows, rows["metric"].map(names), "Variation − baseline")
 

@@ -20,7 +20,7 @@ results = "../../results"  # folder with the results folder of explorer
 # %%
 from pathlib import Path
 
-from dess.analysis import load_results, metrics, numbers
+from dess.analysis import load_results, numbers
 from dess.analysis.answers.settings.home import way_home_range_sentence
 from dess.analysis.answers.settings.points import points_in_words
 from dess.reports.explorer import Grid, make_explorer
@@ -57,7 +57,7 @@ html.write_markdown("{sentence}", sentence=way_home_range_sentence(study))
 # %%
 table = (
     numbers.estimates_as_text(start, "policy")
-    .rename(columns=metrics.METRICS)
+    .rename(columns=grid.metrics)
     .reset_index(names="Policy")
 )
 html.make_table(

@@ -111,6 +111,30 @@ def test_what_one_side_measures_has_no_difference(tmp_path):
     assert line.tolist() == ["–", f"{mean:.2f}", ""]
 
 
+def test_the_first_sentence_says_in_how_many_missions_uavs_can_fly_home(answer, tmp_path):
+    missions = answer.results.missions
+    said = answer.sentence()
+    for policy in POLICIES:
+        of_policy = missions[missions["policy"] == policy].groupby("point")["home"].mean()
+        before, after = (f"{100 * share:.1f} %" for share in of_policy)
+        assert f"with {policy} in {before} of the missions before and in {after} after" in said
+    landing = asked(tmp_path, 4, baseline={"uavs": 2, "landing": True})
+    assert "way home" not in landing.sentence()
+
+
+def test_missions_without_a_quota_have_no_allowance_for_being_shorter(tmp_path):
+    changes = {
+        "baseline": {"uavs": 2, "quota": 0, "landing": True, "max_slots": 60},
+        "policies": ["greedy"],
+    }
+    same = asked(tmp_path, 6, **changes).table().set_index("metric").loc["slots"]
+    assert same[["difference", "low", "high", "p"]].tolist() == [0, 0, 0, 1]
+    longer = asked(tmp_path, 6, **changes, settings={"max_slots": 75})
+    other = longer.table().set_index("metric").loc["slots"]
+    assert other[["difference", "low", "high"]].tolist() == [15, 15, 15]
+    assert found.verdict_on_change(other) == ABOVE
+
+
 @pytest.mark.parametrize(
     ("answer", "side"),
     [
