@@ -254,13 +254,13 @@ def age_changes(results: Results) -> pd.DataFrame:
 def age_sentence(results: Results) -> str:
     """The mean age with the smallest and the third fleet, at the extreme arrival rates.
 
-    Whether it falls is said by the interval of the change.
+    Whether it falls is said by the interval of the relative change, which the page shows.
     """
     table = means_of_metrics(results, [AGE])
     table = table[table["policy"] == results.policies[0]].sort_values("uavs")
     few, more = table["uavs"].unique()[:3][[0, -1]]
     ends = table[table["uavs"].isin([few, more])].set_index("arrival_rate")[_ENDS]
-    changed = changes_from_reference(results, "uavs", few, AGE)
+    changed = changes_from_reference(results, "uavs", few, AGE, relative=True)
     changed = changed[(changed["policy"] == results.policies[0]) & (changed["uavs"] == more)]
     verbs = {ABOVE: "rises", BELOW: "falls", INCONCLUSIVE: "does not surely change,"}
     parts = []

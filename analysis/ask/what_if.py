@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import tomli_w
+from scipy.optimize import brentq
 from scipy.special import ndtri
 
 from dess import InputError
@@ -177,17 +178,29 @@ def missions_needed(answer: Any) -> float:
     """The number of missions that would show a difference of the observed size.
 
     It is computed by the normal approximation from the observed difference and variance, which are
-    estimates themselves.
+    estimates themselves. What the interval allows for rare failures falls with the number of
+    missions, all else with its root.
 
     Returns:
         The number with which the interval excludes 0 with probability ``POWER``; infinite if there
         is no difference, or its variance is unknown.
     """
-    if not answer.difference or not answer.low < answer.high:
+    if not answer.difference or not answer.low < answer.high or np.isnan(answer.student):
         return np.inf
-    quantile = -ndtri((1 - LEVEL) / 2)
-    half = (answer.high - answer.low) / 2 / abs(answer.difference)
-    return float(np.ceil(answer.n * (half * (1 + ndtri(POWER) / quantile)) ** 2))
+    gap, half = abs(answer.difference), (answer.high - answer.low) / 2
+    quantile, power = -ndtri((1 - LEVEL) / 2), ndtri(POWER)
+    spread = answer.student / quantile * np.sqrt(answer.n)
+    rare = np.sqrt(max((half * answer.n / quantile) ** 2 - answer.n * spread**2, 0))
+
+    def shortfall(root: float) -> float:
+        """How far the sum of so many differences is below what is needed."""
+        needed = quantile * np.hypot(spread * root, rare) + power * spread * root
+        return float(needed - gap * root**2)
+
+    least = (quantile + power) * spread / gap
+    most = least + np.sqrt(quantile * rare / gap)
+    root = brentq(shortfall, 0.999 * least, 1.001 * most)
+    return float(np.ceil(root**2))
 
 
 def product_differences(results: Results, policy: str) -> pd.Series:

@@ -340,7 +340,8 @@ def scorecard_sentence(rows: Sequence[Row]) -> str:
     sentences.append(
         f"Of the others, it passes {without} of {len(passed)} that a policy without learning "
         f"passes too, and {undecided_held} of {len(undecided)} on which such policies decide "
-        f"nothing; it has {shared} of {len(weaknesses)} weaknesses that the paper names."
+        f"nothing; it is shown to have {shared} of {len(weaknesses)} weaknesses that the paper "
+        "names."
     )
     return " ".join(sentences)
 

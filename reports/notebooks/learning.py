@@ -119,7 +119,8 @@ html.write_markdown(
 html.make_table(
     answers.ablation_table(table, equal, baseline),
     "Means over n trainings with 95 % intervals, the prediction interval of one new training, "
-    "and differences with Welch's t interval. ▲ better, ▼ worse, ≈ inconclusive",
+    "and differences with Welch's t interval. ▲ better, ▼ worse, ≈ inconclusive, by the "
+    "interval, which is not corrected for the number of variants",
     table,
 )
 

@@ -14,6 +14,7 @@ from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.ask import what_if as found
 from dess.analysis.ask.what_if import BASELINE, VARIATION
 from dess.analysis.metrics import PRODUCT
+from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE
 from tests.analysis.small import asked, write_scenario
@@ -75,8 +76,9 @@ def answer(tmp_path_factory):
 
 
 def row(difference, low, high, p=0.01, n=100):
-    """A row of an answer."""
-    return pd.Series({"difference": difference, "low": low, "high": high, "p": p, "n": n})
+    """A row of an answer, without an allowance for rare failures."""
+    ends = {"difference": difference, "low": low, "high": high}
+    return pd.Series({**ends, "p": p, "n": n, "student": (high - low) / 2})
 
 
 def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(tmp_path):
@@ -160,6 +162,17 @@ def test_so_many_missions_show_the_difference_that_was_seen():
     assert found.missions_needed(row(-gap, -gap - half, -gap + half, n=n)) == needed
     for nothing in (row(0.0, -half, half), row(0.0, 0.0, 0.0), row(gap, gap, gap)):
         assert found.missions_needed(nothing) == np.inf
+
+
+def test_what_is_allowed_for_rare_failures_falls_with_the_number_of_missions():
+    def pairs(n):
+        baseline = np.full(n, 0.5)
+        values = baseline + 0.014 + 0.01 * np.resize([-1, 1], n)
+        return pd.Series(compare_pairs(values, baseline, metric=PRODUCT)._asdict())
+
+    needed = int(found.missions_needed(pairs(40)))
+    assert pairs(40).low < 0 < pairs(needed).low
+    assert pairs(needed // 2).low < 0
 
 
 def with_missions(answer, before, after, ratios):
