@@ -182,7 +182,9 @@ def leading_policies(
     return [policy for policy in (learned, heuristic) if policy]
 
 
-def strongest_fields_sentence(table: pd.DataFrame, policies: Sequence[str]) -> str:
+def strongest_fields_sentence(
+    table: pd.DataFrame, policies: Sequence[str], changes: ByField
+) -> str:
     """Which parameters change the product of every policy most, in a sentence for each.
 
     A parameter may help one policy and hurt another one, so none of them stands for the others.
@@ -190,6 +192,7 @@ def strongest_fields_sentence(table: pd.DataFrame, policies: Sequence[str]) -> s
     Args:
         table: The ``means_by_field``.
         policies: The policies.
+        changes: The changes of the product; where no two values differ significantly, it is said.
     """
     sentences = []
     for policy in policies:
@@ -203,7 +206,9 @@ def strongest_fields_sentence(table: pd.DataFrame, policies: Sequence[str]) -> s
             first, last = [
                 f"{numbers.format_percent(row.mean)} at {row.value}" for row in ends.itertuples()
             ]
-            courses.append(f"{field_named(str(field)).within} (from {first} to {last})")
+            is_open = field in changes and shape_of_changes(changes[field][policy]).words == LEVELS
+            doubt = ", inconclusive" if is_open else ""
+            courses.append(f"{field_named(str(field)).within} (from {first} to {last}{doubt})")
         sentences.append(
             f"The product of {policy} depends most on the {' and on the '.join(courses)}."
         )

@@ -48,7 +48,7 @@ level = numbers.format_level(LEVEL)
 checks = summary.means_of_check(sweet)
 
 # %%
-html.make_answer(main_effects.strongest_fields_sentence(effects, policies))
+html.make_answer(main_effects.strongest_fields_sentence(effects, policies, changes))
 
 # %%
 most = effects[effects["field"].isin(main_effects.strongest_fields(effects, leading))]

@@ -107,13 +107,20 @@ def test_the_answer_says_of_every_policy_where_a_parameter_leads():
         for policy, of_policy in means.items()
         for position, value in enumerate(("440", "600"))
     )  # fmt: skip
-    said = main_effects.strongest_fields_sentence(table, ["learned", "greedy"])
+    pair = {"first": [0], "second": [1], "difference": [0.1]}
+    changes = {
+        "quota": {
+            "learned": pd.DataFrame({**pair, "p_adjusted": [0.01]}),
+            "greedy": pd.DataFrame({**pair, "p_adjusted": [0.2]}),
+        }
+    }
+    said = main_effects.strongest_fields_sentence(table, ["learned", "greedy"], changes)
     assert (
         "of learned depends most on the communication quota (from 90.0 % at 440 to 78.5 % at 600)."
         in said
     )
     assert (
-        "of greedy depends most on the communication quota (from 60.0 % at 440 to 69.0 % at 600)."
-        in said
+        "of greedy depends most on the communication quota (from 60.0 % at 440 to 69.0 % at 600, "
+        "inconclusive)." in said
     )
     assert said.endswith("n = 300 missions per value.")
