@@ -107,6 +107,12 @@ def test_the_age_is_compared_with_the_published_effect(studied):
         set={"age.measured": True},
         design=grid(uavs=[1, 2, 3], arrival_rate=[0.1, 0.5]),
     )
+    # With rare failures the absolute change is open, and the relative one, of the table, is not.
+    rarely = planted(results, AGE, lambda row: 130 + row["replication"] + 100 * (row["uavs"] == 1))
+    assert (operations.age_changes(rarely)["high"] < 0).all()
+    absolute = operations.changes_from_reference(rarely, "uavs", 1, AGE)
+    assert (absolute["high"] > 0).all()
+    assert "the mean age of the data falls from" in operations.age_sentence(rarely)
     # Where it is not known how long missions may last, no rare failures are allowed for.
     results = replace(results, missions=results.missions.drop(columns=MOST_SLOTS))
     halved = planted(results, AGE, lambda row: (80 + row["replication"]) / row["uavs"])
