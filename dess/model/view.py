@@ -169,9 +169,12 @@ def check_team(policies: int, spaces: Iterable[ScenarioSpace]) -> None:
     """
     fleet = max(space.uavs[1] for space in spaces)
     if policies > fleet:
+        uavs = "1 UAV"
+        if fleet > 1:
+            uavs = f"{fleet} UAVs"
         raise InputError(
-            f"policy: the team has {policies} policies, but the largest fleet has {fleet} "
-            f"UAV{'s' * (fleet > 1)}; allowed: {fleet} at most"
+            f"policy: the team has {policies} policies, but the largest fleet has {uavs}; "
+            f"allowed: {fleet} at most"
         )
 
 
