@@ -225,7 +225,7 @@ def save_policy(
         config: The settings of the training.
         space: The scenario space of the training.
         run: Information about the training for readers; ``load_policy`` ignores it.
-        ranges: ``ranges_of`` the scenarios of the training, if these are more than the space.
+        ranges: ``field_ranges`` of the scenarios, if these are more than the space.
 
     Raises:
         InputError: If a file cannot be written.

@@ -343,7 +343,8 @@ def _find_finished_page(
     """Find out whether the page of a report is there and of these results, which are sound then."""
     if values:
         return
-    with suppress(InputError):  # there are none, or ``_lacking`` finds out what is wrong with them
+    # If there are none, ``_list_lacking`` finds out what is wrong.
+    with suppress(InputError):
         report.key = page_key(report, _find_results(report, results))
         kept = not report.formats and has_key(out / report.page, report.key)
         report.is_current = kept and report.is_in(out, results)
