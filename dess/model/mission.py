@@ -7,30 +7,29 @@ The processes decide when things happen; ``rules.py`` decides what they change. 
 mission slots. The processes of a mission are:
 
 - the *clock* opens and closes the slots, and lets the policies decide for all UAVs together;
-- each *UAV* flies slot by slot, or waits for a pad of its charging zone and charges on it;
-- the *radio* serves all flying UAVs m times in a slot, at the times t + n/m;
+- each *UAV* flies slot by slot, or asks for a pad of its charging zone and charges on it;
+- the *radio* lets all UAVs in the air collect data in the m communication slots of a slot, of which
+  number n ends at the time t + n/m;
 - the *arrivals* bring new data to the nodes;
 - the *failures* strike UAVs, pads and nodes; each *pad* has a process that holds it while it is out
   of order.
 
-A charging zone is a ``simpy.PriorityResource``, and its pads are the capacity of the resource. A
-``Signal`` is an event that happens again and again.
+A charging zone is a ``simpy.PriorityResource``, and its pads are the capacity of the resource.
+SimPy counts the pads in use; which pad a UAV stands on is known to the rules. A ``Signal`` is an
+event that happens again and again.
 
 Slot t, from the time t to the time t + 1, is:
 
 1. The policies decide, and the safety controller resolves the moves (``decide_moves``).
 2. The UAVs take their turns at the pads, one after the other (``give_turns``).
-3. The batteries lose or gain what the slot takes or adds, and the UAVs depart (``depart``).
-4. The radio serves the UAVs at t + 1/m, ..., t + 1 (``run_radio``).
+3. The batteries lose or gain what the slot takes or adds (``update_batteries``).
+4. UAVs in the air collect data at t + 1/m, ..., t + 1 (``run_radio``).
 5. New data arrive (``bring_data``), UAVs whose quota is filled or whose battery is empty end
    (``settle``), and things fail or are repaired (``run_failures``).
 
-1 to 3 happen at the time t, and 5 happens at the time t + 1. ``docs/concepts/processes.md`` shows
-the lines that matter.
-
-For numba, a numpy record as an argument takes longer (3 us) than the arrays of the whole state, so
-the compiled functions that are called in every slot take the arrays and hand their first records to
-the rules. A tuple of arrays takes longer (1 us) than its arrays one by one.
+1 to 3 happen at the time t, and 5 happens at the time t + 1, after the last communication slot;
+where data arrive in continuous time, each packet has a time of its own.
+``docs/concepts/processes.md`` shows the lines that matter.
 """
 
 from collections.abc import Sequence
@@ -57,10 +56,10 @@ from dess.physics.landing import is_over
 from dess.physics.wind import ways_home
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
 
-# Why a UAV is interrupted while it waits for a pad or charges.
-CALLED_AWAY = "it may not charge any more"
+# Why a UAV is interrupted: while it waits in a queue, or while it is on a pad.
+CALLED_AWAY = "it no longer wants a pad"
 PAD_FAILED = "its pad has failed"
-# The place of a failed pad in the queue of its zone.
+# The priority of a pad that has failed, in the queue of its zone.
 BEFORE_ALL_UAVS: Any = (-inf,)
 
 
@@ -96,14 +95,18 @@ def simulate(
 
 
 class Signal:
-    """An event that happens again and again."""
+    """An event that happens again and again.
+
+    A SimPy event happens once; a signal has a new one each time. Who waits for it must do so before
+    it is sent: a signal for which no process waits is lost.
+    """
 
     def __init__(self, env: simpy.Environment):
         self._env = env
         self._next = env.event()
 
     def wait(self) -> simpy.Event:
-        """The next time that it happens, for a process to wait for."""
+        """The event of the next time, for a process to yield."""
         return self._next
 
     def send(self, value: Any = None) -> None:
@@ -122,7 +125,9 @@ class Mission:
             ``residual`` and ``sensors`` are parts of it.
         fleet: The numbers of the UAVs.
         zones: The charging zones, whose capacity is the number of their pads.
-        turns: Tell each UAV that a slot opens.
+        turns: Tell each UAV that in this slot it may act at the pads. A UAV in a queue gets none:
+            it waits for its pad.
+        uav_processes: The processes of the UAVs.
         packets: The packets, where data arrive in continuous time.
         listener: Is told what happens; it may write the event log.
     """
@@ -130,14 +135,14 @@ class Mission:
     def __init__(
         self,
         scenario: ScenarioSpace,
-        team: Sequence[Any],
+        policies: Sequence[Any],
         seed: int,
         replication: int,
         *,
         events: bool = False,
     ):
         self.is_extended = scenario.is_extended
-        self.team = team
+        self.policies = policies
         self.world = world_of(scenario)
         self.shown_world = self.world.shown()  # what policies may see of it
         self.state = state_of([scenario], 1)
@@ -147,7 +152,7 @@ class Mission:
         self.residual = self.state.residual[0]
         self.sensors = self.state.sensors[0]
         self.fleet = range(int(self.mission["uavs"]))
-        self.may_charge_bits = 0  # bit i tells whether UAV i may charge in this slot
+        self.wants_pad_bits = 0  # bit i tells whether UAV i wants a pad in this slot
         self.arrivals = np.zeros(len(scenario.nodes), np.int64)
         self.scratch = empty_scratch(scenario.uavs[1], len(scenario.nodes))
         self.listener = LogWriter(self.state, self.world.nodes) if events else Listener()
@@ -159,9 +164,10 @@ class Mission:
         self.env = simpy.Environment()
         self.zones = [simpy.PriorityResource(self.env, pads) for pads in scenario.zone_pads]
         self.zone_of_pad = [zone for zone in self.zones for _ in range(int(zone.capacity))]
+        self.uav_processes: list[simpy.Process] = []
         self.turns = [Signal(self.env) for _ in self.fleet]
-        self.slot_opens = Signal(self.env)
-        self.uavs_are_served = Signal(self.env)
+        self.radio_starts = Signal(self.env)
+        self.radio_is_done = Signal(self.env)
         self.data_are_due = Signal(self.env)
         self.failures_are_due = Signal(self.env)
         self.slot_closes = Signal(self.env)
@@ -171,8 +177,8 @@ class Mission:
     def run(self) -> MissionRecord:
         """Run the mission to its end."""
         env = self.env
-        # The clock comes last: when it opens the first slot, all others wait for it.
-        self.uav_processes = [env.process(self.fly_mission(uav)) for uav in self.fleet]
+        # The clock comes last: when it sends its first signal, all others wait for theirs.
+        self.uav_processes = [env.process(self.run_uav(uav)) for uav in self.fleet]
         env.process(self.run_radio())
         if self.packets is None:
             env.process(self.bring_data())
@@ -183,7 +189,7 @@ class Mission:
         if self.mission["pad_rate"] > 0:
             self.pad_fails = [Signal(env) for _ in self.zone_of_pad]
             for pad, zone in enumerate(self.zone_of_pad):
-                env.process(self.hold_failed_pad(pad, zone))
+                env.process(self.run_pad(pad, zone))
         clock = env.process(self.run_clock())
 
         self.listener.note_start(self.packets.initial_packets() if self.packets else {})
@@ -198,9 +204,9 @@ class Mission:
         while not _is_over(self.state.missions):
             self.decide_moves()
             yield from self.give_turns()
-            self.depart()
-            self.slot_opens.send()
-            yield self.uavs_are_served.wait()
+            self.update_batteries()
+            self.radio_starts.send()
+            yield self.radio_is_done.wait()
             yield from self.announce(self.data_are_due)
             self.settle()
             if self.mission["has_failures"]:
@@ -208,93 +214,105 @@ class Mission:
             yield from self.announce(self.slot_closes)
 
     def announce(self, signal: Signal) -> ProcessGenerator:
-        """Send a signal, and wait until all that follows from it at this time has happened."""
+        """Send a signal, and wait until all else that is due at this time has happened.
+
+        Only the clock may do so: two processes that wait for each other like this never end.
+        """
         signal.send()
         while self.env.peek() <= self.env.now:
             yield self.env.timeout(0)
 
     def decide_moves(self) -> None:
-        """Let the policies decide for all UAVs together, and the safety controller resolve."""
-        decide(self.team, self.state, self.shown_world)
-        self.may_charge_bits = _resolve(self.state.missions, self.state.uavs, *self.world.chart)
+        """Let the policies decide for all UAVs together, and the safety controller move them.
+
+        This also tells which UAVs want a pad in this slot.
+        """
+        decide(self.policies, self.state, self.shown_world)
+        self.wants_pad_bits = _resolve(self.state.missions, self.state.uavs, *self.world.chart)
 
     def give_turns(self) -> ProcessGenerator:
         """Let each UAV take its turn in this slot, one after the other; pads are granted.
 
         First, UAVs are called away from the queues: an interrupt comes before all other events of
         the same time. Then UAVs ask for pads, in the order of the queue, since a pad that is free
-        goes to the first who asks. Then come those who give a pad back, with all others, and at
-        last the pads that have been repaired.
+        goes to the first who asks. Then come those who give a pad back, with all others. The pads
+        that have been repaired come last, and the clock waits until all turns have been taken.
         """
         asking = []
         others = []
         for uav in self.fleet:
             if self.waits_for_pad(uav):
-                if not self.may_charge(uav):
+                if not self.wants_pad(uav):
                     self.uav_processes[uav].interrupt(CALLED_AWAY)
-            elif self.may_charge(uav) and not self.is_charging(uav):
+            elif self.wants_pad(uav) and not self.is_charging(uav):
                 asking.append(uav)
             else:
                 others.append(uav)
-        asking.sort(key=self.place_in_queue)
+        asking.sort(key=self.queue_key_of)
         for uav in asking + others:
             self.turns[uav].send()
         yield from self.announce(self.repaired_pads_return)
 
-    def depart(self) -> None:
-        """Charge and discharge the batteries for this slot, and let the UAVs set out."""
-        _depart(
+    def update_batteries(self) -> None:
+        """Charge and discharge the batteries for this slot, and prepare the search of the radio."""
+        _update_batteries(
             self.state.missions, self.state.uavs, self.world.nodes, self.world.mean_snr,
             self.world.order, self.world.means, *self.world.chart, self.scratch.search,
         )  # fmt: skip
         self.listener.note_moves()
 
     def settle(self) -> None:
-        """Set rewards, and end the missions of UAVs that are done or whose battery is empty."""
+        """Set rewards, and end the missions of UAVs that are done or whose battery is empty.
+
+        The slot that the state has is the next one from here on.
+        """
         _settle(self.state.missions, self.state.uavs)
         self.listener.note_close(self.arrivals)
 
     # --- the UAVs ---
 
-    def fly_mission(self, uav: int) -> ProcessGenerator:
-        """A UAV's mission: in every slot it flies, waits for a pad or charges, until it ends."""
+    def run_uav(self, uav: int) -> ProcessGenerator:
+        """A UAV's mission: it flies slot by slot, with stays at the pads between, until it ends.
+
+        The rules move it and charge it; the process says when it does what.
+        """
         while self.is_active(uav):
             yield self.turns[uav].wait()
-            while self.may_charge(uav):  # again, if its pad has failed
+            while self.wants_pad(uav):  # once more, if its pad fails and it still wants one
                 yield from self.charge(uav)
-            yield self.uavs_are_served.wait()  # it flies its move; the radio serves it on the way
+            yield self.radio_is_done.wait()  # the UAV flies, and collects data on its way
             yield self.slot_closes.wait()
 
     def charge(self, uav: int) -> ProcessGenerator:
         """Wait for a pad and charge on it, both over as many slots as it takes.
 
-        A UAV that is charged gives its pad back at its next turn, and flies in that slot. So does
-        one that is called away from the queue. One whose pad has failed leaves it at once, and may
-        ask again at its next turn.
+        A UAV that is fully charged gives its pad back at its next turn. One that is called away
+        from the queue leaves it at once. One whose pad has failed leaves that at once, and may ask
+        again at its next turn.
         """
         zone = self.zones[self.uavs[uav]["zone"]]
-        self.join_queue(uav)
+        self.note_request(uav)
         try:
-            with zone.request(priority=self.place_in_queue(uav)) as pad:
-                yield pad
+            with zone.request(priority=self.queue_key_of(uav)) as place:
+                yield place
                 self.start_charging(uav)
                 while self.is_charging(uav):
                     yield self.turns[uav].wait()
         except simpy.Interrupt as interrupt:
-            if interrupt.cause == PAD_FAILED:
+            if interrupt.cause == PAD_FAILED:  # at the end of a slot; the next one is to come
                 yield self.turns[uav].wait()
-            if not self.may_charge(uav):
-                self.leave_queue(uav)
+            if not self.wants_pad(uav):
+                self.note_withdrawal(uav)
 
-    def join_queue(self, uav: int) -> None:
-        """Note the slot in which a UAV asks for a pad; after a failure of its pad, it is kept."""
+    def note_request(self, uav: int) -> None:
+        """Note the slot of the request; a UAV whose pad has failed keeps that of its first one."""
         if self.uavs[uav]["pad_request"] < 0:
             self.uavs[uav]["pad_request"] = self.mission["slot"]
             self.mission["pad_requests"] += 1
             self.listener.note_request(uav)
 
-    def leave_queue(self, uav: int) -> None:
-        """Forget that a UAV has asked for a pad."""
+    def note_withdrawal(self, uav: int) -> None:
+        """Note that a UAV does not ask for a pad any more."""
         self.uavs[uav]["pad_request"] = -1
         self.listener.note_withdrawal(uav)
 
@@ -308,38 +326,41 @@ class Mission:
         return bool(self.uavs[uav]["active"])
 
     def is_charging(self, uav: int) -> bool:
-        """Whether a UAV is on a pad and not yet charged."""
+        """Whether a UAV is on a pad and not yet fully charged."""
         return bool(self.uavs[uav]["charging"])
 
-    def may_charge(self, uav: int) -> bool:
-        """Whether a UAV meets the charging condition in this slot."""
-        return bool(self.may_charge_bits >> uav & 1)
+    def wants_pad(self, uav: int) -> bool:
+        """Whether a UAV hovers in a zone by its own choice, with a battery that may be charged.
+
+        It stays true while the UAV waits and while it charges.
+        """
+        return bool(self.wants_pad_bits >> uav & 1)
 
     def waits_for_pad(self, uav: int) -> bool:
-        """Whether a UAV is in the queue of a zone."""
+        """Whether a UAV is in the queue of a zone: then its process waits for the request alone."""
         return isinstance(self.uav_processes[uav].target, Request)
 
-    def place_in_queue(self, uav: int) -> tuple[int, int, int]:
-        """What a UAV is sorted by in the queue of its zone; the lowest is given the next pad."""
+    def queue_key_of(self, uav: int) -> tuple[int, int, int]:
+        """What UAVs are sorted by in the queue of a zone; the lowest is given the next pad."""
         return queue_key(self.mission, self.uavs[uav], uav)
 
     # --- the radio, the data and the failures ---
 
     def run_radio(self) -> ProcessGenerator:
-        """Serve all flying UAVs in the communication slots 1..m of every slot."""
+        """Let all UAVs in the air collect data in the communication slots 1..m of every slot."""
         m = int(self.mission["communication_slots"])
         arrays = (*self.state, self.world.order, self.world.means, *self.scratch)
         while True:
-            yield self.slot_opens.wait()
+            yield self.radio_starts.wait()
             slot = int(self.mission["slot"])
             for n in range(1, m + 1):
-                time = slot + n / m
+                time = slot + n / m  # not a sum of n parts, whose rounding would add up
                 yield self.env.timeout(time - self.env.now)
                 _communicate(*arrays, n)
                 self.listener.note_communications(n)
                 if self.packets is not None:
                     self.packets.deliver(time)
-            self.uavs_are_served.send()
+            self.radio_is_done.send()
 
     def bring_data(self) -> ProcessGenerator:
         """Let new data arrive at the nodes at the end of every slot."""
@@ -350,24 +371,24 @@ class Mission:
 
     def bring_packets(self, packets: Packets) -> ProcessGenerator:
         """Let packets arrive, each at its own time."""
-        time, node = packets.next()
+        time, node = packets.next_arrival()
         while time < inf:
             yield self.env.timeout(max(time - self.env.now, 0.0))
             packets.arrive(node)
-            time, node = packets.next()
+            time, node = packets.next_arrival()
 
     def run_failures(self) -> ProcessGenerator:
         """Let UAVs, pads and nodes fail and be repaired at the end of every slot."""
         while True:
             yield self.failures_are_due.wait()
             strike_uavs(self.mission, self.uavs, LOST)
-            self.strike_pads()
+            self.fail_pads()
             strike_nodes(self.mission, self.residual, self.sensors)
             self.listener.note_failures()
             if self.packets is not None:
                 self.packets.fall_silent(float(self.mission["slot"]))
 
-    def strike_pads(self) -> None:
+    def fail_pads(self) -> None:
         """Let pads fail and be repaired; tell those that fail which UAV is on them."""
         were_out = self.mission["pads_out"].copy()
         were_charging = self.uavs["charging"].copy()
@@ -377,10 +398,10 @@ class Mission:
         for pad in np.nonzero(self.mission["pads_out"] > were_out)[0].tolist():
             self.pad_fails[pad].send(uav_on.get(pad))
 
-    def hold_failed_pad(self, pad: int, zone: simpy.PriorityResource) -> ProcessGenerator:
-        """Hold a pad, like a UAV that charges on it, from when it fails until it is repaired.
+    def run_pad(self, pad: int, zone: simpy.PriorityResource) -> ProcessGenerator:
+        """A pad: from when it fails until it is repaired, it takes a place of its zone.
 
-        A UAV on the pad leaves after the pad has asked, so that no other UAV gets its place.
+        It asks before the UAV on it leaves, so that no other UAV is given that place.
         """
         while True:
             uav = yield self.pad_fails[pad].wait()
@@ -401,6 +422,11 @@ class Mission:
         return records.mission(0, self.listener.log)
 
 
+# For numba, a numpy record as an argument takes longer (3 us) than the arrays of the whole state,
+# and a tuple of arrays longer (1 us) than its arrays one by one. So these functions, which are
+# called in every slot, take the arrays, and hand the records of the only mission to the rules.
+
+
 @kernel
 def _is_over(missions):
     return is_over(missions[0])
@@ -408,14 +434,15 @@ def _is_over(missions):
 
 @kernel
 def _resolve(missions, uavs, zones, parking, sizes, nearest, ways, rows):
-    """Resolve the moves; bit i of the result tells whether UAV i may charge now."""
-    mission, team = missions[0], uavs[0]
+    """Resolve the moves; bit i of the result tells whether UAV i wants a pad (64 UAVs at most)."""
+    mission = missions[0]
+    fleet = uavs[0]
     chart = Chart(zones, parking, sizes, nearest, ways, rows)
-    rules.resolve(mission, team, chart)
-    may_charge = 0
+    rules.resolve(mission, fleet, chart)
+    wants_pad = 0
     for i in range(mission.uavs):
-        may_charge |= np.int64(rules.may_charge(mission, team[i])) << i
-    return may_charge
+        wants_pad |= np.int64(rules.may_charge(mission, fleet[i])) << i
+    return wants_pad
 
 
 @kernel
@@ -424,7 +451,7 @@ def _start_charging(missions, uavs, i):
 
 
 @kernel
-def _depart(
+def _update_batteries(
     missions, uavs, nodes, mean_snr, order, means,
     zones, parking, sizes, nearest, ways, rows, search,
 ):  # fmt: skip

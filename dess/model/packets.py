@@ -187,7 +187,7 @@ class Packets:
             packet.node: n for n, packet in enumerate(self.buffers.all) if packet.generated == 0
         }
 
-    def next(self) -> tuple[float, int]:
+    def next_arrival(self) -> tuple[float, int]:
         """The time of the next arrival [slots], infinite if there is none, and its node."""
         k = int(self._sources["time"].argmin())
         return float(self._sources["time"][k]), k
