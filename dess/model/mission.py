@@ -296,7 +296,7 @@ class Mission:
             with zone.request(priority=self.queue_key_of(uav)) as place:
                 yield place
                 self.start_charging(uav)
-                while self.is_charging(uav):
+                while self.is_charging(uav):  # depart charges it, settle ends the charge
                     yield self.turns[uav].wait()
         except simpy.Interrupt as interrupt:
             if interrupt.cause == PAD_FAILED:  # at the end of a slot; the next one is to come
