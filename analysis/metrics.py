@@ -29,7 +29,7 @@ class Metric:
             has Student's interval, corrected for the skewness of the missions.
         less_is_better: Whether a lower value is better.
         in_percent: Whether it is written in percent, and its differences in percentage points.
-        told: The unit in which it is told where there is a data sheet; empty if in the same.
+        sheet_unit: The unit where there is a data sheet; empty if in the same.
         horizons: The largest value that a mission can have, as a share of the longest that it may
             last; 0 if it is not known.
         least: The smallest value that a mission can have.
@@ -44,7 +44,7 @@ class Metric:
     kind: Kind = "number"
     less_is_better: bool = False
     in_percent: bool = False
-    told: str = ""
+    sheet_unit: str = ""
     horizons: float = 0.0
     least: float = -inf
     most: float = inf
@@ -70,12 +70,12 @@ class Metric:
 
     @property
     def in_units(self) -> "Metric":
-        """The metric as it is told with a data sheet, which has a column of its own."""
-        if self.told:
-            column = f"{self.column}_{self.told}"
+        """The metric in the unit of a data sheet, which has a column of its own."""
+        if self.sheet_unit:
+            column = f"{self.column}_{self.sheet_unit}"
         else:
             column = self.column
-        return replace(self, column=column, unit=self.told or self.unit, told="")
+        return replace(self, column=column, unit=self.sheet_unit or self.unit, sheet_unit="")
 
     @property
     def label(self) -> str:
@@ -90,12 +90,12 @@ class Metric:
     @property
     def head(self) -> str:
         """The name above a column in the terminal."""
-        if self.in_percent or self.is_told:
+        if self.in_percent or self.is_in_sheet_unit:
             return self.within
         return self.label
 
     @property
-    def is_told(self) -> bool:
+    def is_in_sheet_unit(self) -> bool:
         """Whether it is in a unit of a data sheet, which is written behind every value."""
         return self.unit in _SIZES
 
@@ -145,7 +145,7 @@ class Metric:
         )
 
     def _with_unit(self, write: Callable[..., str]) -> Callable[..., str]:
-        if self.is_told:
+        if self.is_in_sheet_unit:
             return lambda *ends: f"{write(*ends)} {self.unit}"
         return write
 
@@ -181,18 +181,24 @@ _OTHERS = (
 MOST_SLOTS, MOST_LOST = "most_slots", "most_lost"
 
 
-def _time_metric(column: str, name: str, told: str = "h", horizons: float = 1.0) -> Metric:
+def _time_metric(column: str, name: str, sheet_unit: str = "h", horizons: float = 1.0) -> Metric:
     """A time of which less is better; 0 ``horizons`` if it is a sum over UAVs."""
     return Metric(
-        column, name, _SLOTS, less_is_better=True, told=told, horizons=horizons, least=0.0
+        column,
+        name,
+        _SLOTS,
+        less_is_better=True,
+        sheet_unit=sheet_unit,
+        horizons=horizons,
+        least=0.0,
     )
 
 
 def _amount_metric(
-    column: str, name: str, unit: str = "", told: str = "", less: bool = False
+    column: str, name: str, unit: str = "", sheet_unit: str = "", less: bool = False
 ) -> Metric:
     """A number that is not negative."""
-    return Metric(column, name, unit, less_is_better=less, told=told, least=0.0)
+    return Metric(column, name, unit, less_is_better=less, sheet_unit=sheet_unit, least=0.0)
 
 
 # Those of ``OPERATIONS``, which only extended scenarios measure.
@@ -214,7 +220,7 @@ _MEASURED = (
     _amount_metric("failures", "Failures of UAVs", less=True),
     _time_metric("slots_grounded", "Time under repair", horizons=0.0),
 )
-# What records have in slots and data units; there is a metric of each where it is told in units.
+# What records have in slots and data units; there is a metric of each in the units of a data sheet.
 _RECORDED = (
     _time_metric("slots", "Length of the mission"),
     _time_metric(MOST_SLOTS, "Longest that the mission may last"),
@@ -226,14 +232,14 @@ _RECORDED = (
     _time_metric("waiting_per_uav", "Waiting per UAV", "min"),
 )
 _IN_UNITS = {metric.in_units.column: metric.in_units for metric in _MEASURED}
-_TOLD = {metric.column: metric.in_units.column for metric in (*_MEASURED, *_RECORDED)}
+_IN_SHEET_UNIT = {metric.column: metric.in_units.column for metric in (*_MEASURED, *_RECORDED)}
 _KNOWN = {metric.column: metric for metric in (*_PAPER, *_OTHERS, *_MEASURED)}
 _KNOWN |= _IN_UNITS | {metric.column: metric for metric in _RECORDED}
 _KNOWN |= {metric.in_units.column: metric.in_units for metric in _RECORDED}
 
 METRICS = {metric.column: metric.name for metric in _PAPER}  # the paper's metrics, with their names
 MEASURES = {metric.column: metric for metric in _MEASURED}
-EITHER = MEASURES | _IN_UNITS  # as they are measured, and as they are told
+EITHER = MEASURES | _IN_UNITS  # as they are measured, and in the units of data sheets
 ALWAYS = (*METRICS, REWARD)  # the metrics of every mission
 # Short names of metrics on the command line.
 ALIASES = {"ratio": RATIO, "product": PRODUCT}
@@ -259,7 +265,7 @@ def metric_for_length(column: str, slots: int, units: Units | None) -> Metric:
     """
     metric = metric_of(column)
     return metric.lasting(
-        slots * size_of(metric.unit, units) if units and metric.is_told else slots
+        slots * size_of(metric.unit, units) if units and metric.is_in_sheet_unit else slots
     )
 
 
@@ -275,38 +281,38 @@ def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
     if metric.kind == "cost" and MOST_LOST in missions:
         return replace(metric, failure=float(missions[MOST_LOST].max()))
     longest = metric_of(MOST_SLOTS)
-    if metric.is_told:
+    if metric.is_in_sheet_unit:
         longest = longest.in_units
     if not metric.horizons or longest.column not in missions or not len(missions):
         return metric
     units = 1.0
-    if metric.is_told:
+    if metric.is_in_sheet_unit:
         units = _SIZES[longest.unit] / _SIZES[metric.unit]
     return metric.lasting(float(missions[longest.column].max()) * units)
 
 
 def in_either(*columns: str) -> list[str]:
-    """Metrics as they are measured and as they are told."""
-    return [*columns, *(_TOLD[column] for column in columns)]
+    """Metrics as they are measured and in the units of data sheets."""
+    return [*columns, *(_IN_SHEET_UNIT[column] for column in columns)]
 
 
-def column_as_told(column: str, missions: Container[str]) -> str:
-    """The column in which a table of missions tells a metric: in units if there is a data sheet."""
-    in_units = _TOLD.get(column, column)
+def column_in_sheet_unit(column: str, missions: Container[str]) -> str:
+    """The column of a metric in a table of missions: in the unit of a data sheet if possible."""
+    in_units = _IN_SHEET_UNIT.get(column, column)
     if in_units in missions:
         return in_units
     return column
 
 
 def columns_in_units(missions: Mapping[str, Any], units: Units) -> dict[str, Any]:
-    """The columns of missions that are told in units, of missions with a data sheet.
+    """The columns in the units of a data sheet, of missions that have one.
 
     Args:
         missions: The columns of the missions, as records have them.
         units: What a slot and a data unit are, numbers or an array of one for each mission.
     """
-    metrics = [m for m in (*_MEASURED, *_RECORDED) if m.told and m.column in missions]
-    return {m.in_units.column: missions[m.column] * size_of(m.told, units) for m in metrics}
+    metrics = [m for m in (*_MEASURED, *_RECORDED) if m.sheet_unit and m.column in missions]
+    return {m.in_units.column: missions[m.column] * size_of(m.sheet_unit, units) for m in metrics}
 
 
 def size_of(unit: str, units: Units) -> float:
@@ -325,9 +331,11 @@ def format_length(slots: int, units: Units | None) -> str:
 def measured_in(missions: Container[str]) -> list[str]:
     """The metrics of extended scenarios that a table of missions, or a row of it, has.
 
-    Those that are told in units come in the place of those in slots and data units.
+    Those in units of a data sheet come in the place of those in slots and data units.
     """
-    return [column_as_told(name, missions) for name in OPERATIONS.names or () if name in missions]
+    return [
+        column_in_sheet_unit(name, missions) for name in OPERATIONS.names or () if name in missions
+    ]
 
 
 def metrics_in(missions: Container[str]) -> list[str]:

@@ -621,7 +621,7 @@ def marl_eval_data(results: Results, metrics: Sequence[str] = (*METRICS,)) -> di
         each run.
 
     Raises:
-        InputError: As for ``rliable_scores``.
+        InputError: If a learner has no complete runs, as ``rliable_scores`` needs them.
     """
     study = results.study.name
     scores = {metric: rliable_scores(results, metric) for metric in metrics}

@@ -93,15 +93,15 @@ class Question:
 
         Args:
             workers: Number of processes. Two or more take seconds to start; they help in long runs.
-            progress: As for ``run_study``.
-            announce: As for ``run_study``.
+            progress: Called with the number of missions done since its last call.
+            announce: Called before each round.
             yes: Whether a question of any length is allowed.
 
         Raises:
             InputError: Before anything is written, if a policy cannot act in the scenario, the
                 question would take long, or another one has the same name; or if the folder cannot
                 be written or is in use.
-            ChunkError: As for ``run_study``.
+            ChunkError: If a chunk could not be computed; all others are complete.
         """
         reuse = self.others
         check_run(self.study, self.out, workers, reuse=reuse, yes=yes)

@@ -29,7 +29,7 @@ from dess.analysis.metrics import (
     PRODUCT,
     RATIO,
     SUCCESS,
-    column_as_told,
+    column_in_sheet_unit,
     columns_in_units,
     format_length,
     in_either,
@@ -120,7 +120,7 @@ def compare_sides(results: Results) -> pd.DataFrame:
     metrics = [
         *of_paper,
         *measured_columns(results),
-        *(column_as_told(name, missions) for name in MEASURES),
+        *(column_in_sheet_unit(name, missions) for name in MEASURES),
     ]
     # Without a quota, all missions last until their horizon.
     has_quota = any(space.quota for space in results.store.manifest.scenarios)

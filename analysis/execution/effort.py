@@ -262,7 +262,7 @@ def plan_study(
         out: The results folder, which need not exist.
         workers: Number of processes.
         accept_code: Whether missions that other code has simulated count as present.
-        reuse: As for ``run_study``.
+        reuse: Other results folders, whose missions are copied where they belong to the study.
 
     Returns:
         What the run would do for every policy and, if the study has bounds, for these.
@@ -299,8 +299,8 @@ def check_run(
         study: The study.
         out: The results folder, which need not exist.
         workers: Number of processes.
-        accept_code: As for ``run_study``.
-        reuse: As for ``run_study``.
+        accept_code: Whether missions that other code has simulated count as present.
+        reuse: Other results folders, whose missions are copied where they belong to the study.
         yes: Whether any time and memory is allowed.
 
     Raises:

@@ -137,7 +137,8 @@ def estimate_means(asked: Asked, progress: Progress | None = None) -> Evaluation
         progress: Called with the number of missions done since its last call.
 
     Raises:
-        InputError: As for ``evaluate``.
+        InputError: If a policy is unknown, a number is out of range, or the team has more policies
+            than the largest fleet has UAVs.
     """
     return _evaluate_in_parts(asked, _missions_at_once(asked.scenario), progress)
 

@@ -121,7 +121,7 @@ def compare_learners(
     training seeds; one checkpoint supports only claims about this checkpoint.
 
     Args:
-        missions: As for ``compare``; the checkpoints and the baseline have the same missions.
+        missions: A row per mission; the checkpoints and the baseline have the same missions.
         learners: For each learner the policies that are its checkpoints. All of them are needed,
             because choosing the best of several trainings would bias the comparison.
         baseline: The policy to compare with; it is not treated as random.
@@ -138,10 +138,11 @@ def compare_learners(
         ``about`` says what ``low``, ``high`` and ``p`` are about: the expected difference over all
         trainings of ``the learner``, or ``this checkpoint``, the only one there is. ``new_low`` and
         ``new_high`` bound the difference of one new training. Rare differences are added as in
-        ``paired``.
+        ``compare_pairs``.
 
     Raises:
-        InputError: As for ``compare``, and if a learner has no checkpoint, or one twice.
+        InputError: If a policy or a metric is unknown, a mission is there twice, or a learner has
+            no checkpoint, or one twice.
     """
     check_share("level", level)
     tables = metrics_by_treatment(missions, "policy", metrics, by)

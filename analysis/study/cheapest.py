@@ -12,7 +12,7 @@ from scipy.special import stdtrit
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.metrics import AGE, column_as_told, size_of
+from dess.analysis.metrics import AGE, column_in_sheet_unit, size_of
 from dess.analysis.names import DECISIONS
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, missions_needed
@@ -389,7 +389,7 @@ class Cheapest(StrictTable):
         """The selected settings, and what is guaranteed about them.
 
         Args:
-            samples: As for ``wanted``.
+            samples: The missions of every design point, with ``cost`` among the metrics.
             settings: The design points.
 
         Raises:
@@ -422,7 +422,7 @@ class Cheapest(StrictTable):
         endless = self.model_copy(update={"budget": MOST})
         names = [
             "cost",
-            *(column_as_told(metric, search.samples[0]) for metric in self.requirements),
+            *(column_in_sheet_unit(metric, search.samples[0]) for metric in self.requirements),
         ]
         points = [*zip(search.samples, search.points.counts, strict=True)]
         times = 2
@@ -574,7 +574,7 @@ class _Search:
         points.costs[point] = np.mean(sample["cost"][:count])
         points.promising[point] = True
         for metric, test in self._tests[point].items():
-            values = np.asarray(sample[column_as_told(metric, sample)][:count], float)
+            values = np.asarray(sample[column_in_sheet_unit(metric, sample)][:count], float)
             shares = as_share(metric, values, horizon)
             test.observe(shares[test.missions :])
             points.promising[point] &= shares.mean() >= test.required

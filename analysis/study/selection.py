@@ -179,8 +179,8 @@ class Selection(StrictTable):
         """The selected design point, and what is guaranteed about it.
 
         Args:
-            samples: As for ``wanted``.
-            settings: As for ``wanted``.
+            samples: The missions of every design point.
+            settings: The design points; this rule does not need them.
 
         Raises:
             InputError: If there is no design point, or one has fewer than ``first`` missions.

@@ -208,7 +208,7 @@ class Precision(StrictTable):
         """Whether the targets were met: a row per design point and metric.
 
         Args:
-            samples: As for ``wanted``, with at least one mission per point.
+            samples: The missions of every design point, one or more of each.
         """
         return [row for point, sample in enumerate(samples) for row in self._rows(point, sample)]
 

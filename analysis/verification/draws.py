@@ -63,7 +63,8 @@ def arrival_checks(counts: np.ndarray, rate: float) -> list[Check]:
     """Compare counts per mission slot and node with independent Poisson variables.
 
     Args:
-        counts, rate: As for ``arrival_fits``.
+        counts: (T, K) data units that arrived, by slot and node.
+        rate: The arrival rate.
     """
     if not rate:
         units = int(counts.sum())
@@ -354,7 +355,9 @@ def coverage_check(metric: str, values: np.ndarray, size: int, share: bool) -> C
 
     Args:
         metric: The name of the metric on the page.
-        values, size, share: As for ``intervals_of_blocks``.
+        values: (n,) a metric of missions; those after the last complete block are left out.
+        size: Number of missions in a block.
+        share: Whether the metric is 0 or 1 in each mission.
     """
     table = intervals_of_blocks(values, size, share)
     n = len(table)

@@ -82,7 +82,7 @@ def sweep(
     from dess.analysis.ask import around
     from dess.analysis.ask.question import sweep_question
     from dess.analysis.ask.sweep import Sweep
-    from dess.analysis.metrics import ALIASES, PRODUCT, SUCCESS, column_as_told
+    from dess.analysis.metrics import ALIASES, PRODUCT, SUCCESS, column_in_sheet_unit
 
     policies = None
     if policy:
@@ -99,7 +99,7 @@ def sweep(
         folder=results,
     )
     measured = question.study.metrics
-    ranking = column_as_told(ALIASES.get(metric or PRODUCT, metric or PRODUCT), measured)
+    ranking = column_in_sheet_unit(ALIASES.get(metric or PRODUCT, metric or PRODUCT), measured)
     if ranking not in measured:
         allowed = one_of(metric, [*ALIASES, *measured])
         raise InputError(f"--metric: {shown(metric)} is not measured{allowed}")

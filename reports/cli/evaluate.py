@@ -129,14 +129,14 @@ def _replace_nan(row: Any) -> Any:
 
 
 def _print_rows(rows: list[dict[str, Any]]) -> None:
-    from dess.analysis.metrics import column_as_told
+    from dess.analysis.metrics import column_in_sheet_unit
 
     for row in rows:
         metrics = {name: estimate for name, estimate in row.items() if isinstance(estimate, dict)}
         metrics = {
             name: estimate
             for name, estimate in metrics.items()
-            if column_as_told(name, metrics) == name
+            if column_in_sheet_unit(name, metrics) == name
         }
         cells = [[name, *(f"{x:.4f}" for x in value.values())] for name, value in metrics.items()]
         console.print_table([row["policy"], "mean", "low", "high"], cells)

@@ -318,13 +318,13 @@ def _values_in_units(values: dict[str, Any], mission: _Mission) -> dict[str, Any
 
 
 def _print_mission(mission: _Mission) -> None:
-    from dess.analysis.metrics import column_as_told, measured_in, metric_of
+    from dess.analysis.metrics import column_in_sheet_unit, measured_in, metric_of
     from dess.analysis.results.event_log import causes_of_failure, residual_data
 
     metrics = _metric_values(mission)
     rows = [
         [name, f"{metrics[name]:g}"]
-        for name in dict.fromkeys(column_as_told(n, metrics) for n in metrics)
+        for name in dict.fromkeys(column_in_sheet_unit(n, metrics) for n in metrics)
     ]
     console.print_table(["", "mission"], rows)
     if measured := _values_in_units(mission.record.measured, mission):

@@ -162,7 +162,7 @@ def show(
     """
     from dess.analysis import numbers
     from dess.analysis.answers import summary
-    from dess.analysis.metrics import column_as_told
+    from dess.analysis.metrics import column_in_sheet_unit
     from dess.reports.cli import tables as printed
 
     if as_csv and as_json:
@@ -173,7 +173,9 @@ def show(
         raise InputError(
             f"--policy: {policy!r} is not in the study{one_of(policy, results.policies)}"
         )
-    targets = {column_as_told(metric, results.missions): end for metric, end in targets.items()}
+    targets = {
+        column_in_sheet_unit(metric, results.missions): end for metric, end in targets.items()
+    }
     means = summary.settings_meeting(summary.means_of_points(results), targets)
     means = summary.add_verdicts(results, means)
     if as_csv:

@@ -187,7 +187,7 @@ def _best_policies(rows: pd.DataFrame) -> pd.Series:
 def _target_in_words(metric: Metric, end: float) -> str:
     """A target, as ``success of 0.99 or more``."""
     bound = f"{metric.within} of {end:g}"
-    if metric.is_told:
+    if metric.is_in_sheet_unit:
         bound += f" {metric.unit}"
     if metric.less_is_better:
         return f"{bound} or less"

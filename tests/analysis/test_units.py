@@ -15,7 +15,7 @@ from dess.analysis.ask import around
 from dess.analysis.ask.assumptions import assumption_sentences
 from dess.analysis.ask.question import sweep_question, what_if_question
 from dess.analysis.ask.what_if import WhatIf
-from dess.analysis.metrics import AGE, column_as_told, metric_of
+from dess.analysis.metrics import AGE, column_in_sheet_unit, metric_of
 from dess.analysis.names import declared_fields, field_named
 from dess.analysis.study.cheapest import Cheapest, Setting
 from tests.analysis.small import SHEET, write_scenario
@@ -46,7 +46,7 @@ def test_values_in_units_are_those_of_the_model_times_the_unit(searched):
     sizes = {"age": ("age_h", hours), "slots": ("slots_h", hours)}
     sizes |= {"uav_slots": ("uav_slots_h", hours), "collected": ("collected_MB", megabytes)}
     for column, (in_units, size) in sizes.items():
-        assert column_as_told(column, missions) == in_units
+        assert column_in_sheet_unit(column, missions) == in_units
         np.testing.assert_allclose(missions[in_units], missions[column] * size, rtol=1e-12)
     assert searched.checks["age_h"].notna().all()
 
@@ -70,7 +70,7 @@ def test_ages_of_missions_of_different_lengths_are_not_compared_without_saying_s
 
 def test_without_a_sheet_nothing_is_told_in_units(studied):
     missions = studied(set={"age.measured": True}).missions
-    assert column_as_told(AGE, missions) == AGE
+    assert column_in_sheet_unit(AGE, missions) == AGE
     assert not [name for name in missions if name.endswith(("_h", "_min", "_MB"))]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.metrics import Metric, column_as_told, metric_of
+from dess.analysis.metrics import Metric, column_in_sheet_unit, metric_of
 from dess.analysis.results.tables import Results
 from dess.analysis.study.cheapest import Cheapest
 
@@ -98,7 +98,7 @@ def requirements_of(results: Results) -> list[Requirement]:
     if not isinstance(rule, Cheapest):
         return []
     return [
-        Requirement(metric_of(column_as_told(metric, results.missions)), rule.amount(metric))
+        Requirement(metric_of(column_in_sheet_unit(metric, results.missions)), rule.amount(metric))
         for metric in rule.requirements
     ]
 

@@ -31,7 +31,7 @@ from dess.analysis.metrics import (
     AGE,
     COST,
     PRODUCT,
-    column_as_told,
+    column_in_sheet_unit,
     format_length,
     in_either,
     metric_in_missions,
@@ -63,7 +63,7 @@ def ranking_metric(results: Results, metric: str | None = None) -> str:
     """
     if metric is None:
         metric = getattr(results.study.selection, "metric", PRODUCT)
-    metric = column_as_told(metric, results.missions)
+    metric = column_in_sheet_unit(metric, results.missions)
     check_metric(results, metric)
     return metric
 
