@@ -60,7 +60,7 @@ def draw_means(
     """The means of metrics against a field, by metric.
 
     Args:
-        means: Rows of ``means``.
+        means: Rows of ``means_of_metrics``.
         x: The field.
         line: The field with a curve for each value.
         panel: The column with a panel for each value.

@@ -74,13 +74,13 @@ def means_of_points(results: Results) -> pd.DataFrame:
 
 
 def settings_meeting(means: pd.DataFrame, targets: Mapping[str, float]) -> pd.DataFrame:
-    """The rows of ``means`` of the settings that meet all targets.
+    """The rows of ``means_of_points`` of the settings that meet all targets.
 
     A setting is a policy at a design point. It meets a target if the whole interval of the mean
     does, so that chance alone seldom lets a setting pass that does not meet it.
 
     Args:
-        means: Rows of ``means``.
+        means: Rows of ``means_of_points``.
         targets: Metric -> the least mean, or the largest of a metric of which less is better.
     """
     for metric, end in targets.items():
@@ -94,7 +94,7 @@ def settings_meeting(means: pd.DataFrame, targets: Mapping[str, float]) -> pd.Da
 
 
 def add_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
-    """Rows of ``means`` with a column ``verdict``: how the policy compares with the others there.
+    """Rows of ``means_of_points`` with a ``verdict``: how a policy compares with the others there.
 
     Compared are the policies of the table at the same design point, by each metric, on the
     replications that they have in common, by ``stats.verdict.may_be_best``: at every design point
@@ -102,7 +102,7 @@ def add_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
 
     Args:
         results: The study.
-        means: Rows of ``means``.
+        means: Rows of ``means_of_points``.
 
     Returns:
         The rows, with ``BEST`` if the policy is significantly better than the others, ``TIED`` if

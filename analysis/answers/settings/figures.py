@@ -122,7 +122,8 @@ def draw_heat_map(
 ) -> Drawing:
     """A metric of a policy over two fields: the best cell, and those that may be as good.
 
-    A star marks the best cell; framed cells are not significantly worse (``averaged``).
+    A star marks the best cell; framed cells are not significantly worse, see
+    ``average_over_others``.
 
     Args:
         results: The study.

@@ -171,7 +171,7 @@ def other_policies_sentences(results: Results, ranked: pd.DataFrame, metric: str
 
     Args:
         results: The study.
-        ranked: The result of ``ranked`` for the metric.
+        ranked: The result of ``rank_settings`` for the metric.
         metric: The metric.
     """
     words = points_in_words(results)
