@@ -77,17 +77,28 @@ class Field:
             maps = [*dict.fromkeys(map(str, values))]
             return [f"{len(v)} cells (map {maps.index(str(v)) + 1})" for v in values]
         if self.key == ZONE_PADS:
-            return [" + ".join(map(str, v)) if isinstance(v, list | tuple) else v for v in values]
+            return [*map(_sum_in_words, values)]
         if self.key == "zone":
             return [f"{width} x {height} at ({x}, {y})" for x, y, width, height in values]
-        plain = [
-            v[0] if isinstance(v, list | tuple) and v and all(item == v[0] for item in v) else v
-            for v in values
-        ]
+        plain = [*map(_single_item, values)]
         is_text = any(isinstance(value, bool | list | tuple | dict) for value in plain)
         if is_text:
             return [*map(value_text, plain)]
         return plain
+
+
+def _sum_in_words(value: Any) -> Any:
+    """Several numbers as ``2 + 3``; one number as it is."""
+    if isinstance(value, list | tuple):
+        return " + ".join(map(str, value))
+    return value
+
+
+def _single_item(value: Any) -> Any:
+    """Several equal items as this item, and any other value as it is."""
+    if isinstance(value, list | tuple) and value and all(item == value[0] for item in value):
+        return value[0]
+    return value
 
 
 # What a mean time of repair of 0 says: there is no repair.

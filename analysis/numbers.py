@@ -108,7 +108,11 @@ def format_p_value(p: float) -> str:
 
 def format_money(amount: float, currency: str) -> str:
     """An amount as ``69,000 EUR``; with two decimals below 100."""
-    return f"{format_minus(f'{amount:,.0f}' if abs(amount) >= 100 else f'{amount:.2f}')} {currency}"
+    if abs(amount) >= 100:
+        text = f"{amount:,.0f}"
+    else:
+        text = f"{amount:.2f}"
+    return f"{format_minus(text)} {currency}"
 
 
 def format_amounts(mean: float, low: float, high: float) -> str:
@@ -159,7 +163,9 @@ def format_signed(value: float, form: str = "+,.0f") -> str:
 
 def join_words(names: Sequence[str], last: str = "and") -> str:
     """A list of names as ``a, b and c``; another word may come before the last."""
-    return f" {last} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    if len(names) < 2:
+        return "".join(names)
+    return f"{', '.join(names[:-1])} {last} {names[-1]}"
 
 
 def write_csv(frame: pd.DataFrame, form: str | None = None) -> str:

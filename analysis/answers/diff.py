@@ -191,11 +191,17 @@ def differing_origins(found: Diff) -> list[str]:
     libraries = [f"{n} {a.libraries.get(n, '-')} and {b.libraries.get(n, '-')}" for n in names]
     seeds = _distinct_seeds(found.a, found.b)
     constants = _differing_constants(found)
+    different_seeds = []
+    if len(seeds) > 1:
+        both = " and ".join(map(str, seeds))
+        different_seeds.append(f"{both}, so that missions are compared without pairs")
+    different_versions = []
+    if a.version != b.version:
+        different_versions.append(f"{a.version} and {b.version}")
     parts = {
-        "seeds": [f"{' and '.join(map(str, seeds))}, so that missions are compared without pairs"]
-        * (len(seeds) > 1),
+        "seeds": different_seeds,
         "scenario": [f"{field} {of_a} and {of_b}" for field, of_a, of_b in constants],
-        "version": [f"{a.version} and {b.version}"] if a.version != b.version else [],
+        "version": different_versions,
         "code": modules,
         "weights": changed,
         "libraries": libraries,

@@ -204,18 +204,22 @@ def sweep_question(
     load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
     if isinstance(policies, str):
         policies = [policies]
-    data = {
+    fixed: dict[str, Any] = {field: values[field][0] for field in values if field not in swept}
+    if AGE in (requirements or ()):
+        fixed["age.measured"] = True
+    data: dict[str, Any] = {
         "name": "sweep" if name is None else name,
         "description": SWEEP,
         "scenario": str(scenario),
-        "set": {field: values[field][0] for field in values if field not in swept}
-        | ({"age.measured": True} if AGE in (requirements or ()) else {}),
+        "set": fixed,
         "design": {"kind": "grid", "values": swept},
         "policies": list_teams(policies or [ANY_POLICY]),
         "seed": seed,
-        **({"costs": dict(prices)} if prices else {}),
-        **({} if requirements else {"missions": missions}),
     }
+    if prices:
+        data["costs"] = dict(prices)
+    if not requirements:
+        data["missions"] = missions
     study = study_from(data, "sweep", run_files=True)
     # What is decided by the design points, so once the study is known to be valid.
     decided: dict[str, Any] = {}

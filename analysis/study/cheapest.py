@@ -453,12 +453,13 @@ class Cheapest(StrictTable):
 
     def _in_words(self, shift: float) -> str:
         """The requirements in words, such as ``a mean success of at least 0.985``."""
-        means = [
-            f"{metric.replace('_', ' ')} of at least {amount + shift:g}"
-            if not isinstance(amount, str) and metric != AGE
-            else f"{metric} of at most {amount} {'-' if shift > 0 else '+'} {abs(shift):g} horizons"
-            for metric, amount in self.requirements.items()
-        ]
+        sign = "-" if shift > 0 else "+"
+        means = []
+        for metric, amount in self.requirements.items():
+            if isinstance(amount, str) or metric == AGE:
+                means.append(f"{metric} of at most {amount} {sign} {abs(shift):g} horizons")
+            else:
+                means.append(f"{metric.replace('_', ' ')} of at least {amount + shift:g}")
         return f"a mean {' and a mean '.join(means)}"
 
 
