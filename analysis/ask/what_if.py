@@ -124,7 +124,7 @@ def compare_sides(results: Results) -> pd.DataFrame:
     ]
     # Without a quota, all missions last until their horizon.
     has_quota = any(space.quota for space in results.store.manifest.scenarios)
-    fixed = [] if has_quota else [column_as_told("slots", missions)]
+    fixed = [] if has_quota else [column_in_sheet_unit("slots", missions)]
     tables = []
     for policy, rows in missions.groupby("policy", sort=False):
         table = _compare_with_baseline(rows, metrics, fixed)
