@@ -210,8 +210,8 @@ def _parse_targets(texts: Iterable[str]) -> dict[str, float]:
     targets = {}
     for name, share in options.parse_all_settings(texts, "--target", TARGET).items():
         if (metric := ALIASES.get(name, name)) not in METRICS | MEASURES:
-            candidates = one_of(name, [*METRICS, *ALIASES, *MEASURES])
-            raise InputError(f"--target: {name!r} is unknown{candidates}")
+            allowed = one_of(name, [*METRICS, *ALIASES, *MEASURES])
+            raise InputError(f"--target: {name!r} is unknown{allowed}")
         is_number = isinstance(share, int | float) and not isinstance(share, bool)
         if metric in MEASURES and not (is_number and share >= 0):
             raise InputError(f"--target: {name}: {share!r} is not allowed; allowed: 0 or more")
