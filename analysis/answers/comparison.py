@@ -21,13 +21,13 @@ from dess.analysis.answers.summary import (
     correct_for_all_tests,
     rank_learned_and_others,
     rank_policies,
-    trained_policies_by_learner,
 )
 from dess.analysis.figures import Drawing, style
 from dess.analysis.figures.comparison import central_range
 from dess.analysis.figures.style import plot_front
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from dess.analysis.names import PARAMETERS, field_named, value_text
+from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import add_adjusted, compare, compare_pairs, for_choice
 from dess.analysis.stats.intervals import LEVEL, by_replication, values_within, wilson_interval

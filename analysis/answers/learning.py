@@ -15,9 +15,9 @@ import scipy
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers.settings.points import points_in_words
-from dess.analysis.answers.summary import trained_policies_by_learner
 from dess.analysis.figures import Drawing
 from dess.analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS
+from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import adjust_p_values
 from dess.analysis.stats.intervals import LEVEL, Interval, mean_interval

@@ -2,17 +2,15 @@
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 from dess.analysis import numbers
 from dess.analysis.answers.fleet import cheapest
-from dess.analysis.answers.settings.figures import counted_missions
 from dess.analysis.answers.settings.points import ends_of_point, ends_sentence, points_in_words
-from dess.analysis.figures import Drawing, style
+from dess.analysis.figures import Drawing
 from dess.analysis.metrics import (
     ALWAYS,
     HOME,
@@ -24,6 +22,7 @@ from dess.analysis.metrics import (
     metric_of,
 )
 from dess.analysis.results.chunks import parts_of
+from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.distribution import distribution
@@ -48,7 +47,13 @@ from dess.analysis.tables import (
     stack_by_policy,
 )
 
-PRINTED: dict = {"color": style.INK, "linestyle": "--", "linewidth": 1.3}
+if TYPE_CHECKING:  # figures need the extra reports
+    from matplotlib.figure import Figure
+
+PRINTED: dict[str, Any] = {
+    "linestyle": "--",
+    "linewidth": 1.3,
+}  # how the numbers of the paper are drawn
 UNGUARDED = "random-unguarded"  # the policy that acts without the return guard
 
 
@@ -404,23 +409,6 @@ def comparison_table(results: Results) -> Table:
     return _difference_table(results, data, "policy", caption)
 
 
-def trained_policies_by_learner(results: Results) -> dict[str, list[str]]:
-    """The trained policies by learner; those of one learner differ in the seed of their training.
-
-    Returns:
-        For the name of each learner its policies, in the order of the study.
-    """
-    policies: dict[str, list[str]] = {}
-    for team in results.store.manifest.policies:
-        if len(team.members) == 1 and (learner := team.members[0].learner):
-            policies.setdefault(learner, []).append(team.policy)
-    names = [learner.rpartition(" ")[0] for learner in policies]  # without the hash
-    unique = len({*names}) == len(names)
-    if unique:
-        return dict(zip(names, policies.values(), strict=True))
-    return policies
-
-
 def compare_learned_with_heuristic(results: Results) -> pd.DataFrame:
     """Every learner compared with the best policy that is not learned, on the same missions.
 
@@ -605,7 +593,7 @@ def means_of_check(results: Results) -> pd.DataFrame:
     return summary(results.checks, by=["policy", "point"])
 
 
-def plot_performance(summary: pd.DataFrame, metric: str, printed: float | None = None) -> Figure:
+def plot_performance(summary: pd.DataFrame, metric: str, printed: float | None = None) -> "Figure":
     """A metric of every policy: means with intervals, and the paper's number as a line.
 
     Args:
@@ -613,6 +601,8 @@ def plot_performance(summary: pd.DataFrame, metric: str, printed: float | None =
         metric: The metric.
         printed: The paper's number.
     """
+    from dess.analysis.figures import style
+
     rows = summary[summary["metric"] == metric]
     measure = metric_of(metric)
     with style.new_panels(1.3 + 0.42 * len(rows), values="x") as (figure, ax):
@@ -620,7 +610,13 @@ def plot_performance(summary: pd.DataFrame, metric: str, printed: float | None =
         for y, mean in enumerate(rows["mean"]):
             style.note_at_right(measure.write(mean), y, ax)
         if printed is not None:
-            ax.axvline(printed, **PRINTED, label=f"paper {measure.write(printed)}", zorder=1)
+            ax.axvline(
+                printed,
+                color=style.INK,
+                **PRINTED,
+                label=f"paper {measure.write(printed)}",
+                zorder=1,
+            )
         ax.set(title=measure.name, xlim=(-0.02, 1.02) if measure.is_bounded else None)
         style.set_axis_unit(ax.xaxis, measure.axis, 5)
     return figure
@@ -628,7 +624,7 @@ def plot_performance(summary: pd.DataFrame, metric: str, printed: float | None =
 
 def plot_by_fleet(
     summary: pd.DataFrame, metric: str, printed: Mapping[int, float] | None = None
-) -> Figure:
+) -> "Figure":
     """A metric of every policy against the number of UAVs, with intervals.
 
     Args:
@@ -636,11 +632,19 @@ def plot_by_fleet(
         metric: One of ``METRICS``.
         printed: The paper's numbers by number of UAVs.
     """
+    from dess.analysis.figures import style
+
     rows = style.place_values(summary[summary["metric"] == metric], "uavs")
     with style.new_panels(3.9, values="y", legend=5) as (figure, ax):
         style.plot_along(rows, style.policy_colours(rows["policy"]), "%", ax)
         if printed:
-            ax.plot(*zip(*sorted(printed.items()), strict=True), "D", label="paper", **PRINTED)
+            ax.plot(
+                *zip(*sorted(printed.items()), strict=True),
+                "D",
+                label="paper",
+                color=style.INK,
+                **PRINTED,
+            )
         ax.set(title=METRICS[metric], xlabel="UAVs", ylim=(-0.03, 1.04))
     return figure
 
@@ -649,6 +653,6 @@ def draw_performance(results: Results, metric: str) -> Drawing:
     """A metric of every policy at the only design point."""
     table = means_of_points(results)
     data = table[table["metric"] == metric]
-    caption = f"n = {counted_missions(data)} missions per policy; bars are {INTERVALS}."
+    caption = f"n = {numbers.format_span(data['n'])} missions per policy; bars are {INTERVALS}."
     alt = f"{metric_of(metric).name} of every policy"
     return Drawing(plot_performance(table, metric), alt, caption, data)

@@ -37,6 +37,7 @@ from dess.analysis.metrics import (
     metric_of,
 )
 from dess.analysis.names import RANGES, field_in_words, field_named, meaning_of_field
+from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.resimulate import resimulate
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.differences import compare
@@ -406,7 +407,7 @@ class WhatIf:
             sentences.append(
                 "Intervals of the means may overlap although the paired difference is clear."
             )
-        if summary.trained_policies_by_learner(self.results):
+        if trained_policies_by_learner(self.results):
             sentences.append(
                 "A learned policy is used as it was trained; in a setting far from its training, "
                 "a new training may do better."

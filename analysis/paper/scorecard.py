@@ -16,6 +16,7 @@ from dess.analysis.answers import summary
 from dess.analysis.answers.learning import BAND
 from dess.analysis.paper import measures, rules, values
 from dess.analysis.paper.rules import MARGIN, NEAR
+from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import INCONCLUSIVE, position_of
 from dess.base.files.reading import parse_toml, read_text
@@ -252,7 +253,7 @@ def _evidence_of_policy(
         raise measures.MissingError(f"the study {study} has not been run")
     results = studies[study]
     which = f"policy {column}"
-    learners = summary.trained_policies_by_learner(results)
+    learners = trained_policies_by_learner(results)
     if column in NULLS:
         among = [name for name in results.policies if name == column]
     elif column == COLUMNS[0]:

@@ -12,6 +12,7 @@ from dess.analysis import load_study, run_study
 from dess.analysis.answers import summary
 from dess.analysis.answers.settings.sobol import sobol_indices
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO
+from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.stats.differences import compare
 from dess.analysis.study.design import Saltelli
 
@@ -188,9 +189,9 @@ def test_checkpoints_of_one_learner_are_one_learner(tmp_path):
         return run_study(study, tmp_path / "-".join(policies))
 
     results = results_of("greedy", "random", "ddqn", "ddqn-2")
-    assert summary.trained_policies_by_learner(results) == {"ddqn": ["ddqn", "ddqn-2"]}
+    assert trained_policies_by_learner(results) == {"ddqn": ["ddqn", "ddqn-2"]}
     mixed = results_of("greedy", "ddqn", "ddqn-paper", "ddqn,greedy")
-    assert sorted(summary.trained_policies_by_learner(mixed).values()) == [["ddqn"], ["ddqn-paper"]]
+    assert sorted(trained_policies_by_learner(mixed).values()) == [["ddqn"], ["ddqn-paper"]]
     table = summary.compare_learned_with_heuristic(results)
     assert set(table["about"]) == {"the learner"}
     assert set(table["trainings"]) == {2}

@@ -190,7 +190,7 @@ def test_rates_move_over_their_phase(monkeypatch):
     ]
     training = DQNTraining(tiny(phases=phases, evaluate_every=20), CPU)
     epsilons_used = _noted(monkeypatch, training, "_collect_slot")
-    learned = _noted(monkeypatch, training.learner, "update")
+    learned = _noted(monkeypatch, training.learner, "update_networks")
     training.run_ticks(1000)
     # The first phase starts at random, the second as it begins.
     falling = [0.5 - 0.49 * min(tick / 40, 1) for tick in range(80)]
