@@ -50,10 +50,8 @@ from dess.analysis.tables import (
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.figure import Figure
 
-PRINTED: dict[str, Any] = {
-    "linestyle": "--",
-    "linewidth": 1.3,
-}  # how the numbers of the paper are drawn
+# How the numbers of the paper are drawn.
+PRINTED: dict[str, Any] = {"linestyle": "--", "linewidth": 1.3}
 UNGUARDED = "random-unguarded"  # the policy that acts without the return guard
 
 
