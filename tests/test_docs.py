@@ -90,9 +90,10 @@ def table(text: str, heading: str) -> dict[str, list[list[float]]]:
 def outside(tmp_path, monkeypatch):
     """The policy of the how-to page as an installed package; the name of the policy.
 
-    The working folder has this policy, and the files that pages give a title.
+    The working folder has this policy, and the files that pages give a title; a title with a
+    folder is that of a file of the repository.
     """
-    for title, text in re.findall(r'^```\w+ title="(.+?)"\n(.*?)^```', ALL, re.M | re.S):
+    for title, text in re.findall(r'^```\w+ title="([^/]+?)"\n(.*?)^```', ALL, re.M | re.S):
         (tmp_path / title).write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     source = next(block for block in blocks(OWN_POLICY, "python") if "class " in block)
