@@ -129,7 +129,7 @@ def compare_learners(
         by: Columns whose values form groups of missions, compared one by one.
         level: Confidence level of each interval.
         correction: Correction of the p-values over all rows, as for
-        ``differences.adjust_p_values``.
+            ``differences.adjust_p_values``.
 
     Returns:
         A row per learner, group and metric: ``learner``, ``baseline``, the columns ``by``,
