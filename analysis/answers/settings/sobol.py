@@ -1,15 +1,15 @@
 """Sobol indices: which share of the variance of a metric each field and the noise explain."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 from scipy.special import ndtri
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.figures import Drawing, style
+from dess.analysis.figures import Drawing
 from dess.analysis.metrics import (
     ALWAYS,
     METRICS,
@@ -24,16 +24,21 @@ from dess.analysis.stats.intervals import (
 from dess.analysis.study.design import NOISE, Saltelli
 from dess.analysis.tables import INTERVALS, Table, stack_by_policy
 
+if TYPE_CHECKING:  # figures need the extra reports
+    from matplotlib.figure import Figure
+
 RESAMPLES = 1000  # bootstrap resamples of the blocks of the design; every metric has the same
 
 
-def plot_indices(rows: pd.DataFrame, title: str) -> Figure:
+def plot_indices(rows: pd.DataFrame, title: str) -> "Figure":
     """Sobol indices of every parameter as dots with intervals; the noise has its own row.
 
     Args:
-        rows: Rows of ``dess.analysis.answers.settings.sobol.sobol_indices_of`` of a policy and a
-        metric. title: The title of the figure.
+        rows: Rows of ``sobol_indices_of`` of a policy and a metric.
+        title: The title of the figure.
     """
+    from dess.analysis.figures import style
+
     rows = rows.reset_index(drop=True)
     look = style.dot_style((style.readable_palette()[0], "o"))
     with style.new_panels(1.5 + 0.45 * len(rows), values="x", legend=2) as (figure, ax):
