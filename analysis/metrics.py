@@ -111,7 +111,7 @@ class Metric:
 
     @property
     def axis(self) -> str:
-        """The unit in which an axis of a figure is written, as for ``style.set_axis_unit``."""
+        """The unit in which an axis of a figure is written: ``%``, or empty for plain numbers."""
         return "%" if self.in_percent else ""
 
     @property

@@ -82,7 +82,7 @@ class DuelingNetwork:
 
     @staticmethod
     def layer_sizes(shapes: Shapes, hidden: Sequence[int]) -> Sizes:
-        """The sizes of the layers, as for ``PaperNetwork``."""
+        """The inputs and outputs of each layer, by its name."""
         widths = [*shapes[0], *hidden]
         ends = {"value": (1, widths[-1]), "advantage": (ACTIONS, widths[-1])}
         return _dense_layer_sizes(widths) | ends
@@ -106,7 +106,7 @@ class SetNetwork:
 
     @staticmethod
     def layer_sizes(shapes: Shapes, hidden: Sequence[int]) -> Sizes:
-        """The sizes of the layers, as for ``PaperNetwork``."""
+        """The inputs and outputs of each layer, by its name."""
         (own_inputs,), (_, action), *sets = shapes
         nodes, others, joint = hidden
         sizes: Sizes = {

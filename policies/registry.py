@@ -216,7 +216,7 @@ def load_team(text: str, uavs: int | None = None, *, run_files: bool = False) ->
         text: The team.
         uavs: The size of the largest fleet, if the policies that never act in it are to be left
             out, as at some design points of a study; all are loaded by default.
-        run_files: Whether Python files may be run, as for ``load``.
+        run_files: Whether the file of a policy, ``FILE.py:CLASS``, may be run.
 
     Raises:
         InputError: If one of them is unknown.
@@ -310,7 +310,7 @@ def describe_policy(name: str, *, run_files: bool = False) -> About:
 
     Args:
         name: The policy.
-        run_files: Whether a Python file may be run, as for ``load``.
+        run_files: Whether the file of a policy, ``FILE.py:CLASS``, may be run.
 
     Raises:
         InputError: If it does not exist or cannot be loaded.

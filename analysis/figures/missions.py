@@ -212,7 +212,7 @@ def plot_courses(
     Args:
         rows: Rows with ``panel``, ``slot``, ``mean``, ``low`` and ``high``.
         line: The column.
-        unit: The unit of the means, as for ``style.set_axis_unit``.
+        unit: The unit of the means: ``%``, ``points``, or empty for plain numbers.
         titles: The titles of the panels, by ``panel``.
         heading: The title of the legend.
     """

@@ -304,7 +304,7 @@ def plot_along(
     Args:
         rows: The rows; see ``place_values``.
         looks: The curves to draw, by the value of the column as text.
-        unit: The unit of the means, as for ``style.set_axis_unit``.
+        unit: The unit of the means: ``%``, ``points``, or empty for plain numbers.
         ax: The axes to draw on.
         line: The column.
         options: Further arguments of ``Axes.errorbar``.

@@ -393,7 +393,7 @@ def compare(
         metrics: Columns of numbers.
         by: Columns whose values form groups of missions, compared one by one.
         level: Confidence level of each interval.
-        correction: Correction of the p-values over all rows, as for ``adjust_p_values``.
+        correction: Correction of the p-values over all rows: ``holm``, ``fdr`` or None.
         of: What is compared: ``policy`` or ``point``.
 
     Returns:

@@ -104,7 +104,11 @@ def blocks(seed, replication, stream, substream, slot, indices, words, count):
     The compiler makes vector code of the loop if ``count`` is a multiple of eight.
 
     Args:
-        seed, replication, stream, substream, slot: As for ``block``.
+        seed: Seed of the study, ``uint64``.
+        replication: Number of the replication, below 2**32.
+        stream: Purpose of the draw, one of this module's stream constants.
+        substream: Part of the stream (UAV and group of communication slots), below 2**24.
+        slot: Mission slot, below 2**32.
         indices: (R,) indices.
         words: (4, R) the words of each index, overwritten.
         count: How many of the indices to compute, from the first on.

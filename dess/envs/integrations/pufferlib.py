@@ -35,7 +35,8 @@ class HarvestPufferEnv(pufferlib.PufferEnv):
         """Make the environment.
 
         Args:
-            scenario: As for ``vector_env``, as are ``num_envs``, ``seed`` and ``guarded``.
+            scenario: The scenario, or the space from which each mission draws its parameters; or
+                what ``load_scenario`` takes.
             num_envs: Number of missions in progress.
             seed: Seed of the missions, until ``reset`` is called with another seed.
             guarded: Whether the masks are those of the return guard.
