@@ -142,11 +142,16 @@ class Report:
         return nbformat.writes(notebook) + "\n"
 
     def is_in(self, out: Path, results: Path) -> bool:
-        """Whether the notebook for Jupyter is in ``out``, and names the folder of the results."""
+        """Whether the notebook for Jupyter is in ``out``, and names the folder of the results.
+
+        The notebook of a report that reads no results names none.
+        """
         try:
             text = read_text(out / f"{self.name}.ipynb", LARGEST)
         except InputError:
             return False
+        if "results" not in self.parameters:
+            return True
         cell = _parameters_cell(self.original).source
         expected = replace_values(cell, {"results": _relative_path(str(results), out)})
         line = next(line for line in expected.splitlines() if line.startswith("results"))

@@ -18,7 +18,7 @@ from dess.analysis import run_study
 from dess.reports.cli import main
 from dess.reports.pages import kernels
 from dess.reports.pages.body import make_page
-from dess.reports.pages.notebook import PARAMETERS, Report, read_report
+from dess.reports.pages.notebook import PARAMETERS, Report, read_report, report_names
 from dess.reports.pages.render import ReportError, render
 from tests.analysis.small import small_study
 from tests.reports.small import Links, words_of
@@ -337,6 +337,17 @@ def test_a_notebook_that_is_missing_or_of_other_results_is_written_again(
             file.write_text(wrong, "utf-8")
         render(["mission"], results, tmp_path, notebooks=notebooks)
         assert file.read_text("utf-8") == written
+
+
+def test_the_notebook_of_every_shipped_report_is_known_again(tmp_path):
+    """That of a report that reads no results, too."""
+    for name in report_names():
+        report = read_report(name)
+        text = report.for_jupyter(tmp_path / "results", tmp_path, {})
+        (tmp_path / f"{name}.ipynb").write_text(text, "utf-8")
+        assert report.is_in(tmp_path, tmp_path / "results")
+        if "results" in report.parameters:
+            assert not report.is_in(tmp_path, tmp_path / "others")
 
 
 # --- processes ---
