@@ -36,6 +36,8 @@ class Metric:
         most: The largest value that a mission can have. Of a time, ``metric_in_missions`` finds it.
         failure: By how much a failure changes it, where the range is not known; 0 if that is not
             known either. Of a cost, ``metric_in_missions`` finds it.
+        grows: Whether it grows with the length of the mission, so that only missions of the same
+            length are to be compared by it.
     """
 
     column: str
@@ -49,6 +51,7 @@ class Metric:
     least: float = -inf
     most: float = inf
     failure: float = 0.0
+    grows: bool = False
 
     @property
     def range(self) -> tuple[float, float]:
@@ -175,13 +178,15 @@ _OTHERS = (
     Metric(REWARD, "Reward", failure=FAILURE_COST),
     Metric(BOUND, "Upper bound", least=0.0, most=1.0),
     Metric(GAP, "Optimality gap", less_is_better=True, least=-1.0, most=1.0),
-    Metric(COST, "Cost", kind="cost", less_is_better=True, least=0.0),
+    Metric(COST, "Cost", kind="cost", less_is_better=True, least=0.0, grows=True),
 )
 # The columns of the longest that each mission may last, and of what a loss of its UAVs costs.
 MOST_SLOTS, MOST_LOST = "most_slots", "most_lost"
 
 
-def _time_metric(column: str, name: str, sheet_unit: str = "h", horizons: float = 1.0) -> Metric:
+def _time_metric(
+    column: str, name: str, sheet_unit: str = "h", horizons: float = 1.0, grows: bool = False
+) -> Metric:
     """A time of which less is better; 0 ``horizons`` if it is a sum over UAVs."""
     return Metric(
         column,
@@ -191,6 +196,7 @@ def _time_metric(column: str, name: str, sheet_unit: str = "h", horizons: float 
         sheet_unit=sheet_unit,
         horizons=horizons,
         least=0.0,
+        grows=grows,
     )
 
 
@@ -204,9 +210,9 @@ def _amount_metric(
 # Those of ``OPERATIONS``, which only extended scenarios measure.
 _MEASURED = (
     # An age grows with time, so the mean of a node that nothing reaches is half of the horizon.
-    _time_metric(AGE, "Age of information", horizons=0.5),
-    _time_metric("peak_age", "Peak age of information"),
-    _time_metric("age_p99", "99th percentile of the age"),
+    _time_metric(AGE, "Age of information", horizons=0.5, grows=True),
+    _time_metric("peak_age", "Peak age of information", grows=True),
+    _time_metric("age_p99", "99th percentile of the age", grows=True),
     _time_metric("latency", "Latency"),
     _time_metric("latency_p99", "99th percentile of the latency"),
     _amount_metric("generated", "Packets generated"),

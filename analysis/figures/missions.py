@@ -231,7 +231,7 @@ def plot_courses(
             for value, course in rows[rows["panel"] == panel].groupby(line, sort=False):
                 colour = looks[value_text(value)][0]
                 ax.fill_between(course["slot"], course["low"], course["high"], step="post",
-                                color=colour, alpha=0.25, linewidth=0)  # fmt: skip
+                                color=colour, **style.BAND)  # fmt: skip
                 ax.plot(course["slot"], course["mean"], color=colour, label=value_text(value))
             ax.set(title=title, ylim=(0, None), xlim=(0, rows["slot"].max()))
             style.set_axis_unit(ax.yaxis, unit, 4)

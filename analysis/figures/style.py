@@ -44,6 +44,7 @@ LINES = ("-", "--", ":", "-.")
 MARKERS = "os^vPX*"
 WIDTH, DPI = 5.2, 150  # inches, dots per inch
 OUTLINED: dict = {"path_effects": [withStroke(linewidth=2.5, foreground="white")]}  # of texts
+BAND: dict = {"alpha": 0.25, "linewidth": 0}  # of confidence bands, in the colour of their line
 # In all figures, blue means better, orange worse, and grey inconclusive.
 BETTER, WORSE = "#0173b2", "#c05000"
 ZERO: dict = {"color": INK, "linewidth": 1, "zorder": 1}  # the line of no difference

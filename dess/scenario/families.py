@@ -110,6 +110,9 @@ MOST_SEED = 10**9 - 1
 
 # The seeds of each set of seas, for every family. Seeds below 1000 are for examples.
 SETS = {"train": range(1000, 1300), "validation": range(2000, 2010), "test": range(3000, 3060)}
+# The families of these sets. A new family is none of them, so that studies and trainings of before
+# keep their seas.
+SET_FAMILIES = ("scattered", "clustered", "coast", "archipelago", "corridor", "dense", "large")
 
 # The least battery of a charged UAV, and that on seas of more rows and columns together than these.
 _LEAST, _LEAST_FAR, _FAR = 60, 80, 80
@@ -175,7 +178,7 @@ def seas_of(name: str) -> list[str]:
         InputError: If there is no such set.
     """
     check_known("set of seas", name, SETS)
-    return [f"{family}:{seed}" for family in FAMILIES for seed in SETS[name]]
+    return [f"{family}:{seed}" for family in SET_FAMILIES for seed in SETS[name]]
 
 
 # --- the families ---

@@ -28,12 +28,9 @@ from dess.analysis.answers.settings.points import (
     varied_values,
 )
 from dess.analysis.metrics import (
-    AGE,
-    COST,
     PRODUCT,
     column_in_sheet_unit,
     format_length,
-    in_either,
     metric_in_missions,
     metric_of,
     metrics_in,
@@ -49,10 +46,6 @@ from dess.analysis.stats.verdict import may_be_best, within_reach
 from dess.analysis.tables import MOST_ROWS, WIDER, Table, allowance_sentence, format_counts
 
 MOST_NAMES = 3  # the largest number of settings that are named because they may be as good
-
-
-# What grows with the length of a mission, so that missions of the same length are to be compared.
-_OF_LENGTH = {*in_either(AGE, "peak_age", "age_p99"), COST}
 
 
 def ranking_metric(results: Results, metric: str | None = None) -> str:
@@ -151,7 +144,7 @@ def unequal_lengths_sentence(results: Results, metrics: Iterable[str]) -> str:
         results: The study.
         metrics: The metrics that are compared.
     """
-    compared = [metric_of(metric).within for metric in metrics if metric in _OF_LENGTH]
+    compared = [metric_of(metric).within for metric in metrics if metric_of(metric).grows]
     missions = results.missions
     has_quota = any(space.quota for space in results.store.manifest.scenarios)
     if not compared or not has_quota or missions["slots"].nunique() == 1:

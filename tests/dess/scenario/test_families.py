@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from dess import InputError, load_scenario
 from dess.physics.chart import parking_of, spread
 from dess.scenario import families
-from dess.scenario.families import FAMILIES, MOST_SEED, sea_of, seas_of
+from dess.scenario.families import FAMILIES, MOST_SEED, SET_FAMILIES, sea_of, seas_of
 from dess.scenario.scenario import ScenarioSpace, scenario_description, scenario_names
 
 # What never changes: a sea of each family, as TOML.
@@ -70,8 +70,8 @@ def test_sets_are_disjoint_and_have_seas_of_each_family():
     sizes = {"train": 300, "validation": 10, "test": 60}
     drawn = {name: seas_of(name) for name in sizes}
     for name, size in sizes.items():
-        assert len(drawn[name]) == size * len(FAMILIES)
-        assert {sea.split(":")[0] for sea in drawn[name]} == {*FAMILIES}
+        assert len(drawn[name]) == size * len(SET_FAMILIES)
+        assert {sea.split(":")[0] for sea in drawn[name]} == {*SET_FAMILIES}
     assert len({sea for name in drawn for sea in drawn[name]}) == sum(map(len, drawn.values()))
     with pytest.raises(InputError, match="'tests' is unknown .did you mean test.*; allowed: train"):
         seas_of("tests")
