@@ -15,7 +15,7 @@ import numpy as np
 from dess.base.errors import InputError
 from dess.base.kernels import kernel
 from dess.model.guard.battery import must_charge, slots_needed
-from dess.model.guard.moves import safe_moves
+from dess.model.guard.moves import called_safe_moves
 from dess.model.guard.parking import parking_cell, parking_memory
 from dess.model.guard.ways import battery_home
 from dess.model.rules import data_left, legal_moves, may_act
@@ -144,7 +144,7 @@ def _fill(missions, uavs, residual, guarded, chart, reach, out_missions, out_uav
             if may_act(u):
                 if guarded:
                     charge = row[MUST_CHARGE] != 0
-                    row[MASK] = safe_moves(
+                    row[MASK] = called_safe_moves(
                         mission, team, i, chart, charge, home, memory.planned, reach
                     )
                 else:

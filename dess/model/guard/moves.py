@@ -139,6 +139,12 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     return nearest or 1 << HOVER  # who gives way may have nowhere to go
 
 
+@kernel
+def called_safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
+    """``safe_moves`` as a function that is called, not inlined: its code is long to compile."""
+    return safe_moves(mission, uavs, i, chart, charge, home, planned, reach)
+
+
 @inlined
 def _wait(mission, u, chart, action, x, y, home):
     """The battery [%] that a UAV keeps in wind for its wait for a pad if it comes after an action.
@@ -173,7 +179,7 @@ def _mask(missions, uavs, residual, rows_mission, rows_uav, chart, reach):
         home = stays(team[i])
         if charge:
             home = parking_cell(mission, team, i, data, chart, memory, reach)
-        safe = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
+        safe = called_safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
         for action in range(5):
             masks[row, action] = safe >> action & 1
     return masks
