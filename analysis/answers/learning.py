@@ -223,7 +223,7 @@ def methods_sentence(rungs: pd.DataFrame) -> str:
     ]
     return (
         f"Trainings reach a mean product of {reached[0]} and of {reached[-1]}. "
-        f"Of them learn to charge: {numbers.join_words(counts[:3])}."
+        f"Of the trainings, {numbers.join_words(counts[:3])} learn to charge."
     )
 
 
