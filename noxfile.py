@@ -42,8 +42,8 @@ for command in sys.argv[1:]:
 REQUIREMENTS = ("pyproject.toml", "constraints.txt")
 # Two test files at a time, in the order of their collection.
 SIDE_BY_SIDE = ("-n", "2", "--dist", "loadfile", "--no-loadscope-reorder")
-# The tests simulate little and compile much, so they compile with less optimization, which changes
-# no number, into a cache of their own. All other sessions compile as users do.
+# The tests and the fuzzer simulate little and compile much, so they compile with less optimization,
+# which changes no number, into a cache of their own. All other sessions compile as users do.
 QUICK_COMPILING = {"NUMBA_OPT": "1", "NUMBA_CACHE_DIR": str(Path("build/numba").resolve())}
 RESULTS, REPORTS = Path("results"), Path("build/reports")
 # Beside the quick tests, what shows the lowest versions of the libraries for pages and commands.
@@ -113,7 +113,7 @@ def verify(session: nox.Session) -> None:
 def fuzz(session: nox.Session) -> None:
     """Try bad inputs, signals and forged files; ``-- --minutes 10 --seed N`` are its parameters."""
     install(session, "[test]")
-    session.run("python", "-m", "tests.fuzz", *session.posargs)
+    session.run("python", "-m", "tests.fuzz", *session.posargs, env=QUICK_COMPILING)
 
 
 @nox.session

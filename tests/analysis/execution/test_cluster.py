@@ -84,6 +84,7 @@ def test_a_study_goes_on_after_its_scheduler_was_killed(tmp_path, monkeypatch, c
     assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
 
 
+@pytest.mark.slow
 def test_dask_waits_for_workers_and_leaves_the_same_bytes(tmp_path, monkeypatch):
     monkeypatch.setattr(workers, "LOOK", 0.1)
     study = small_study(tmp_path, logged=1)

@@ -67,6 +67,7 @@ def check_studies(folder, workers, number, kills, missions, progress=chunks):
         assert files_of(killed.out) == whole
 
 
+@pytest.mark.slow
 def test_a_killed_study_equals_an_undisturbed_one(tmp_path):
     check_studies(tmp_path, 1, signal.SIGKILL, 1, 100)
 
