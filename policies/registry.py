@@ -28,7 +28,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from dess.base.errors import InputError, one_of, shown
+from dess.base.errors import InputError, shown, unknown_name
 from dess.base.files.reading import Missing, paths_in, read_text
 from dess.base.sources import path_of
 from dess.model.view import View
@@ -71,7 +71,7 @@ TRAINED = Path(__file__).with_name("trained")  # one folder per trained policy
 
 # A class of a Python file.
 FILE = re.compile(r"(?P<path>.+\.py):(?P<kind>\w+)")
-_ALLOWED = "allowed: a class whose objects have a name and act(view)"
+_ALLOWED = "a class whose objects have a name and act(view)"
 _OTHERS = (
     "the folder of a trained policy, FILE.py:CLASS, or what an installed package registers under "
     f"the entry point {GROUP}"
@@ -128,18 +128,19 @@ def load(name: str | Path, *, run_files: bool = False) -> Policy:
     if file := FILE.fullmatch(name):
         if not run_files:
             raise InputError(
-                f"policy: {shown(name)} is a Python file, which is run only if you name it; "
-                "allowed: --policy FILE.py:CLASS, if you trust the file"
+                "policy",
+                f"{shown(name)} is a Python file, which is run only if you name it",
+                "--policy FILE.py:CLASS, if you trust the file",
             )
         path = Path(file["path"])
         kind = file["kind"]
         if not os.path.isfile(path):  # False for a name that no file can have
-            raise InputError(f"policy: {path}: no such file; allowed: FILE.py:CLASS")
+            raise InputError(f"policy: {path}", "no such file", "FILE.py:CLASS")
         return _make_policy(kind, str(path), lambda: _find_class(_import_name(path), kind))
     if point := _registered_policies().get(name):
         return _make_policy(name, point.value, point.load)
     _check_untrained(Path(name))
-    raise InputError(f"policy: {shown(name)} is unknown{one_of(name, names(), _OTHERS)}")
+    raise unknown_name("policy", f"{shown(name)} is unknown", name, names(), _OTHERS)
 
 
 def folder_of(name: str) -> Path | None:
@@ -153,8 +154,9 @@ def _check_untrained(folder: Path) -> None:
     """Raise an error if a folder has a training that has not written any weights yet."""
     if os.path.exists(folder / CHECKPOINT):  # False for a name that no folder can have
         raise InputError(
-            f"policy: {folder} is a training that has no weights yet; allowed: after the command "
-            "that began it is run again with --resume"
+            "policy",
+            f"{folder} is a training that has no weights yet",
+            "after the command that began it is run again with --resume",
         )
 
 
@@ -165,16 +167,30 @@ def package_of(name: str) -> str:
 
 
 def _make_policy(name: str, where: str, load_class: Callable[[], Callable[[], Any]]) -> Policy:
-    """A policy of a class, which may be anybody's."""
+    """A policy of a class, which may be anybody's.
+
+    Raises:
+        InputError: If the class cannot be loaded, or is none of a policy.
+    """
+    try:
+        return _instantiate(load_class)
+    except _NoPolicyError as error:
+        raise InputError("policy", f"{name} of {where} {error}", _ALLOWED) from error.__cause__
+
+
+class _NoPolicyError(Exception):
+    """Why a class gives no policy, in words that follow its name."""
+
+
+def _instantiate(load_class: Callable[[], Callable[[], Any]]) -> Policy:
     try:
         policy = load_class()()
     except InputError:
         raise
     except Exception as error:  # code of others may raise anything; name it
-        line = f"policy: {name} of {where} cannot be loaded: {type(error).__name__}: {error}"
-        raise InputError(f"{line}; {_ALLOWED}") from error
+        raise _NoPolicyError(f"cannot be loaded: {type(error).__name__}: {error}") from error
     if not isinstance(policy, Policy):
-        raise InputError(f"policy: {name} of {where} has no name and act(view); {_ALLOWED}")
+        raise _NoPolicyError("has no name and act(view)")
     return policy
 
 
@@ -187,9 +203,7 @@ def _find_class(module: str, name: str) -> Callable[[], Any]:
     names_of_module = vars(import_module(module))
     if name not in names_of_module:
         classes = [n for n, value in names_of_module.items() if hasattr(value, "act")]
-        raise InputError(
-            f"policy: {module}: {shown(name)} is no class of it{one_of(name, classes)}"
-        )
+        raise unknown_name(f"policy: {module}", f"{shown(name)} is no class of it", name, classes)
     return names_of_module[name]
 
 
@@ -205,7 +219,7 @@ def _import_name(path: Path) -> str:
     path_of.cache_clear()
     spec = find_spec(path.stem)
     if not spec or not spec.origin or Path(spec.origin).resolve() != path.resolve():
-        raise InputError(f"policy: {path}: another module has its name; allowed: another file name")
+        raise InputError(f"policy: {path}", "another module has its name", "another file name")
     return path.stem
 
 
@@ -260,10 +274,9 @@ def _describe_registered(point: EntryPoint) -> str:
     """What a policy of another package is, or why it cannot be loaded."""
     origin = f"of the package {package_of(point.name)}"
     try:
-        words = inspect.getdoc(type(load(point.name))) or ""
-    except InputError as error:
-        problem = str(error).partition(point.value)[2].partition("; allowed:")[0]
-        return f"{problem.strip()} ({origin})"
+        words = inspect.getdoc(type(_instantiate(point.load))) or ""
+    except (InputError, _NoPolicyError) as error:
+        return f"{error} ({origin})"
     return f"{words.partition(chr(10))[0].rstrip('.')} ({origin})" if words else origin
 
 

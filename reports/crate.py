@@ -45,9 +45,7 @@ def write_crate(results: Results, page: Path, path: Path, published: date, licen
         InputError: If there is no such licence, or a file of the results is damaged.
     """
     for damaged in results.store.damaged:
-        raise InputError(
-            f"{damaged}: has been changed since it was written; allowed: results without damage"
-        )
+        raise InputError(damaged, "has been changed since it was written", "results without damage")
     files = _collect_files(results, page)
     about = load_template("ro-crate-metadata.json").render(
         study=results.manifest["study"],
@@ -73,7 +71,7 @@ def check_page(page: Path, results: Results) -> None:
     shown = Page.read(page, LIMIT, allowed)
     keys = [evidence.key for evidence in shown.evidence]
     if keys != [results.store.manifest.key] or not shown.is_sealed:
-        raise InputError(f"{page}: does not show the results of this study; allowed: {allowed}")
+        raise InputError(page, "does not show the results of this study", allowed)
 
 
 def find_licence(text: str) -> str:
@@ -88,8 +86,9 @@ def find_licence(text: str) -> str:
         licence = ""
     if not licence.replace("-", "").replace(".", "").isalnum() or "LicenseRef" in licence:
         raise InputError(
-            f"--license: {text!r} is unknown; allowed: an identifier of https://spdx.org/licenses, "
-            "such as MIT, CC-BY-4.0 or CC0-1.0"
+            "--license",
+            f"{text!r} is unknown",
+            "an identifier of https://spdx.org/licenses, such as MIT, CC-BY-4.0 or CC0-1.0",
         )
     return licence
 

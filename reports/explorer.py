@@ -50,8 +50,9 @@ class Grid:
         if len(places) < 2 or not len(table) == len(table.drop_duplicates()) == settings:
             study = results.study.name
             raise InputError(
-                f"explorer: {study} is not a full grid of two fields or more; "
-                'allowed: a study with kind = "grid"'
+                "explorer",
+                f"{study} is not a full grid of two fields or more",
+                'a study with kind = "grid"',
             )
 
     @property

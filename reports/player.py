@@ -226,8 +226,9 @@ def _check_log(log: pd.DataFrame, scenario: Scenario) -> None:
             numbers = sorted(rows.loc[rows[what] >= 0, what])
             if numbers != list(range(count)):
                 raise InputError(
-                    f"events: {edge} has {len(numbers)} rows of a {what}; "
-                    f"allowed: one for each of the scenario's {count}"
+                    "events",
+                    f"{edge} has {len(numbers)} rows of a {what}",
+                    f"one for each of the scenario's {count}",
                 )
 
 
@@ -330,8 +331,9 @@ def check_ffmpeg() -> None:
         is_available = FFMpegWriter.isAvailable()
     if not is_available:
         raise InputError(
-            "animation: .mp4 needs the program ffmpeg, which is not installed; allowed: install "
-            "it, or write .gif or .html, which need no other program"
+            "animation",
+            ".mp4 needs the program ffmpeg, which is not installed",
+            "install it, or write .gif or .html, which need no other program",
         )
 
 

@@ -33,7 +33,7 @@ from dess.analysis.stats.differences import add_adjusted, compare, compare_pairs
 from dess.analysis.stats.intervals import LEVEL, by_replication, values_within, wilson_interval
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, on_front, position_by_test
 from dess.analysis.study.stopping import Text
-from dess.base.errors import one_of
+from dess.base.errors import unknown_name
 from dess.base.files.documents import Document
 from dess.base.files.reading import read_text
 from dess.base.files.writing import check_target, write_file
@@ -82,8 +82,8 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
     """
     for role, asked in (("learned", learned), ("heuristic", heuristic)):
         if asked is not None and asked not in results.policies:
-            allowed = one_of(asked, results.policies)
-            raise InputError(f"{role}: {asked!r} is not in the study{allowed}")
+            problem = f"{asked!r} is not in the study"
+            raise unknown_name(role, problem, asked, results.policies)
     means = by_replication(results.missions, PRODUCT, ["policy", "point"]).mean()
     means = means.groupby("policy").mean()
     trained = sorted(
@@ -98,8 +98,9 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
     pairs = [pair for pair in candidates if pair[0] != pair[1]]
     if not pairs:
         raise InputError(
-            f"learned, heuristic: no two policies to compare among {', '.join(results.policies)}; "
-            "allowed: two or more, and not one for both"
+            "learned, heuristic",
+            f"no two policies to compare among {', '.join(results.policies)}",
+            "two or more, and not one for both",
         )
     return Pair(*pairs[0], len({frozenset(pair) for pair in pairs}))
 
@@ -134,8 +135,8 @@ def pair_missions(results: Results, pair: Pair) -> pd.DataFrame:
         InputError: If the study has several design points.
     """
     if (points := len(results.store.manifest.points)) > 1:
-        many = f"study {results.study.name}: {points} design points"
-        raise InputError(f"{many}; allowed: one for all missions")
+        where = f"study {results.study.name}"
+        raise InputError(where, f"{points} design points", "one for all missions")
     table = results.missions.assign(
         initial_data=results.missions["initial"] / len(results.scenario().nodes)
     )

@@ -104,7 +104,7 @@ def diff_results(a: Results, b: Results) -> Diff:
     common = missions_a.merge(missions_b, on=_KEYS, suffixes=("_a", "_b"))
     if (common if is_paired else cells).empty:
         lacking = ", ".join(f"only {rows['only_in'][0]} has {rows['what'][0]}" for rows in alone)
-        raise InputError(f"{both}: no mission is in both: {lacking}; allowed: {_ALLOWED}")
+        raise InputError(both, f"no mission is in both: {lacking}", _ALLOWED)
     sides = None
     if not is_paired:
         rows = pd.concat([missions_a.assign(side="a"), missions_b.assign(side="b")])

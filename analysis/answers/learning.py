@@ -22,7 +22,7 @@ from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import adjust_p_values
 from dess.analysis.stats.intervals import LEVEL, Interval, mean_interval
 from dess.analysis.stats.verdict import INCONCLUSIVE, MARKS, judge_parts, position_of, verdict_above
-from dess.base.errors import one_of
+from dess.base.errors import unknown_name
 from dess.base.files.reading import paths_in
 from dess.base.files.tables import read_table
 from dess.policies.learner.config import TrainingConfig, learner_identifier, read_description
@@ -564,7 +564,7 @@ def read_curves(path: Path) -> pd.DataFrame:
     ends = [{*last_phase(averages, a).index} & {*last_phase(averages, b).index} for a, b in pairs]
     if BASELINE not in {*curves["variant"]} or not ends or not all(ends):
         pair = " and ".join(next(iter(PAIRS.values())))
-        raise InputError(f"{path}: variant: has no pair of trainings; allowed: {pair}")
+        raise InputError(f"{path}: variant", "has no pair of trainings", pair)
     return curves
 
 
@@ -586,14 +586,14 @@ def rliable_scores(results: Results, metric: str = PRODUCT) -> dict[str, np.ndar
             learners have different numbers of trainings.
     """
     if metric not in ALWAYS:
-        raise InputError(f"metric: {metric!r} is unknown{one_of(metric, ALWAYS)}")
+        raise unknown_name("metric", f"{metric!r} is unknown", metric, ALWAYS)
     algorithms = _policies_of_runs(results)
     points = range(len(results.store.manifest.points))
     runs = len(next(iter(algorithms.values())))
     cells = results.missions.groupby(["policy", "point"], sort=False)[metric]
     size = int(cells.size().min()) // runs
     if not size:
-        raise InputError(f"missions: {cells.size().min()} for {runs} runs; allowed: at least one")
+        raise InputError("missions", f"{cells.size().min()} for {runs} runs", "at least one")
     means = {
         cell: values.to_numpy(float)[: runs * size].reshape(runs, size).mean(axis=1)
         for cell, values in cells
@@ -649,7 +649,7 @@ def _policies_of_runs(results: Results) -> dict[str, list[str]]:
     algorithms = trained | {policy: [policy] for policy in results.policies if policy in others}
     counts = {len(policies) for policies in algorithms.values()} - {1}
     if len(counts) > 1:
-        raise InputError(f"trainings: {sorted(counts)}; allowed: as many of every learner")
+        raise InputError("trainings", str(sorted(counts)), "as many of every learner")
     runs = max(counts, default=RUNS)
     return {
         name: names if len(names) == runs else names * runs for name, names in algorithms.items()

@@ -67,7 +67,7 @@ def means_by_field(results: Results) -> pd.DataFrame:
     for number, values in enumerate(design):
         if len(values) != 1:
             fields = ", ".join(values) or "no field"
-            raise InputError(f"point {number}: sets {fields}; allowed: one field at a time")
+            raise InputError(f"point {number}", f"sets {fields}", "one field at a time")
     rows = [(field, value_text(value)) for values in design for field, value in values.items()]
     table = pd.DataFrame(rows, columns=["field", "value"]).rename_axis("point").reset_index()
     table["position"] = table.groupby("field").cumcount()

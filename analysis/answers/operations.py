@@ -104,9 +104,7 @@ def changes_from_reference(
     check_metric(results, metric)
     table = values_of_points(results)
     if field not in table or reference not in table[field].to_numpy():
-        raise InputError(
-            f"{field}: is never {reference!r} in the study; allowed: one of its values"
-        )
+        raise InputError(field, f"is never {reference!r} in the study", "one of its values")
     rows = []
     measure = metric_in_missions(results.missions, metric)
     for policy, missions in results.missions.groupby("policy", sort=False):

@@ -42,7 +42,7 @@ def missions_by_sea(results: Results) -> pd.DataFrame:
     """
     names = _sea_names(results)
     if not all(":" in name for name in names):
-        raise InputError(f"{results.store.folder}: no study of seas; allowed: one whose design is")
+        raise InputError(results.store.folder, "no study of seas", "one whose design is")
     counts = np.array([len(space.nodes) for space in results.store.manifest.scenarios])
     point = results.missions["point"].to_numpy()
     sea = pd.Series(names, dtype=str)[point].to_numpy()

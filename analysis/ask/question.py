@@ -34,7 +34,7 @@ from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.design import MAX_SIZE, GridDesign, TableDesign
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.study import Study, study_from
-from dess.base.errors import one_of, validation_line
+from dess.base.errors import to_input_error, unknown_name
 from dess.base.files.reading import paths_in
 from dess.base.files.writing import toml_value, write_file
 from dess.policies.registry import list_teams
@@ -197,9 +197,7 @@ def sweep_question(
         InputError: If a field, a value, a policy, a price or a requirement is not allowed.
     """
     if unknown := [key for key in prices or () if key not in Costs.model_fields]:
-        raise InputError(
-            f"prices: {unknown[0]!r} is unknown{one_of(unknown[0], Costs.model_fields)}"
-        )
+        raise unknown_name("prices", f"{unknown[0]!r} is unknown", unknown[0], Costs.model_fields)
     swept = {field: of_field for field, of_field in values.items() if len(of_field) > 1}
     load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
     if isinstance(policies, str):
@@ -244,20 +242,20 @@ def _cheapest_rule(
     """The rule that searches for the cheapest setting that meets the requirements."""
     prices = study.costs
     if not prices:
-        raise InputError("requirements: need prices; allowed: prices, such as uav=20000")
+        raise InputError("requirements", "need prices", "prices, such as uav=20000")
     least = {}
     for metric, share in requirements.items():
         full = ALIASES.get(metric, metric)
         if full not in (*METRICS, AGE):
-            allowed = one_of(metric, [*METRICS, *ALIASES, AGE])
-            raise InputError(f"requirements: {metric!r} is unknown{allowed}")
+            names = [*METRICS, *ALIASES, AGE]
+            raise unknown_name("requirements", f"{metric!r} is unknown", metric, names)
         least[full] = share
     spaces = study.scenarios
     fleet = prices.uav * max(space.uavs[1] for space in spaces)
     fleet += prices.pad * max(space.charging_pads for space in spaces)
     running = prices.missions * (prices.charge + prices.hour + prices.lost_uav)
     if not fleet and not running:
-        raise InputError("prices: all are 0; allowed: one or more above 0")
+        raise InputError("prices", "all are 0", "one or more above 0")
     rule = {
         "procedure": "cheapest",
         "requirements": least,
@@ -271,7 +269,7 @@ def _cheapest_rule(
         cheapest_rule.check_age(spaces)
         return cheapest_rule
     except ValidationError as error:
-        raise InputError(validation_line(error, "sweep: selection: cheapest", Cheapest)) from None
+        raise to_input_error(error, "sweep: selection: cheapest", Cheapest) from None
 
 
 def what_if_question(
@@ -294,7 +292,7 @@ def what_if_question(
     """
     for name, values in (("settings", settings), ("baseline", baseline or {})):
         if not isinstance(values, Mapping):
-            raise InputError(f"{name}: {values!r}; allowed: fields and values, such as {{uavs=5}}")
+            raise InputError(name, repr(values), "fields and values, such as {uavs=5}")
     fixed = dotted(dict(baseline or {}))
     changed = dotted(dict(settings))
     measuring = {field for field in changed if field.endswith(".measured")}
@@ -304,7 +302,7 @@ def what_if_question(
     sides = load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed)
     _check_changes(*sides, changed)
     if isinstance(missions, int) and missions < 2:
-        raise InputError(f"missions: {missions} is too few; allowed: 2 or more")
+        raise InputError("missions", f"{missions} is too few", "2 or more")
     before = {field: fixed[field] for field in changed if field in fixed}
     data = {
         "name": WHAT_IF,
@@ -325,12 +323,13 @@ def _check_changes(before: ScenarioSpace, after: ScenarioSpace, changed: Iterabl
     for field in changed:
         if value_of_field(before, field) == value_of_field(after, field):
             raise InputError(
-                f"settings: {field} is {field_in_words(before, field)} in the baseline already; "
-                "allowed: another value"
+                "settings",
+                f"{field} is {field_in_words(before, field)} in the baseline already",
+                "another value",
             )
     if not changed:
         allowed = ", ".join(fields_of(ScenarioSpace))
-        raise InputError(f"settings: none is given; allowed: one or more of {allowed}")
+        raise InputError("settings", "none is given", f"one or more of {allowed}")
 
 
 def _fields_to_measure(values: Iterable[str]) -> dict[str, bool]:
@@ -367,7 +366,7 @@ def list_values(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...
         count = len(given)
     if not 0 < count <= MAX_SIZE:
         counted = f"{count:,}" if count else "no"
-        raise InputError(f"{field}: has {counted} values; allowed: 1 to {MAX_SIZE:,}")
+        raise InputError(field, f"has {counted} values", f"1 to {MAX_SIZE:,}")
     return tuple(map(_as_toml_value, given))
 
 

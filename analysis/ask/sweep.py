@@ -122,7 +122,7 @@ class Sweep:
 
         if x is None:
             if not (fields := [*varied_values(self.results)]):
-                raise InputError("x: no field is swept; allowed: a sweep of one field or more")
+                raise InputError("x", "no field is swept", "a sweep of one field or more")
             x = fields[0]
             hue = hue or next(iter(fields[1:]), None)
         return draw_curves(self.results, x, hue, metric).figure

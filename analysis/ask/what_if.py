@@ -11,7 +11,6 @@ import tomli_w
 from scipy.optimize import brentq
 from scipy.special import ndtri
 
-from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.answers.missions import estimate_metric, fate_in_words
@@ -43,7 +42,7 @@ from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import LEVEL, by_replication
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position_of
-from dess.base.errors import one_of
+from dess.base.errors import unknown_name
 
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.figure import Figure
@@ -611,7 +610,7 @@ def check_shown(question: Question, policy: str | None) -> None:
     """
     asked = question.study.policies
     if policy is not None and policy not in asked:
-        raise InputError(f"shown: {policy!r} is not asked about{one_of(policy, asked)}")
+        raise unknown_name("shown", f"{policy!r} is not asked about", policy, asked)
 
 
 def what_if(

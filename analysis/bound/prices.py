@@ -163,13 +163,14 @@ def check_scenario(scenario: ScenarioSpace) -> None:
         InputError: If it has a section beyond the paper, or if a bound takes too much memory.
     """
     if scenario.is_extended:
-        raise InputError("bound: the scenario has sections beyond the paper; allowed: none of them")
+        raise InputError("bound", "the scenario has sections beyond the paper", "none of them")
     memory = ceilings_memory(scenario, Detail())
     if memory > MOST_MEMORY:
         raise InputError(
-            f"bound: a mission takes {memory / 2**30:,.1f} GiB of memory; allowed: "
-            f"{MOST_MEMORY / 2**30:.0f} GiB at most, with fewer cells (grid) or slots (quota, "
-            "max_slots)"
+            "bound",
+            f"a mission takes {memory / 2**30:,.1f} GiB of memory",
+            f"{MOST_MEMORY / 2**30:.0f} GiB at most, with fewer cells (grid) or slots "
+            "(quota, max_slots)",
         )
 
 

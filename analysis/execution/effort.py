@@ -106,7 +106,7 @@ def check_workers(workers: int) -> None:
         InputError: If it is below 1 or above ``MAX_WORKERS``.
     """
     if not 1 <= workers <= MAX_WORKERS:
-        raise InputError(f"workers: {workers} is out of range; allowed: 1..{MAX_WORKERS:,}")
+        raise InputError("workers", f"{workers} is out of range", f"1..{MAX_WORKERS:,}")
 
 
 def seconds_of(
@@ -157,7 +157,7 @@ def check_time(what: str, seconds: float | Range) -> None:
         least = seconds
         text = numbers.format_duration(seconds)
     if least > LONG_RUN:
-        raise InputError(f"{what}, about {text}; allowed: {CONFIRMED}")
+        raise InputError("", f"{what}, about {text}", CONFIRMED)
 
 
 def check_missions(what: str, spaces: Sequence[ScenarioSpace], earlier: float = 0.0) -> float:

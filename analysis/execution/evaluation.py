@@ -67,8 +67,8 @@ class Asked(NamedTuple):
         """Refuse numbers that are out of range, and teams that are unknown or too large."""
         effort.check_workers(self.workers)
         if not 1 <= self.missions <= MAX_REPLICATION + 1:
-            allowed = f"allowed: 1..{MAX_REPLICATION + 1:,}"
-            raise InputError(f"missions: {self.missions} is out of range; {allowed}")
+            allowed = f"1..{MAX_REPLICATION + 1:,}"
+            raise InputError("missions", f"{self.missions} is out of range", allowed)
         check_seed(self.seed, self.missions - 1)
         check_team(len(self.load_policies()), [self.scenario])
 

@@ -232,8 +232,8 @@ def attempt_job(job: Job, progress: Progress | None = None) -> Any:
         if was_interrupted(error):
             raise KeyboardInterrupt from None
         if isinstance(error, OSError) and error.errno in _FULL:
-            line = f"{job.policy}: {error.strerror}; allowed: a disk with room for compiled code"
-            raise InputError(line) from None
+            allowed = "a disk with room for compiled code"
+            raise InputError(job.policy, str(error.strerror), allowed) from None
         return Problem.of(error, first_failing(job, _must_fail))
 
 

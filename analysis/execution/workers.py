@@ -236,7 +236,7 @@ class Cluster(Pool):
                 raise
             except Exception as error:  # of many types, by what is at the address
                 reason = str(error) or f"no scheduler answers within {ANSWER:.0f} s"
-                raise InputError(self._refusal(f"cannot be reached: {reason}")) from None
+                raise self._refusal(f"cannot be reached: {reason}") from None
             stack.callback(self._leave)
             self._exits = stack.pop_all()
         return self
@@ -301,11 +301,11 @@ class Cluster(Pool):
             if isinstance(error, InputError):
                 raise error
             reason = f"a worker cannot run jobs: {type(error).__name__}: {error}"
-            raise InputError(self._refusal(reason, "workers with the same libraries"))
+            raise self._refusal(reason, "workers with the same libraries")
         return future.result()
 
-    def _refusal(self, reason: str, allowed: str = "tcp://HOST:PORT of a scheduler") -> str:
-        return f"scheduler: {self.address}: {reason}; allowed: {allowed}"
+    def _refusal(self, problem: str, allowed: str = "tcp://HOST:PORT of a scheduler") -> InputError:
+        return InputError(f"scheduler: {self.address}", problem, allowed)
 
     def _greet(self) -> None:
         """Ask the scheduler who it is: a client would wait for an answer for ever.
@@ -316,7 +316,7 @@ class Cluster(Pool):
         with ThreadPoolExecutor(1) as thread:  # this one may have an event loop, as in a notebook
             kind = thread.submit(asyncio.run, _kind(self.address)).result()
         if kind != "Scheduler":
-            raise InputError(self._refusal(f"is a {kind}"))
+            raise self._refusal(f"is a {kind}")
 
     def _leave(self) -> None:
         with suppress(Exception):  # the scheduler may be gone
@@ -358,5 +358,5 @@ def _check_and_run(job: Job, code: str, own: list[Member] | str) -> Any:
     if job.code != own:
         other = f"code or weights of {job.policy}"
     if other:
-        raise InputError(f"scheduler: a worker has other {other}; allowed: the same as here")
+        raise InputError("scheduler", f"a worker has other {other}", "the same as here")
     return attempt_job(job)

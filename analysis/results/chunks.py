@@ -177,7 +177,7 @@ def stack_tables(tables: Sequence[pa.Table]) -> pd.DataFrame:
         frame = frame[~hashable.duplicated()]
         if frame.duplicated(key).any():
             raise InputError(
-                "results: two files have different records of a mission; allowed: one of them"
+                "results", "two files have different records of a mission", "one of them"
             )
     return frame
 
@@ -204,9 +204,7 @@ def check_places(folder: Path) -> None:
     """
     for path in (*(folder / name for name in FOLDERS), *paths_in(folder, "*/policy=*")):
         if path.is_symlink() or (path.exists() and not path.is_dir()):
-            raise InputError(
-                f"{path}: is a link, or not what a run would write there; allowed: {ELSEWHERE}"
-            )
+            raise InputError(path, "is a link, or not what a run would write there", ELSEWHERE)
 
 
 def is_ours(path: Path) -> bool:

@@ -158,7 +158,7 @@ class Manifest(provenance.Origin):
         if changes and accepting is None:
             modules = ", ".join(changes)
             raise InputError(
-                f"{path}: made by other code of {modules}; allowed: {_ALLOWED}, or --accept-code"
+                path, f"made by other code of {modules}", f"{_ALLOWED}, or --accept-code"
             )
         accepted = []
         if changes:
@@ -194,7 +194,7 @@ class Manifest(provenance.Origin):
         }
         for complaint, holds in complaints.items():
             if holds:
-                raise InputError(f"{path}: {complaint}; allowed: {_ALLOWED}")
+                raise InputError(path, complaint, _ALLOWED)
 
     @property
     def key(self) -> str:

@@ -24,10 +24,9 @@ from pydantic import (
 )
 
 import dess
-from dess import InputError
 from dess.analysis.study.stopping import Text
 from dess.analysis.study.study import StudyData, change_scenario
-from dess.base.errors import validation_line
+from dess.base.errors import to_input_error
 from dess.base.files.documents import Document, Sha256
 from dess.base.sources import OURS, code_of, combined
 from dess.policies.registry import Policy, is_confirmed, load_team
@@ -204,7 +203,7 @@ def _member_identity(policy: Policy) -> Member:
     try:
         return Member.model_validate(fields)
     except ValidationError as error:  # the class may be anybody's
-        raise InputError(validation_line(error, "policy", Member)) from None
+        raise to_input_error(error, "policy", Member) from None
 
 
 def engine_code() -> str:

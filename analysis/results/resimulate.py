@@ -130,8 +130,9 @@ def resimulate(results: Results, policy: str, point: int, replication: int) -> M
         mission.record, stored_record(results, policy, point, replication)
     ):
         raise InputError(
-            f"{results.store.folder}: {policy}, point {point}, replication {replication}: "
-            f"{changed}; allowed: results that were made by this code"
+            f"{results.store.folder}: {policy}, point {point}, replication {replication}",
+            changed,
+            "results that were made by this code",
         )
     return mission
 
@@ -154,8 +155,9 @@ def stored_record(results: Results, policy: str, point: int, replication: int) -
         measured = (name for name in MEASURES if name in row and not isnan(row[name]))
         return _by_field(row, uavs) | {name: row[name] for name in measured}
     raise InputError(
-        f"{results.store.folder}: no mission of {policy}, point {point}, replication "
-        f"{replication}; allowed: a mission of the study"
+        results.store.folder,
+        f"no mission of {policy}, point {point}, replication {replication}",
+        "a mission of the study",
     )
 
 

@@ -31,7 +31,8 @@ from dess.analysis.study.study import Study
 from dess.base.files.reading import paths_in
 from dess.base.files.writing import check_folder, delete, locked, make_folder, write_file
 
-_BUSY = f"in use by another run; allowed: {ELSEWHERE}, or wait for its end"
+# What is said if another process writes into the folder, and what is allowed then.
+_BUSY = ("in use by another run", f"{ELSEWHERE}, or wait for its end")
 
 # The folders of the tables of each kind of work; a chunk is present when the first one is.
 TABLES = {"missions": ("missions", "uavs"), "bounds": ("bounds",), "events": ("events",)}
@@ -102,7 +103,7 @@ class Store:
         store = cls(folder, _extended_manifest(folder, manifest, accept_code))
         chunks.check_places(folder)
         with ExitStack() as lock:
-            lock.enter_context(locked(folder / chunks.LOCK, _BUSY))
+            lock.enter_context(locked(folder / chunks.LOCK, *_BUSY))
             # Read again under the lock, because another run may have ended in the meantime.
             store.manifest = _extended_manifest(folder, manifest, accept_code)
             store._prepare()
@@ -369,7 +370,7 @@ class Store:
         """The rows of some parts, all of which must be present, in the tables of their kind."""
         for gap in self.missing(kind, parts)[:1]:
             whole = next(part for part in parts if part.cell == gap.cell)
-            raise InputError(self._incomplete(whole, gap.replications))
+            raise self._incomplete(whole, gap.replications)
         frames = [tables[table] for tables in self._tables_with(kind, parts)]
         key = kind, table, *map(id, frames)
         if key not in self._stacked:
@@ -382,7 +383,7 @@ class Store:
         tables_of_parts = (tables for part in parts for tables in self._tables[kind, part.cell.key])
         return [*{id(tables): tables for tables in tables_of_parts}.values()]
 
-    def _incomplete(self, part: chunks.Part, gap: range) -> str:
+    def _incomplete(self, part: chunks.Part, gap: range) -> InputError:
         team = part.cell.team
         values = self.manifest.points[part.cell.point].values
         where = ""
@@ -392,12 +393,12 @@ class Store:
         what = "bounds"
         if team != NO_TEAM:
             what = f"missions of {self.manifest.policies[team].policy}"
-        line = f"{self.folder}: incomplete, {present} {what}{where}"
+        problem = f"incomplete, {present} {what}{where}"
         if self.damaged:
-            line += f" (damaged: {self.damaged[0]})"
+            problem += f" (damaged: {self.damaged[0]})"
         if failed := self._failures():
-            line += f" ({len(failed)} chunks failed, see {failed[0]})"
-        return f"{line}; allowed: run the study again to complete it"
+            problem += f" ({len(failed)} chunks failed, see {failed[0]})"
+        return InputError(self.folder, problem, "run the study again to complete it")
 
     @property
     def logged(self) -> list[tuple[Cell, int]]:
@@ -429,8 +430,9 @@ def _extended_manifest(folder: Path, manifest: Manifest, accept_code: bool) -> M
     if not path.exists():
         if any(not chunks.is_ours(other) for other in paths_in(folder)):
             raise InputError(
-                f"{folder}: holds other files and no {chunks.MANIFEST}; "
-                "allowed: a results folder, or a new or empty one"
+                folder,
+                f"holds other files and no {chunks.MANIFEST}",
+                "a results folder, or a new or empty one",
             )
         return manifest
     existing = Manifest.read(path)

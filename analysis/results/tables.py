@@ -22,7 +22,7 @@ from dess.analysis.results.store import Place, Store
 from dess.analysis.study.cheapest import Cheapest, CheapestChoice
 from dess.analysis.study.selection import Choice, Selection
 from dess.analysis.study.study import StudyData
-from dess.base.errors import one_of
+from dess.base.errors import unknown_name
 from dess.base.files.writing import toml_value
 from dess.model.record import MISSION_RECORD
 from dess.scenario.fields import dotted
@@ -165,8 +165,9 @@ class Results:
             log = self.store.load_log(cell, replication)
         if log is None:
             raise InputError(
-                f"{self.store.folder}: no event log of {policy}, point {point}, replication "
-                f"{replication}; allowed: 0..logged - 1, logged = {logged}"
+                self.store.folder,
+                f"no event log of {policy}, point {point}, replication {replication}",
+                f"0..logged - 1, logged = {logged}",
             )
         return log.to_pandas()
 
@@ -237,9 +238,7 @@ class Results:
             InputError: If it is not.
         """
         if policy not in self.policies:
-            raise InputError(
-                f"policy: {policy!r} is not in the study{one_of(policy, self.policies)}"
-            )
+            raise unknown_name("policy", f"{policy!r} is not in the study", policy, self.policies)
 
     def cell(self, policy: str, point: int) -> Cell:
         """The cell of a policy at a design point, with its key.
@@ -250,7 +249,7 @@ class Results:
         self.check_policy(policy)
         points = len(self.store.manifest.points)
         if not 0 <= point < points:
-            raise InputError(f"point: {point} is not in the study; allowed: 0..{points - 1}")
+            raise InputError("point", f"{point} is not in the study", f"0..{points - 1}")
         return self.store.manifest.cells[self.policies.index(policy)][point]
 
 
@@ -291,7 +290,7 @@ def results_of(store: Store) -> Results:
         if checked := check_parts(manifest, number):
             checks[team.policy] = store.missions(checked)
     if not manifest.complete:
-        raise InputError(f"{store.folder}: incomplete; allowed: run the study again to complete it")
+        raise InputError(store.folder, "incomplete", "run the study again to complete it")
     all_missions = _label_missions(manifest, missions)
     if checks:
         all_checks = _label_missions(manifest, checks)

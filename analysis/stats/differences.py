@@ -27,21 +27,21 @@ def metrics_by_treatment(
         InputError: If a column is missing or not of numbers, or a mission appears twice.
     """
     if of not in get_args(Treatment):
-        raise InputError(f"of: {of!r}; allowed: {', '.join(get_args(Treatment))}")
+        raise InputError("of", repr(of), ", ".join(get_args(Treatment)))
     intervals.check_columns(missions, [of, "replication", *metrics, *by])
     if of in by:
-        raise InputError(f"by: {of} is what is compared; allowed: other columns")
+        raise InputError("by", f"{of} is what is compared", "other columns")
     for metric in metrics:
         values = pd.to_numeric(missions[metric], errors="coerce")
         if metric in EITHER:
             values = values[missions[metric].notna()]
         if odd := int(len(values) - np.isfinite(values).sum()):
-            raise InputError(f"{metric}: no number in {odd} missions; allowed: finite numbers")
+            raise InputError(metric, f"no number in {odd} missions", "finite numbers")
     keys = list(dict.fromkeys([*by, *(k for k in _MISSION if k in missions and k != of)]))
     twice = missions.duplicated([of, *keys])
     if twice.any():
         first = _first_row(missions.loc[twice, [of, *keys]])
-        raise InputError(f"missions: {first} is there twice; allowed: every mission once")
+        raise InputError("missions", f"{first} is there twice", "every mission once")
     spaces = [of, *(key for key in keys if key in (*by, "policy", "point", "seed"))]
     values = {metric: intervals.values_within(missions, metric, spaces) for metric in metrics}
     table = missions[[of, *keys]].assign(**values)
@@ -57,7 +57,7 @@ def select_table(tables: Mapping[Any, pd.DataFrame], of: str, name: str | int) -
         InputError: If there are no missions of it.
     """
     if name not in tables:
-        raise InputError(f"{of}: {name} has no missions; allowed: {', '.join(map(str, tables))}")
+        raise InputError(of, f"{name} has no missions", ", ".join(map(str, tables)))
     return tables[name]
 
 
@@ -67,8 +67,10 @@ def check_same_missions(tables: Mapping[Any, pd.DataFrame], name: Any, baseline:
         absent = tables[having].index.difference(tables[lacking].index)
         if len(absent):
             raise InputError(
-                f"{lacking}: lacks {len(absent)} of the missions of {having}, the first at "
-                f"{_first_row(absent.to_frame())}; allowed: the same missions for both"
+                lacking,
+                f"lacks {len(absent)} of the missions of {having}, the first at "
+                f"{_first_row(absent.to_frame())}",
+                "the same missions for both",
             )
 
 
@@ -110,7 +112,7 @@ def adjust_p_values(p: np.ndarray, correction: Correction | None) -> np.ndarray:
     """
     if correction not in (*get_args(Correction), None):
         allowed = ", ".join(get_args(Correction))
-        raise InputError(f"correction: {correction!r}; allowed: {allowed}, or none")
+        raise InputError("correction", repr(correction), f"{allowed}, or none")
     p = np.asarray(p, float)
     if correction is None:
         return p
@@ -416,7 +418,7 @@ def compare(
     reference = select_table(tables, of, baseline)
     others = [name for name in tables if name != baseline]
     if not others:
-        raise InputError(f"{of}: nothing to compare with {baseline}; allowed: two or more")
+        raise InputError(of, f"nothing to compare with {baseline}", "two or more")
     rows = []
     measures = {metric: metric_in_missions(missions, metric) for metric in metrics}
     for name in others:

@@ -58,7 +58,7 @@ def distribution(
     """
     intervals.check_columns(missions, [metric, *by])
     if worst not in get_args(Worst):
-        raise InputError(f"worst: {worst!r}; allowed: {', '.join(get_args(Worst))}")
+        raise InputError("worst", repr(worst), ", ".join(get_args(Worst)))
     for name, share in [*(("quantiles", q) for q in quantiles), ("tail", tail), ("level", level)]:
         intervals.check_share(name, share)
     sign = 1 if worst == "lowest" else -1

@@ -16,7 +16,7 @@ from scipy.special import ndtr, ndtri, stdtrit
 
 from dess import InputError
 from dess.analysis.metrics import Metric, metric_in_missions, metric_of, metrics_in
-from dess.base.errors import one_of
+from dess.base.errors import unknown_name
 
 LEVEL = 0.95
 
@@ -437,13 +437,13 @@ def check_columns(missions: pd.DataFrame, needed: Sequence[str]) -> None:
     """Raise ``InputError`` if a needed column is missing."""
     for name in needed:
         if name not in missions:
-            raise InputError(f"{name}: no such column{one_of(name, missions.columns)}")
+            raise unknown_name(name, "no such column", name, missions.columns)
 
 
 def check_share(name: str, share: float) -> None:
     """Raise ``InputError`` unless a share, such as a confidence level, is between 0 and 1."""
     if not (isinstance(share, int | float) and 0 < share < 1):
-        raise InputError(f"{name}: {share!r}; allowed: between 0 and 1")
+        raise InputError(name, repr(share), "between 0 and 1")
 
 
 def group_rows(missions: pd.DataFrame, by: Sequence[str]) -> Iterator[tuple[tuple, pd.DataFrame]]:

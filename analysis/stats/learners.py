@@ -152,8 +152,9 @@ def compare_learners(
     for learner, checkpoints in learners.items():
         if not checkpoints or len(set(checkpoints)) < len(checkpoints) or baseline in checkpoints:
             raise InputError(
-                f"learner {learner}: checkpoints {', '.join(checkpoints) or 'none'}; "
-                f"allowed: one or more, all distinct, without the baseline {baseline}"
+                f"learner {learner}",
+                f"checkpoints {', '.join(checkpoints) or 'none'}",
+                f"one or more, all distinct, without the baseline {baseline}",
             )
         trained = [select_table(tables, "policy", checkpoint) for checkpoint in checkpoints]
         for checkpoint in checkpoints:

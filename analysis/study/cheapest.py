@@ -324,7 +324,7 @@ class Cheapest(StrictTable):
         for metric, amount in given.items() if isinstance(given, dict) else ():
             if not is_number(amount) and not (metric == AGE and isinstance(amount, str)):
                 form = 'a number, or of age a time such as "6 h"'
-                raise InputError(f"{metric} is {shown(amount)}; allowed: {form}")
+                raise InputError("", f"{metric} is {shown(amount)}", form)
         return given
 
     @model_validator(mode="after")
@@ -334,10 +334,11 @@ class Cheapest(StrictTable):
             if not isinstance(least, str):
                 share = least
             if metric != AGE and not self.tolerance < share < 1 - self.tolerance:
-                raise ValueError(
-                    f"requirements.{metric}: {share:g} is out of range; allowed: between "
-                    f"{self.tolerance:g} and {1 - self.tolerance:g}, which keeps the tolerance "
-                    "away from 0 and 1"
+                raise InputError(
+                    f"requirements.{metric}",
+                    f"{share:g} is out of range",
+                    f"between {self.tolerance:g} and {1 - self.tolerance:g}, which keeps the "
+                    "tolerance away from 0 and 1",
                 )
         return self
 
@@ -369,9 +370,9 @@ class Cheapest(StrictTable):
                     allowed = f'a time such as "6 h" in the horizon of {horizon:g} h'
                 else:
                     allowed = f"mission slots in the horizon of {horizon:g}"
-                raise InputError(f"{where}: {shown(required)} does not fit; allowed: {allowed}")
+                raise InputError(where, f"{shown(required)} does not fit", allowed)
             if not space.age.measured:
-                raise InputError(f"{where}: is not measured; allowed: age.measured = true")
+                raise InputError(where, "is not measured", "age.measured = true")
 
     def wanted(self, samples: Samples, settings: Sequence[Setting]) -> list[int]:
         """The number of missions that every design point needs.

@@ -61,7 +61,7 @@ def _rows_by_field(value: Any) -> Any:
 def _have_values(fields: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
     for field, values in fields.items():
         if not values:
-            raise ValueError(f"{field} has no values; allowed: one or more")
+            raise InputError("", f"{field} has no values", "one or more")
     return fields
 
 
@@ -73,9 +73,8 @@ def _are_ranges(ranges: dict[str, Any]) -> dict[str, Any]:
             else:
                 numbers = "numbers"
             printed = shown(list(ends) if isinstance(ends, tuple) else ends)
-            raise ValueError(
-                f"{field}: {printed} is not a range; "
-                f"allowed: [low, high], {numbers} with low <= high"
+            raise InputError(
+                field, f"{printed} is not a range", f"[low, high], {numbers} with low <= high"
             )
     return ranges
 
@@ -95,7 +94,7 @@ def _is_range(field: str, ends: Any) -> bool:
 
 def _is_power_of_two(number: int) -> int:
     if number & (number - 1):
-        raise ValueError(f"{number} is not a power of two; allowed: 1, 2, 4, 8, ...")
+        raise InputError("", f"{number} is not a power of two", "1, 2, 4, 8, ...")
     return number
 
 
@@ -121,7 +120,7 @@ class _Design(StrictTable):
             InputError: If there are more than ``MAX_SIZE``; none of them is made.
         """
         if self.count > MAX_SIZE:
-            raise InputError(f"design: {self.count:,} points; allowed: {MAX_SIZE:,} at most")
+            raise InputError("design", f"{self.count:,} points", f"{MAX_SIZE:,} at most")
         return tuple(self._points())
 
     @abstractmethod
@@ -279,8 +278,8 @@ class Saltelli(Sampled):
     def _is_not_too_large(self) -> Self:
         if self.count > MAX_SIZE:
             most = 2 ** ((MAX_SIZE // (len(self.ranges) + 3)).bit_length() - 1)
-            raise ValueError(
-                f"base: {self.base:,} gives {self.count:,} design points; allowed: {most:,} at most"
+            raise InputError(
+                "base", f"{self.base:,} gives {self.count:,} design points", f"{most:,} at most"
             )
         return self
 

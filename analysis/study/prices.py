@@ -56,9 +56,9 @@ class Costs(StrictTable):
         follows = any(space.units for space in spaces)
         where = "costs.slot_seconds"
         if follows and self.slot_seconds is not None:
-            raise InputError(f"{where}: follows from the data sheet; allowed: without this field")
+            raise InputError(where, "follows from the data sheet", "without this field")
         if self.hour and self.slot_seconds is None and not follows:
-            raise InputError(f"{where}: is missing; allowed: with hour, the seconds of a slot")
+            raise InputError(where, "is missing", "with hour, the seconds of a slot")
 
     def of_lost(self, uavs: Any) -> Any:
         """What it costs if every mission loses this number of UAVs, in the currency."""
@@ -106,8 +106,9 @@ class Costs(StrictTable):
             return np.zeros(missions)
         if field not in uavs or np.isnan(np.asarray(uavs[field], float)).any():
             raise InputError(
-                f"costs: the records of an earlier version have no {field}, which has a price; "
-                "allowed: results of this version, in another results folder"
+                "costs",
+                f"the records of an earlier version have no {field}, which has a price",
+                "results of this version, in another results folder",
             )
         return np.bincount(mission, np.asarray(uavs[field]), missions)
 

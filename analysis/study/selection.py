@@ -118,7 +118,7 @@ def check_begun(samples: Samples, first: int) -> None:
         InputError: If there is no design point, or one has fewer than ``first`` missions.
     """
     if not samples or min(map(missions_of, samples)) < first:
-        raise InputError(f"choice: a point lacks missions; allowed: {first} or more of each")
+        raise InputError("choice", "a point lacks missions", f"{first} or more of each")
 
 
 class Selection(StrictTable):
@@ -155,11 +155,12 @@ class Selection(StrictTable):
     @model_validator(mode="after")
     def _fits_the_procedure(self) -> Self:
         if self.procedure == "kn-bounded" and not metric_of(self.metric).is_bounded:
-            raise ValueError(f"metric: {self.metric} is not bounded; allowed: procedure kn with it")
+            raise InputError("metric", f"{self.metric} is not bounded", "procedure kn with it")
         if self.procedure == "kn" and self.metric in (SUCCESS, PRODUCT):
-            raise ValueError(
-                f"metric: {self.metric} falls to 0 in rare failures, for which kn guarantees "
-                "nothing; allowed: procedure kn-bounded with it"
+            raise InputError(
+                "metric",
+                f"{self.metric} falls to 0 in rare failures, for which kn guarantees nothing",
+                "procedure kn-bounded with it",
             )
         return self
 
@@ -204,8 +205,9 @@ class Selection(StrictTable):
         by_point = [values_in(sample, self.metric) for sample in samples]
         if any(np.isnan(values).any() for values in by_point):
             raise InputError(
-                f"selection.metric: {self.metric} is not measured in some missions; "
-                "allowed: a metric that every mission has"
+                "selection.metric",
+                f"{self.metric} is not measured in some missions",
+                "a metric that every mission has",
             )
         sign = 1.0
         if metric_of(self.metric).less_is_better:

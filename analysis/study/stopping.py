@@ -25,7 +25,7 @@ from dess.analysis.stats.intervals import (
     skewness_of,
     wilson_half_width,
 )
-from dess.base.errors import listed, one_of, shown, validation_line
+from dess.base.errors import listed, shown, to_input_error, unknown_name
 from dess.physics.section import Integer, Number, plain
 
 _METRICS = [*ALWAYS, *MEASURES]
@@ -41,13 +41,13 @@ _GROWTH = 2.0
 
 def _check_printable(text: str) -> str:
     if not text.isprintable():  # also half a character, which no encoding can write
-        raise ValueError(f"{shown(text)} has characters that cannot be printed; allowed: a line")
+        raise InputError("", f"{shown(text)} has characters that cannot be printed", "a line")
     return text
 
 
 def _check_metric(metric: str) -> str:
     if metric not in _METRICS:
-        raise ValueError(f"{shown(metric)} is unknown{one_of(metric, _METRICS)}")
+        raise unknown_name("", f"{shown(metric)} is unknown", metric, _METRICS)
     return metric
 
 
@@ -86,11 +86,11 @@ def of_its_kind(key: str, *models: type[BaseModel]) -> BeforeValidator:
             return value
         kind = value.get(key)
         if not isinstance(kind, str) or kind not in kinds:
-            raise ValueError(f"{key}: {shown(kind)} is unknown{one_of(kind, kinds)}")
+            raise unknown_name(key, f"{shown(kind)} is unknown", kind, kinds)
         try:
             return kinds[kind].model_validate(value)
         except ValidationError as error:
-            raise ValueError(validation_line(error, kind, kinds[kind])) from None
+            raise to_input_error(error, kind, kinds[kind]) from None
 
     return BeforeValidator(read)
 
@@ -108,7 +108,7 @@ class Target(StrictTable):
     @model_validator(mode="after")
     def _is_given(self) -> Self:
         if self.absolute is None and self.relative is None:
-            raise ValueError("no target is given; allowed: absolute, relative, or both")
+            raise InputError("", "no target is given", "absolute, relative, or both")
         return self
 
     def width(self, means: np.ndarray) -> np.ndarray:
@@ -187,8 +187,8 @@ class Precision(StrictTable):
     @model_validator(mode="after")
     def _is_affordable(self) -> Self:
         if (least := self.first + self.look_ahead) > self.budget:
-            raise ValueError(
-                f"budget: {self.budget} is less than first + look_ahead; allowed: {least} or more"
+            raise InputError(
+                "budget", f"{self.budget} is less than first + look_ahead", f"{least} or more"
             )
         return self
 
@@ -272,7 +272,7 @@ def values_in(sample: Mapping[str, np.ndarray], metric: str) -> np.ndarray:
     """
     if metric not in sample:
         present = [name for name in _METRICS if name in sample]
-        raise InputError(f"{metric}: is not measured by the scenario; allowed: {listed(present)}")
+        raise InputError(metric, "is not measured by the scenario", listed(present))
     return np.asarray(sample[metric], float)
 
 

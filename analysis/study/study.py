@@ -26,7 +26,7 @@ from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Selection
 from dess.analysis.study.stopping import MOST, Precision, StrictTable, Text
-from dess.base.errors import cut, listed, one_of, validation_line
+from dess.base.errors import cut, listed, to_input_error, unknown_name
 from dess.base.files.reading import Shipped
 from dess.model.batch import check_slotted
 from dess.model.record import measures_of
@@ -184,7 +184,7 @@ class Study(StudyData):
         for team in teams:
             load_team(team, run_files=_may_run_files(info.context))
             if teams.count(team) > 1:
-                raise ValueError(f"{team} is listed twice; allowed: distinct teams")
+                raise InputError("", f"{team} is listed twice", "distinct teams")
         return teams
 
     @model_validator(mode="after")
@@ -194,8 +194,8 @@ class Study(StudyData):
         self._check_metrics()
         self._choose_engine()
         if self.logged > self.first:
-            raise ValueError(
-                f"logged: {self.logged} is more than the missions; allowed: 0..{self.first}"
+            raise InputError(
+                "logged", f"{self.logged} is more than the missions", f"0..{self.first}"
             )
         self._check_budget()
         self._check_teams()
@@ -225,22 +225,22 @@ class Study(StudyData):
 
     def _check_rule(self) -> None:
         if self.precision and self.selection:
-            raise ValueError("precision: selection is also given; allowed: either")
+            raise InputError("precision", "selection is also given", "either")
         if self.rule and "missions" in self.model_fields_set:
             if self.precision:
                 rule = "precision"
             else:
                 rule = "selection"
-            raise ValueError(f"missions: are decided by {rule}; allowed: either")
+            raise InputError("missions", f"are decided by {rule}", "either")
         if isinstance(self.selection, Cheapest) and not self.costs:
-            raise ValueError(
-                "costs: are missing; allowed: a table of prices, for the selection of the cheapest"
+            raise InputError(
+                "costs", "are missing", "a table of prices, for the selection of the cheapest"
             )
         if self.costs:
             self.costs.check(self.scenarios)
         if isinstance(self.design, Saltelli) and (self.rule or self.missions != 1):
-            raise ValueError(
-                "missions: every point of a saltelli design is one mission; allowed: missions = 1"
+            raise InputError(
+                "missions", "every point of a saltelli design is one mission", "missions = 1"
             )
 
     def _check_metrics(self) -> None:
@@ -259,18 +259,18 @@ class Study(StudyData):
         for space in self.scenarios:
             measured = metrics_in([HOME, *measures_of(space)])
             if absent := sorted(asked - {*measured}):
-                raise ValueError(
-                    f"{key}: {absent[0]} is not measured at every design point; allowed: "
-                    f"{listed(measured)}"
+                raise InputError(
+                    key, f"{absent[0]} is not measured at every design point", listed(measured)
                 )
 
     def _check_budget(self) -> None:
         """Check that the budget of a selection is enough for its first round."""
         least = self.first * self.size
         if self.selection and least > self.selection.budget:
-            raise ValueError(
-                f"selection.budget: {self.selection.budget} is less than the first missions of all "
-                f"design points; allowed: {least} or more"
+            raise InputError(
+                "selection.budget",
+                f"{self.selection.budget} is less than the first missions of all design points",
+                f"{least} or more",
             )
 
     def _check_teams(self) -> None:
@@ -278,9 +278,10 @@ class Study(StudyData):
         fleet = max(space.uavs[1] for space in self.scenarios)
         for team in self.policies:
             if team.count(",") >= fleet:
-                raise ValueError(
-                    f"policies: {team} has more policies than the largest fleet has UAVs; "
-                    f"allowed: {fleet} at most"
+                raise InputError(
+                    "policies",
+                    f"{team} has more policies than the largest fleet has UAVs",
+                    f"{fleet} at most",
                 )
 
     @property
@@ -327,14 +328,14 @@ class Study(StudyData):
         """Check that every design point has a scenario, and is listed once."""
         for point in self.points:
             if both := sorted(self.set.keys() & point.values.keys()):
-                raise InputError(f"design: {both[0]} is also in set; allowed: either")
+                raise InputError("design", f"{both[0]} is also in set", "either")
         checked = set()
         for point, space in zip(self.points, self.scenarios, strict=True):
             # As the scenario has the values, which is the same for 1 and 1.0.
             key = frozenset((f, v if f == SEA else space.value(f)) for f, v in point.values.items())
             if key in checked and not isinstance(self.design, Sampled):  # equal integers by chance
                 shown = _values_in_words(point.values)
-                raise InputError(f"design: {shown} is listed twice; allowed: once")
+                raise InputError("design", f"{shown} is listed twice", "once")
             checked.add(key)
 
     def _scenario_at(self, values: dict[str, Any]) -> ScenarioSpace:
@@ -347,12 +348,12 @@ class Study(StudyData):
             for field, cells in product(("grid", "rows", "cell_size"), ("nodes", "no_fly")):
                 moves = getattr(space, cells) != getattr(self._base, cells)
                 if values.keys() & {field, cells, SEA} == {field} and moves:
-                    raise InputError(f"{field} moves the {cells} of a file; allowed: cells")
+                    raise InputError("", f"{field} moves the {cells} of a file", "cells")
             return space
         except InputError as error:
-            raise InputError(
-                f"at {_values_in_words(values)}: {error}" if values else str(error)
-            ) from None
+            if values:
+                raise error.within(f"at {_values_in_words(values)}") from None
+            raise
 
 
 @lru_cache(maxsize=2**15)
@@ -384,7 +385,7 @@ def study_from(data: Mapping[str, Any], what: str, *, run_files: bool = False) -
     try:
         return Study.model_validate(data, context={"run_files": run_files})
     except ValidationError as error:
-        raise InputError(validation_line(error, what, Study)) from None
+        raise to_input_error(error, what, Study) from None
 
 
 def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
@@ -411,9 +412,7 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
         overrides["policies"] = list_teams(overrides["policies"])
     values |= _with_fewer_logs(values, overrides)
     if unknown := sorted(values.keys() - Study.model_fields.keys()):
-        raise InputError(
-            f"{where}: {unknown[0]}: unknown key{one_of(unknown[0], Study.model_fields)}"
-        )
+        raise unknown_name(f"{where}: {unknown[0]}", "unknown key", unknown[0], Study.model_fields)
     study = study_from(values, where, run_files="policies" in overrides)
     study._origin = (text, overrides)
     return study

@@ -328,5 +328,5 @@ def read_cross_check(folder: str | Path, results: Results) -> CrossCheck:
     key = results.store.manifest.key
     missions = CrossCheck.load(path, _ALLOWED, fixed={"study": key})
     if len(missions.rates) != len(offsets_of_node(space)):
-        raise InputError(f"{path}: rates: are not those of the study; allowed: {_ALLOWED}")
+        raise InputError(f"{path}: rates", "are not those of the study", _ALLOWED)
     return missions

@@ -52,8 +52,9 @@ class Suite:
         for section in ("failures", "arrivals", "landing"):
             if self.space.has(section):
                 raise InputError(
-                    f"{Path(folder) / STUDY}: its scenario has {section}, which this page cannot "
-                    "check; allowed: a study without them"
+                    Path(folder) / STUDY,
+                    f"its scenario has {section}, which this page cannot check",
+                    "a study without them",
                 )
         self.again = measurements.read_cross_check(folder, self.study)
         self.others, self.damaged = balances.studies_in(Path(folder), but=STUDY)
@@ -85,7 +86,7 @@ class Suite:
             InputError: If the block has no such number.
         """
         if block not in range(2, _LARGEST_BLOCK + 1):
-            raise InputError(f"block: {block!r}; allowed: 2..{_LARGEST_BLOCK:,}")
+            raise InputError("block", repr(block), f"2..{_LARGEST_BLOCK:,}")
         space = self.space
         seed = self.study.store.manifest.seed
         logs = self.logs

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+from pathlib import Path
 from reprlib import Repr
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
@@ -34,7 +35,47 @@ _REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = _QUOTED // 3
 
 
 class InputError(ValueError):
-    """Bad input: one line that says where, what, and what is allowed."""
+    """Bad input: one line that says where, what, and what is allowed.
+
+        >>> print(InputError("uavs", "0 is too few", "1..64").within("scenario bay"))
+        scenario bay: uavs: 0 is too few; allowed: 1..64
+
+    Args:
+        where: The place of the input, from the outside in, such as ``plan.toml: design``; empty if
+            only the caller knows it and adds it with ``within``.
+        problem: What is wrong there.
+        allowed: What is allowed there; empty if the problem says it.
+
+    Attributes:
+        where: As in the arguments, as text.
+        problem: As in the arguments.
+        allowed: As in the arguments.
+    """
+
+    def __init__(self, where: str | Path, problem: str, allowed: str = "") -> None:
+        self.where = str(where)
+        self.problem = problem
+        self.allowed = allowed
+        super().__init__(self.where, problem, allowed)
+
+    def __str__(self) -> str:
+        if self.allowed:
+            return f"{self.complaint}; allowed: {self.allowed}"
+        return self.complaint
+
+    @property
+    def complaint(self) -> str:
+        """Where and what, without what is allowed."""
+        if self.where:
+            return f"{self.where}: {self.problem}"
+        return self.problem
+
+    def within(self, place: str | Path) -> "InputError":
+        """The same error of input that is a part of a larger one."""
+        where = str(place)
+        if self.where:
+            where = f"{place}: {self.where}"
+        return InputError(where, self.problem, self.allowed)
 
     def _render_traceback_(self) -> list[str]:
         """What a notebook shows of it, in the place of a traceback."""
@@ -49,7 +90,7 @@ def check_type(name: str, value: object, kinds: Any, allowed: str) -> None:
     """
     if not isinstance(value, kinds):
         kind = type(value).__name__
-        raise InputError(f"{name}: {shown(value)} is of type {kind}; allowed: {allowed}")
+        raise InputError(name, f"{shown(value)} is of type {kind}", allowed)
 
 
 def shown(value: object) -> str:
@@ -97,39 +138,61 @@ def listed(names: Iterable[str]) -> str:
     return ", ".join(listed_names)
 
 
-def one_of(name: object, names: Iterable[str], also: str = "") -> str:
-    """The end of a message about an unknown name: what may be meant, and what is allowed.
+def unknown_name(
+    where: str | Path, problem: str, name: object, names: Iterable[str], also: str = ""
+) -> InputError:
+    """The error about an unknown name: it says what may be meant, and what is allowed.
 
-        >>> "price 'uvs' is unknown" + one_of("uvs", ["uav", "pad"])
-        "price 'uvs' is unknown (did you mean uav?); allowed: uav, pad"
+        >>> print(unknown_name("prices", "'uvs' is unknown", "uvs", ["uav", "pad"]))
+        prices: 'uvs' is unknown (did you mean uav?); allowed: uav, pad
 
     Args:
+        where: The place of the name.
+        problem: What is said about the name.
         name: The unknown name.
         names: The known names. Of many, only those that are close are printed, if there are some.
         also: What else is allowed, such as ``a TOML file``.
     """
     distinct = list(dict.fromkeys(names))
-    lower = {other.lower(): other for other in reversed(distinct)}
-    asked = name[:_QUOTED].lower() if isinstance(name, str) else shown(name)
-    close = [lower[match] for match in get_close_matches(asked, lower, cutoff=0.7)]
-    meant = ""
-    if close:
-        meant = f" (did you mean {' or '.join(close)}?)"
+    close = _close_names(name, distinct)
     text = listed(distinct)
     if close and len(distinct) > _CLOSE:
         text = f"{', '.join(close)} and {len(distinct) - len(close)} others"
     allowed = ", or ".join(part for part in (text, also) if part)
-    return f"{meant}; allowed: {allowed or 'none'}"
+    return InputError(where, problem + _question(close), allowed or "none")
+
+
+def suggestion(name: object, names: Iterable[str]) -> str:
+    """Which of the known names may be meant by another, as a question; empty if none is close."""
+    return _question(_close_names(name, names))
+
+
+def _close_names(name: object, names: Iterable[str]) -> list[str]:
+    lower = {other.lower(): other for other in reversed([*names])}
+    asked = name[:_QUOTED].lower() if isinstance(name, str) else shown(name)
+    return [lower[match] for match in get_close_matches(asked, lower, cutoff=0.7)]
+
+
+def _question(names: Sequence[str]) -> str:
+    if not names:
+        return ""
+    return f" (did you mean {' or '.join(names)}?)"
 
 
 def check_known(name: str, value: object, known: Iterable[str], also: str = "") -> None:
-    """Refuse a value that is none of some names; ``also`` is as for ``one_of``.
+    """Refuse a value that is none of some names.
+
+    Args:
+        name: What has the value.
+        value: The value.
+        known: The names.
+        also: What else is allowed, for the message.
 
     Raises:
         InputError: If it is another one.
     """
     if value not in (names := [*known]):
-        raise InputError(f"{name}: {shown(value)} is unknown{one_of(value, names, also)}")
+        raise unknown_name(name, f"{shown(value)} is unknown", value, names, also)
 
 
 def validated(
@@ -151,11 +214,11 @@ def validated(
     try:
         return model.model_validate(values, context=context)
     except ValidationError as error:
-        raise InputError(validation_line(error, where, model)) from None
+        raise to_input_error(error, where, model) from None
 
 
-def validation_line(error: "ValidationError", where: str, model: "type[BaseModel]") -> str:
-    """The first error of pydantic as one line: place, key, problem and allowed values.
+def to_input_error(error: "ValidationError", where: str, model: "type[BaseModel]") -> InputError:
+    """The first error of pydantic: place and key, problem and allowed values.
 
     Args:
         error: The errors.
@@ -173,30 +236,29 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
     if path:
         place = f"{where}: {'.'.join(path)}"
     if kind == "extra_forbidden":
-        return f"{place}: unknown key{one_of(loc[-1], fields)}"
+        return unknown_name(place, "unknown key", loc[-1], fields)
     if kind == "literal_error":
         choices = [word.strip("'") for word in re.split(", | or ", first["ctx"]["expected"])]
-        return f"{place}: {shown(value)} is unknown{one_of(value, choices)}"
+        return unknown_name(place, f"{shown(value)} is unknown", value, choices)
     if kind == "union_tag_invalid":
         choices = re.findall("'([^']*)'", first["ctx"]["expected_tags"])
         named = first["ctx"]["discriminator"].strip("'")
         tag = first["ctx"]["tag"]
-        return f"{place}.{named}: {shown(tag)} is unknown{one_of(tag, choices)}"
+        return unknown_name(f"{place}.{named}", f"{shown(tag)} is unknown", tag, choices)
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, InputError):
+        return cause.within(place)
     allowed = f"a table of {listed(fields)}"
     if field:
         allowed = form_of(field)
     if kind == "value_error":
-        line = f"{place}: {first['msg'].removeprefix('Value error, ')}"
-        is_complete = isinstance(first["ctx"]["error"], InputError) or "; allowed: " in line
-        if is_complete:
-            return line
-        return f"{line}; allowed: {allowed}"
+        return InputError(place, str(cause), allowed)
     if kind == "missing" and field and is_whole:
-        return f"{place}: is missing; allowed: {form_of(field, described=True)}"
+        return InputError(place, "is missing", form_of(field, described=True))
     problem = _problem(kind)
     if is_short:
         problem = "is too short"
-    return f"{place}: {shown(value)} {problem}; allowed: {allowed}"
+    return InputError(place, f"{shown(value)} {problem}", allowed)
 
 
 def _problem(kind: str) -> str:

@@ -18,8 +18,10 @@ def check_floors() -> None:
     """
     if missing := [name for name in FLOORS if find_spec(f"dess.{name}") is None]:
         raise InputError(
+            "",
             f"{Path(__file__).parents[1]} is a part of the package, without "
-            f"{' and '.join(missing)}; allowed: an installation with pip, or the whole repository"
+            f"{' and '.join(missing)}",
+            "an installation with pip, or the whole repository",
         )
 
 

@@ -77,7 +77,7 @@ def kernel(function: Callable) -> Any:
         InputError: If the environment does not let numba compile.
     """
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
-        raise InputError("NUMBA_DISABLE_JIT: the simulator runs only compiled; allowed: unset it")
+        raise InputError("NUMBA_DISABLE_JIT", "the simulator runs only compiled", "unset it")
     stamp = _code_behind(function.__module__, inspect.getfile(function))
     try:
         compiled = njit(cache=bool(stamp), **_OPTIONS)(function)

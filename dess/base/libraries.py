@@ -45,7 +45,7 @@ def missing(extra: str, what: str) -> MissingLibraryError | None:
         what: What needs it, for the message.
     """
     absent = (library for library in EXTRAS[extra] if find_spec(library) is None)
-    return next((MissingLibraryError(_line(what, library, extra)) for library in absent), None)
+    return next((_missing_library(what, library, extra) for library in absent), None)
 
 
 def needs(extra: str, what: str) -> None:
@@ -63,11 +63,12 @@ def absence(error: ModuleNotFoundError, what: str) -> MissingLibraryError | None
     library = (error.name or "").partition(".")[0]
     for extra, libraries in EXTRAS.items():
         if library in libraries:
-            return MissingLibraryError(_line(what, library, extra))
+            return _missing_library(what, library, extra)
     return None
 
 
-def _line(what: str, library: str, extra: str) -> str:
+def _missing_library(what: str, library: str, extra: str) -> MissingLibraryError:
     title = _TITLES.get(library, library)
     command = f"pip install '.[{extra}]' -c constraints.txt"
-    return f"{what} needs {title}, which is not installed; in a clone of the repository: {command}"
+    problem = f"needs {title}, which is not installed; in a clone of the repository: {command}"
+    return MissingLibraryError("", f"{what} {problem}")

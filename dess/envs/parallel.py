@@ -156,10 +156,10 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         if not self.agents and not actions:
             return {}, {}, {}, {}, {}
         if not self._flying:
-            raise InputError("step: no episode is in progress; allowed: reset() first")
+            raise InputError("step", "no episode is in progress", "reset() first")
         if not self._flying.keys() <= actions.keys() <= self._here.keys():
             pilots = list(self._flying)
-            raise InputError(f"actions: of {sorted(actions)}; allowed: one of each of {pilots}")
+            raise InputError("actions", f"of {sorted(actions)}", f"one of each of {pilots}")
         chosen = [HOVER] * len(self.possible_agents)
         for agent, i in self._flying.items():
             chosen[i] = actions[agent]

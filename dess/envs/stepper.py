@@ -98,8 +98,9 @@ class MissionStepper:
         seeds = [*seed] if isinstance(seed, Sequence | np.ndarray) else [seed]
         if len(seeds) != 1 and len(seeds) != len(self.indices):
             raise InputError(
-                f"seed: there are {len(seeds)}; allowed: an integer, or a list of "
-                f"{len(self.indices)}, one for each mission in progress"
+                "seed",
+                f"there are {len(seeds)}",
+                f"an integer, or a list of {len(self.indices)}, one for each mission in progress",
             )
         for seed_of_mission in seeds:
             check_seed(seed_of_mission, replication)
@@ -223,11 +224,9 @@ def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
     array = np.asarray(actions)
     if array.dtype.kind not in "iu" or array.shape != shape:
         raise InputError(
-            f"actions: {array.dtype} of shape {array.shape}; allowed: integers of shape {shape}"
+            "actions", f"{array.dtype} of shape {array.shape}", f"integers of shape {shape}"
         )
     wrong = array[array.astype(np.uint64) >= len(ACTION_NAMES)]  # negative ones become large
     if wrong.size:
-        raise InputError(
-            f"actions: {wrong[0]} is not an action; allowed: 0..{len(ACTION_NAMES) - 1}"
-        )
+        raise InputError("actions", f"{wrong[0]} is not an action", f"0..{len(ACTION_NAMES) - 1}")
     return array.astype(np.int64)

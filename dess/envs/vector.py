@@ -89,9 +89,9 @@ class HarvestVectorEnv(VectorEnv):
         """
         if autoreset_mode not in [name for mode in _MODES for name in (mode, mode.value)]:
             allowed = " or ".join(mode.value for mode in _MODES)
-            raise InputError(f"autoreset_mode: {autoreset_mode!r}; allowed: {allowed}")
+            raise InputError("autoreset_mode", repr(autoreset_mode), allowed)
         if not isinstance(num_envs, int | np.integer) or num_envs < 1:
-            raise InputError(f"num_envs: {num_envs!r} is not allowed; allowed: an integer >= 1")
+            raise InputError("num_envs", f"{num_envs!r} is not allowed", "an integer >= 1")
         self.autoreset_mode = AutoresetMode(autoreset_mode)  # where TorchRL reads it
         self.metadata = {"autoreset_mode": self.autoreset_mode}
         self.missions = int(num_envs)
@@ -143,7 +143,7 @@ class HarvestVectorEnv(VectorEnv):
             InputError: If ``reset`` was not called first, or the actions are not allowed.
         """
         if not self._stepper.is_started:
-            raise InputError("step: no mission is in progress; allowed: reset() first")
+            raise InputError("step", "no mission is in progress", "reset() first")
         checked = checked_actions(actions, (self.num_envs,))
         outcome = self._stepper.step(checked.reshape(self.state.uavs.shape))
         info: dict[str, Any] = {name: outcome.ravel()[name].copy() for name in _INFOS}

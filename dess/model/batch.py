@@ -120,8 +120,9 @@ def check_slotted(spaces: Iterable[ScenarioSpace]) -> None:
     for space in spaces:
         if space.needs_events:
             raise InputError(
-                f"arrivals.process: {space.arrivals.process} needs the SimPy engine; "
-                "allowed: the engine events, or slotted"
+                "arrivals.process",
+                f"{space.arrivals.process} needs the SimPy engine",
+                "the engine events, or slotted",
             )
 
 
@@ -138,7 +139,7 @@ def _numbers(replications: Sequence[int] | int) -> np.ndarray:
     if numbers.ndim == 0 and numbers.dtype.kind in "iu" and numbers >= 0:
         return np.arange(int(numbers))
     if numbers.ndim != 1 or (len(numbers) and numbers.dtype.kind not in "iu"):
-        raise InputError(f"replications: {shown(replications)}; allowed: a number, or integers")
+        raise InputError("replications", shown(replications), "a number, or integers")
     return numbers.astype(np.int64)
 
 

@@ -298,9 +298,9 @@ def check_seed(seed: int, replication: int) -> None:
         check_type(name, number, int | np.integer, "an integer")
     seed, replication = int(seed), int(replication)
     if not 0 <= seed <= streams.MAX_SEED:
-        raise InputError(f"seed: {seed} is out of range; allowed: 0..2**64-1")
+        raise InputError("seed", f"{seed} is out of range", "0..2**64-1")
     if not 0 <= replication <= streams.MAX_REPLICATION:
-        raise InputError(f"replication: {replication} is out of range; allowed: 0..2**32-1")
+        raise InputError("replication", f"{replication} is out of range", "0..2**32-1")
 
 
 def spaces_of(scenarios: Iterable[AnyScenario]) -> list[ScenarioSpace]:

@@ -144,7 +144,7 @@ def team_of(policy: Any, spaces: Sequence[ScenarioSpace]) -> list[Any]:
     for member in team:
         _check_policy(member)
     if not team:
-        raise InputError(f"policy: the team is empty; allowed: at least one policy, {_POLICY}")
+        raise InputError("policy", "the team is empty", f"at least one policy, {_POLICY}")
     if spaces:
         check_team(len(team), spaces)
     return team
@@ -154,7 +154,7 @@ def _check_policy(policy: Any) -> None:
     """Refuse what is not a policy."""
     if isinstance(policy, type) or not callable(getattr(policy, "act", None)):
         kind = type(policy).__name__
-        raise InputError(f"policy: {shown(policy)} is of type {kind}; allowed: {_POLICY}")
+        raise InputError("policy", f"{shown(policy)} is of type {kind}", _POLICY)
 
 
 def check_team(policies: int, spaces: Iterable[ScenarioSpace]) -> None:
@@ -173,8 +173,9 @@ def check_team(policies: int, spaces: Iterable[ScenarioSpace]) -> None:
         if fleet > 1:
             uavs = f"{fleet} UAVs"
         raise InputError(
-            f"policy: the team has {policies} policies, but the largest fleet has {uavs}; "
-            f"allowed: {fleet} at most"
+            "policy",
+            f"the team has {policies} policies, but the largest fleet has {uavs}",
+            f"{fleet} at most",
         )
 
 

@@ -15,6 +15,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from dess.base.errors import InputError
 from dess.base.kernels import kernel
 from dess.physics import streams
 from dess.physics.section import Integer, Number, Section
@@ -82,13 +83,13 @@ class Arrivals(Section):
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
         if self.process == "slotted" and (self.schedule or self.buffer or self.service != "oldest"):
-            raise ValueError(
-                "process: slotted arrivals have no schedule, buffer or service; allowed: continuous"
+            raise InputError(
+                "process", "slotted arrivals have no schedule, buffer or service", "continuous"
             )
         for (earlier, _), (later, _) in pairwise(self.schedule):
             if later <= earlier:
-                raise ValueError(
-                    f"schedule: slot {later:g} comes after slot {earlier:g}; allowed: growing slots"
+                raise InputError(
+                    "schedule", f"slot {later:g} comes after slot {earlier:g}", "growing slots"
                 )
         return self
 

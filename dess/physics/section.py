@@ -6,6 +6,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from dess.base.errors import InputError
 from dess.base.kernels import inlined
 
 # A strict integer: 2.0, true and "2" are refused.
@@ -19,7 +20,7 @@ Probability = Annotated[Number, Field(ge=0, le=1)]
 
 def _at_least_a_slot(mean: float) -> float:
     if 0 < mean < 1:
-        raise ValueError(f"{mean} is less than a slot; allowed: 0, or 1 and more")
+        raise InputError("", f"{mean} is less than a slot", "0, or 1 and more")
     return mean
 
 

@@ -65,7 +65,7 @@ def _check_limits(text: str, units: str, limits: Sequence[tuple[float, float]]) 
     names = units.split(" ")[::2]
     for number, unit, (least, most) in zip(measured(text, units), names, limits, strict=True):
         if not least <= number <= most:
-            raise InputError(f"{shown(text)} is out of range; allowed: {least:g}..{most:g} {unit}")
+            raise InputError("", f"{shown(text)} is out of range", f"{least:g}..{most:g} {unit}")
 
 
 def _quantity(
@@ -155,7 +155,7 @@ class DataSheet(Section):
         if self.is_on:
             has_budget = any(getattr(self, name) for name in LINK_BUDGET)
             if has_budget and self.snr:
-                raise InputError("snr: follows from tx_power; allowed: one of both")
+                raise InputError("snr", "follows from tx_power", "one of both")
             needed = [*_NEEDED, "snr"]
             if has_budget:
                 needed = [*_NEEDED, *LINK_BUDGET]
@@ -163,7 +163,7 @@ class DataSheet(Section):
                 needed.append("mtbf")
             for name in needed:
                 if getattr(self, name) is None:
-                    raise InputError(f"{name}: is missing; allowed: {self.form_of(name)}")
+                    raise InputError(name, "is missing", self.form_of(name))
             self.fields()
         return self
 
@@ -238,7 +238,7 @@ class DataSheet(Section):
         return ", ".join(named) or "the data sheet"
 
     def _refuse(self, name: str, problem: str, allowed: str) -> NoReturn:
-        raise InputError(f"{name}: {shown(getattr(self, name))} {problem}; allowed: {allowed}")
+        raise InputError(name, f"{shown(getattr(self, name))} {problem}", allowed)
 
     def _slots(self, name: str, most: float = 1e12) -> float:
         """A time in slots, of which there are at least one and no more than ``most``."""

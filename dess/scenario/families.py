@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from dess.base.errors import InputError, check_known, one_of, shown
+from dess.base.errors import InputError, check_known, shown, unknown_name
 from dess.physics import streams
 from dess.physics.chart import FAR, NO_FLY, OPEN, Cell, Rectangle, parking_of, spread, zones_of
 
@@ -162,12 +162,12 @@ def sea_of(name: str) -> dict[str, Any]:
     """
     family, _, seed = name.partition(":")
     if family not in FAMILIES:
-        raise InputError(f"{name}: no such family of seas{one_of(family, FAMILIES)}")
+        raise unknown_name(name, "no such family of seas", family, FAMILIES)
     if not re.fullmatch("0|[1-9][0-9]{0,8}", seed):
         wrong = "has no seed"
         if seed:
             wrong = f"has the seed {shown(seed)}"
-        raise InputError(f"{family}: {wrong}; allowed: {family}:0..{family}:{MOST_SEED}")
+        raise InputError(family, wrong, f"{family}:0..{family}:{MOST_SEED}")
     return dict(_fields_of(family, int(seed)))
 
 

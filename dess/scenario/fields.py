@@ -365,7 +365,7 @@ def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
             allowed = "with further zones"
             if zones:
                 allowed = f"a number, or a list of {len(zones)}"
-            raise InputError(f"{ZONE_PADS}: {shown(pads)} does not fit; allowed: {allowed}")
+            raise InputError(ZONE_PADS, f"{shown(pads)} does not fit", allowed)
         result["zones"] = [
             {**zone, "pads": n} for zone, n in zip(zones, pads_of_zones, strict=True)
         ]

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dess.base.errors import InputError, one_of, shown, validated
+from dess.base.errors import InputError, shown, unknown_name, validated
 from dess.scenario.data_sheet import LINK_BUDGET, DataSheet
 from dess.scenario.nodes import MAX_GRID, RATES, NodesFile, NodesFound
 from dess.scenario.places import GEOGRAPHIC, LIMITS, Projection
@@ -77,7 +77,7 @@ class NewScenario:
         """
         allowed = (*DataSheet.model_fields, *_BEYOND)
         if name not in allowed:
-            raise InputError(f"--set: {name}: unknown key{one_of(name, allowed)}")
+            raise unknown_name(f"--set: {name}", "unknown key", name, allowed)
         if name in DataSheet.model_fields:
             with _told(name):
                 DataSheet.check(name, answer or None)
@@ -86,7 +86,7 @@ class NewScenario:
         elif name == "no_fly":
             self._check_no_fly(answer)
         elif not (answer.isdecimal() and 1 <= int(answer) <= 64):
-            raise InputError(f"{name}: {shown(answer)} is out of range; allowed: 1..64")
+            raise InputError(name, f"{shown(answer)} is out of range", "1..64")
         self._check_together(self.answers | {name: answer})
         self.answers[name] = answer
 
@@ -97,7 +97,7 @@ class NewScenario:
         if not self.nodes.is_geographic:
             if not (x.is_integer() and y.is_integer() and 0 <= min(x, y) <= max(x, y) < MAX_GRID):
                 allowed = f"a cell x, y: integers from 0 to {MAX_GRID - 1}"
-                raise InputError(f"base: {shown(answer)} is no cell; allowed: {allowed}")
+                raise InputError("base", f"{shown(answer)} is no cell", allowed)
             return
         swapped = [y, x]
         is_swappable = abs(y) <= most_x and abs(x) <= most_y
@@ -106,12 +106,12 @@ class NewScenario:
             if is_swappable:
                 hint = f": {y:g}, {x:g}?"
             allowed = f"longitude -180..180, then latitude -90..90{hint}"
-            raise InputError(f"base: {shown(answer)} is no place on the Earth; allowed: {allowed}")
+            raise InputError("base", f"{shown(answer)} is no place on the Earth", allowed)
         away = self._away([x, y])
         if is_swappable and away > _SWAPPED * self._away(swapped):
             distance = f"{away:,.0f} km from the nearest node"
             allowed = f"longitude, then latitude, such as {y:g}, {x:g}"
-            raise InputError(f"base: {shown(answer)} is {distance}; allowed: {allowed}")
+            raise InputError("base", f"{shown(answer)} is {distance}", allowed)
 
     def _away(self, degrees: list[float]) -> float:
         """The way from a place to the nearest node [km]."""
@@ -122,7 +122,7 @@ class NewScenario:
     def _check_no_fly(self, answer: str) -> None:
         if answer and not (self.path.parent / answer).is_file():
             allowed = f"the name of a file beside {self.path.name}, or nothing"
-            raise InputError(f"no_fly: {shown(answer)} is no file; allowed: {allowed}")
+            raise InputError("no_fly", f"{shown(answer)} is no file", allowed)
 
     def _check_together(self, answers: Mapping[str, str]) -> None:
         """Refuse answers from which no slots and cells follow, or a sea that is too large."""
@@ -144,7 +144,7 @@ class NewScenario:
         if max(columns, rows) > MAX_GRID:
             size = f"{columns:,} x {rows:,} cells of {printed(cell, 'm')}, the way of a slot"
             allowed = f"{MAX_GRID} x {MAX_GRID}, with UAVs that fly further or a nearer base"
-            raise InputError(f"base: {self.path} and the base take {size}; allowed: {allowed}")
+            raise InputError("base", f"{self.path} and the base take {size}", allowed)
 
     def _sides(self, answers: Mapping[str, str], cell: float) -> tuple[int, int, int]:
         """The cells of the grid from west to east and from north to south, and of a zone's side."""
@@ -205,7 +205,7 @@ def _told(name: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise InputError(f"{name}: {error}") from None
+        raise error.within(name) from None
 
 
 def _place(answer: str) -> list[float]:
@@ -215,7 +215,7 @@ def _place(answer: str) -> list[float]:
             raise ValueError
     except ValueError:
         allowed = "two numbers with a comma between them"
-        raise InputError(f"base: {shown(answer)} is no place; allowed: {allowed}") from None
+        raise InputError("base", f"{shown(answer)} is no place", allowed) from None
     return [x, y]
 
 

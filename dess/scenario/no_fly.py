@@ -80,7 +80,7 @@ def zones_in(path: Path, size: Size) -> list[Rectangle]:
     is_blue = (blue > 127) & (red < 128)
     rectangles = ndimage.find_objects(ndimage.label(is_blue)[0])
     if not rectangles or not all(is_blue[part].all() for part in rectangles):
-        raise InputError(f"{path}: has no zones; allowed: one blue rectangle or more")
+        raise InputError(path, "has no zones", "one blue rectangle or more")
     return [(x.start, y.start, x.stop - x.start, y.stop - y.start) for y, x in rectangles]
 
 
@@ -94,15 +94,15 @@ def _of_text(path: Path, size: Size, _: Projection | None, source: NoFlyFile) ->
         rows = rows[begin:]
     filled = [place for place, (_, line) in enumerate(rows) if line]
     rows = rows[filled[0] : filled[-1] + 1] if filled else []
-    allowed = f"allowed: {size[1]} lines of {size[0]} cells, as grid and rows say"
+    allowed = f"{size[1]} lines of {size[0]} cells, as grid and rows say"
     if len(rows) != size[1]:
-        raise InputError(f"{path}: has {len(rows):,} lines; {allowed}")
+        raise InputError(path, f"has {len(rows):,} lines", allowed)
     for number, line in rows:
         if unknown := line.strip(CLOSED + FREE):
             letters = "# for a no-fly cell, . for an open one, or the MAPF letters " + _MAPF
-            raise InputError(f"{path}: line {number}: has {shown(unknown[0])}; allowed: {letters}")
+            raise InputError(f"{path}: line {number}", f"has {shown(unknown[0])}", letters)
         if len(line) != size[0]:
-            raise InputError(f"{path}: line {number}: has {len(line):,} cells; {allowed}")
+            raise InputError(f"{path}: line {number}", f"has {len(line):,} cells", allowed)
     return np.array([[cell in CLOSED for cell in line] for _, line in rows])
 
 
@@ -131,10 +131,10 @@ def _pixels(path: Path, size: Size) -> np.ndarray:
             actual = image.size
             pixels = np.array(image.convert("RGB") if actual == size else ())
     except (OSError, SyntaxError):
-        raise InputError(f"{path}: is no picture; allowed: a PNG file") from None
+        raise InputError(path, "is no picture", "a PNG file") from None
     if actual != size:
         allowed = f"{size[0]} x {size[1]}, as grid and rows say"
-        raise InputError(f"{path}: has {actual[0]} x {actual[1]} pixels; allowed: {allowed}")
+        raise InputError(path, f"has {actual[0]} x {actual[1]} pixels", allowed)
     return pixels
 
 
@@ -143,11 +143,12 @@ def _of_places(
 ) -> np.ndarray:
     is_geographic, features = places.reader(path, places.READERS)(path)
     if not features:
-        raise InputError(f"{path}: has no places; allowed: one or more")
+        raise InputError(path, "has no places", "one or more")
     if is_geographic and projection is None:
         raise InputError(
-            f"{path}: has degrees, and the nodes are cells; allowed: cells, nodes from a file "
-            "with degrees, or centre"
+            path,
+            "has degrees, and the nodes are cells",
+            "cells, nodes from a file with degrees, or centre",
         )
     closed = np.zeros(size[::-1], np.bool_)
     unseen = []
@@ -165,7 +166,7 @@ def _of_places(
             if not places.is_on_grid(cell, size):
                 what = f"off the grid of {size[0]} x {size[1]} cells, at {cell.tolist()}"
                 allowed = f"0 <= x < {size[0]}, 0 <= y < {size[1]}"
-                raise InputError(f"{path}: {place.where} is {what}; allowed: {allowed}")
+                raise InputError(path, f"{place.where} is {what}", allowed)
             cells[cell[1], cell[0]] = True
         closed |= cells
     if unseen:
@@ -230,7 +231,7 @@ def _radius(place: Place, path: Path) -> float:
         radius = quantity_of(str(value), where, "m")
     if not 0 <= radius <= MOST_METRES:
         allowed = f"metres from 0 to {MOST_METRES:,}, or a distance with its unit"
-        raise InputError(f"{where}: {shown(value)} is out of range; allowed: {allowed}")
+        raise InputError(where, f"{shown(value)} is out of range", allowed)
     return radius
 
 

@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
-from dess.base.errors import InputError, listed, one_of, shown
+from dess.base.errors import InputError, listed, shown, unknown_name
 from dess.physics.chart import Cell
 from dess.scenario import places
 from dess.scenario.places import Place, Projection, Size
@@ -100,7 +100,7 @@ class NodesFound(NamedTuple):
             if kind == places.POINT
         ]
         if not points:
-            raise InputError(f"{path}: has 0 nodes; allowed: 1..{MAX_NODES}")
+            raise InputError(path, "has 0 nodes", f"1..{MAX_NODES}")
         rows, spots = zip(*points, strict=True)
         return cls(path, source, is_geographic, [*rows], np.array(spots))
 
@@ -145,7 +145,7 @@ class NodesFound(NamedTuple):
         if self.source.place == "own" and len(groups) < len(cells_of_rows):
             self._refuse_shared(groups, projection, is_cell_fixed)
         if len(groups) > MAX_NODES:
-            raise InputError(f"{self.path}: has {len(groups):,} nodes; allowed: 1..{MAX_NODES}")
+            raise InputError(self.path, f"has {len(groups):,} nodes", f"1..{MAX_NODES}")
         names = [*map(self._name, range(len(cells_of_rows)))]
         members = [*groups.values()]
         arrivals = {
@@ -174,7 +174,7 @@ class NodesFound(NamedTuple):
             return []
         if kind.is_listed:
             both = f"the scenario lists {kind.field}"
-            raise InputError(f"{self.path}: has the column {column}, and {both}; allowed: one")
+            raise InputError(self.path, f"has the column {column}, and {both}", "one")
         values = [self._amount(row, column, kind) for row in self.rows]
         sums = [sum(values[number] for number in group) for group in groups]
         if kind.unit:
@@ -187,14 +187,14 @@ class NodesFound(NamedTuple):
         filled = [name for name in sorted(columns) if self._is_filled(name)]
         if kind.asked:
             if kind.asked not in columns:
-                raise InputError(f"{self.path}: has no {kind.asked}{one_of(kind.asked, columns)}")
+                raise unknown_name(self.path, f"has no {kind.asked}", kind.asked, columns)
             if kind.asked in filled:
                 return kind.asked
             return ""
         matching = [name for name in filled if name.lower() in kind.known]
         if len({name.lower() for name in matching}) > 1:
             both = f"the columns {' and '.join(matching)}"
-            raise InputError(f"{self.path}: has {both} for one field; allowed: one of them")
+            raise InputError(self.path, f"has {both} for one field", "one of them")
         if matching:
             return matching[0]
         return ""
@@ -215,13 +215,13 @@ class NodesFound(NamedTuple):
             least, most = kind.limits
             if not least <= amount <= most:
                 limits = f"{least:g}..{most:g} {kind.unit}".rstrip()
-                raise InputError(f"{where}: {shown(text)} is out of range; allowed: {limits}")
+                raise InputError(where, f"{shown(text)} is out of range", limits)
             return amount
         if kind.otherwise is None:
             allowed = "a number"
             if kind.unit:
                 allowed = form_of(kind.unit)
-            raise InputError(f"{where}: is empty; allowed: {allowed}, or one in {kind.for_all}")
+            raise InputError(where, "is empty", f"{allowed}, or one in {kind.for_all}")
         return kind.otherwise
 
     def _title(self, number: int) -> str:
@@ -241,7 +241,7 @@ class NodesFound(NamedTuple):
                 verb = "are"
             enough = _enough(own, size, self.is_geographic, is_cell_fixed)
             line = f"{names} {verb} off the grid of {size[0]} x {size[1]} cells"
-            raise InputError(f"{self.path}: {line}; allowed: {enough}")
+            raise InputError(self.path, line, enough)
 
     def _refuse_shared(
         self, groups: dict[Cell, list[int]], projection: Projection | None, is_cell_fixed: bool
@@ -256,7 +256,7 @@ class NodesFound(NamedTuple):
         if projection:
             parted = "" if is_cell_fixed else self._finer(projection)
         ways_out = 'place = "merge", place = "nearest" beside the file'
-        raise InputError(f"{self.path}: {cells}; allowed: {parted}{ways_out}")
+        raise InputError(self.path, cells, f"{parted}{ways_out}")
 
     def _finer(self, projection: Projection) -> str:
         """The smallest cells that the largest grid allows, if they part all nodes."""
@@ -294,7 +294,7 @@ def _nearest_free(
     for number in moved:
         free = np.argwhere(is_free)[:, ::-1]
         if not len(free):
-            raise InputError("nodes: there are more than open cells; allowed: a larger grid")
+            raise InputError("nodes", "there are more than open cells", "a larger grid")
         x, y = free[((free + 0.5 - spots[number]) ** 2).sum(1).argmin()].tolist()
         cells[number] = (x, y)
         is_free[y, x] = False

@@ -175,7 +175,7 @@ class OwnSea(NamedTuple):
         place = validated(ZonePlace, of, where)
         if projection is None:
             allowed = "[x, y, width, height], nodes from a file with degrees, or centre"
-            raise InputError(f"{where}: has degrees, and the nodes are cells; allowed: {allowed}")
+            raise InputError(where, "has degrees, and the nodes are cells", allowed)
         [centre] = projection.cells(np.array([[place.lon, place.lat]]))
         x, y = np.round(centre - np.array([place.width, place.height]) / 2).astype(int).tolist()
         return x, y, place.width, place.height

@@ -17,7 +17,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
-from dess.base.errors import InputError, one_of, shown, validated
+from dess.base.errors import InputError, shown, unknown_name, validated
 from dess.base.files.documents import Document
 from dess.base.files.reading import TEXT_LIMIT, read_text
 from dess.physics.chart import Cell
@@ -137,7 +137,7 @@ class Place(NamedTuple):
             InputError: If it has none of this name.
         """
         if name and name not in self.properties:
-            raise InputError(f"{self.where}: has no {name}{one_of(name, self.properties)}")
+            raise unknown_name(self.where, f"has no {name}", name, self.properties)
         lower = {str(key).lower(): value for key, value in self.properties.items()}
         values = [self.properties[name]] if name else [lower.get(key) for key in known]
         return next((value for value in values if value not in (None, "")), None)
@@ -174,7 +174,7 @@ def reader(path: Path, readers: Mapping[str, Callable[..., Any]]) -> Callable[..
         InputError: If there is none.
     """
     if path.suffix.lower() not in readers:
-        raise InputError(f"{path}: has no known file ending; allowed: {', '.join(readers)}")
+        raise InputError(path, "has no known file ending", ", ".join(readers))
     return readers[path.suffix.lower()]
 
 
@@ -196,12 +196,12 @@ def read_table(path: Path) -> Places:
         columns = [name.strip() for name in next(lines, [])]
         rows = [(f"line {lines.line_num}", row) for row in lines if any(map(str.strip, row))]
     except csv.Error as error:
-        raise InputError(f"{path}: is not a CSV file: {error}; allowed: CSV with commas") from None
+        raise InputError(path, f"is not a CSV file: {error}", "CSV with commas") from None
     axes = {axis: [c for c in columns if c.lower() in COLUMNS[axis]] for axis in COLUMNS}
     pairs = [pair for pair in LIMITS if all(len(axes[axis]) == 1 for axis in pair)]
     if len(pairs) != 1:
         present = ", ".join(columns) or "none"
-        raise InputError(f"{path}: has columns {present}; allowed: x and y, or lon and lat")
+        raise InputError(path, f"has columns {present}", "x and y, or lon and lat")
     is_geographic = pairs == [GEOGRAPHIC]
     places = []
     for line, texts in rows:
@@ -224,7 +224,7 @@ def number_of(text: str, place: str) -> float:
     try:
         return float(text.replace(",", "."))
     except ValueError:
-        raise InputError(f"{place} is {shown(text)}; allowed: a number") from None
+        raise InputError("", f"{place} is {shown(text)}", "a number") from None
 
 
 def amount_of(text: str, place: str) -> float:
@@ -236,7 +236,7 @@ def amount_of(text: str, place: str) -> float:
     if may_part_thousands(text.strip()):
         allowed = f"{text.replace(',', '')} or {text.replace(',', '.')}"
         problem = "has a comma that may part thousands or decimals"
-        raise InputError(f"{place}: {shown(text)} {problem}; allowed: {allowed}")
+        raise InputError(place, f"{shown(text)} {problem}", allowed)
     return number_of(text, place)
 
 
@@ -244,10 +244,10 @@ def _number(text: str, place: str, most: int, is_geographic: bool) -> float:
     """A number of at most this size; a cell has integers."""
     number = number_of(text, place)
     if not -most - _ROUNDING <= number <= most + _ROUNDING:
-        raise InputError(f"{place} is {number:g}; allowed: {-most:,}..{most:,}")
+        raise InputError("", f"{place} is {number:g}", f"{-most:,}..{most:,}")
     if not is_geographic and not number.is_integer():
         raise InputError(
-            f"{place} is {number:g}; allowed: an integer (a cell); degrees are lon and lat"
+            "", f"{place} is {number:g}", "an integer (a cell); degrees are lon and lat"
         )
     return min(max(number, -most), most)
 
@@ -316,14 +316,14 @@ def _ring(value: Any, place: str) -> np.ndarray:
     ring = _positions(value, place)
     if len(ring) < 4 or (ring[0] != ring[-1]).any():
         allowed = "four positions or more, the last as the first"
-        raise InputError(f"{place}: is no ring; allowed: {allowed}")
+        raise InputError(place, "is no ring", allowed)
     return ring
 
 
 def _line(value: Any, place: str) -> np.ndarray:
     line = _positions(value, place)
     if len(line) < 2:
-        raise InputError(f"{place}: is no line; allowed: two positions or more")
+        raise InputError(place, "is no line", "two positions or more")
     return line
 
 
@@ -332,7 +332,7 @@ def _positions(value: Any, place: str) -> np.ndarray:
     try:
         positions = np.array([position[:2] for position in value], float).reshape(len(value), 2)
     except (TypeError, ValueError, OverflowError, KeyError):
-        raise InputError(f"{place}: has not two numbers; allowed: [lon, lat]") from None
+        raise InputError(place, "has not two numbers", "[lon, lat]") from None
     most = np.array(LIMITS[GEOGRAPHIC])
     for number, axis in np.argwhere(~(np.abs(positions) <= most + _ROUNDING)):
         where = place
@@ -340,8 +340,8 @@ def _positions(value: Any, place: str) -> np.ndarray:
             where = f"{place}.{number}"
         name = GEOGRAPHIC[axis]
         limit = most[axis]
-        line = f"{name} is {positions[number, axis]:g}; allowed: -{limit}..{limit}"
-        raise InputError(f"{where}: {line}")
+        problem = f"{name} is {positions[number, axis]:g}"
+        raise InputError(where, problem, f"-{limit}..{limit}")
     return np.clip(positions, -most, most)
 
 

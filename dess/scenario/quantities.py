@@ -12,7 +12,7 @@ from fractions import Fraction
 from functools import cache, lru_cache
 from typing import NoReturn
 
-from dess.base.errors import InputError, one_of, shown
+from dess.base.errors import InputError, shown, suggestion
 
 # What a quantity is and an example, by its units. A word in between parts two quantities.
 KINDS = {
@@ -139,7 +139,7 @@ def quantity_of(text: str, place: str, unit: str) -> float:
     try:
         return measured(text, unit)[0]
     except InputError as error:
-        raise InputError(f"{place}: {error}") from None
+        raise error.within(place) from None
 
 
 def _number(text: str, unit: str, units: str) -> Fraction:
@@ -187,8 +187,7 @@ def _refuse_unit(text: str, name: str, unit: str, units: str) -> NoReturn:
         refuse(text, "has a unit of another kind", units)
     is_rate = unit in _OVER_TIME
     names = _sizes(unit) if is_rate and "/" in name else _single(unit)
-    close = one_of(name, names).partition("; allowed: ")[0]
-    refuse(text, f"has an unknown unit{close}", units)
+    refuse(text, f"has an unknown unit{suggestion(name, names)}", units)
 
 
 @cache
@@ -224,7 +223,7 @@ def times(text: str, factor: float) -> str:
 
 def refuse(value: object, problem: str, units: str, allowed: str = "") -> NoReturn:
     """Refuse a value that is no quantity of these units, in one line."""
-    raise InputError(f"{shown(value)} {problem}; allowed: {allowed or form_of(units)}")
+    raise InputError("", f"{shown(value)} {problem}", allowed or form_of(units))
 
 
 def form_of(units: str) -> str:

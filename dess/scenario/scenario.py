@@ -23,7 +23,7 @@ from pydantic import (
     model_validator,
 )
 
-from dess.base.errors import InputError, check_type, form_of, one_of, shown, validated
+from dess.base.errors import InputError, check_type, form_of, shown, unknown_name, validated
 from dess.base.files.reading import Shipped, parse_toml
 from dess.physics.section import Integer, Section
 from dess.scenario.consistency import problems
@@ -81,7 +81,7 @@ class Constants(Fields):
         }
         following = data_sheet.fields()
         for name in sorted(following.keys() & dotted(values).keys() - {*OPEN}):
-            raise InputError(f"{name}: follows from the data sheet; allowed: without this field")
+            raise InputError(name, "follows from the data sheet", "without this field")
         for name, value in following.items():
             _check_following(data_sheet, name, value)
         return merged(following, values)
@@ -110,7 +110,7 @@ class Constants(Fields):
     def _is_consistent(self, info: ValidationInfo) -> Self:
         all_problems = chain(problems(self), _out_of_range(self))
         for problem in () if info.context == DRAFT else all_problems:
-            raise ValueError(problem)
+            raise problem
         return self
 
     @classmethod
@@ -134,7 +134,7 @@ class Constants(Fields):
             InputError: If the field does not exist, or holds no numbers.
         """
         if field not in SAMPLED and field not in self.numeric:
-            raise InputError(f"field: {field!r} is not a number{one_of(field, self.numeric)}")
+            raise unknown_name("field", f"{field!r} is not a number", field, self.numeric)
         between = {
             "uavs": (1, min(self.zone_cells, MOST_UAVS)),
             "pads": (1, self.zone_cells),
@@ -292,7 +292,7 @@ def scenario_at(base: str | Path, values: Mapping[str, Any], /, **overrides: Any
     name = values.get(SEA, base)
     if SEA in values and not (isinstance(name, str) and is_scenario_name(name)):
         seas = [*scenario_names(), *scenario_families()]
-        raise InputError(f"{SEA}: {shown(name)} is unknown{one_of(name, seas)}")
+        raise unknown_name(SEA, f"{shown(name)} is unknown", name, seas)
     fields = {field: value for field, value in values.items() if field != SEA}
     return load_scenario(name, **overrides, **fields)
 
@@ -346,12 +346,13 @@ def _check_following(sheet: DataSheet, name: str, value: Any) -> None:
     except ValidationError as error:
         number = error.errors()[0]["input"]
         raise InputError(
-            f"data_sheet: with {sheet.origin(name)}, {name} is {number:,g}; allowed: "
-            f"{form_of(fields_of(Fields)[limited])}"
+            "data_sheet",
+            f"with {sheet.origin(name)}, {name} is {number:,g}",
+            form_of(fields_of(Fields)[limited]),
         ) from None
 
 
-def _out_of_range(c: Constants) -> Iterator[str]:
+def _out_of_range(c: Constants) -> Iterator[InputError]:
     """The sampled parameters lie within their limits, and C_S is below C_C."""
     values = {name: getattr(c, name) for name in SAMPLED}
     ends = {name: (value, value) if is_number(value) else value for name, value in values.items()}
@@ -364,11 +365,12 @@ def _out_of_range(c: Constants) -> Iterator[str]:
             reason = ""
             if name == "uavs":
                 reason = f" (cells of the zone, at most {MOST_UAVS})"
-            yield f"{name}: {setting} is out of range; allowed: {least}..{most}{reason}"
+            yield InputError(name, f"{setting} is out of range", f"{least}..{most}{reason}")
     start = ends["charge_start"][1]
     complete = ends["charge_complete"][0]
     if start >= complete:
-        yield (
-            f"charge_start: {start} is not below charge_complete {complete}; "
-            "allowed: 10 <= charge_start < charge_complete <= 100 (eq. 1)"
+        yield InputError(
+            "charge_start",
+            f"{start} is not below charge_complete {complete}",
+            "10 <= charge_start < charge_complete <= 100 (eq. 1)",
         )

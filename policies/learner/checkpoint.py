@@ -154,7 +154,7 @@ def load_training(
         limit = 2**36
     values, metadata = trained.read_arrays(path, HEADER_LIMIT + limit)
     if "dess" not in metadata:
-        raise InputError(f"{path}: no checkpoint of a training; allowed: {CHECKPOINT} of one")
+        raise InputError(path, "no checkpoint of a training", f"{CHECKPOINT} of one")
     header = Header.parse(metadata["dess"], str(path), fixed={"format": FORMAT})
     raw = parse_json(metadata["dess"], str(path))
     training = new_training(config, device)
@@ -162,17 +162,14 @@ def load_training(
     saved = header.config.model_dump(mode="json") | {"scenario": header.scenario}
     if different := [key for key in settings if settings[key] != saved[key]]:
         raise InputError(
-            f"{path}: of another config ({', '.join(different)} differ); "
-            "allowed: the one it began with"
+            path, f"of another config ({', '.join(different)} differ)", "the one it began with"
         )
     require_version(header.observation_version, training.observation, path)
     if (
         trained.hash_arrays({k: v for k, v in raw.items() if k != "sha256"}, values)
         != header.sha256
     ):
-        raise InputError(
-            f"{path}: damaged: its content has not the checksum of its header; allowed: {_WHOLE}"
-        )
+        raise InputError(path, "damaged: its content has not the checksum of its header", _WHOLE)
     try:
         training.enter_phase(header.progress.phase_index)
         for name, value in raw["progress"].items():
@@ -181,10 +178,10 @@ def load_training(
         trained.require_same_forms(values, _expected_arrays(training, finished), str(path))
         _restore_training(training, values, raw)
     except (LookupError, ValueError, TypeError, RuntimeError, OverflowError) as error:
-        problem = str(error).removeprefix(f"{path}: ").partition("; allowed:")[0]
-        raise InputError(
-            f"{path}: damaged, or of another scenario: {problem}; allowed: {_WHOLE}"
-        ) from None
+        problem = str(error)
+        if isinstance(error, InputError):
+            problem = error.problem
+        raise InputError(path, f"damaged, or of another scenario: {problem}", _WHOLE) from None
     return training
 
 

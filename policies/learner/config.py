@@ -64,7 +64,7 @@ Factor = Annotated[float, Field(strict=True, ge=1e-6, le=1e6)]
 def _in_one_line(text: str) -> str:
     """Refuse what a terminal would not show as it is: a name appears in messages and tables."""
     if not text.isprintable():
-        raise ValueError(f"{shown(text)} has control characters; allowed: printable characters")
+        raise InputError("", f"{shown(text)} has control characters", "printable characters")
     return text
 
 
@@ -100,7 +100,7 @@ class Phase(_Settings):
     @model_validator(mode="after")
     def _is_a_temperature(self) -> "Phase":
         if 0.0 < self.temperature < 1e-6:  # values divided by it would be infinite
-            raise ValueError(f"temperature: {self.temperature} is too low; allowed: 0, 1e-6..1e6")
+            raise InputError("temperature", f"{self.temperature} is too low", "0, 1e-6..1e6")
         return self
 
 
@@ -198,17 +198,19 @@ class TrainingConfig(_Settings):
     @model_validator(mode="after")
     def _is_consistent(self) -> "TrainingConfig":
         if self.ticks // self.evaluate_every > MOST_EVALUATIONS:
-            raise ValueError(
-                f"evaluate_every: {self.evaluate_every} makes more than {MOST_EVALUATIONS:,} "
-                f"evaluations in {self.ticks:,} ticks; allowed: more ticks between evaluations"
+            raise InputError(
+                "evaluate_every",
+                f"{self.evaluate_every} makes more than {MOST_EVALUATIONS:,} evaluations in "
+                f"{self.ticks:,} ticks",
+                "more ticks between evaluations",
             )
         if self.evaluation_seed == MISSION_SEED + self.seed:
-            raise ValueError(
-                f"evaluation_seed: {self.evaluation_seed} is that of the training; allowed: another"
+            raise InputError(
+                "evaluation_seed", f"{self.evaluation_seed} is that of the training", "another"
             )
         names = [phase.name for phase in self.phases]
         if len(set(names)) < len(names):
-            raise ValueError(f"phases: {shown(names)} are not distinct; allowed: distinct names")
+            raise InputError("phases", f"{shown(names)} are not distinct", "distinct names")
         return self
 
     @model_validator(mode="after")
@@ -218,25 +220,28 @@ class TrainingConfig(_Settings):
             fields = type(part).model_fields
             for name in fields:
                 if name in unused and getattr(part, name) != fields[name].default:
-                    raise ValueError(
-                        f"{name}: {shown(getattr(part, name))} has no effect with the observation "
-                        f"{self.observation}; allowed: to leave it out"
+                    raise InputError(
+                        name,
+                        f"{shown(getattr(part, name))} has no effect with the observation "
+                        f"{self.observation}",
+                        "to leave it out",
                     )
         if self.algorithm == "ppo":
             if len(self.hidden) != 3:
-                raise ValueError(f"hidden: {list(self.hidden)} are not three; allowed: three")
+                raise InputError("hidden", f"{list(self.hidden)} are not three", "three")
             for phase in self.phases:
                 if not phase.temperature:
-                    raise ValueError(f"phases: {phase.name} has no temperature; allowed: above 0")
+                    raise InputError("phases", f"{phase.name} has no temperature", "above 0")
             return self
         if self.replay < self.n_step + 2:  # of two slots an environment has simulated at least one
-            raise ValueError(
-                f"replay: {self.replay} is too few; allowed: n_step {self.n_step} + 2 or more"
+            raise InputError(
+                "replay", f"{self.replay} is too few", f"n_step {self.n_step} + 2 or more"
             )
         if self.learning_starts <= self.n_step:
-            raise ValueError(
-                f"learning_starts: {self.learning_starts} is too few; allowed: more than n_step "
-                f"{self.n_step}"
+            raise InputError(
+                "learning_starts",
+                f"{self.learning_starts} is too few",
+                f"more than n_step {self.n_step}",
             )
         return self
 
@@ -305,13 +310,14 @@ def load_config(
     config = config.model_copy(update={"set": config.set | dict(fields or {})})
     for key in sorted(config.set.keys() & TrainingConfig.model_fields.keys()):
         raise InputError(
-            f"{where}: {key} is a setting of the training, not a field of the scenario; allowed: "
-            f"{key} = VALUE in a config file"
+            where,
+            f"{key} is a setting of the training, not a field of the scenario",
+            f"{key} = VALUE in a config file",
         )
     try:
         config.space  # noqa: B018 - it is checked when it is made
     except InputError as error:
-        raise InputError(f"{where}: scenario: {error}") from None
+        raise error.within(f"{where}: scenario") from None
     return config
 
 
@@ -323,8 +329,9 @@ def validate_config(values: dict[str, Any], where: str) -> TrainingConfig:
     """
     for key in sorted(values.keys() & ScenarioSpace.model_fields.keys()):
         raise InputError(
-            f"{where}: {key} is a field of the scenario; allowed: "
-            f"--set {shlex.quote(f'{key}={toml_value(values[key])}')}, or {key} in the table [set]"
+            where,
+            f"{key} is a field of the scenario",
+            f"--set {shlex.quote(f'{key}={toml_value(values[key])}')}, or {key} in the table [set]",
         )
     return validated(TrainingConfig, values, where)
 

@@ -108,8 +108,9 @@ class ReplayMemory:
         oldest = max(0, self.count - self.capacity)
         if newest - oldest < n_step:
             raise InputError(
-                f"replay: {self.count} slots in memory are too few for {n_step}-step returns; "
-                "allowed: more than n_step"
+                "replay",
+                f"{self.count} slots in memory are too few for {n_step}-step returns",
+                "more than n_step",
             )
         rows: list[np.ndarray] = []
         uavs: list[np.ndarray] = []
@@ -124,8 +125,9 @@ class ReplayMemory:
             keep = np.nonzero(good)[0][:missing]
             if not len(keep) and len(rows) > 1000:
                 raise InputError(
-                    "replay: hardly any slot of the memory has a transition; allowed: a scenario "
-                    "whose missions last more than a slot"
+                    "replay",
+                    "hardly any slot of the memory has a transition",
+                    "a scenario whose missions last more than a slot",
                 )
             rows.append(row[keep])
             uavs.append(uav[keep])

@@ -110,17 +110,19 @@ class LearnedPolicy:
             others = of_missions[of_missions != value]
             if len(others):
                 raise InputError(
-                    f"policy {self.name}: has learned {field} {value}, not {others[0]}; "
-                    "allowed: the grid, zone and nodes of its training"
+                    f"policy {self.name}",
+                    f"has learned {field} {value}, not {others[0]}",
+                    "the grid, zone and nodes of its training",
                 )
         if not np.array_equal(view.world.chart.zones, layout.zones):
             raise InputError(
-                f"policy {self.name}: has learned a square grid with one zone and no no-fly cells; "
-                "allowed: the grid, zone and nodes of its training"
+                f"policy {self.name}",
+                "has learned a square grid with one zone and no no-fly cells",
+                "the grid, zone and nodes of its training",
             )
         if not np.array_equal(view.world.nodes, layout.nodes):
             raise InputError(
-                f"policy {self.name}: has learned other nodes; allowed: those of its training"
+                f"policy {self.name}", "has learned other nodes", "those of its training"
             )
 
 

@@ -207,8 +207,9 @@ class ProximalTraining(training.Training):
         shown = [decisions for decisions, _ in simulated if len(decisions.actions)]
         if not shown:
             raise InputError(
-                "scenario: no UAV had a choice in any mission of a tick; "
-                "allowed: one in which there is more to decide"
+                "scenario",
+                "no UAV had a choice in any mission of a tick",
+                "one in which there is more to decide",
             )
         self.finished += [records for _, records in simulated]
         self.uav_slots += sum(int(records["uav_slots"].sum()) for _, records in simulated)

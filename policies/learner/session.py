@@ -46,7 +46,8 @@ SIGNALS = [
 # Weights times rows of a batch up to which a network is small: one thread computes it fastest.
 SMALL = 100_000_000
 
-_BUSY = "in use by another training; allowed: another --out, or wait for its end"
+# What is said if another process trains into the folder, and what is allowed then.
+_BUSY = ("in use by another training", "another --out, or wait for its end")
 
 # Bytes of the losses of an update, as tensors.
 _LOSS = 2000
@@ -62,9 +63,9 @@ def choose_device(name: str) -> torch.device:
         InputError: If the name is unknown, or ``cuda`` is not available.
     """
     if name not in ("auto", "cpu", "cuda"):
-        raise InputError(f"device: {name!r} is unknown; allowed: auto, cpu, cuda")
+        raise InputError("device", f"{name!r} is unknown", "auto, cpu, cuda")
     if name == "cuda" and not torch.cuda.is_available():
-        raise InputError("device: torch finds no CUDA device here; allowed: auto, cpu")
+        raise InputError("device", "torch finds no CUDA device here", "auto, cpu")
     return torch.device("cuda" if name != "cpu" and torch.cuda.is_available() else "cpu")
 
 
@@ -167,7 +168,7 @@ def train(
     if not accept_size:
         allowed = "a smaller network, replay memory or batch, fewer environments, or --yes"
         check_memory(f"training {config.name}", sizes.total, allowed)
-    with locked(out / LOCK, _BUSY):
+    with locked(out / LOCK, *_BUSY):
         _check_folder(out, resume)  # again, as another training may have ended in the meantime
         if announce:
             announce(sizes.missions)
@@ -183,8 +184,9 @@ def train(
             if isinstance(error, RuntimeError) and "alloc" not in str(error):
                 raise  # torch has no error of its own for memory
             raise InputError(
-                f"training {config.name}: about {sizes.total / 2**30:.1f} GiB of memory are "
-                "too much for this machine; allowed: fewer environments or slots"
+                f"training {config.name}",
+                f"about {sizes.total / 2**30:.1f} GiB of memory are too much for this machine",
+                "fewer environments or slots",
             ) from error
         with _limit_threads(training):
             _run_training(training, out, progress)
@@ -252,17 +254,17 @@ def _check_folder(out: Path, resume: bool) -> None:
     check_folder(out)
     names = {path.name for path in paths_in(out)}
     if resume and CHECKPOINT not in names:
-        raise InputError(f"{out / CHECKPOINT}: no such file; allowed: the folder of a training")
+        raise InputError(out / CHECKPOINT, "no such file", "the folder of a training")
     if resume:
         return
     if CHECKPOINT in names:
-        raise InputError(f"{out}: holds a training; allowed: --resume, or another folder")
+        raise InputError(out, "holds a training", "--resume, or another folder")
     if MODEL in names:
-        raise InputError(f"{out}: holds a policy; allowed: another folder")
+        raise InputError(out, "holds a policy", "another folder")
     # A run that was killed before its first checkpoint may have left its lock and a temporary file.
     if others := sorted(n for n in names if n != LOCK and not n.endswith(".tmp")):
         raise InputError(
-            f"{out}: holds other files, such as {shown(others[0])}; allowed: a new or empty folder"
+            out, f"holds other files, such as {shown(others[0])}", "a new or empty folder"
         )
 
 

@@ -62,7 +62,7 @@ def write_arrays(path: Path, arrays: Weights, metadata: dict[str, str]) -> None:
         try:
             save_file(_make_contiguous(arrays), temporary, metadata)
         except SafetensorError as error:
-            raise InputError(f"{path}: cannot be written: {error}; allowed: another path") from None
+            raise InputError(path, f"cannot be written: {error}", "another path") from None
 
 
 def read_arrays(path: Path, limit: int) -> tuple[Arrays, dict[str, str]]:
@@ -86,7 +86,7 @@ def describe_damage(path: Path, error: Exception) -> InputError:
     problem = str(error)
     if isinstance(error, KeyError):
         problem = f"numbers of the type {error}"
-    return InputError(f"{path}: damaged: {problem}; allowed: a safetensors file")
+    return InputError(path, f"damaged: {problem}", "a safetensors file")
 
 
 def hash_arrays(content: Any, arrays: Weights) -> str:
@@ -116,13 +116,13 @@ def require_same_forms(arrays: Weights, wanted: Weights, where: str) -> None:
     """
     for name in sorted(arrays.keys() ^ wanted.keys()):
         problem = "is missing" if name in wanted else "is one too many"
-        raise InputError(f"{where}: {shown(name)} {problem}; allowed: the tensors of the config")
+        raise InputError(where, f"{shown(name)} {problem}", "the tensors of the config")
     for name, value in wanted.items():
         actual, allowed = (f"{array.dtype} {[*array.shape]}" for array in (arrays[name], value))
         if actual != allowed:
-            raise InputError(f"{where}: {name} is {actual}; allowed: {allowed}, as the config says")
+            raise InputError(where, f"{name} is {actual}", f"{allowed}, as the config says")
         if not _is_sound(arrays[name]):
-            raise InputError(f"{where}: {name} has impossible values; allowed: finite numbers")
+            raise InputError(where, f"{name} has impossible values", "finite numbers")
 
 
 def arrays_under(arrays: Weights, name: str) -> Arrays:
@@ -185,7 +185,7 @@ def make_observation(config: TrainingConfig, space: ScenarioSpace) -> tuple[Layo
     layout = layout_of(space)
     if config.observation == "maps" and (2 * layout.grid - 1) // POOL < network.NARROWEST:
         raise InputError(
-            f"observation: a grid of {layout.grid} is too small for maps; allowed: vector, sets"
+            "observation", f"a grid of {layout.grid} is too small for maps", "vector, sets"
         )
     return layout, _KINDS[config.observation][0](layout)
 
@@ -286,8 +286,7 @@ def _read_folder(folder: Path) -> tuple[bytes, Description]:
         if read_description(folder) != description:  # a training has just replaced both files
             return _read_folder(folder)
         raise InputError(
-            f"{path}: damaged: it has not the checksum in {CONFIG}; allowed: the file it was made "
-            "with"
+            path, f"damaged: it has not the checksum in {CONFIG}", "the file it was made with"
         )
     return content, description
 
@@ -303,7 +302,7 @@ def _make_cached_policy(folder: Path, content: bytes, text: str) -> LearnedPolic
     try:
         layout, observation = make_observation(config, ScenarioSpace.of(uavs=1, **(values or {})))
     except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+        raise error.within(where) from None
     require_version(description.observation_version, observation, where)
     weights = _parse_weights(content, path)
     require_same_forms(weights, expected_weights(config, observation), str(path))
@@ -330,7 +329,7 @@ def require_version(version: int, observation: Any, path: Path) -> None:
         InputError: If they were.
     """
     if version != observation.version:
-        raise InputError(f"{path}: observation version {version!r}; allowed: {observation.version}")
+        raise InputError(path, f"observation version {version!r}", str(observation.version))
 
 
 def _parse_weights(content: bytes, path: Path) -> Arrays:

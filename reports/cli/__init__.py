@@ -46,7 +46,7 @@ def _check_text(words: Sequence[str]) -> None:
 
     for word in words:
         if not is_text(word):
-            raise InputError(f"{shown(word)}: is not text in UTF-8; allowed: another name")
+            raise InputError(shown(word), "is not text in UTF-8", "another name")
 
 
 def _report_error(error: BaseException, words: Sequence[str], is_interrupted: bool) -> int:
@@ -74,11 +74,11 @@ def _report_error(error: BaseException, words: Sequence[str], is_interrupted: bo
             f"dess: error: {error.format_message()}{hint}", error.exit_code
         )
     if isinstance(error, InputError):
-        return console.print_failure(f"dess: error: {error}", 2)
+        return console.print_refusal(error)
     if isinstance(error, ModuleNotFoundError):
         absent = absence(error, " ".join(["dess", *words[:1]]))
         if absent is not None:
-            return console.print_failure(f"dess: error: {absent}", 2)
+            return console.print_refusal(absent)
     if isinstance(error, OSError | SystemExit):
         return console.print_system_error(error)
     if isinstance(error, MemoryError):

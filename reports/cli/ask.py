@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dess.base.errors import InputError, one_of, shown
+from dess.base.errors import shown, unknown_name
 from dess.base.libraries import missing
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption, run_or_exit
@@ -101,8 +101,8 @@ def sweep(
     measured = question.study.metrics
     ranking = column_in_sheet_unit(ALIASES.get(metric or PRODUCT, metric or PRODUCT), measured)
     if ranking not in measured:
-        allowed = one_of(metric, [*ALIASES, *measured])
-        raise InputError(f"--metric: {shown(metric)} is not measured{allowed}")
+        names = [*ALIASES, *measured]
+        raise unknown_name("--metric", f"{shown(metric)} is not measured", metric, names)
     page = f"{PREFIX}{question.study.name}"
     results_of_sweep = _run_question(question, page, out, workers, dry_run, yes)
     answer = Sweep(question, results_of_sweep)

@@ -31,7 +31,7 @@ class _Line(logging.Formatter):
     """A message of a log as one line of printable characters."""
 
     def format(self, record: logging.LogRecord) -> str:
-        return _in_one_line(record.getMessage())
+        return cut(_in_one_line(record.getMessage()), MESSAGE)
 
 
 WIDTH = 100  # of a table in the terminal [characters]
@@ -70,17 +70,34 @@ def print_system_error(error: OSError | SystemExit) -> int:
     if place:
         line = f"dess: error: {place}: {reason}"
     if error.errno == errno.ENAMETOOLONG:  # such a name is bad input
-        return print_failure(f"{line}; allowed: another path", 2)
+        return print_failure(line, 2, "another path")
     return print_failure(line, 1)
 
 
-def print_failure(message: str, code: int) -> int:
+def print_refusal(error: InputError) -> int:
+    """Print the line about bad input on stderr, and return the exit code."""
+    return print_failure(f"dess: error: {error.complaint}", 2, error.allowed)
+
+
+def print_failure(message: str, code: int, allowed: str = "") -> int:
     """Print one line on stderr that says why the command fails, and return the exit code.
 
     The line has no control characters, and of a long one the beginning and the end.
+
+    Args:
+        message: Why.
+        code: The exit code.
+        allowed: What is allowed; a line that is too long still says it.
     """
+    line = _in_one_line(message)
+    end = ""
+    if allowed:
+        end = "; allowed: "
+        room = MESSAGE - len(line) - len(end)
+        end += cut(_in_one_line(allowed), max(room, MESSAGE // 2))
+    line = cut(line, MESSAGE - len(end))
     try:
-        print(_in_one_line(message), file=sys.stderr)
+        print(line + end, file=sys.stderr)
     except OSError:  # there is no stream left for the line
         _silence_stream(sys.stderr)
     return code
@@ -91,14 +108,8 @@ def _silence_stream(stream: TextIO) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _in_one_line(message: str) -> str:
-    """The message in one line; one that is too long still says what is allowed."""
-    line = printable(" ".join(message.split()))
-    what, allowed, values = line.rpartition("; allowed: ")
-    if not allowed or len(line) <= MESSAGE:
-        return cut(line, MESSAGE)
-    end = allowed + cut(values, max(MESSAGE // 2, MESSAGE - len(what + allowed)))
-    return cut(what, MESSAGE - len(end)) + end
+def _in_one_line(text: str) -> str:
+    return printable(" ".join(text.split()))
 
 
 def print_text(text: object, stream: TextIO | None = None) -> None:
@@ -129,7 +140,7 @@ def ask_questions(
     missing = [name for name in asked if questions[name][1] is None]
     if missing and not sys.stdin.isatty():
         allowed = f"--set {missing[0]}=..., or a terminal, where it is asked"
-        raise InputError(f"{', '.join(missing)}: missing; allowed: {allowed}")
+        raise InputError(", ".join(missing), "missing", allowed)
     while asked:
         name = asked[0]
         meaning, default = questions[asked[0]]
@@ -155,7 +166,7 @@ def open_outputs(paths: Sequence[Path]) -> Iterator[list[Path]]:
     """
     files = [path for path in paths if not is_stdout(path)]
     if len(files) < len(paths) and sys.stdout.isatty():
-        raise InputError("-: standard output is a terminal; allowed: a file, or a pipe")
+        raise InputError("-", "standard output is a terminal", "a file, or a pipe")
     with replacing_all(files) as temporaries:
         if len(files) == len(paths):
             yield temporaries
@@ -184,7 +195,7 @@ def check_ending(
         InputError: If the ending is another one.
     """
     if path and not (is_stream and is_stdout(path)) and path.suffix.lower() not in allowed:
-        raise InputError(f"{option}: {path} is not {kind}; allowed: {', '.join(allowed)}")
+        raise InputError(option, f"{path} is not {kind}", ", ".join(allowed))
 
 
 def is_stdout(path: Path) -> bool:

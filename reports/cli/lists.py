@@ -151,9 +151,9 @@ def new_scenario(
 
     console.check_ending("FILE.toml", path, (".toml",), "a scenario")
     if path.exists():
-        raise InputError(f"{path}: exists; allowed: the name of a new file")
+        raise InputError(path, "exists", "the name of a new file")
     if nodes.absolute().parent != path.absolute().parent:
-        raise InputError(f"--nodes: {nodes} is in another folder; allowed: a file beside {path}")
+        raise InputError("--nodes", f"{nodes} is in another folder", f"a file beside {path}")
     parts = (answer.partition("=") for answer in answers or [])
     typed_answers = {key.strip(): value.strip() for key, _, value in parts}
     new = NewScenario(nodes)
@@ -175,7 +175,7 @@ def new_scenario(
     try:
         space = parsed_scenario(text, path)
     except InputError as error:
-        raise InputError(f"{path} is written, but cannot be simulated: {error}") from None
+        raise error.within(f"{path} is written, but cannot be simulated") from None
     console.print_text(f"{path}, {picture}: {space.units}")
 
 

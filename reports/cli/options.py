@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from dess.base.errors import InputError, one_of, shown
+from dess.base.errors import InputError, shown, unknown_name
 from dess.base.files.reading import parse_toml
 from dess.reports.cli.console import print_text
 
@@ -164,11 +164,11 @@ def parse_setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[s
             return key, parsed["value"]
     if allowed == FIELD and (_RANGE.fullmatch(value) or "," in value.partition("[")[0]):
         many = shlex.join(["dess", "sweep", SET, text])
-        raise InputError(f"{option}: {shown(text)} has several values; allowed: one, or {many}")
+        raise InputError(option, f"{shown(text)} has several values", f"one, or {many}")
     if allowed == FIELD and value:
         _check_word(key, value, option)
         return key, value
-    raise InputError(f"{option}: {shown(text)} is not KEY=VALUE; allowed: {allowed}")
+    raise InputError(option, f"{shown(text)} is not KEY=VALUE", allowed)
 
 
 def takes_quantities(field: str) -> bool:
@@ -210,7 +210,7 @@ def _find_field(name: str, option: str = SET) -> "FieldInfo":
 
     fields = fields_of(ScenarioSpace)
     if name not in fields:
-        raise InputError(f"{option}: {name}: unknown key{one_of(name, fields)}")
+        raise unknown_name(f"{option}: {name}", "unknown key", name, fields)
     return fields[name]
 
 
@@ -229,11 +229,11 @@ def _check_word(name: str, word: str, option: str = SET) -> None:
     if word in words or kind == "text in quotes":
         return
     if words:
-        raise InputError(f"{option}: {name}: {shown(word)} is unknown{one_of(word, words)}")
+        raise unknown_name(f"{option}: {name}", f"{shown(word)} is unknown", word, words)
     problem = "has the wrong form"
     if kind:
         problem = f"is not {kind}"
-    raise InputError(f"{option}: {name}: {shown(word)} {problem}; allowed: {form_of(field)}")
+    raise InputError(f"{option}: {name}", f"{shown(word)} {problem}", form_of(field))
 
 
 def _is_plain(value: Any) -> bool:
@@ -351,13 +351,13 @@ def _parse_number(text: str, end: str) -> Decimal:
 
 
 def _range_error(text: str, problem: str, allowed: str) -> InputError:
-    return InputError(f"--set: {text!r} {problem}; allowed: {allowed}")
+    return InputError("--set", f"{text!r} {problem}", allowed)
 
 
 def _refuse_repetition(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     unique: dict[str, Any] = {}
     for key, value in pairs:
         if key in unique:
-            raise InputError(f"{option}: {key} is given twice; allowed: once")
+            raise InputError(option, f"{key} is given twice", "once")
         unique[key] = value
     return unique

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dess.base.errors import InputError, one_of, shown
+from dess.base.errors import InputError, shown, unknown_name
 from dess.reports.cli import console
 from dess.reports.cli.console import YesOption
 from dess.reports.cli.options import (
@@ -64,13 +64,13 @@ def report(
         formats = [kind.strip() for kind in figures.split(",")]
     for kind in formats:
         if kind not in PICTURES:
-            raise InputError(f"--figures: {shown(kind)} is unknown{one_of(kind, PICTURES)}")
+            raise unknown_name("--figures", f"{shown(kind)} is unknown", kind, PICTURES)
     if results != RESULTS and not os.path.lexists(results):
-        raise InputError(f"--results: {results}: no such folder; allowed: one with results")
+        raise InputError(f"--results: {results}", "no such folder", "one with results")
     values = dict(parse_setting(text, "--parameter", PARAMETER) for text in parameters or [])
     if settings:
         if names and WHAT_IF not in names:
-            raise InputError(f"--set: {' '.join(names)} takes no --set; allowed: {WHAT_IF}")
+            raise InputError("--set", f"{' '.join(names)} takes no --set", WHAT_IF)
         values["settings"] = dict(parse_setting(text) for text in settings)
         values.setdefault("baseline", {})  # the scenario itself, not that of the default question
     if yes:  # a parameter of the notebooks that simulate missions

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from dess.base.errors import InputError, one_of, shown
+from dess.base.errors import InputError, shown, unknown_name
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption
 
@@ -83,7 +83,7 @@ def simulate(
         _refuse_given(context, "scenario", "settings", "seed")
         asked = _read_study(of, point, policy, replication)
     elif point is not None:
-        raise InputError("--point: belongs to a study; allowed: with --of DIR")
+        raise InputError("--point", "belongs to a study", "with --of DIR")
     else:
         space = options.load_space(scenario, settings)
         policy = policy or "greedy"
@@ -93,7 +93,7 @@ def simulate(
         check_missions("simulate", [asked.space])
     check_seed(asked.seed, asked.replication)
     if path and path.suffix.lower() == ".kml" and asked.space.centre is None:
-        raise InputError(f"--path: {path}: the sea has no degrees; allowed: .geojson, .csv")
+        raise InputError(f"--path: {path}", "the sea has no degrees", ".geojson, .csv")
     writers = {
         events: _write_log,
         figure: _write_map,
@@ -102,7 +102,7 @@ def simulate(
     }
     paths = [file for file in (events, figure, animation, path) if file]
     if len({file.absolute() for file in paths}) < len(paths):
-        raise InputError("--events, --figure: the same file; allowed: a file for each")
+        raise InputError("--events, --figure", "the same file", "a file for each")
     console.check_ending("--events", events, LOGS, "an event log", is_stream=True)
     console.check_ending("--figure", figure, FIGURES, "a picture")
     console.check_ending("--animation", animation, ANIMATIONS, "an animation")
@@ -113,7 +113,7 @@ def simulate(
         check_ffmpeg()
     is_binary = events is not None and console.is_stdout(events)
     if is_binary and as_json:
-        raise InputError("--json: standard output has the event log; allowed: --events FILE")
+        raise InputError("--json", "standard output has the event log", "--events FILE")
     with console.open_outputs(paths) as temporaries:
         with console.compile_notice():
             which = asked.seed, asked.replication
@@ -194,12 +194,12 @@ def _choose_of_study(option: str, given: T | None, there: Sequence[T], allowed: 
     if given is None and len(there) == 1:
         return there[0]
     if given is None:
-        raise InputError(f"--{option}: the study has {len(there):,}; allowed: one of {allowed}")
+        raise InputError(f"--{option}", f"the study has {len(there):,}", f"one of {allowed}")
     if given not in there:
-        end = f"; allowed: {allowed}"
+        problem = f"{shown(given)} is not in the study"
         if isinstance(given, str):
-            end = one_of(given, map(str, there))
-        raise InputError(f"--{option}: {shown(given)} is not in the study{end}")
+            raise unknown_name(f"--{option}", problem, given, map(str, there))
+        raise InputError(f"--{option}", problem, allowed)
     return given
 
 
@@ -209,7 +209,7 @@ def _refuse_given(context: typer.Context, *names: str) -> None:
         source = context.get_parameter_source(name)
         if source and source.name != "DEFAULT":
             option = _OPTION_OF.get(name, name)
-            raise InputError(f"--{option}: comes from the study; allowed: --of without --{option}")
+            raise InputError(f"--{option}", "comes from the study", f"--of without --{option}")
 
 
 @dataclass(frozen=True)

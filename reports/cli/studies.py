@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dess.base.errors import InputError, one_of
+from dess.base.errors import InputError, unknown_name
 from dess.base.libraries import needs
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption, run_or_exit
@@ -166,13 +166,11 @@ def show(
     from dess.reports.cli import tables as printed
 
     if as_csv and as_json:
-        raise InputError("--csv: not with --json; allowed: one of them")
+        raise InputError("--csv", "not with --json", "one of them")
     targets = _parse_targets(target or [])
     results = _load_folder(folder)
     if policy is not None and policy not in results.policies:
-        raise InputError(
-            f"--policy: {policy!r} is not in the study{one_of(policy, results.policies)}"
-        )
+        raise unknown_name("--policy", f"{policy!r} is not in the study", policy, results.policies)
     targets = {
         column_in_sheet_unit(metric, results.missions): end for metric, end in targets.items()
     }
@@ -197,9 +195,7 @@ def _load_folder(folder: Path) -> "Results":
     from dess.analysis.results.tables import load_results
 
     if not folder.exists() and (options.RESULTS / folder).is_dir():
-        raise InputError(
-            f"{folder}: no such folder; allowed: a results folder: {options.RESULTS / folder}"
-        )
+        raise InputError(folder, "no such folder", f"a results folder: {options.RESULTS / folder}")
     return load_results(folder)
 
 
@@ -210,15 +206,15 @@ def _parse_targets(texts: Iterable[str]) -> dict[str, float]:
     targets = {}
     for name, share in options.parse_all_settings(texts, "--target", TARGET).items():
         if (metric := ALIASES.get(name, name)) not in METRICS | MEASURES:
-            allowed = one_of(name, [*METRICS, *ALIASES, *MEASURES])
-            raise InputError(f"--target: {name!r} is unknown{allowed}")
+            names = [*METRICS, *ALIASES, *MEASURES]
+            raise unknown_name("--target", f"{name!r} is unknown", name, names)
         is_number = isinstance(share, int | float) and not isinstance(share, bool)
         if metric in MEASURES and not (is_number and share >= 0):
-            raise InputError(f"--target: {name}: {share!r} is not allowed; allowed: 0 or more")
+            raise InputError(f"--target: {name}", f"{share!r} is not allowed", "0 or more")
         if metric in METRICS and not (is_number and 0 <= share <= 1):
-            raise InputError(f"--target: {name}: {share!r} is not a share; allowed: 0..1")
+            raise InputError(f"--target: {name}", f"{share!r} is not a share", "0..1")
         if metric in targets:
-            raise InputError(f"--target: {metric} is given twice; allowed: once")
+            raise InputError("--target", f"{metric} is given twice", "once")
         targets[metric] = float(share)
     return targets
 

@@ -64,9 +64,7 @@ def train(
     config = load_config(name, fields, **changes)
     start_folder = folder_of(start or "")
     if start and not start_folder:
-        raise InputError(
-            f"--from: {shown(start)} is no trained policy; allowed: one, or its folder"
-        )
+        raise InputError("--from", f"{shown(start)} is no trained policy", "one, or its folder")
     needs("learning", "dess train")
     from dess.policies.learner.session import EVENTS, train
     from dess.policies.learner.training import DivergenceError

@@ -19,7 +19,7 @@ from multiprocessing import Pipe, Process, set_start_method
 from multiprocessing.connection import Connection, wait
 from threading import Thread
 from traceback import format_exception
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from dess.analysis.results.tables import keep_results
 from dess.base.errors import InputError
@@ -101,8 +101,11 @@ def _run_cells(number: int, cells: Sequence[str], parent: Connection) -> None:
             return
 
 
-def _run_cell(shell: "InteractiveShell", cell: str) -> tuple[list[dict], list[str] | None]:
-    """Run a cell: its outputs as Jupyter stores them, and the name, text and place of its error."""
+def _run_cell(shell: "InteractiveShell", cell: str) -> tuple[list[dict], dict[str, Any] | None]:
+    """Run a cell: its outputs as Jupyter stores them, and the text and place of its error.
+
+    An ``InputError`` has its parts as well, under ``refusal``.
+    """
     from IPython.core.displayhook import CapturingDisplayHook
     from IPython.core.displaypub import CapturingDisplayPublisher
 
@@ -112,7 +115,12 @@ def _run_cell(shell: "InteractiveShell", cell: str) -> tuple[list[dict], list[st
     with redirect_stdout(streams["stdout"]), redirect_stderr(streams["stderr"]):
         result = shell.run_cell(cell)
     if error := result.error_before_exec or result.error_in_exec:
-        return [], [type(error).__name__, str(error), "".join(format_exception(error))]
+        refusal = None
+        if type(error) is InputError:
+            refusal = error.args
+        text = f"{type(error).__name__}: {error}"
+        traceback = "".join(format_exception(error))
+        return [], {"text": text, "traceback": traceback, "refusal": refusal}
     outputs: list[dict] = [
         {"output_type": "stream", "name": name, "text": stream.getvalue()}
         for name, stream in streams.items()

@@ -60,7 +60,7 @@ def run_reports(
                 for warning in (output for output in outputs if output.get("name") == "stderr"):
                     log.warning(warning["text"].rstrip())
                 if error:
-                    _store_error(report, *error)
+                    _store_error(report, error)
                     continue
                 report.done += 1
                 if progress:
@@ -72,12 +72,12 @@ def run_reports(
                 report.failure = ": ".join([_describe_cell(report), "its process ended", *last])
 
 
-def _store_error(report: Report, kind: str, error: str, traceback: str) -> None:
+def _store_error(report: Report, error: dict[str, Any]) -> None:
     """Store the error of a cell in its report, or raise it if the notebook refuses its input."""
-    if kind == InputError.__name__:
-        raise InputError(f"report {report.name}: {error}")
-    report.failure = f"{_describe_cell(report)}: {kind}: {error}"
-    report.traceback = traceback
+    if error["refusal"]:
+        raise InputError(*error["refusal"]).within(f"report {report.name}")
+    report.failure = f"{_describe_cell(report)}: {error['text']}"
+    report.traceback = error["traceback"]
 
 
 def _describe_cell(report: Report) -> str:

@@ -21,7 +21,7 @@ from typing import Any
 import nbformat
 from nbformat import NotebookNode
 
-from dess.base.errors import InputError, one_of, shown
+from dess.base.errors import InputError, shown, unknown_name
 from dess.base.files.reading import paths_in, read_text
 from dess.policies.registry import is_path
 
@@ -185,7 +185,7 @@ def read_report(name: str, folder: Path = SHIPPED) -> Report:
         InputError: If the folder has no report of that name.
     """
     if name not in (names := report_names(folder)):
-        raise InputError(f"report: {shown(name)} is unknown{one_of(name, names)}")
+        raise unknown_name("report", f"{shown(name)} is unknown", name, names)
     return make_report(name, parse_notebook(name, folder))
 
 
@@ -225,15 +225,18 @@ def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:
     lacking = [name for name in OF_EXAMPLE if name not in names]
     if "scenario" in names and lacking and any(r.name == "own-sea" for r in reports):
         raise InputError(
-            f"parameter: own-sea has the {', '.join(lacking)} of its example, bay; "
-            "allowed: those of the scenario, each by --parameter"
+            "parameter",
+            f"own-sea has the {', '.join(lacking)} of its example, bay",
+            "those of the scenario, each by --parameter",
         )
     allowed = set().union(*(report.parameters for report in reports)) - {"results"}
     for name in names:
         if name not in allowed:
-            raise InputError(
-                f"parameter: {name!r} is unknown to {', '.join(r.name for r in reports)}"
-                f"{one_of(name, sorted(allowed))}"
+            raise unknown_name(
+                "parameter",
+                f"{name!r} is unknown to {', '.join(r.name for r in reports)}",
+                name,
+                sorted(allowed),
             )
 
 

@@ -108,14 +108,14 @@ def find_pages(out: Path, but: Container[str] = ()) -> dict[str, Page]:
     pages = {}
     names = sort_pages(path.name for path in paths_in(out, "*.html"))
     for path in (out / name for name in names if name not in but):
-        try:
+        is_sound = False
+        with suppress(InputError):
             page = Page.read(path)
-            if not (page.is_sealed and page.card and page.evidence is not None):
-                raise InputError("altered")
-        except InputError:
-            log.warning("%s: altered, or of another version; the index leaves it out", path)
-        else:
+            is_sound = page.is_sealed and bool(page.card) and page.evidence is not None
+        if is_sound:
             pages[path.name] = page
+        else:
+            log.warning("%s: altered, or of another version; the index leaves it out", path)
     return pages
 
 
@@ -174,7 +174,8 @@ def _hash_file(path: Path) -> str:
 
 
 PATIENCE = 60.0  # for which the page of another process is waited for [s]
-_BUSY = "another process writes there; allowed: wait"
+# What is said if it takes longer, and what is allowed then.
+_BUSY = ("another process writes there", "wait")
 
 
 class ReportError(RuntimeError):
@@ -234,8 +235,9 @@ def render(
     if asked and len(commands) > 1 and all(isinstance(e, Missing) for e in commands.values()):
         names = " ".join(command.rpartition(" ")[2] for command in commands)
         raise InputError(
-            f"results: {results} holds no results of {len(commands)} studies; allowed: what "
-            f"is made by: dess study run {names} --out {quote(str(results))}"
+            "results",
+            f"{results} holds no results of {len(commands)} studies",
+            f"what is made by: dess study run {names} --out {quote(str(results))}",
         )
     for name, errors in lacking.items():
         for error in errors.values():
@@ -313,7 +315,7 @@ def _write_pages(
     }
     for report in complete:
         files |= {f"{report.folder}/{name}": picture for name, picture in _decode_figures(report)}
-    with locked(out / LOCK, _BUSY, PATIENCE):
+    with locked(out / LOCK, *_BUSY, PATIENCE):
         others = find_pages(out, but=new_pages)
         pages = add_bars(others | new_pages)
         files |= {name: page.text for name, page in pages.items() if page != others.get(name)}
@@ -371,12 +373,13 @@ def _list_lacking(report: notebook.Report, results: Path) -> dict[str, InputErro
 def _check_results(folder: Path) -> None:
     if not (folder / MANIFEST).exists():
         raise Missing(
-            f"results: {folder} holds no results of study {folder.name}; "
-            f"allowed: what is made by: dess study run {folder.name} --out {quote(str(folder))}"
+            "results",
+            f"{folder} holds no results of study {folder.name}",
+            f"what is made by: dess study run {folder.name} --out {quote(str(folder))}",
         )
     manifest = Manifest.read(folder / MANIFEST)
     study = manifest.study.name
     if study != folder.name:
-        raise InputError(f"results: {folder} holds study {study}; allowed: {folder.name}")
+        raise InputError("results", f"{folder} holds study {study}", folder.name)
     if not manifest.complete:
-        raise InputError(f"results: {folder}: incomplete; allowed: run the study again")
+        raise InputError(f"results: {folder}", "incomplete", "run the study again")

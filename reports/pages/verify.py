@@ -113,7 +113,7 @@ def verify_page(
     """
     page = Page.read(path, LIMIT, _ALLOWED)
     if not page.has_seal:
-        raise InputError(f"{path}: is not a page of dess; allowed: {_ALLOWED}")
+        raise InputError(path, "is not a page of dess", _ALLOWED)
     altered = []
     if not page.is_sealed:
         altered = ["the page has been altered"]
@@ -150,7 +150,7 @@ def verify_results(
     """
     folders = [path.parent for path in paths_in(folder, f"**/{MANIFEST}")]
     if not folders:
-        raise InputError(f"{folder}: contains no results and is not a page; allowed: {_ALLOWED}")
+        raise InputError(folder, "contains no results and is not a page", _ALLOWED)
     sampling = _Sampling(missions, seed, named, yes)
     if folders == [folder]:
         return _check_study(Store.read(folder), sampling)

@@ -38,7 +38,7 @@ def _run(
             with TemporaryDirectory() as folder, chdir(folder), redirect_stderr(io.StringIO()):
                 _execute(report)
         except InputError as error:
-            raise InputError(f"report {report.name}: {error}") from error
+            raise error.within(f"report {report.name}") from error
         except Exception as error:  # of a cell, which may raise anything
             report.failure = f"report {report.name}: {type(error).__name__}: {error}"
 

@@ -703,8 +703,9 @@ def _cheapest_choice(results: Results, policy: str) -> CheapestChoice:
     choice = results.cheapest(policy)
     if choice is None:
         raise InputError(
-            f"{results.store.folder}: does not search for the cheapest setting; allowed: a study "
-            'with the procedure "cheapest"'
+            results.store.folder,
+            "does not search for the cheapest setting",
+            'a study with the procedure "cheapest"',
         )
     return choice
 

@@ -30,7 +30,7 @@ from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.verdict import front_membership, on_front
 from dess.analysis.study.prices import PARTS, PURCHASE, Costs, stranded_uavs
 from dess.analysis.tables import MOST_ROWS, Table
-from dess.base.errors import one_of
+from dess.base.errors import unknown_name
 from dess.scenario.fields import ZONE_PADS
 
 CERTAIN = 0.01  # settings with a lower probability of being on a front are not in the table
@@ -114,7 +114,7 @@ def cost_front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
     """
     columns = [*METRICS, *(requirement.column for requirement in requirements_of(results))]
     if metric not in columns:
-        raise InputError(f"metric: {metric!r} is unknown{one_of(metric, METRICS)}")
+        raise unknown_name("metric", f"{metric!r} is unknown", metric, METRICS)
     sign = 1
     if metric_of(metric).less_is_better:
         sign = -1
@@ -137,7 +137,7 @@ def prices_of(results: Results) -> Costs:
     prices = results.study.costs
     if prices is None:
         raise InputError(
-            f"{results.store.folder}: the study has no prices; allowed: one with a table [costs]"
+            results.store.folder, "the study has no prices", "one with a table [costs]"
         )
     return prices
 

@@ -38,7 +38,7 @@ def baseline_in_words(results: Results, point: int) -> str:
     """
     words = points_in_words(results)
     if point not in range(len(words)):
-        raise InputError(f"baseline: {point!r} is not a design point; allowed: 0..{len(words) - 1}")
+        raise InputError("baseline", f"{point!r} is not a design point", f"0..{len(words) - 1}")
     return words[point]
 
 

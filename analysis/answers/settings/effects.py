@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from dess import InputError
 from dess.analysis.answers.settings.points import (
     missions_with_metric,
     ordered_values,
@@ -27,7 +26,7 @@ from dess.analysis.stats.intervals import (
 )
 from dess.analysis.stats.verdict import may_be_best
 from dess.analysis.tables import Table
-from dess.base.errors import one_of
+from dess.base.errors import unknown_name
 
 MOST_VALUES, BINS = 12, 5  # a field with more than MOST_VALUES numbers is divided into BINS bins
 
@@ -60,8 +59,8 @@ def average_over_others(
     """
     table = values_of_points(results)
     if unknown := [field for field in by if field not in table]:
-        allowed = one_of(unknown[0], map(str, table))
-        raise InputError(f"{unknown[0]}: has not several values in the study{allowed}")
+        problem = "has not several values in the study"
+        raise unknown_name(unknown[0], problem, unknown[0], map(str, table))
     return _average_labelled(results, table[[*by]], metric, policy)
 
 

@@ -9,7 +9,6 @@ from typing import Any
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.metrics import (
     COST,
@@ -21,7 +20,7 @@ from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.tables import (
     INTERVALS,
 )
-from dess.base.errors import one_of
+from dess.base.errors import unknown_name
 
 
 def varied_values(results: Results) -> dict[str, list[Any]]:
@@ -136,7 +135,7 @@ def check_metric(results: Results, metric: str) -> None:
     """Raise ``InputError`` if the missions do not have the metric."""
     metrics = [*metrics_in(results.missions), *([COST] if COST in results.missions else [])]
     if metric not in metrics:
-        raise InputError(f"metric: {metric!r} is unknown{one_of(metric, metrics)}")
+        raise unknown_name("metric", f"{metric!r} is unknown", metric, metrics)
 
 
 def missions_with_metric(results: Results, metric: str, policy: str | None) -> pd.DataFrame:

@@ -115,8 +115,9 @@ def sobol_indices(
         InputError: If there is not one mission of every point of the design.
     """
     if len(missions) != design.count:
-        allowed = f"allowed: one for each of its {design.count} design points"
-        raise InputError(f"missions: {len(missions)} are not those of the design; {allowed}")
+        problem = f"{len(missions)} are not those of the design"
+        allowed = f"one for each of its {design.count} design points"
+        raise InputError("missions", problem, allowed)
     tables = {
         metric: _estimate_indices(design, missions[metric].to_numpy(float)) for metric in metrics
     }

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from dess.base.errors import InputError, shown, validation_line
+from dess.base.errors import InputError, shown, to_input_error
 from dess.base.files.reading import parse_json, read_bytes
 
 LIMIT = 256 * 2**20  # bytes of the largest document; a design point of a manifest takes about 150
@@ -58,21 +58,20 @@ class Document(BaseModel):
         try:
             data = parse_json(text, where)  # also refuses integers that cannot be printed
             if not isinstance(data, dict):
-                raise InputError(f"{where}: is not an object; allowed: an object of JSON")
+                raise InputError(where, "is not an object", "an object of JSON")
             for key, value in fixed.items():
                 present = data.get(key, value)
                 if type(present) is not type(value) or present != value:
-                    line = (
-                        f"{where}: has {key} {shown(present)}, not {shown(value)}; allowed: {value}"
-                    )
-                    raise Outdated(_refused(line, allowed))
+                    problem = f"has {key} {shown(present)}, not {shown(value)}"
+                    raise Outdated(where, problem, allowed or str(value))
             return cls.model_validate_json(text, strict=True)
         except ValidationError as error:
-            raise InputError(_refused(validation_line(error, where, cls), allowed)) from None
+            refusal = to_input_error(error, where, cls)
         except Outdated:
             raise
         except InputError as error:
-            raise InputError(_refused(str(error), allowed)) from None
+            refusal = error
+        raise InputError(refusal.where, refusal.problem, allowed or refusal.allowed)
 
     @classmethod
     def load(
@@ -99,10 +98,3 @@ class Document(BaseModel):
         """
         content = read_bytes(path, limit, absent or allowed or "a file")
         return cls.parse(content.removeprefix(BOM_UTF8), str(path), allowed, fixed)
-
-
-def _refused(line: str, allowed: str) -> str:
-    """The line, with other words for what is allowed, if there are some."""
-    if allowed:
-        return f"{line.partition('; allowed:')[0]}; allowed: {allowed}"
-    return line

@@ -53,7 +53,7 @@ def check_memory(what: str, needed: float, allowed: str) -> None:
     """
     at_hand = available_memory()
     if needed > at_hand:
-        raise InputError(
-            f"{what}: about {needed / GIB:,.1f} GiB of memory, of which {at_hand / GIB:,.1f} are "
-            f"available; allowed: {allowed}"
+        problem = (
+            f"about {needed / GIB:,.1f} GiB of memory, of which {at_hand / GIB:,.1f} are available"
         )
+        raise InputError(what, problem, allowed)

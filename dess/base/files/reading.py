@@ -16,7 +16,7 @@ from os.path import realpath
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
-from dess.base.errors import InputError, one_of, shown
+from dess.base.errors import InputError, shown, unknown_name
 
 # The largest text file that is read without another limit [bytes].
 TEXT_LIMIT = 64 * 2**20
@@ -53,7 +53,7 @@ def read_text(
     try:
         return read_bytes(path, limit, allowed).decode(encoding)
     except UnicodeDecodeError:
-        raise InputError(f"{path}: cannot be read: it is not text; allowed: UTF-8") from None
+        raise InputError(path, "cannot be read: it is not text", "UTF-8") from None
 
 
 def read_bytes(path: Path, limit: int = TEXT_LIMIT, allowed: str = "a file") -> bytes:
@@ -83,11 +83,11 @@ def paths_in(folder: Path, pattern: str = "*") -> list[Path]:
     """
     try:
         if folder.is_dir() and not os.access(folder, os.R_OK | os.X_OK):
-            raise InputError(f"{folder}: cannot be read: Permission denied; allowed: a folder")
+            raise InputError(folder, "cannot be read: Permission denied", "a folder")
         return sorted(folder.glob(pattern))
     except OSError as error:
         reason = error.strerror or error
-        raise InputError(f"{folder}: cannot be read: {reason}; allowed: a folder") from None
+        raise InputError(folder, f"cannot be read: {reason}", "a folder") from None
 
 
 def kind_of(found: os.stat_result) -> str:
@@ -109,12 +109,12 @@ def _opened(path: Path, limit: int, allowed: str) -> Iterator[BinaryIO]:
     except InputError:
         raise
     except (FileNotFoundError, NotADirectoryError):
-        raise Missing(f"{path}: no such file; allowed: {allowed}") from None
+        raise Missing(path, "no such file", allowed) from None
     except IsADirectoryError:
-        raise InputError(f"{path}: cannot be read: it is a folder; allowed: {allowed}") from None
+        raise InputError(path, "cannot be read: it is a folder", allowed) from None
     except (OSError, ValueError) as error:  # a ValueError for a path with a null character
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: cannot be read: {reason}; allowed: {allowed}") from None
+        raise InputError(path, f"cannot be read: {reason}", allowed) from None
 
 
 def _open_at_once(path: str, flags: int) -> int:
@@ -123,7 +123,7 @@ def _open_at_once(path: str, flags: int) -> int:
 
 
 def _too_large(path: Path, limit: int) -> InputError:
-    return InputError(f"{path}: is too large; allowed: {limit:,} bytes at most")
+    return InputError(path, "is too large", f"{limit:,} bytes at most")
 
 
 # A dotted TOML key with more than 64 parts. The parser takes time with the square of their number.
@@ -148,7 +148,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
         data = tomllib.loads(text)
         _check_depth(data)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{where}: not valid TOML: {_reason(error)}; allowed: TOML") from None
+        raise InputError(where, f"not valid TOML: {_reason(error)}", "TOML") from None
     return data
 
 
@@ -165,7 +165,7 @@ def parse_json(text: str | bytes, where: str) -> Any:
         if _SURROGATE.search(decoded):
             json.dumps(data, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{where}: not valid JSON: {_reason(error)}; allowed: JSON") from None
+        raise InputError(where, f"not valid JSON: {_reason(error)}", "JSON") from None
     return data
 
 
@@ -244,12 +244,13 @@ class Shipped(NamedTuple):
         is_inside = file not in ("", ".") and "\0" not in file
         if not is_inside or Path(realpath(folder)) not in Path(realpath(folder / file)).parents:
             raise InputError(
-                f"{name_or_path}: {key}: {shown(file)} is not in the same folder; allowed: the "
-                "name of a file beside this one, or in a folder there"
+                f"{name_or_path}: {key}",
+                f"{shown(file)} is not in the same folder",
+                "the name of a file beside this one, or in a folder there",
             )
         if "\\" in file and not (folder / file).exists():
             named = file.replace("\\", "/")
-            raise InputError(f"{name_or_path}: {key}: {shown(file)} is no file; allowed: {named}")
+            raise InputError(f"{name_or_path}: {key}", f"{shown(file)} is no file", named)
         return folder / file
 
     def load(
@@ -269,7 +270,7 @@ class Shipped(NamedTuple):
         """
         text = str(name_or_path)
         if not is_text(text):
-            raise InputError(f"{shown(text)}: is not a name in UTF-8; allowed: another name")
+            raise InputError(shown(text), "is not a name in UTF-8", "another name")
         if text in self.names():
             where = f"{self.kind} {text}"
             file = resources.files(self.package).joinpath(f"{self.folder}/{text}.toml")
@@ -277,5 +278,5 @@ class Shipped(NamedTuple):
         try:
             return text, parse_toml(read_text(Path(text), TOML_LIMIT, "utf-8-sig"), text)
         except Missing:
-            allowed = one_of(text, [*self.names(), *others], "a TOML file")
-            raise InputError(f"{text}: no such {self.kind}{allowed}") from None
+            names = [*self.names(), *others]
+            raise unknown_name(text, f"no such {self.kind}", text, names, "a TOML file") from None

@@ -60,7 +60,7 @@ def read_table(path: Path, schema: pa.Schema | None = None) -> pa.Table:
         wrong = "damaged, or no parquet file"
         if place:
             wrong = f"has no sound column {place}"
-        raise InputError(f"{path}: {wrong}; allowed: a parquet file") from None
+        raise InputError(path, wrong, "a parquet file") from None
 
 
 def _is_sound(column: pa.ChunkedArray) -> bool:

@@ -159,17 +159,17 @@ def _check_place(path: Path) -> None:
     except FileNotFoundError:
         return
     if not stat.S_ISREG(status.st_mode):
-        raise InputError(f"{path}: is {kind_of(status)}; allowed: a file")
+        raise InputError(path, f"is {kind_of(status)}", "a file")
     if path.is_symlink() and Path("/dev") in path.absolute().parents:  # such as /dev/stdout
-        raise InputError(f"{path}: is a device; allowed: a file")
+        raise InputError(path, "is a device", "a file")
 
 
 def _check_name(path: Path) -> None:
     """Refuse a path that no file can have."""
     if "\0" in str(path):
-        raise InputError(f"{path}: has a null character; allowed: another path")
+        raise InputError(path, "has a null character", "another path")
     if any(len(os.fsencode(part)) > _LONGEST for part in path.parts):
-        raise InputError(f"{path}: File name too long; allowed: {_LONGEST} bytes at most")
+        raise InputError(path, "File name too long", f"{_LONGEST} bytes at most")
 
 
 @cache
@@ -192,7 +192,7 @@ def writable(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         reason = error.strerror or error
-        raise InputError(f"{path}: cannot be written: {reason}; allowed: another path") from None
+        raise InputError(path, f"cannot be written: {reason}", "another path") from None
 
 
 def check_folder(path: Path) -> None:
@@ -208,7 +208,7 @@ def check_folder(path: Path) -> None:
         reason = "Not a directory"
         if nearest.is_dir():
             reason = "Permission denied"
-        raise InputError(f"{path}: cannot be written: {reason}; allowed: another path")
+        raise InputError(path, f"cannot be written: {reason}", "another path")
 
 
 def make_folder(path: Path) -> None:
@@ -238,12 +238,13 @@ SUFFIX = ".lock"
 
 
 @contextmanager
-def locked(path: Path, busy: str, patience: float = 0.0) -> Iterator[None]:
+def locked(path: Path, busy: str, allowed: str, patience: float = 0.0) -> Iterator[None]:
     """Let no other process work in a folder; the folder is made if there is none.
 
     Args:
         path: A file in the folder, which is there as long as the work goes on.
         busy: What the message says if another process works there.
+        allowed: What it says is allowed then.
         patience: How long to wait for the end of its work [s].
 
     Raises:
@@ -257,10 +258,10 @@ def locked(path: Path, busy: str, patience: float = 0.0) -> Iterator[None]:
             try:
                 lock.acquire(timeout=patience)
             except Timeout:
-                raise InputError(f"{path.parent}: {busy}") from None
+                raise InputError(path.parent, busy, allowed) from None
             except NotImplementedError:  # as some network file systems
                 raise InputError(
-                    f"{path}: its file system has no locks; allowed: a folder on a local disk"
+                    path, "its file system has no locks", "a folder on a local disk"
                 ) from None
         yield
     finally:
@@ -277,7 +278,7 @@ def check_lock(path: Path) -> None:
     """
     check_target(path)
     if path.is_symlink():
-        raise InputError(f"{path}: is a link; allowed: a folder without it")
+        raise InputError(path, "is a link", "a folder without it")
 
 
 @contextmanager

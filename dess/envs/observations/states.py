@@ -89,8 +89,7 @@ def layout_of(space: ScenarioSpace) -> Layout:
     for field, is_wrong, allowed in misfits:
         if is_wrong:
             raise InputError(
-                f"{field}: the observations vector and maps need {allowed}; "
-                "allowed: the observation state"
+                field, f"the observations vector and maps need {allowed}", "the observation state"
             )
     return Layout(space.grid, np.array(space.zone), np.array(space.nodes))
 

@@ -8,7 +8,7 @@ from scipy.stats import qmc
 
 from dess import InputError
 from dess.analysis.study.design import MAX_SIZE, Design, GridDesign, LatinHypercube, Saltelli
-from dess.base.errors import validation_line
+from dess.base.errors import to_input_error
 from dess.base.files.reading import parse_toml
 from dess.physics.streams import MAX_REPLICATION, MAX_SEED
 from dess.scenario.families import seas_of
@@ -199,7 +199,7 @@ BAD |= {
 def test_a_bad_design_gets_one_line(text):
     with pytest.raises(ValidationError) as error:
         plan(text if "design" in text else f"[design]\n{text}")
-    line = validation_line(error.value, "plan", Plan)
+    line = str(to_input_error(error.value, "plan", Plan))
     assert line.startswith("plan: design: ")
     assert "\n" not in line
     for part in BAD[text]:

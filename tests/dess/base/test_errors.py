@@ -1,12 +1,14 @@
 """The words of messages: what is allowed, and what may have been meant."""
 
-from typing import Literal
+import pickle
+from pathlib import Path
+from typing import Annotated, Literal
 
 import pytest
 from IPython.core.interactiveshell import InteractiveShell
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from dess.base.errors import one_of, validation_line
+from dess.base.errors import InputError, to_input_error, unknown_name, validated
 
 MANY = [f"field_{number:02}" for number in range(20)] + ["uavs"]
 FIRST = ", ".join(MANY[:18])
@@ -27,14 +29,33 @@ FIRST = ", ".join(MANY[:18])
     ],
 )
 def test_a_close_name_comes_first(name, names, also, end):
-    assert one_of(name, names, also) == end
+    assert str(unknown_name("plan", "who?", name, names, also)) == f"plan: who?{end}"
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (InputError("uavs", "0 is too few", "1..64"), "uavs: 0 is too few; allowed: 1..64"),
+        (InputError(Path("a.csv"), "is empty"), "a.csv: is empty"),
+        (InputError("", "5 m is too far", "4 m"), "5 m is too far; allowed: 4 m"),
+    ],
+)
+def test_a_message_is_made_of_where_what_and_what_is_allowed(error, line):
+    assert str(error) == line
+    assert str(error.within("plan")) == f"plan: {line}"
+    again = pickle.loads(pickle.dumps(error))
+    assert (again.where, again.problem, again.allowed) == error.args
 
 
 def test_bad_input_in_a_notebook_is_a_line(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
-    cell = "from dess import InputError; raise InputError('settings: uavs is 5; allowed: 6')"
+    cell = "from dess import InputError; raise InputError('settings', 'uavs is 5', '6')"
     InteractiveShell().run_cell(cell)
     assert capsys.readouterr().out.strip() == "InputError: settings: uavs is 5; allowed: 6"
+
+
+def refuse(number: int) -> int:
+    raise InputError("at noon", f"{number} is odd", "2, 4")
 
 
 class Part(BaseModel):
@@ -78,5 +99,15 @@ LINES: list[tuple[dict, str]] = [
 def test_an_error_is_a_line_about_the_innermost_field(values, line):
     with pytest.raises(ValidationError) as error:
         Whole.model_validate({"name": "x"} | values if values else {})
-    found = validation_line(error.value, "plan", Whole)
+    found = str(to_input_error(error.value, "plan", Whole))
     assert found.startswith(f"plan: {line}") and "\n" not in found
+
+
+class Plan(BaseModel):
+    size: Annotated[int, AfterValidator(refuse)]
+
+
+def test_an_error_of_a_validator_keeps_its_parts():
+    with pytest.raises(InputError) as error:
+        validated(Plan, {"size": 5}, "plan")
+    assert error.value.args == ("plan: size: at noon", "5 is odd", "2, 4")

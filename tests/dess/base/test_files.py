@@ -121,7 +121,7 @@ def test_after_an_error_the_old_content_stays(tmp_path, error):
     ("of", "name", "use"),
     [
         (Path, "touch", lambda path: write_file(path, "new")),
-        (FileLock, "acquire", lambda path: locked(path, "in use").__enter__()),
+        (FileLock, "acquire", lambda path: locked(path, "in use", "wait").__enter__()),
     ],
 )
 def test_an_interrupt_as_soon_as_a_file_is_there_leaves_none(of, name, use, tmp_path, monkeypatch):
@@ -205,7 +205,7 @@ def test_a_file_system_without_locks_is_a_line_with_a_path(tmp_path, monkeypatch
     monkeypatch.setattr(FileLock, "acquire", refuse)
     lock = tmp_path / ".lock"
     with pytest.raises(InputError, match=rf"{lock}: its file system has no locks; allowed: "):
-        locked(lock, "in use").__enter__()
+        locked(lock, "in use", "wait").__enter__()
 
 
 def test_temporary_folders_are_removed_and_those_of_killed_processes(tmp_path):
@@ -242,10 +242,10 @@ def test_an_interrupt_while_a_temporary_folder_is_removed_leaves_none(tmp_path, 
 
 def test_processes_wait_for_each_other_but_not_for_ever(tmp_path):
     lock = tmp_path / "new" / ".lock"
-    refused = pytest.raises(InputError, match="new: busy")
-    with locked(lock, "busy"), refused, locked(lock, "busy", 0.05):
+    refused = pytest.raises(InputError, match="new: busy; allowed: wait")
+    with locked(lock, "busy", "wait"), refused, locked(lock, "busy", "wait", 0.05):
         raise AssertionError("two at a time")
-    with locked(lock, "busy"):
+    with locked(lock, "busy", "wait"):
         pass
     assert list(lock.parent.iterdir()) == []
 
@@ -259,6 +259,6 @@ def test_a_lock_is_a_file_of_its_own(kind, tmp_path):
         path.symlink_to(links[kind])
     else:
         os.mkfifo(path) if kind == "pipe" else path.mkdir()
-    with pytest.raises(InputError, match=r"\.lock: .*; allowed: "), locked(path, "busy"):
+    with pytest.raises(InputError, match=r"\.lock: .*; allowed: "), locked(path, "busy", "wait"):
         raise AssertionError("not locked")
     assert os.path.lexists(path) and outside.read_text() == "another's"

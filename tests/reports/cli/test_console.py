@@ -9,6 +9,7 @@ from numba import njit
 from numba.core.caching import NullCache
 from numba.core.event import trigger_event
 
+from dess.base.errors import InputError
 from dess.reports import cli
 from dess.reports.cli import console
 from tests.analysis.small import environment
@@ -78,10 +79,10 @@ def test_a_warning_is_a_line_of_printable_characters(monkeypatch, capsys):
 
 @pytest.mark.parametrize("values", ["a list of " + "names, " * 30, "a, b"])
 def test_a_long_error_says_what_is_allowed(values, capsys):
-    console.print_failure(f"config.json: phases: {'x' * 290} is wrong; allowed: {values}", 2)
+    console.print_refusal(InputError("config.json: phases", f"{'x' * 290} is wrong", values))
     line = capsys.readouterr().err
     assert len(line) <= console.MESSAGE + 1
-    assert line.startswith("config.json: phases: x") and "; allowed: a" in line
+    assert line.startswith("dess: error: config.json: phases: x") and "; allowed: a" in line
 
 
 ENDS = {

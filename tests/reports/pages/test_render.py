@@ -53,7 +53,7 @@ from dess.reports.pages import html
 
 study = load_results(Path(results) / "trial")
 if policy not in study.policies:
-    raise InputError(f"policy: {policy} is not in the study")
+    raise InputError("policy", f"{policy} is not in the study", "greedy")
 
 # %% [markdown]
 # ## The missions, at a charging threshold C_S
