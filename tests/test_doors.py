@@ -80,38 +80,3 @@ def test_files_are_opened_read_written_and_listed_by_the_door_alone():
         if not name.startswith(DOOR)
     }
     assert {name: found for name, found in past.items() if found} == ALLOWED
-
-
-# What makes data of text. All JSON that is read becomes a model, in ``Document``; other text is
-# parsed only where this process has made it (``dumps``, ``to_json``).
-PARSING = {"loads", "parse_json", "validate_json", "model_validate_json"}
-MADE_HERE = {"dumps", "to_json"}
-# Text that is parsed outside the door, by the module.
-PARSED = {
-    # The header of a checkpoint, which is a ``Document``, as it was written: for its checksum.
-    "dess.policies.learner.checkpoint": {"parse_json"},
-    # Tables that are no objects of JSON, by types of pydantic.
-    "dess.analysis.results.parquet": {"validate_json"},
-    # Keys of dictionaries and of a cache, which are texts of JSON.
-    "dess.analysis.study.cheapest": {"loads"},
-    "dess.analysis.study.study": {"loads"},
-    "dess.policies.learner.trained": {"model_validate_json"},
-    # Lines from the process that has started this one.
-    "dess.reports.pages.cells": {"loads"},
-}
-
-
-def parsed(tree: ast.Module) -> Iterator[str]:
-    """The names of the calls that make data of text which others may have written."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call):
-            name = getattr(node.func, "attr", getattr(node.func, "id", ""))
-            inner = {getattr(n, "attr", "") for part in node.args for n in ast.walk(part)}
-            if name in PARSING and not inner & MADE_HERE:
-                yield name
-
-
-def test_documents_become_models():
-    outside = {name: tree for name, tree in SOURCES.items() if not name.startswith(DOOR)}
-    found = {name: {*parsed(tree)} for name, tree in outside.items()}
-    assert {name: names for name, names in found.items() if names} == PARSED

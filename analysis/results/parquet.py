@@ -15,15 +15,14 @@ from typing import Annotated, Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
-from pyarrow.compute import list_value_length
 from pydantic import Field, TypeAdapter
 
-from dess import InputError
 from dess.analysis.bound import Bound
 from dess.analysis.results.chunks import Chunk, name_of, short_hash
 from dess.base.files.reading import paths_in, read_bytes
-from dess.base.files.tables import LIMIT, check_size, parquet_of
+from dess.base.files.tables import LIMIT, parquet_of
 from dess.base.files.writing import write_file
 from dess.model.events import EVENT_COLUMNS, EVENT_NAMES
 from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
@@ -253,38 +252,25 @@ def read(path: Path, kind: str = "events") -> pa.Table | None:
         kind: One of ``SCHEMAS``; by default an event log.
 
     Raises:
-        InputError: If it cannot be read, or takes more memory than there is.
+        InputError: If it cannot be read.
     """
     content = read_bytes(path, LIMIT, "a file of results")
     if short_hash(content) != path.stem.rpartition("-")[2]:
         return None
-    schemas = SCHEMAS[kind]
-    words = [name for name in schemas[0].names if name in WORDS]
     try:
-        # Texts stay numbers until it is known that they are few: a long one may be in every row.
-        file = pq.ParquetFile(pa.BufferReader(content), read_dictionary=words)
-        if file.schema_arrow.names not in [schema.names for schema in schemas]:
-            return None
-        check_size(path, file.metadata)
-        table = file.read(use_threads=False)
-        for name in words:
-            word_columns = {*WORDS[name]}
-            if any({*chunk.dictionary.to_pylist()} - word_columns for chunk in table[name].chunks):
-                return None
-            place = table.column_names.index(name)
-            table = table.set_column(place, name, table[name].cast(pa.string()))
-        is_known = any(map(table.schema.equals, schemas)) and _are_valid(table)
-    except InputError:
-        raise
+        table = pq.ParquetFile(pa.BufferReader(content)).read(use_threads=False)
+        is_known = any(map(table.schema.equals, SCHEMAS[kind])) and _are_valid(table)
     except (OSError, KeyError, ValueError, pa.ArrowException):  # what pyarrow raises
         return None
     return table if is_known else None
 
 
 def _are_valid(table: pa.Table) -> bool:
-    """Whether no value is missing, all numbers are finite, and no index is out of range."""
+    """Whether no value is missing, and every number and word is one that its column may have."""
     for name, column in zip(table.column_names, table.columns, strict=True):
         if column.null_count:
+            return False
+        if name in WORDS and not pc.all(pc.is_in(column, pa.array(WORDS[name]))).as_py():
             return False
         if limits := _column_limits(name, column.type):
             low, high = limits
@@ -292,7 +278,7 @@ def _are_valid(table: pa.Table) -> bool:
             if not ((values >= low) & (values <= high)).all():
                 return False
     if "cuts" in table.column_names:  # there are prices for every cut, as many of each
-        cuts, prices = (list_value_length(table[name]).to_numpy() for name in ("cuts", "prices"))
+        cuts, prices = (pc.list_value_length(table[name]).to_numpy() for name in ("cuts", "prices"))
         return bool((cuts > 0).all() and not (prices % cuts).any())
     return "event" not in table.column_names or "mission_end" in table["event"].to_pylist()
 

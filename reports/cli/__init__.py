@@ -40,13 +40,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _check_text(words: Sequence[str]) -> None:
-    """Refuse arguments that are not UTF-8, which not every library could write or print."""
+    """Refuse arguments that are not UTF-8, which not every library could write or print.
+
+    Python makes halves of characters of their bytes.
+    """
     from dess.base.errors import InputError, shown
-    from dess.base.files.reading import is_text
 
     for word in words:
-        if not is_text(word):
-            raise InputError(shown(word), "is not text in UTF-8", "another name")
+        try:
+            word.encode()
+        except UnicodeEncodeError:
+            raise InputError(shown(word), "is not text in UTF-8", "another name") from None
 
 
 def _report_error(error: BaseException, words: Sequence[str], is_interrupted: bool) -> int:

@@ -126,9 +126,6 @@ def _too_large(path: Path, limit: int) -> InputError:
     return InputError(path, "is too large", f"{limit:,} bytes at most")
 
 
-# A dotted TOML key with more than 64 parts. The parser takes time with the square of their number.
-_PART = r"""(?:[\w-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')"""
-_DOTTED = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{64}}")
 # More levels of lists and tables than any input has.
 _DEEPEST = 100
 # Escapes that can stand for half a character, which no encoding can write.
@@ -143,8 +140,6 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     """
     try:
         text.encode()
-        if _DOTTED.search(text):
-            raise RecursionError
         data = tomllib.loads(text)
         _check_depth(data)
     except (ValueError, RecursionError) as error:
@@ -167,18 +162,6 @@ def parse_json(text: str | bytes, where: str) -> Any:
     except (ValueError, RecursionError) as error:
         raise InputError(where, f"not valid JSON: {_reason(error)}", "JSON") from None
     return data
-
-
-def is_text(name: str) -> bool:
-    """Whether a name can be written in UTF-8, which no half of a character can.
-
-    Python makes such halves of the bytes of an argument or a file name that are not UTF-8.
-    """
-    try:
-        name.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def _check_depth(data: Any) -> None:
@@ -269,8 +252,6 @@ class Shipped(NamedTuple):
             InputError: If the file does not exist, cannot be read or is not TOML.
         """
         text = str(name_or_path)
-        if not is_text(text):
-            raise InputError(shown(text), "is not a name in UTF-8", "another name")
         if text in self.names():
             where = f"{self.kind} {text}"
             file = resources.files(self.package).joinpath(f"{self.folder}/{text}.toml")

@@ -7,12 +7,10 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from dess.base.errors import InputError
-from dess.base.files.memory import check_memory
 from dess.base.files.reading import read_bytes
 from dess.base.files.writing import write_file
 
 LIMIT = 2**30  # bytes of the largest file
-SMALL = 2**24  # bytes that every process has: it takes longer to ask for the memory than to read
 
 
 def write_table(path: Path, table: pa.Table) -> None:
@@ -40,13 +38,11 @@ def read_table(path: Path, schema: pa.Schema | None = None) -> pa.Table:
             infinite. Other columns are left out. By default all columns are read as they are.
 
     Raises:
-        InputError: If there is no such file, if it is no such table, or takes more memory than
-            there is.
+        InputError: If there is no such file, or it is no such table.
     """
     place = ""
     try:
         file = pq.ParquetFile(pa.BufferReader(read_bytes(path, LIMIT, "a parquet file")))
-        check_size(path, file.metadata)
         table = file.read(use_threads=False)
         if schema:
             for place in schema.names:
@@ -67,17 +63,3 @@ def _is_sound(column: pa.ChunkedArray) -> bool:
     """Whether a column has values, and all of them, and finite ones."""
     is_finite = not pa.types.is_floating(column.type) or pc.all(pc.is_finite(column)).as_py()
     return len(column) > 0 and not column.null_count and is_finite
-
-
-def check_size(path: Path, metadata: pq.FileMetaData) -> None:
-    """Refuse a file whose content is larger than the memory, although the file is small.
-
-    Raises:
-        InputError: If it is.
-    """
-    groups = [metadata.row_group(number) for number in range(metadata.num_row_groups)]
-    columns = [group.column(n) for group in groups for n in range(metadata.num_columns)]
-    size = sum(group.total_byte_size for group in groups)
-    size += 8 * sum(column.num_values for column in columns)
-    if 3 * size > SMALL:
-        check_memory(f"{path}: {metadata.num_rows:,} rows", 3 * size, "a smaller table")

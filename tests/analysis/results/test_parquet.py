@@ -16,7 +16,7 @@ import pytest
 from dess import InputError
 from dess.analysis import load_results, run_study
 from dess.analysis.results import event_log, parquet
-from dess.analysis.results.chunks import name_of, short_hash
+from dess.analysis.results.chunks import name_of
 from dess.analysis.results.store import Store
 from dess.model.events import PARAMETER_EVENTS
 from dess.reports.cli import main
@@ -105,31 +105,6 @@ def test_event_logs_of_before_are_read_and_verified(sound, tmp_path):
     assert main(["verify", str(folder)]) == 0
     changed = forged(folder, tmp_path / "changed", "events", column("value", lambda v: v + 1))
     assert main(["verify", str(changed)]) == 1
-
-
-def test_a_small_file_with_very_many_rows_is_refused_before_it_is_read(sound, tmp_path):
-    """All columns are constant, so that a million rows take next to no space."""
-    folder = shutil.copytree(sound, tmp_path / "out")
-    path = sorted((folder / "uavs").rglob("*.parquet"))[0]
-    table = pq.ParquetFile(path).read()
-    block = pa.table(
-        [pa.array(np.zeros(2**20, field.type.to_pandas_dtype()))
-         if field.name not in ("cell", "end")
-         else pa.array(["battery"] * 2**20).cast(field.type) for field in table.schema],
-        schema=table.schema,
-    )  # fmt: skip
-    sink = pa.BufferOutputStream()
-    with pq.ParquetWriter(sink, table.schema, compression="zstd") as writer:
-        for _ in range(4):
-            writer.write_table(block)
-    content = sink.getvalue().to_pybytes()
-    bomb = path.with_name(f"{KEY}-{short_hash(content)}.parquet")
-    bomb.write_bytes(content)
-    assert len(content) < 2**20
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.setattr("dess.base.files.memory.available_memory", lambda: 2**29)
-        with pytest.raises(InputError, match=r"4,194,304 rows: about .* GiB of memory"):
-            Store.read(folder)
 
 
 def test_what_only_has_the_name_of_a_chunk_is_left_alone(sound, tmp_path):

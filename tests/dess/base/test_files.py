@@ -85,12 +85,11 @@ def test_regular_files_are_read_up_to_a_limit(tmp_path):
             read_text(none, allowed="a page")
 
 
-DIGITS, DOTS = "9" * 5000, ".".join(['"a b"'] * 10_000)
+DIGITS = "9" * 5000
 WRONG = [
     (parse_toml, f"quota = {DIGITS}", "too many digits"),
     (parse_toml, "quota = " + "[" * 10_000, "nested too deeply"),
-    (parse_toml, ".".join(["a"] * 10_000) + " = 1", "nested too deeply"),
-    (parse_toml, f"{DOTS} = 1", "nested too deeply"),
+    (parse_toml, ".".join(["a"] * 101) + " = 1", "nested too deeply"),
     (parse_toml, r'name = "\uD800"', "not a Unicode scalar"),
     (parse_toml, "quota", "Expected '='"),
     (parse_json, DIGITS, "too many digits"),

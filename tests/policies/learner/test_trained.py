@@ -134,14 +134,6 @@ def test_a_flipped_byte_is_refused(folder):
     load_policy(folder)
 
 
-def test_a_network_takes_no_memory_before_its_weights_are_there(folder, monkeypatch):
-    content = json.loads((folder / CONFIG).read_text("utf-8"))
-    content["training"]["hidden"] = [4096, 4096]
-    (folder / CONFIG).write_text(json.dumps(content), "utf-8")
-    monkeypatch.setattr(trained, "make_policy", lambda *_: pytest.fail("memory is taken"))
-    assert "hidden.0.weight is float32 [16, 242]; allowed: float32 [4096, 242]" in _refusal(folder)
-
-
 def test_a_kill_while_it_is_replaced_leaves_a_policy(training, folder, monkeypatch):
     old = load_policy(folder).weights
     before = files_of(folder)
