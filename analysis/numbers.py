@@ -147,8 +147,17 @@ def format_span(values: Iterable[float], form: str = "{:,}") -> str:
 
 
 def format_count(number: int, what: str) -> str:
-    """A number of things, as ``1 UAV`` or ``3 UAVs``."""
-    return f"{number} {what}{'' if number == 1 else 's'}"
+    """A number of things, as ``1 policy`` or ``3,000 policies``."""
+    return f"{number:,} {inflect(what, number)}"
+
+
+def inflect(what: str, number: int) -> str:
+    """The name of a thing, or of several, as ``policy`` or ``policies``."""
+    if number == 1:
+        return what
+    if what.endswith("y"):
+        return f"{what.removesuffix('y')}ies"
+    return f"{what}s"
 
 
 def format_truth(value: object) -> str:

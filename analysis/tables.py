@@ -120,10 +120,11 @@ def allowance_sentence(what: str, plain: str, wide: str, n: int) -> str:
         wide: Half the length of its interval.
         n: Number of missions.
     """
+    few = numbers.format_count(max(round(n / 3), 1), "mission")
     return (
         f"The intervals allow for rare failures, which the missions may not show: {n:,} missions "
-        f"without one do not rule out a failure in {max(round(n / 3), 1):,} missions. Without this "
-        f"allowance (Student's t), {what} would be known to {plain}; with it, to {wide}."
+        f"without one do not rule out a failure in {few}. Without this allowance (Student's t), "
+        f"{what} would be known to {plain}; with it, to {wide}."
     )
 
 

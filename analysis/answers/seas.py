@@ -42,7 +42,9 @@ def missions_by_sea(results: Results) -> pd.DataFrame:
     """
     names = _sea_names(results)
     if not all(":" in name for name in names):
-        raise InputError(results.store.folder, "no study of seas", "one whose design is")
+        raise InputError(
+            results.store.folder, "no study of seas", "one whose design is a set of seas"
+        )
     counts = np.array([len(space.nodes) for space in results.store.manifest.scenarios])
     point = results.missions["point"].to_numpy()
     sea = pd.Series(names, dtype=str)[point].to_numpy()
@@ -161,7 +163,8 @@ def policies_table(results: Results, times: Times) -> pd.DataFrame:
     if BOUND in results.missions:
         says = results.missions[results.missions[BOUND] < 1.0].groupby("policy")
         columns["Of the bound"] = says[PRODUCT].sum() / says[BOUND].sum()
-    table = pd.DataFrame(columns).loc[results.policies].map(numbers.format_percent)
+    shares = pd.DataFrame(columns).loc[results.policies]
+    table = shares.map(numbers.format_percent, na_action="ignore")
     seconds = {
         cost.policy: numbers.format_seconds(cost.batch) for cost in times.costs if cost.batch
     }

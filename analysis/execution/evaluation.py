@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess import InputError, simulate_batch
+from dess.analysis import numbers
 from dess.analysis.execution import effort
 from dess.analysis.execution.jobs import (
     CHUNK,
@@ -225,7 +226,8 @@ def check_evaluation(asked: Sequence[Asked], yes: bool = False) -> None:
         team.check()
     scenario, workers, engine = asked[0].scenario, asked[0].workers, asked[0].engine
     missions = sum(team.missions for team in asked)
-    what = f"evaluate: {missions:,} missions (policies: {len(asked)}, workers: {workers:,})"
+    counted = numbers.format_count(missions, "mission")
+    what = f"evaluate: {counted} (policies: {len(asked)}, workers: {workers:,})"
     if not yes:
         effort.check_workers_memory(what, workers, [scenario], 4 * MEMORY, engine == "events")
         times = [

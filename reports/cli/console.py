@@ -380,12 +380,14 @@ def _mission_bar() -> "Iterator[tuple[Progress, Announce]]":
     with progress_bar("mission") as shown:
 
         def begin(started: "Round") -> None:
+            from dess.analysis.numbers import format_count  # which loads pandas
+
             if started.work:
                 shown.set_description(started.work, refresh=False)
             elif started.number:
                 shown.set_description(f"round {started.number + 1}", refresh=False)
             else:
-                line = f"{started.missions:,} missions"
+                line = format_count(started.missions, "mission")
                 if started.present:
                     line += f", {started.present:,} of them present"
                 print_text(line, sys.stderr)

@@ -130,6 +130,7 @@ def _replace_nan(row: Any) -> Any:
 
 def _print_rows(rows: list[dict[str, Any]]) -> None:
     from dess.analysis.metrics import column_in_sheet_unit
+    from dess.analysis.numbers import inflect
 
     for row in rows:
         metrics = {name: estimate for name, estimate in row.items() if isinstance(estimate, dict)}
@@ -143,6 +144,5 @@ def _print_rows(rows: list[dict[str, Any]]) -> None:
         engine = ", SimPy engine" if row["engine"] == "events" else ""
         speed = f" in {row['seconds']:.2f} s: {row['uav_slots'] / row['seconds']:,.0f} UAV-slots/s"
         took = "" if row["seconds"] != row["seconds"] else speed
-        console.print_text(
-            f" {row['missions']} missions, {row['uav_slots']} UAV-slots{took}{engine}"
-        )
+        counted = f"{row['missions']} {inflect('mission', row['missions'])}"
+        console.print_text(f" {counted}, {row['uav_slots']} UAV-slots{took}{engine}")

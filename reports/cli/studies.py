@@ -121,17 +121,20 @@ def _run_and_summarize(
 def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
     """Print the missions that a run would simulate, and the range of its time."""
     from dess.analysis.execution.effort import largest_budget, total_time
+    from dess.analysis.numbers import format_count
 
     rows = [[p.policy, f"{p.missions:,}", f"{p.present:,}", str(p.seconds)] for p in plan]
     console.print_table(["policy", "missions", "present", "time on one core"], rows)
-    per_cell = f"{study.first} replications"
+    per_cell = format_count(study.first, "replication")
     if study.rule:
         rule = "selection" if study.selection else "precision"
         per_cell += f" and more, up to {largest_budget(study):,} missions, as {rule} asks"
     missions = sum(p.missions for p in plan[: len(study.policies)])
+    policies = format_count(len(study.policies), "policy")
+    points = format_count(study.size, "design point")
     console.print_text(
-        f"{out}: {missions:,} missions of study {study.name} ({len(study.policies)} policies "
-        f"x {study.size:,} design points x {per_cell})"
+        f"{out}: {format_count(missions, 'mission')} of study {study.name} ({policies} "
+        f"x {points} x {per_cell})"
     )
     console.print_text(
         f"{total_time(plan, workers)} with {workers} at work, by the usual speed of such missions; "
@@ -340,6 +343,7 @@ def export(
         page: The page of the results.  [default: it is rendered for the crate]
         licence: Licence of the results, by its SPDX identifier.
     """
+    from dess.analysis.numbers import format_count
     from dess.reports.crate import check_page, find_licence, write_crate
     from dess.reports.pages.render import render_study
 
@@ -354,5 +358,5 @@ def export(
                 page = render_study(folder, pages, progress)
         write_crate(results, page, temporary, date.today(), licence)
     if not console.is_stdout(crate):
-        missions = f"{len(results.missions):,} missions"
+        missions = format_count(len(results.missions), "mission")
         console.print_text(f"{crate}: {missions} with {page.name}, licence {licence}")

@@ -35,7 +35,8 @@ MANY_POINTS = 40  # more design points are not listed
 def print_summary(results: Results, folder: Path, short: bool) -> None:
     """Print the means at the only design point, or the selected points and their check."""
     study = results.study
-    console.print_text(f"{folder}: {len(results.missions):,} missions of study {study.name}")
+    missions = numbers.format_count(len(results.missions), "mission")
+    console.print_text(f"{folder}: {missions} of study {study.name}")
     for change in results.store.manifest.accepted:
         console.print_text(f" accepted: {change.text}")
     printed = values.PRINTED.get(study.name, {})
@@ -267,16 +268,17 @@ MANY, FIELDS = 10, 4  # rows on differences, and fields of a mission, that are p
 
 def print_diff(found: diff.Diff, most: int) -> None:
     """Print how many missions of two results differ, by how much, and the most changed ones."""
-    missions = len(found.missions)
+    counted = numbers.format_count(len(found.missions), "mission")
     differ = len(found.changed)
     if found.unpaired is not None:
-        console.print_text(f"{len(found.unpaired):,} missions of both, with different random draws")
+        both = numbers.format_count(len(found.unpaired), "mission")
+        console.print_text(f"{both} of both, with different random draws")
     elif found.identical:
-        console.print_text(f"identical: {missions:,} missions")
+        console.print_text(f"identical: {counted}")
     elif not differ:
-        console.print_text(f"identical: the {missions:,} missions that both have")
+        console.print_text(f"identical: the {counted} that both have")
     else:
-        console.print_text(f"{differ:,} of {missions:,} missions differ")
+        console.print_text(f"{differ:,} of {counted} differ")
     for origin in diff.differing_origins(found):
         console.print_text(f" {origin}")
     _print_alone(found.alone)
@@ -290,7 +292,8 @@ def _print_alone(alone: pd.DataFrame) -> None:
     """What only one of the folders has."""
     for side, rows in alone.groupby("only_in"):
         for row in rows[:MANY].itertuples():
-            console.print_text(f" only in {side}: {row.what} ({row.missions:,} missions)")
+            counted = numbers.format_count(row.missions, "mission")
+            console.print_text(f" only in {side}: {row.what} ({counted})")
         if len(rows) > MANY:
             console.print_text(
                 f" only in {side}: {len(rows) - MANY:,} more groups of missions; --json has them"

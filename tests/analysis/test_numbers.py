@@ -59,3 +59,11 @@ def test_a_time_has_three_digits_in_its_unit(time, text):
 )
 def test_a_duration_has_one_unit(seconds, text):
     assert numbers.format_duration(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("number", "what", "text"),
+    [(1, "mission", "1 mission"), (0, "pad", "0 pads"), (3000, "policy", "3,000 policies")],
+)
+def test_one_thing_is_in_the_singular(number, what, text):
+    assert numbers.format_count(number, what) == text

@@ -20,7 +20,7 @@ def test_a_dry_run_tells_the_plan_and_writes_nothing(dess, tmp_path):
     before = files_of(tmp_path)
     code, out, _ = dess("study", "run", "trial.toml", "--missions", 30, "--dry-run")
     assert code == 0
-    assert "60 missions of study trial (2 policies x 1 design points x 30 replications)" in out
+    assert "60 missions of study trial (2 policies x 1 design point x 30 replications)" in out
     assert re.search(r"up to 15 seconds with 1 at work", out)
     assert files_of(tmp_path) == before
 
