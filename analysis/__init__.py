@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
     from dess.analysis.answers.learning import marl_eval_data as marl_eval_data
     from dess.analysis.answers.learning import rliable_scores as rliable_scores
-    from dess.analysis.ask.sweep import sweep as sweep
-    from dess.analysis.ask.what_if import what_if as what_if
+    from dess.analysis.ask.answer import sweep as sweep
+    from dess.analysis.ask.answer import what_if as what_if
     from dess.analysis.execution.evaluation import evaluate as evaluate
     from dess.analysis.execution.runner import run_study as run_study
     from dess.analysis.results.resimulate import resimulate as resimulate
@@ -41,8 +41,8 @@ _HOME = {
     "bootstrap_interval": "stats.intervals",
     "compare": "stats.differences",
     "compare_learners": "stats.learners",
-    "sweep": "ask.sweep",
-    "what_if": "ask.what_if",
+    "sweep": "ask.answer",
+    "what_if": "ask.answer",
 }
 
 __all__ = [*_HOME]

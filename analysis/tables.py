@@ -20,6 +20,7 @@ from dess.analysis.stats.verdict import MARKS, position_by_test
 INTERVALS = f"{numbers.format_level(LEVEL)} intervals"
 MARKED = "▲ better, ▼ worse, ≈ inconclusive"
 CHECKED = f"The check of the selected settings: means with {INTERVALS}"
+MOST_PRINTED = 20  # the largest number of rows of a table that the terminal prints
 MOST_ROWS = 25  # the largest number of rows of a table on a page; its data have all rows
 WIDER = 1.5  # times as wide as without the allowance for failures: what is explained in words
 _HEADS = {"policy": "Policy", "n": "Missions", **METRICS, HOME: metric_of(HOME).name}

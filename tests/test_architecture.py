@@ -76,12 +76,11 @@ MAY_RUN_FILES = {
     "dess.analysis.execution.evaluation.evaluate": {"dess.analysis"},
     **{
         f"dess.analysis.ask.question.{name}_question": {
-            *(f"dess.analysis.ask.{name}", "dess.reports.cli.ask"),
+            *("dess.analysis.ask.answer", "dess.reports.cli.ask"),
         }
         for name in ("sweep", "what_if")
     },
-    "dess.analysis.ask.sweep.sweep": {"dess.analysis"},
-    "dess.analysis.ask.what_if.what_if": {"dess.analysis"},
+    **{f"dess.analysis.ask.answer.{name}": {"dess.analysis"} for name in ("sweep", "what_if")},
     **{f"dess.analysis.{name}": set() for name in ("evaluate", "sweep", "what_if")},
 }
 

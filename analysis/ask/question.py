@@ -68,6 +68,14 @@ class Question:
     out: Path
 
     @property
+    def is_comparison(self) -> bool:
+        """Whether it asks what changes in a variation of a baseline, and not for the best setting.
+
+        The design points are then the baseline and the variation.
+        """
+        return isinstance(self.study.design, TableDesign)
+
+    @property
     def file(self) -> Path:
         """The file of the study, which ``dess study run`` reads."""
         return self.out.parent / f"{self.out.name}.toml"
@@ -198,42 +206,52 @@ def sweep_question(
     """
     if unknown := [key for key in prices or () if key not in Costs.model_fields]:
         raise unknown_name("prices", f"{unknown[0]!r} is unknown", unknown[0], Costs.model_fields)
-    swept = {field: of_field for field, of_field in values.items() if len(of_field) > 1}
     load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
-    if isinstance(policies, str):
-        policies = [policies]
+    swept = {field: of_field for field, of_field in values.items() if len(of_field) > 1}
     fixed: dict[str, Any] = {field: values[field][0] for field in values if field not in swept}
     if AGE in (requirements or ()):
         fixed["age.measured"] = True
+    if isinstance(policies, str):
+        policies = [policies]
     data: dict[str, Any] = {
         "name": "sweep" if name is None else name,
         "description": SWEEP,
         "scenario": str(scenario),
         "set": fixed,
         "design": {"kind": "grid", "values": swept},
-        "policies": list_teams(policies or [ANY_POLICY]),
         "seed": seed,
     }
     if prices:
         data["costs"] = dict(prices)
-    if not requirements:
-        data["missions"] = missions
-    study = study_from(data, "sweep", run_files=True)
-    # What is decided by the design points, so once the study is known to be valid.
-    decided: dict[str, Any] = {}
     if requirements:
-        decided["selection"] = _cheapest_rule(requirements, missions, study)
-    if policies is None:
-        if requirements:
-            missions_per_point = max(ROOM, missions)
-        else:
-            missions_per_point = missions
-        decided["policies"] = policies_for(study.scenarios, missions_per_point)
-    study = study.model_copy(update=decided)
+        study = _validated_study(data, "sweep", policies, max(ROOM, missions))
+        rule = _cheapest_rule(requirements, missions, study)
+        study = study.model_copy(update={"selection": rule})
+    else:
+        study = _validated_study(data | {"missions": missions}, "sweep", policies, missions)
     if name is None:
         name = f"{'-'.join(swept)[:LONGEST] or 'sweep'}-{_question_key(study)}"
         study = study.model_copy(update={"name": name})
     return Question(study, Path(folder) / SWEEPS / name)
+
+
+def _validated_study(
+    data: Mapping[str, Any], what: str, policies: Iterable[str] | None, missions: int
+) -> Study:
+    """The study of a question, whose policies a user has typed.
+
+    Args:
+        data: The fields of the study without its policies.
+        what: What they are of, for messages.
+        policies: Its policies. Without any, the best policy that five minutes allow, and
+            ``greedy``.
+        missions: For how many missions of a design point this choice leaves time.
+    """
+    typed = list_teams([ANY_POLICY] if policies is None else policies)
+    study = study_from({**data, "policies": typed}, what, run_files=True)
+    if policies is None:
+        return study.model_copy(update={"policies": policies_for(study.scenarios, missions)})
+    return study
 
 
 def _cheapest_rule(
@@ -299,8 +317,9 @@ def what_if_question(
     if changed.keys() - measuring:  # what changes is something else, which both sides measure
         fixed |= {field: changed.pop(field) for field in sorted(measuring)}
     fixed = _fields_to_measure(fixed | changed) | fixed
-    sides = load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed)
-    _check_changes(*sides, changed)
+    _check_changes(
+        load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed), changed
+    )
     if isinstance(missions, int) and missions < 2:
         raise InputError("missions", f"{missions} is too few", "2 or more")
     before = {field: fixed[field] for field in changed if field in fixed}
@@ -310,11 +329,10 @@ def what_if_question(
         "scenario": str(scenario),
         "set": {field: value for field, value in fixed.items() if field not in changed},
         "design": {"kind": "table", "rows": [before, changed]},
-        "policies": list_teams(policies_for(sides, missions) if policies is None else policies),
         "missions": missions,
         "seed": seed,
     }
-    study = study_from(data, "question", run_files=True)
+    study = _validated_study(data, "question", policies, missions)
     return Question(study, Path(folder) / WHAT_IF / _question_key(study))
 
 

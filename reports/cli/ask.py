@@ -4,7 +4,6 @@ import json
 import shlex
 import sys
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,15 +18,11 @@ from dess.reports.cli.studies import print_plan
 from dess.reports.pages import PREFIX, check_pages
 
 if TYPE_CHECKING:
-    import pandas as pd
-
+    from dess.analysis.ask.answer import Answer
     from dess.analysis.ask.question import Question
-    from dess.analysis.ask.sweep import Sweep
-    from dess.analysis.ask.what_if import WhatIf
     from dess.analysis.results.tables import Results
     from dess.reports.pages.kernels import Progress
 
-SHOWN = 20  # rows of the table
 PRICE = "a price and its amount, e.g. uav=20000"
 SHARE = "a metric and its least mean, e.g. success=0.99"
 
@@ -79,16 +74,14 @@ def sweep(
         out: Folder of the page.
         dry_run: Only print the plan and the range of its time.
     """
-    from dess.analysis.ask import around
     from dess.analysis.ask.question import sweep_question
-    from dess.analysis.ask.sweep import Sweep
-    from dess.analysis.metrics import ALIASES, PRODUCT, SUCCESS, column_in_sheet_unit
 
+    values = options.parse_all_values(settings or [])
     policies = None
     if policy:
         policies = [name for text in policy for name in text.split(",")]
     question = sweep_question(
-        options.parse_all_values(settings or []),
+        values,
         scenario,
         policies,
         missions,
@@ -98,34 +91,19 @@ def sweep(
         name,
         folder=results,
     )
-    measured = question.study.metrics
-    ranking = column_in_sheet_unit(ALIASES.get(metric or PRODUCT, metric or PRODUCT), measured)
-    if ranking not in measured:
-        names = [*ALIASES, *measured]
-        raise unknown_name("--metric", f"{shown(metric)} is not measured", metric, names)
-    page = f"{PREFIX}{question.study.name}"
-    results_of_sweep = _run_question(question, page, out, workers, dry_run, yes)
-    answer = Sweep(question, results_of_sweep)
     parameters = {}
     if metric:
-        parameters["metric"] = ranking
-    if question.study.selection:
-        changes = around.question_around(results_of_sweep, question.study.scenario)
-        if changes:
-            _run_question(changes, page, out, workers, dry_run, yes)
+        parameters["metric"] = _measured_metric(question, metric)
+    answer = _answer_question(
+        question, f"{PREFIX}{question.study.name}", out, workers, dry_run, yes
+    )
 
     def render(progress: "Progress") -> Path:
         from dess.reports.pages.render import render_study
 
-        return render_study(question.out, out, progress, parameters)
+        return render_study(answer.question.out, out, progress, parameters)
 
-    tables = {"table": answer.table(ranking)}
-    if question.study.selection:
-        tables["fleets"] = answer.fleets()
-        show = partial(_print_fleets, answer, parameters.get("metric", SUCCESS))
-    else:
-        show = partial(_print_settings, answer, ranking)
-    _print_answer(answer, answer.answers(ranking), tables, show, render, as_json, "sweep")
+    _print_answer(answer, parameters.get("metric"), render, as_json, "sweep")
 
 
 @options.add_command(app, WHAT_IF)
@@ -166,14 +144,14 @@ def what_if(
         out: Folder of the page.
         dry_run: Only print the plan and the range of its time.
     """
+    from dess.analysis.ask.answer import check_shown
     from dess.analysis.ask.question import what_if_question
-    from dess.analysis.ask.what_if import VARIATION, WhatIf, best_policy_of_side, check_shown
 
     changes = options.parse_all_settings(settings, options.SET)
     fixed = options.parse_all_settings(baseline or [], "--baseline")
     question = what_if_question(changes, fixed, scenario, policy, missions, seed, results)
     check_shown(question, shown)
-    results_of_pair = _run_question(question, WHAT_IF, out, workers, dry_run, yes)
+    answer = _answer_question(question, WHAT_IF, out, workers, dry_run, yes)
     parameters = {
         "settings": changes,
         "baseline": fixed,
@@ -190,12 +168,31 @@ def what_if(
         render([WHAT_IF], results, out, progress, parameters)
         return out / f"{WHAT_IF}.html"
 
-    answer = WhatIf(
-        question, results_of_pair, shown or best_policy_of_side(results_of_pair, VARIATION)
-    )
-    show = partial(_print_measures, answer)
-    tables = {"table": answer.table()}
-    _print_answer(answer, answer.answers(), tables, show, render, as_json, "what-if question")
+    _print_answer(answer, None, render, as_json, "what-if question")
+
+
+def _measured_metric(question: "Question", metric: str) -> str:
+    """The column of the metric that ranks the settings of a sweep."""
+    from dess.analysis.metrics import ALIASES, column_in_sheet_unit
+
+    measured = question.study.metrics
+    column = column_in_sheet_unit(ALIASES.get(metric, metric), measured)
+    if column not in measured:
+        names = [*ALIASES, *measured]
+        raise unknown_name("--metric", f"{shown(metric)} is not measured", metric, names)
+    return column
+
+
+def _answer_question(
+    question: "Question", page: str, out: Path, workers: int, dry_run: bool, yes: bool
+) -> "Answer":
+    """Ask a question, and what changes around a cheapest fleet that it finds."""
+    from dess.analysis.ask.answer import Answer
+
+    answer = Answer(question, _run_question(question, page, out, workers, dry_run, yes))
+    if changes := answer.question_around():
+        _run_question(changes, page, out, workers, dry_run, yes)
+    return answer
 
 
 def _run_question(
@@ -217,18 +214,22 @@ def _run_question(
 
 
 def _print_answer(
-    answer: "Sweep | WhatIf",
-    sentences: list[str],
-    tables: "dict[str, pd.DataFrame]",
-    show: Callable[[], None],
+    answer: "Answer",
+    metric: str | None,
     render: "Callable[[Progress], Path]",
     as_json: bool,
     asked: str,
 ) -> None:
     """Print an answer, and write its page, which takes longer; or print all of it as JSON."""
+    from dess.reports.cli.tables import print_cells
+
     question = answer.question
+    sentences = answer.answers(metric)
     if not as_json:
-        show()
+        for table in answer.brief_tables(metric):
+            print_cells(table.cells)
+            if table.caption:
+                console.print_text(table.caption)
         for line in sentences:
             console.print_text(line)
         console.print_text(f"study: {question.file}")
@@ -241,77 +242,13 @@ def _print_answer(
     if as_json:
         places = {"results": str(question.out), "study_file": str(question.file)}
         about = {"study": question.study.name, **places, "page": page and str(page)}
-        rows = {name: json.loads(table.to_json(orient="records")) for name, table in tables.items()}
+        rows = {
+            name: json.loads(table.to_json(orient="records"))
+            for name, table in answer.tables(metric).items()
+        }
         print(json.dumps({**about, "answers": sentences, **rows}, indent=2))
     elif page:
         console.print_text(f"page: {page}")
-
-
-def _print_settings(answer: "Sweep", ranking: str) -> None:
-    """Print the first settings of the ranking."""
-    import numpy as np
-    import pandas as pd
-
-    from dess.analysis import numbers
-    from dess.analysis.answers.settings.home import with_way_home
-    from dess.analysis.answers.settings.points import varied_values
-    from dess.analysis.metrics import COST, PRODUCT, SUCCESS, metric_of
-    from dess.analysis.names import field_named
-
-    prices = answer.question.study.costs
-    table = answer.table(ranking)
-    top = table.head(SHOWN)
-    cells = pd.DataFrame({"rank": top["rank"], "": np.where(top["tied"], "≈", "")})
-    cells["policy"] = top["policy"]
-    for field in varied_values(answer.results):
-        cells[field] = top[field].map(field_named(field).cell)
-    shown = with_way_home(answer.results, [ranking, SUCCESS, PRODUCT])
-    for metric in map(metric_of, shown):
-        if metric.column != COST:
-            cells[metric.head] = numbers.format_estimates(top, metric.column, metric.written)
-    if prices:
-        cells[COST] = [numbers.format_money(cost, prices.currency) for cost in top[COST]]
-    console.print_table([*map(str, cells)], cells.astype(str).to_numpy().tolist())
-    settings = f"{len(table):,} settings"
-    if len(table) > SHOWN:
-        settings += f", the first {SHOWN} are shown"
-    what = metric_of(ranking).within
-    console.print_text(f"{settings}; ≈: the {what} may be as good as that of the first")
-
-
-def _print_fleets(answer: "Sweep", further: str) -> None:
-    """Print the fleets of a search by cost, with the answer marked; then what a change brings.
-
-    Args:
-        answer: The answer.
-        further: A metric that is shown beside those of the requirements.
-    """
-    from dess.analysis.answers.fleet import cheapest
-    from dess.analysis.answers.fleet.requirements import requirements_in_words, requirements_of
-    from dess.analysis.ask import around
-    from dess.reports.cli.tables import print_frame
-
-    results = answer.results
-    rows = cheapest.fleet_rows(results)
-    cells = cheapest.fleet_cells(results, cheapest.shown_rows(rows, SHOWN), further)
-    print_frame("Fleet", cells.set_index("Fleet"))
-    pairs = f"{len(rows):,} pairs of a fleet and a policy"
-    if len(rows) > SHOWN:
-        pairs += f", {SHOWN} of them shown"
-    console.print_text(
-        f"{pairs}, the cheapest first; required: "
-        f"{requirements_in_words(requirements_of(results))}; {cheapest.VERDICTS_EXPLAINED}"
-    )
-    if around.is_known(results):
-        print_frame("What if", around.table_around(results).cells.set_index("What if"))
-
-
-def _print_measures(answer: "WhatIf") -> None:
-    """Print what was measured on both sides, policy by policy."""
-    from dess.reports.cli.tables import print_frame
-
-    for policy in answer.results.policies:
-        print_frame(policy, answer.measures(policy).set_index("Mean per mission"))
 
 
 def _with_quotes(text: str) -> str:

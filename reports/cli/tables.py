@@ -104,10 +104,16 @@ def print_frame(title: str, cells: pd.DataFrame) -> None:
     console.print_table([title, *(_SHORT.get(head, head) for head in map(str, cells))], rows)
 
 
+def print_cells(cells: pd.DataFrame) -> None:
+    """Print a table of text."""
+    first = cells.columns[0]
+    print_frame(str(first), cells.set_index(first))
+
+
 def _print_titled(title: str, cells: pd.DataFrame) -> None:
     """Print a table of text below its title."""
     console.print_text(title)
-    print_frame(str(cells.columns[0]), cells.set_index(cells.columns[0]))
+    print_cells(cells)
 
 
 def _print_selections(selected: pd.DataFrame) -> None:

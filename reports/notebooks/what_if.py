@@ -30,7 +30,7 @@ from IPython.display import display
 
 from dess.analysis import metrics, what_if
 from dess.analysis.answers import summary
-from dess.analysis.ask.what_if import measured_columns
+from dess.analysis.answers.variation import measured_columns
 from dess.analysis.metrics import metric_of
 from dess.reports.pages import html
 from dess.reports.pages import study as page
@@ -40,24 +40,25 @@ asked = what_if(
     settings, baseline, scenario, policies, missions, seed, results, workers, shown=shown, yes=yes
 )
 found = asked.results
+variation = asked.variation
 
 # %%
-html.make_answer(asked.sentence())
+html.make_answer(variation.sentence())
 
 # %%
 pairs = f"n = {missions:,} pairs per policy"
 html.lead_figure(
-    asked.plot(), "Paired differences of the metrics", f"{pairs}; bars are 95 % intervals."
+    variation.plot(), "Paired differences of the metrics", f"{pairs}; bars are 95 % intervals."
 )
 
 # %% [markdown]
 # ## Why
 
 # %%
-html.write_markdown("Of the pairs, {better}.", better=html.escape_sentences(asked.winners()))
+html.write_markdown("Of the pairs, {better}.", better=html.escape_sentences(variation.winners()))
 
 # %%
-html.write_markdown("{contrasts}", contrasts=html.escape_sentences(asked.contrasts()))
+html.write_markdown("{contrasts}", contrasts=html.escape_sentences(variation.contrasts()))
 
 # %%
 extended = [metric for metric in measured_columns(found) if found.missions[metric].any()]
@@ -67,9 +68,9 @@ caption = f"n = {missions:,} missions per dot; bars are 95 % intervals of the me
 spread = f"{pairs}. The lower panel ends at the 5 % and 95 % quantiles."
 html.make_gallery(
     [
-        (asked.plot_spread(), "Distribution of the paired differences of the product", spread),
+        (variation.plot_spread(), "Distribution of the paired differences of the product", spread),
         *(
-            (asked.plot_means(metric), f"{name}, baseline and variation", f"{name}. {caption}")
+            (variation.plot_means(metric), f"{name}, baseline and variation", f"{name}. {caption}")
             for metric in (*metrics.METRICS, *extended)
             for name in [metric_of(metric).name]
         ),
@@ -83,7 +84,7 @@ html.make_gallery(
 # variation; each in the baseline and in the variation, by the policy that is best there.
 
 # %%
-examples = asked.typical(), asked.worst()
+examples = variation.typical(), variation.worst()
 html.make_gallery([drawing for example in examples for drawing in example.drawings()])
 
 # %% [markdown]
@@ -92,16 +93,16 @@ html.make_gallery([drawing for example in examples for drawing in example.drawin
 # %%
 html.write_markdown(
     "{answer}\n\n{reading}\n\n{why} {weights}\n\n{notes}",
-    answer=html.escape_sentences(asked.answer()),
-    reading=html.escape_sentences(asked.reading()),
-    why=summary.allowance_for_difference(asked.table(), "policy"),
+    answer=html.escape_sentences(variation.answer()),
+    reading=html.escape_sentences(variation.reading()),
+    why=summary.allowance_for_difference(variation.table(), "policy"),
     weights=summary.weights_in_words(found),
     notes=page.list_notes(found),
 )
 
 # %%
 html.make_table(
-    asked.pairing(),
+    variation.pairing(),
     f"What common random numbers gain in the differences of n = {missions:,} pairs: the variance "
     "that is left of that of independent missions, and how many of these would be as precise",
 )
@@ -112,7 +113,7 @@ html.make_table(
 # %%
 for policy in found.policies:
     marks = "▲ higher in the variation, ▼ lower, ≈ inconclusive"
-    display(html.make_table(asked.measures(policy), f"{policy}, n = {missions:,}; {marks}"))
+    display(html.make_table(variation.measures(policy), f"{policy}, n = {missions:,}; {marks}"))
 
 # %% [markdown]
 # ## Change the question
@@ -122,7 +123,7 @@ for policy in found.policies:
 
 # %%
 command = html.command_block([asked.question.command])
-study = html.code_block("toml", asked.as_toml().rstrip("\n"))
+study = html.code_block("toml", variation.as_toml().rstrip("\n"))
 html.write_markdown("{command}\n\n{study}", command=command, study=study)
 
 # %% [markdown]
@@ -130,7 +131,7 @@ html.write_markdown("{command}\n\n{study}", command=command, study=study)
 
 # %%
 name = found.manifest["study"]["scenario"]
-html.make_table(asked.field_table(), f"Scenario {name}, {missions:,} missions of each policy")
+html.make_table(variation.field_table(), f"Scenario {name}, {missions:,} missions of each policy")
 
 # %%
 for example in examples:

@@ -8,8 +8,8 @@ from typing import Any
 import tomli_w
 
 from dess.analysis import load_study
+from dess.analysis.ask.answer import Answer
 from dess.analysis.ask.question import what_if_question
-from dess.analysis.ask.what_if import WhatIf, best_policy_of_side
 from dess.analysis.study.study import Study
 
 SCENARIO: dict[str, Any] = {
@@ -56,7 +56,7 @@ def small_study(folder: Path, **changes: Any) -> Study:
     return load_study(path, **changes)
 
 
-def asked(folder: Path, missions: int = 12, **changes: Any) -> WhatIf:
+def asked(folder: Path, missions: int = 12, **changes: Any) -> Answer:
     """The answer to a question about the small scenario: six UAVs at a single pad, not two."""
     values = {
         "settings": {"uavs": 6, "pads": 1},
@@ -67,8 +67,7 @@ def asked(folder: Path, missions: int = 12, **changes: Any) -> WhatIf:
         "missions": missions,
     }
     question = what_if_question(**values | changes, folder=folder)
-    results = question.ask()
-    return WhatIf(question, results, best_policy_of_side(results, 1))
+    return Answer(question, question.ask())
 
 
 def grid(**values: Any) -> dict[str, Any]:

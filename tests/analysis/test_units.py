@@ -12,9 +12,9 @@ from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.fleet.costs import mean_cost_parts
 from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
 from dess.analysis.ask import around
+from dess.analysis.ask.answer import Answer
 from dess.analysis.ask.assumptions import assumption_sentences
 from dess.analysis.ask.question import sweep_question, what_if_question
-from dess.analysis.ask.what_if import WhatIf
 from dess.analysis.metrics import AGE, column_in_sheet_unit, metric_of
 from dess.analysis.names import declared_fields, field_named
 from dess.analysis.study.cheapest import Cheapest, Setting
@@ -78,10 +78,10 @@ def test_lengths_and_data_of_a_question_are_in_units(tmp_path):
     scenario = write_scenario(tmp_path, **SHEET)
     longer = {"data_sheet.endurance": "70 min"}  # a slot is twice as long
     question = what_if_question(longer, None, scenario, ["greedy"], 3, folder=tmp_path)
-    answer = WhatIf(question, question.ask(), "greedy")
+    answer = Answer(question, question.ask())
     table = answer.table().set_index("metric")
     assert table.loc["slots_h", ["before", "after"]].tolist() == pytest.approx([2, 2], rel=0.02)
-    rows = answer.measures("greedy")["Mean per mission"].tolist()
+    rows = answer.variation.measures("greedy")["Mean per mission"].tolist()
     assert {"Length of the mission [h]", "Data collected [MB]"} <= {*rows}
     assert not [row for row in rows if "lots" in row]
 

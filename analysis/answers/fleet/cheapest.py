@@ -58,7 +58,7 @@ from dess.analysis.metrics import COST, HOME, SUCCESS, metric_of
 from dess.analysis.names import DECISIONS
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.study.cheapest import Answer, Cheapest, CheapestChoice
-from dess.analysis.tables import INTERVALS, MOST_ROWS, Table, format_counts
+from dess.analysis.tables import INTERVALS, MOST_PRINTED, MOST_ROWS, Table, format_counts
 from dess.scenario.fields import ZONE_PADS
 
 ALL_CONDITIONS = "all conditions"
@@ -646,6 +646,22 @@ def fleet_table(results: Results, further: str = SUCCESS) -> Table:
         )
     caption += f"{VERDICTS_EXPLAINED.capitalize()}. Means with {intervals_in_words(results)}"
     return Table(fleet_cells(results, top, further), caption, rows)
+
+
+def brief_fleet_table(results: Results, further: str = SUCCESS) -> Table:
+    """The fleets by cost, with the answer marked, as the terminal prints them.
+
+    Args:
+        results: The study.
+        further: A metric that is shown beside those of the requirements.
+    """
+    rows = fleet_rows(results)
+    pairs = f"{len(rows):,} pairs of a fleet and a policy"
+    if len(rows) > MOST_PRINTED:
+        pairs += f", {MOST_PRINTED} of them shown"
+    required = f"required: {requirements_in_words(requirements_of(results))}"
+    caption = f"{pairs}, the cheapest first; {required}; {VERDICTS_EXPLAINED}"
+    return Table(fleet_cells(results, shown_rows(rows, MOST_PRINTED), further), caption, rows)
 
 
 def condition_table(results: Results) -> Table:

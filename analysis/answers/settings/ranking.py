@@ -28,13 +28,16 @@ from dess.analysis.answers.settings.points import (
     varied_values,
 )
 from dess.analysis.metrics import (
+    COST,
     PRODUCT,
+    SUCCESS,
     column_in_sheet_unit,
     format_length,
     metric_in_missions,
     metric_of,
     metrics_in,
 )
+from dess.analysis.names import field_named
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.intervals import (
     by_replication,
@@ -43,7 +46,14 @@ from dess.analysis.stats.intervals import (
     mean_interval,
 )
 from dess.analysis.stats.verdict import may_be_best, within_reach
-from dess.analysis.tables import MOST_ROWS, WIDER, Table, allowance_sentence, format_counts
+from dess.analysis.tables import (
+    MOST_PRINTED,
+    MOST_ROWS,
+    WIDER,
+    Table,
+    allowance_sentence,
+    format_counts,
+)
 
 MOST_NAMES = 3  # the largest number of settings that are named because they may be as good
 
@@ -272,6 +282,31 @@ def best_settings_table(results: Results, rows: pd.DataFrame, metric: str) -> Ta
         f"means with {intervals_in_words(results)}"
     )
     return Table(cells, caption, rows)
+
+
+def ranked_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
+    """The first settings of the ranking, in few columns, as the terminal prints them.
+
+    Args:
+        results: The study.
+        rows: The result of ``rank_settings`` for the metric, with the costs if there are prices.
+        metric: The metric.
+    """
+    top = rows.head(MOST_PRINTED)
+    cells = pd.DataFrame({"rank": top["rank"].astype(str), "": np.where(top["tied"], "≈", "")})
+    cells["policy"] = top["policy"]
+    for field in varied_values(results):
+        cells[field] = top[field].map(field_named(field).cell)
+    for measure in map(metric_of, with_way_home(results, [metric, SUCCESS, PRODUCT])):
+        if measure.column != COST:
+            cells[measure.head] = numbers.format_estimates(top, measure.column, measure.written)
+    if prices := results.study.costs:
+        cells[COST] = [numbers.format_money(cost, prices.currency) for cost in top[COST]]
+    settings = f"{len(rows):,} settings"
+    if len(rows) > MOST_PRINTED:
+        settings += f", the first {MOST_PRINTED} are shown"
+    legend = f"≈: the {metric_of(metric).within} may be as good as that of the first"
+    return Table(cells, f"{settings}; {legend}", rows)
 
 
 def best_of_policies_table(results: Results, metric: str) -> Table:

@@ -10,9 +10,9 @@ from scipy import stats
 
 from dess import InputError
 from dess.analysis import sweep
+from dess.analysis.answers import variation as found
 from dess.analysis.answers.settings.points import varied_values
-from dess.analysis.ask import what_if as found
-from dess.analysis.ask.what_if import BASELINE, VARIATION
+from dess.analysis.answers.variation import BASELINE, VARIATION
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.intervals import LEVEL
@@ -107,7 +107,7 @@ def test_what_one_side_measures_has_no_difference(tmp_path):
     answers = answer.table().set_index("metric")
     assert np.isnan(answers.loc["age", ["before", "difference"]].astype(float)).all()
     assert (answers.loc["age", "n"], answers.loc["success", "n"]) == (0, 4)
-    lines = answer.measures("greedy").set_index("Mean per mission")
+    lines = answer.variation.measures("greedy").set_index("Mean per mission")
     line = lines.loc["Age of information [mission slots]"]
     mean = answer.results.missions["age"].mean()
     assert line.tolist() == ["–", f"{mean:.2f}", ""]
@@ -115,13 +115,13 @@ def test_what_one_side_measures_has_no_difference(tmp_path):
 
 def test_the_first_sentence_says_in_how_many_missions_uavs_can_fly_home(answer, tmp_path):
     missions = answer.results.missions
-    said = answer.sentence()
+    said = answer.variation.sentence()
     for policy in POLICIES:
         of_policy = missions[missions["policy"] == policy].groupby("point")["home"].mean()
         before, after = (f"{100 * share:.1f} %" for share in of_policy)
         assert f"with {policy} in {before} of the missions before and in {after} after" in said
     landing = asked(tmp_path, 4, baseline={"uavs": 2, "landing": True})
-    assert "way home" not in landing.sentence()
+    assert "way home" not in landing.variation.sentence()
 
 
 def test_missions_without_a_quota_have_no_allowance_for_being_shorter(tmp_path):
@@ -191,10 +191,10 @@ def test_the_typical_mission_has_the_median_difference_and_the_worst_the_least_l
     made = with_missions(answer, before, after, [0.6, 0.4, 0.8, 0.3, 0.7])
     differences = found.product_differences(made.results, "greedy").tolist()
     assert differences == pytest.approx([0.1, -0.1, -0.9, 0.2, -0.9])
-    assert (made.typical().replication, made.worst().replication) == (1, 4)
+    assert (made.variation.typical().replication, made.variation.worst().replication) == (1, 4)
     even = with_missions(answer, [0.0] * 4, [0.4, 0.1, 0.2, 0.2], [0.5] * 4)
     # The lower middle, of those alike the first.
-    assert (even.typical().replication, even.worst().replication) == (2, 1)
+    assert (even.variation.typical().replication, even.variation.worst().replication) == (2, 1)
 
 
 def test_what_contradicts_the_mean_is_said_only_where_it_occurs(answer):
@@ -204,7 +204,7 @@ def test_what_contradicts_the_mean_is_said_only_where_it_occurs(answer):
         made = with_missions(answer, before, after, [0.5] * 4)
         missions = made.results.missions
         missions = missions.assign(success=(missions[PRODUCT] > 0).astype(float))
-        return replace(made, results=replace(made.results, missions=missions)).contrasts()
+        return replace(made, results=replace(made.results, missions=missions)).variation.contrasts()
 
     said = contrasts([0.5, 0.5, 0.5, 0.5], [0.6, 0.6, 0.6, 0.0])
     assert said.startswith("With greedy, the product is higher in more missions than it is lower, ")
@@ -215,18 +215,18 @@ def test_what_contradicts_the_mean_is_said_only_where_it_occurs(answer):
 
 def test_what_is_explained_occurs(answer, monkeypatch):
     """Intervals that overlap, marks that are used, and learned policies."""
-    assert "learned policy" not in answer.reading()
+    assert "learned policy" not in answer.variation.reading()
     monkeypatch.setattr(found, "verdict_on_change", lambda _: ABOVE)
-    assert "≈" not in answer.reading()
+    assert "≈" not in answer.variation.reading()
     monkeypatch.setattr(found, "verdict_on_change", lambda _: INCONCLUSIVE)
-    assert "≈" in answer.reading() and "overlap" not in answer.reading()
+    assert "≈" in answer.variation.reading() and "overlap" not in answer.variation.reading()
 
 
 def test_a_metric_that_is_equal_in_all_missions_has_no_correlation(answer, monkeypatch):
     table = answer.table().assign(variance_reduction=np.nan, correlation=np.nan)
     monkeypatch.setattr(found, "compare_sides", lambda _: table)
-    assert set(answer.pairing()["Correlation"]) == {"no variance"}
-    assert "nan" not in answer.pairing().to_string()
+    assert set(answer.variation.pairing()["Correlation"]) == {"no variance"}
+    assert "nan" not in answer.variation.pairing().to_string()
 
 
 def test_the_best_policy_of_each_side_is_found(answer):
@@ -235,8 +235,8 @@ def test_the_best_policy_of_each_side_is_found(answer):
         side = table[(table["point"] == point) & (table["metric"] == PRODUCT)]
         best = side.loc[side["mean"].idxmax(), "policy"]
         assert found.best_policy_of_side(answer.results, point) == best
-    assert answer.shown == best
-    assert answer._repr_markdown_() == answer.answer()  # what Jupyter shows
+    assert answer.variation.shown == best
+    assert answer._repr_markdown_() == answer.variation.answer()  # what Jupyter shows
     assert [line.split(":")[0] for line in answer.answers()[1:]] == POLICIES
 
 

@@ -1,8 +1,13 @@
-"""The answer to a what-if question asked in one line: ``analysis.what_if``."""
+"""A variation of a scenario compared with its baseline, on the same missions.
 
-from collections.abc import Iterable, Mapping, Sequence
+    variation = Variation(load_results("results/what-if/HASH"), "greedy")
+    variation.sentence()
+
+The study has two design points: the baseline, then the variation.
+"""
+
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,12 +20,6 @@ from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.answers.missions import estimate_metric, fate_in_words
 from dess.analysis.answers.settings.home import with_way_home
-from dess.analysis.ask.question import (
-    Question,
-    strip_markdown,
-    what_if_question,
-)
-from dess.analysis.execution.jobs import Progress
 from dess.analysis.metrics import (
     HOME,
     METRICS,
@@ -42,7 +41,7 @@ from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import LEVEL, by_replication
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position_of
-from dess.base.errors import unknown_name
+from dess.analysis.tables import Table
 
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.figure import Figure
@@ -277,16 +276,14 @@ def _format_amount(value: float, *ends: float, sign: str = "") -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class WhatIf:
-    """The answer to a what-if question.
+class Variation:
+    """A variation compared with its baseline.
 
     Attributes:
-        question: The study that was run, its folder and its command.
-        results: The results; ``results.missions`` is a tidy table of the missions.
+        results: The study; ``results.missions`` is a tidy table of the missions.
         shown: The policy of ``typical`` and ``worst``.
     """
 
-    question: Question
     results: Results
     shown: str
 
@@ -304,9 +301,6 @@ class WhatIf:
         before, after = map(self._best, (BASELINE, VARIATION))
         lines = "\n".join(f"- {conclusion_in_words(row)}" for row in self._of_product())
         return f"{lines}\n\nThe highest mean: in the baseline {before}; in the variation {after}."
-
-    def _repr_markdown_(self) -> str:
-        return self.answer()
 
     def sentence(self) -> str:
         """What the variation changes, in a sentence."""
@@ -341,12 +335,9 @@ class WhatIf:
             "With landing = true, missions end on the ground."
         )
 
-    def answers(self) -> list[str]:
-        """What the variation changes, and then the conclusion on every policy, in sentences."""
-        return [
-            self.sentence(),
-            *(strip_markdown(conclusion_in_words(row)) for row in self._of_product()),
-        ]
+    def sentences(self) -> list[str]:
+        """What the variation changes, then the conclusion on every policy, in Markdown."""
+        return [self.sentence(), *map(conclusion_in_words, self._of_product())]
 
     def _best(self, point: int) -> str:
         """The best policy of one side with its mean, as ``greedy, 95.3 % [94.5, 96.1]``."""
@@ -473,6 +464,12 @@ class WhatIf:
         heads = ["Mean per mission", "Baseline", "Variation", "Paired difference"]
         return pd.DataFrame(lines, columns=heads)
 
+    def measures_table(self, policy: str) -> Table:
+        """The rows of the table of a policy, under its name, as the terminal prints them."""
+        table = self.table()
+        cells = self.measures(policy).rename(columns={"Mean per mission": policy})
+        return Table(cells, "", table[table["policy"] == policy])
+
     def pairing(self) -> pd.DataFrame:
         """How much common random numbers narrow the intervals, as a table to print."""
         table = self.table()
@@ -557,18 +554,18 @@ class Example:
     """A replication of the shown policy in the baseline and in the variation.
 
     Attributes:
-        answer: The answer to the question.
+        variation: The variation and its baseline.
         replication: The replication.
     """
 
-    answer: WhatIf
+    variation: Variation
     replication: int
 
     def effect(self) -> str:
         """By how much the variation changes the mission, in a sentence of Markdown."""
-        policy = self.answer.shown
+        policy = self.variation.shown
         gap = numbers.format_difference(
-            product_differences(self.answer.results, policy)[self.replication], 0
+            product_differences(self.variation.results, policy)[self.replication], 0
         )
         return (
             f"Replication {self.replication} with **{policy}**: the variation changes the product "
@@ -577,10 +574,10 @@ class Example:
 
     def commands(self) -> list[str]:
         """The commands that simulate both missions again."""
-        command = self.answer.results.command
+        command = self.variation.results.command
         lines = []
         for point, side in enumerate(SIDES):
-            lines += [f"# {side}", command(self.answer.shown, point, self.replication)]
+            lines += [f"# {side}", command(self.variation.shown, point, self.replication)]
         return lines
 
     def drawings(self) -> "list[tuple[Figure, str, str]]":
@@ -590,68 +587,13 @@ class Example:
     def _drawing(self, point: int) -> "tuple[Figure, str, str]":
         from dess.analysis.figures.missions import mission_figure
 
-        shown, results = self.answer.shown, self.answer.results
+        shown, results = self.variation.shown, self.variation.results
         mission = resimulate(results, shown, point, self.replication)
         figure = mission_figure(mission.events, mission.scenario)
         caption = (
-            f"{SIDES[point].capitalize()} ({', '.join(self.answer.sides[point])}): collection "
+            f"{SIDES[point].capitalize()} ({', '.join(self.variation.sides[point])}): collection "
             f"ratio {numbers.format_percent(mission.record.collection_ratio)}; "
             f"{fate_in_words(mission)}. "
             f"{format_length(mission.record.slots, mission.scenario.units)}. n = 1."
         )
         return figure, "Map of the mission; battery, residual data and charging", caption
-
-
-def check_shown(question: Question, policy: str | None) -> None:
-    """Refuse a policy to show that the question does not ask about.
-
-    Raises:
-        InputError: If there is one.
-    """
-    asked = question.study.policies
-    if policy is not None and policy not in asked:
-        raise unknown_name("shown", f"{policy!r} is not asked about", policy, asked)
-
-
-def what_if(
-    settings: Mapping[str, Any],
-    baseline: Mapping[str, Any] | None = None,
-    scenario: str | Path = "paper",
-    policies: Sequence[str] | None = None,
-    missions: int = 500,
-    seed: int = 0,
-    folder: str | Path = "results",
-    workers: int = 1,
-    *,
-    shown: str | None = None,
-    progress: Progress | None = None,
-    yes: bool = False,
-) -> WhatIf:
-    """Simulate a baseline and a variation of it with common random numbers, and compare them.
-
-    The missions are stored in ``FOLDER/what-if``. The same question is answered at once the next
-    time; with more missions, only those that are missing are simulated.
-
-    Args:
-        settings: Fields of the scenario that the variation sets.
-        baseline: Fields of the scenario that are set in both; in the variation, ``settings`` comes
-            first.
-        scenario: The name of a shipped scenario, or a TOML file.
-        policies: Teams, each compared with itself: ``"P"`` or ``"P,P,..."``. Without any, the best
-            policy that five minutes allow, and ``greedy``.
-        missions: Number of missions of each policy on each side, at least 2.
-        seed: Seed of the missions.
-        folder: Folder in which results are stored.
-        workers: Number of processes. Two or more take seconds to start; they help in long runs.
-        shown: The policy of ``typical`` and ``worst``. By default the best one in the variation.
-        progress: Called with the number of missions done since its last call.
-        yes: Whether the question may take more than an hour.
-
-    Raises:
-        InputError: Before anything is written, if a field, a value or a policy is unknown or not
-            allowed, a policy cannot act in the scenario, or the question would take long.
-    """
-    question = what_if_question(settings, baseline, scenario, policies, missions, seed, folder)
-    check_shown(question, shown)
-    results = question.ask(workers, progress, yes=yes)
-    return WhatIf(question, results, shown or best_policy_of_side(results, VARIATION))
