@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dess.analysis import numbers
+from dess.base.descriptions import Description, description_of
 from dess.base.errors import form_of, kind_of
 from dess.scenario.fields import SAMPLED, ZONE_PADS, fields_of
 from dess.scenario.scenario import Scenario, ScenarioSpace
@@ -187,8 +188,9 @@ def declared_fields(space: ScenarioSpace) -> list[Declared]:
     return [
         Declared(
             name,
-            _meaning_and_unit(name)[0] + (", from the data sheet" if name in follows else ""),
-            _meaning_and_unit(name)[1],
+            described_field(name).without_unit
+            + (", from the data sheet" if name in follows else ""),
+            described_field(name).unit,
             _allowed_values(space, name),
             *(single_value(side.plain_value(name)) for side in (default, space)),
         )
@@ -196,19 +198,9 @@ def declared_fields(space: ScenarioSpace) -> list[Declared]:
     ]
 
 
-def meaning_of_field(name: str) -> str:
-    """What a field is: its description, ``meaning [unit] (symbol): form``, without the form."""
-    description = fields_of(ScenarioSpace)[name].description or ""
-    return description.partition(": ")[0]
-
-
-def _meaning_and_unit(name: str) -> tuple[str, str]:
-    """What a field is, and its unit."""
-    meaning = meaning_of_field(name)
-    unit = re.search(r" \[([^\],]+)\]", meaning)
-    if unit:
-        return (meaning.replace(unit[0], ""), unit[1])
-    return (meaning, "")
+def described_field(name: str) -> Description:
+    """What a field is, with its unit and its symbol, as the model declares it."""
+    return description_of(fields_of(ScenarioSpace)[name])
 
 
 def _allowed_values(space: ScenarioSpace, name: str) -> str:

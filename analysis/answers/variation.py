@@ -34,7 +34,7 @@ from dess.analysis.metrics import (
     measured_in,
     metric_of,
 )
-from dess.analysis.names import RANGES, field_in_words, field_named, meaning_of_field
+from dess.analysis.names import RANGES, described_field, field_in_words, field_named
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.resimulate import resimulate
 from dess.analysis.results.tables import Results, compute_once
@@ -207,11 +207,6 @@ def product_differences(results: Results, policy: str) -> pd.Series:
     missions = results.missions[results.missions["policy"] == policy]
     sides = missions.pivot(index="replication", columns="point", values=PRODUCT)
     return sides[VARIATION] - sides[BASELINE]
-
-
-def _brief_meaning(field: str) -> str:
-    """What a field is, without details, which follow after a semicolon."""
-    return meaning_of_field(field).partition(";")[0]
 
 
 def best_policy_of_side(results: Results, point: int) -> str:
@@ -425,7 +420,7 @@ class Variation:
         """Fields of the scenario in the baseline and in the variation, as a table to print."""
         sides = [self.results.scenario(point) for point in (BASELINE, VARIATION)]
         rows = [
-            (name, _brief_meaning(name), *(field_in_words(side, name) for side in sides))
+            (name, described_field(name).brief, *(field_in_words(side, name) for side in sides))
             for name in names
         ]
         return pd.DataFrame(rows, columns=["Field", "Meaning", "Baseline", "Variation"])

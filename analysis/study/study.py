@@ -26,6 +26,7 @@ from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Selection
 from dess.analysis.study.stopping import MOST, Precision, StrictTable, Text
+from dess.base.descriptions import Description
 from dess.base.errors import cut, listed, to_input_error, unknown_name
 from dess.base.files.reading import Shipped
 from dess.model.batch import check_slotted
@@ -102,11 +103,13 @@ class StudyData(StrictTable):
     )
     design: Design | None = Field(
         None,
-        description="the design points: a table with the kind of the design; without one, the "
-        "scenario is the only point",
+        description=Description(
+            "the design points",
+            form="a table with the kind of the design; without one, the scenario is the only point",
+        ),
     )
     policies: Annotated[tuple[Text, ...], BeforeValidator(tuples)] = Field(
-        min_length=1, description='teams: "P" or "P,P,..."'
+        min_length=1, description=Description("teams", form='"P" or "P,P,..."')
     )
     missions: Integer = Field(
         1000, ge=1, le=MOST, description="per design point and policy; with a rule, not given"

@@ -8,6 +8,8 @@ from reprlib import Repr
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
+from dess.base.descriptions import description_of
+
 if TYPE_CHECKING:  # the command line raises InputError long before anything needs pydantic
     from pydantic import BaseModel, ValidationError
     from pydantic.fields import FieldInfo
@@ -271,15 +273,15 @@ def _problem(kind: str) -> str:
 def form_of(field: "FieldInfo", described: bool = False) -> str:
     """What the value of a field of a model may be, in words, such as ``a number 0..100``.
 
-    Lists and tables have their description as well; if it says the form after a colon, only that.
+    Lists and tables have their description as well; if it has a form, only that.
 
     Args:
         field: The field.
         described: Whether a single value has its description, too.
     """
-    description = field.description or ""
+    description = description_of(field)
     single = bool(kind_of(field) or choices_of(field))
-    if (form := description.partition(": ")[2]) and not single:
+    if (form := description.form) and not single:
         length = _length(field.metadata)
         if length:
             return f"{form} ({length.strip()})"

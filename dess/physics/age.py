@@ -11,6 +11,7 @@ import math
 import numpy as np
 from pydantic import Field
 
+from dess.base.descriptions import Description
 from dess.base.kernels import inlined, kernel
 from dess.physics.section import Number, Section, for_sections
 
@@ -30,7 +31,9 @@ class Age(Section):
         0.0,
         ge=-1_000_000,
         le=1_000_000,
-        description="reward per slot and unit of the mean age of all nodes [slots]",
+        description=Description(
+            "reward per slot and unit of the mean age of all nodes", unit="slots"
+        ),
     )
 
 

@@ -15,6 +15,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from dess.base.descriptions import Description
 from dess.base.errors import InputError
 from dess.base.kernels import kernel
 from dess.physics import streams
@@ -46,35 +47,52 @@ class Arrivals(Section):
 
     process: Literal["slotted", "continuous"] = Field(
         "slotted",
-        description="when new data arrive: slotted, at the ends of mission slots (eq. 12), or "
-        "continuous, a Poisson process per node",
+        description=Description(
+            "when new data arrive",
+            form="slotted, at the ends of mission slots (eq. 12), or continuous, a Poisson "
+            "process per node",
+        ),
     )
     rates: tuple[Rate, ...] = Field(
         (),
         max_length=1024,
-        description="arrival rate per node [data units per slot]: a number 0..100 per node; "
-        "without it, arrival_rate for all",
+        description=Description(
+            "arrival rate per node",
+            unit="data units per slot",
+            form="a number 0..100 per node; without it, arrival_rate for all",
+        ),
     )
     initial: tuple[Amount, ...] = Field(
         (),
         max_length=1024,
-        description="initial data per node [data units]: a number for each; without it, "
-        "initial_data for all",
+        description=Description(
+            "initial data per node",
+            unit="data units",
+            form="a number for each; without it, initial_data for all",
+        ),
     )
     merged: tuple[Annotated[Integer, Field(ge=1)], ...] = Field(
         (),
         max_length=1024,
-        description="how many sensor nodes each node stands for: it has as many times the "
-        "arrival_rate and the initial_data",
+        description=Description(
+            "how many sensor nodes each node stands for",
+            form="it has as many times the arrival_rate and the initial_data",
+        ),
     )
     schedule: tuple[tuple[Time, Rate], ...] = Field(
         (),
         max_length=MOST_ROWS,
-        description="factors of the rates over time: a list of [slot, factor], the factor 0..100 "
-        "from this slot on and 1 before the first",
+        description=Description(
+            "factors of the rates over time",
+            form="a list of [slot, factor], the factor 0..100 from this slot on and 1 before the "
+            "first",
+        ),
     )
     buffer: Integer = Field(
-        0, ge=0, le=1_000_000, description="packets that a node can hold; 0 for no limit"
+        0,
+        ge=0,
+        le=1_000_000,
+        description=Description("packets that a node can hold", note="0 for no limit"),
     )
     service: Literal["oldest", "newest"] = Field(
         "oldest", description="which packet of a node is served first"

@@ -6,6 +6,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
+from dess.base.descriptions import Description
 from dess.base.kernels import inlined, kernel
 from dess.physics.section import Integer, Section, for_sections
 
@@ -25,16 +26,21 @@ class Charging(Section):
         0,
         ge=0,
         le=6400,
-        description="battery that all pads of a zone together can add in a slot [%]; 0 for no "
-        "limit",
+        description=Description(
+            "battery that all pads of a zone together can add in a slot",
+            unit="%",
+            note="0 for no limit",
+        ),
     )
     measured: bool = Field(
         False, description="whether records have the queue, waiting time and use of the pads"
     )
     plan_waits: bool = Field(
         True,
-        description="whether the return guard allows for the wait for a pad; always with another "
-        "order, a limit of power or pads that may fail",
+        description=Description(
+            "whether the return guard allows for the wait for a pad",
+            note="always with another order, a limit of power or pads that may fail",
+        ),
     )
 
     def constants(self) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from dess.base.descriptions import Description
 from dess.base.kernels import inlined, kernel
 from dess.physics import streams
 from dess.physics.landing import is_over, stands
@@ -20,8 +21,11 @@ class Failures(Section):
     )
     uav_repair: Slots = Field(
         0.0,
-        description="mean time until a failed UAV flies again [slots]: at least 1, or 0 if it is "
-        "lost",
+        description=Description(
+            "mean time until a failed UAV flies again",
+            unit="slots",
+            form="at least 1, or 0 if it is lost",
+        ),
     )
     uav_data: Literal["kept", "lost"] = Field(
         "kept", description="whether the data that a lost UAV has collected count"
@@ -31,16 +35,22 @@ class Failures(Section):
     )
     pad_repair: Slots = Field(
         0.0,
-        description="mean time until a failed pad works again [slots]: at least 1, or 0 if it "
-        "never does",
+        description=Description(
+            "mean time until a failed pad works again",
+            unit="slots",
+            form="at least 1, or 0 if it never does",
+        ),
     )
     node_rate: Probability = Field(
         0.0, description="probability that a node falls silent in a mission slot"
     )
     node_repair: Slots = Field(
         0.0,
-        description="mean time until a silent node answers again [slots]: at least 1, or 0 if it "
-        "never does",
+        description=Description(
+            "mean time until a silent node answers again",
+            unit="slots",
+            form="at least 1, or 0 if it never does",
+        ),
     )
     node_data: Literal["kept", "lost"] = Field(
         "kept", description="whether the data of a node are kept while it is silent"

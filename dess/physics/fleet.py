@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import Field
 
+from dess.base.descriptions import Description
 from dess.base.kernels import inlined
 from dess.physics.section import Integer, Number, Section
 
@@ -18,7 +19,12 @@ class UavType(Section):
     """A type of UAV; UAV i of a mission has type ``i % len(fleet)``."""
 
     flying_time: Integer | None = Field(
-        None, ge=1, le=100, description="battery at the start [%]; without it, that of the scenario"
+        None,
+        ge=1,
+        le=100,
+        description=Description(
+            "battery at the start", unit="%", note="without it, that of the scenario"
+        ),
     )
     slots_per_cell: Integer = Field(
         1, ge=1, le=8, description="mission slots that a move to the next cell takes"
@@ -27,7 +33,9 @@ class UavType(Section):
         None,
         ge=1,
         le=1_000_000,
-        description="communication slots that the UAV must fill; without it, those of the scenario",
+        description=Description(
+            "communication slots that the UAV must fill", note="without it, those of the scenario"
+        ),
     )
     rate: Number = Field(
         1.0, ge=0.001, le=1000, description="factor of the rate at which the UAV collects data"

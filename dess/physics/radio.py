@@ -2,6 +2,7 @@
 
 from pydantic import Field
 
+from dess.base.descriptions import Description
 from dess.physics.section import Number, Section, for_sections
 
 
@@ -12,14 +13,25 @@ class Radio(Section):
         0.0,
         ge=0,
         le=1e6,
-        description="distance at which the mean SNR is edge_snr [m]; 0 for half the grid's "
-        "diagonal",
+        description=Description(
+            "distance at which the mean SNR is edge_snr",
+            unit="m",
+            note="0 for half the grid's diagonal",
+        ),
     )
     range: Number = Field(
-        0.0, ge=0, le=1e7, description="distance beyond which there is no service [m]; 0 for none"
+        0.0,
+        ge=0,
+        le=1e7,
+        description=Description(
+            "distance beyond which there is no service", unit="m", note="0 for none"
+        ),
     )
     max_rate: Number = Field(
-        0.0, ge=0, le=1000, description="largest spectral efficiency [bit/s/Hz]; 0 for none"
+        0.0,
+        ge=0,
+        le=1000,
+        description=Description("largest spectral efficiency", unit="bit/s/Hz", note="0 for none"),
     )
 
 

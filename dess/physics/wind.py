@@ -17,6 +17,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from dess.base.descriptions import Description
 from dess.base.kernels import inlined, kernel
 from dess.physics import streams
 from dess.physics.chart import NO_FLY, Chart, read_only
@@ -35,7 +36,9 @@ class Wind(Section):
         0.0,
         ge=0,
         le=MOST,
-        description="battery that a move against the mean wind costs more [%]; 0 for none",
+        description=Description(
+            "battery that a move against the mean wind costs more", unit="%", note="0 for none"
+        ),
     )
     direction: Number = Field(
         0.0,
@@ -44,12 +47,17 @@ class Wind(Section):
         description="where the mean wind comes from [degrees from north, clockwise]",
     )
     gusts: Number = Field(
-        0.0, ge=0, le=MOST, description="standard deviation of the wind from cell to cell [%]"
+        0.0,
+        ge=0,
+        le=MOST,
+        description=Description("standard deviation of the wind from cell to cell", unit="%"),
     )
     seed: Integer = Field(0, ge=0, le=2**32 - 1, description="seed of the field of wind")
     moves: tuple[Push, Push, Push, Push] = Field(
         (0.0, 0.0, 0.0, 0.0),
-        description="battery that moves cost more beside this [%]: [north, east, south, west]",
+        description=Description(
+            "battery that moves cost more beside this", unit="%", form="[north, east, south, west]"
+        ),
     )
 
     def pushes(self) -> Moves:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, NoReturn, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from dess.base.descriptions import Description, description_of
 from dess.base.errors import InputError, shown
 from dess.physics.section import Section
 from dess.physics.wind import Moves, largest_wind, moves_in
@@ -94,10 +95,14 @@ class DataSheet(Section):
     reserve: str | None = _quantity("percent", "share of the battery that is never used", 0, 60)
     horizon: str | None = _quantity("s", "length of a mission, or else max_slots", example="8 h")
     data_rate: str | tuple[str, ...] | None = _quantity(
-        "bit/s", "new data of a node: one for all, or a list for each", 0
+        "bit/s", Description("new data of a node", form="one for all, or a list for each"), 0
     )
     backlog: str | tuple[str, ...] | None = _quantity(
-        "bit", "data of a node at the start, or else none: one for all, or a list for each", 0
+        "bit",
+        Description(
+            "data of a node at the start, or else none", form="one for all, or a list for each"
+        ),
+        0,
     )
     bandwidth: str | None = _quantity("Hz", "bandwidth of the radio")
     snr: str | None = _quantity("dB at m", "mean SNR at a distance", -200, 200, second=_DISTANCES)
@@ -176,8 +181,8 @@ class DataSheet(Section):
     @classmethod
     def form_of(cls, name: str) -> str:
         """What a field means, with an example."""
-        example, meaning = cls.example(name)
-        return f'{meaning.partition(":")[0]}, such as "{example}"'
+        brief = description_of(cls.model_fields[name]).brief
+        return f'{brief}, such as "{cls.example(name)[0]}"'
 
     @property
     def units(self) -> Units:

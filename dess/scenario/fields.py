@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
 from pydantic.fields import FieldInfo
 
+from dess.base.descriptions import Description
 from dess.base.errors import InputError, shown
 from dess.physics.age import Age
 from dess.physics.arrivals import MOST_AMOUNT, Arrivals
@@ -70,7 +71,9 @@ class Zone(Strict):
     pads: Integer | None = Field(
         None,
         ge=1,
-        description="charging pads of a further zone; without it, as many as the zone has cells",
+        description=Description(
+            "charging pads of a further zone", note="without it, as many as the zone has cells"
+        ),
     )
 
 
@@ -79,64 +82,91 @@ class Fields(Strict):
 
     # World
     grid: Integer = Field(
-        32, ge=2, le=MOST_CELLS, description="cells of the grid from west to east (M)"
+        32,
+        ge=2,
+        le=MOST_CELLS,
+        description=Description("cells of the grid from west to east", symbol="M"),
     )
     rows: Integer | None = Field(
         None,
         ge=2,
         le=MOST_CELLS,
-        description="cells of the grid from north to south; without it, as many as from west to "
-        "east",
+        description=Description(
+            "cells of the grid from north to south", note="without it, as many as from west to east"
+        ),
     )
-    cell_size: Number = Field(800.0, ge=0.01, le=100_000, description="side of a cell [m] (c)")
-    altitude: Number = Field(10.0, ge=0.01, le=100_000, description="flying altitude [m] (h)")
+    cell_size: Number = Field(
+        800.0, ge=0.01, le=100_000, description=Description("side of a cell", unit="m", symbol="c")
+    )
+    altitude: Number = Field(
+        10.0, ge=0.01, le=100_000, description=Description("flying altitude", unit="m", symbol="h")
+    )
     nodes: tuple[Cell, ...] = Field(
         PAPER_NODES,
         min_length=1,
         max_length=MOST_NODES,
-        description="cells of the sensor nodes: [x, y] for each",
+        description=Description("cells of the sensor nodes", form="[x, y] for each"),
     )
     names: tuple[str, ...] = Field(
-        (), max_length=MOST_NODES, description="names of the sensor nodes: one for each"
+        (),
+        max_length=MOST_NODES,
+        description=Description("names of the sensor nodes", form="one for each"),
     )
     moved: tuple[Integer, ...] = Field(
         (),
         max_length=MOST_NODES,
-        description="nodes that are not in their own cells: their numbers, from 0",
+        description=Description(
+            "nodes that are not in their own cells", form="their numbers, from 0"
+        ),
     )
     zone: Rectangle = Field(
-        (26, 2, 4, 4), description="start and charging zone (L): [x, y, width, height] in cells"
+        (26, 2, 4, 4),
+        description=Description(
+            "start and charging zone", symbol="L", form="[x, y, width, height] in cells"
+        ),
     )
     pads: Integer | None = Field(
-        None, ge=1, description="charging pads; without it, as many as the zone has cells"
+        None,
+        ge=1,
+        description=Description("charging pads", note="without it, as many as the zone has cells"),
     )
     zones: tuple[Zone, ...] = Field(
         (),
         max_length=MOST_ZONES - 1,
-        description="further charging zones: a table of cells and pads for each",
+        description=Description(
+            "further charging zones", form="a table of cells and pads for each"
+        ),
     )
     no_fly: tuple[Cell, ...] = Field(
-        (), description="cells that no UAV may enter, such as islands: [x, y] for each"
+        (),
+        description=Description(
+            "cells that no UAV may enter, such as islands", form="[x, y] for each"
+        ),
     )
     centre: tuple[Longitude, Latitude] | None = Field(
-        None, description="centre of the grid [degrees]: [lon, lat]"
+        None, description=Description("centre of the grid", unit="degrees", form="[lon, lat]")
     )
     forbid_swaps: bool = Field(False, description="cancel the moves of two UAVs that swap cells")
 
     # Time
     slot_length: Number = Field(
-        1.0, ge=1e-6, le=1_000_000, description="length of a mission slot (delta_t)"
+        1.0,
+        ge=1e-6,
+        le=1_000_000,
+        description=Description("length of a mission slot", symbol="delta_t"),
     )
     communication_slots: Integer = Field(
-        4, ge=1, le=64, description="communication slots in a mission slot (m)"
+        4, ge=1, le=64, description=Description("communication slots in a mission slot", symbol="m")
     )
     max_slots: Integer = Field(
         500, ge=1, le=MOST_SLOTS, description="mission slots after which a mission is truncated"
     )
     landing: bool = Field(
         False,
-        description="whether missions end on the ground: UAVs stand in a zone for nothing, and "
-        "land when their quota is filled",
+        description=Description(
+            "whether missions end on the ground",
+            form="UAVs stand in a zone for nothing, and land when their quota is filled",
+        ),
     )
 
     # Energy
@@ -144,14 +174,21 @@ class Fields(Strict):
         10,
         ge=0.01,
         le=100,
-        description="battery gained in a charging slot [%]; what is not whole waits for the next",
+        description=Description(
+            "battery gained in a charging slot",
+            unit="%",
+            note="what is not whole waits for the next",
+        ),
     )
     flight_cost: Integer = Field(
         1,
         ge=0,
         le=1,
-        description="battery spent in a slot without charging [%]; 0 to fly without battery "
-        "decrease (Algorithm 1, phase I)",
+        description=Description(
+            "battery spent in a slot without charging",
+            unit="%",
+            note="0 to fly without battery decrease (Algorithm 1, phase I)",
+        ),
     )
 
     # Channel
@@ -159,43 +196,69 @@ class Fields(Strict):
         -25.0,
         ge=-300,
         le=300,
-        description="mean SNR at half the grid's diagonal, or at radio.anchor [dB]",
+        description=Description(
+            "mean SNR at half the grid's diagonal, or at radio.anchor", unit="dB"
+        ),
     )
     path_loss_exponent: Number = Field(
-        2.27, ge=0.01, le=10, description="path loss exponent (alpha)"
+        2.27, ge=0.01, le=10, description=Description("path loss exponent", symbol="alpha")
     )
     shadowing_variance: Number = Field(
-        2.0, ge=0, le=400, description="variance of shadowing [dB^2]"
+        2.0, ge=0, le=400, description=Description("variance of shadowing", unit="dB^2")
     )
 
     # Data
     initial_data: Annotated[tuple[Number, Number], AS_RANGE] = Field(
-        (5.0, 20.0), description="initial data per node [data units]: a number or [low, high]"
+        (5.0, 20.0),
+        description=Description(
+            "initial data per node", unit="data units", form="a number or [low, high]"
+        ),
     )
     arrival_rate: Number = Field(
-        0.02, ge=0, le=100, description="new data per node and mission slot [data units] (lambda)"
+        0.02,
+        ge=0,
+        le=100,
+        description=Description(
+            "new data per node and mission slot", unit="data units", symbol="lambda"
+        ),
     )
     quota: Integer = Field(
         440,
         ge=0,
         le=1_000_000,
-        description="communication slots that a UAV must fill (U_C); 0, with landing, for none: "
-        "UAVs work, and the mission lasts, until max_slots",
+        description=Description(
+            "communication slots that a UAV must fill",
+            symbol="U_C",
+            note="0, with landing, for none",
+            form="UAVs work, and the mission lasts, until max_slots",
+        ),
     )
 
     # Reward (Table III)
     reward_data: Reward = Field(
-        1.3, description="reward per data unit that the team collects (alpha)"
+        1.3, description=Description("reward per data unit that the team collects", symbol="alpha")
     )
     reward_overruled: Reward = Field(
-        -1.0, description="reward of an action that the safety controller overrules (beta)"
+        -1.0,
+        description=Description(
+            "reward of an action that the safety controller overrules", symbol="beta"
+        ),
     )
     reward_depleted: Reward = Field(
-        -300.0, description="reward of a UAV whose battery is empty before its quota is filled (nu)"
+        -300.0,
+        description=Description(
+            "reward of a UAV whose battery is empty before its quota is filled", symbol="nu"
+        ),
     )
-    reward_charging: Reward = Field(0.05, description="reward per charging slot (c)")
-    reward_quota: Reward = Field(100.0, description="reward of a UAV that fills its quota (omega)")
-    reward_step: Reward = Field(-0.1, description="reward per mission slot (zeta)")
+    reward_charging: Reward = Field(
+        0.05, description=Description("reward per charging slot", symbol="c")
+    )
+    reward_quota: Reward = Field(
+        100.0, description=Description("reward of a UAV that fills its quota", symbol="omega")
+    )
+    reward_step: Reward = Field(
+        -0.1, description=Description("reward per mission slot", symbol="zeta")
+    )
 
     # Beyond the paper; off by default
     arrivals: Arrivals = Arrivals.off()
@@ -207,7 +270,9 @@ class Fields(Strict):
     fleet: tuple[UavType, ...] = Field(
         (),
         max_length=MOST_UAVS,
-        description="types of UAVs: a table for each; UAV i has type i modulo their number",
+        description=Description(
+            "types of UAVs", form="a table for each; UAV i has type i modulo their number"
+        ),
     )
     data_sheet: DataSheet = DataSheet.off()
 

@@ -23,6 +23,7 @@ from pydantic import (
     model_validator,
 )
 
+from dess.base.descriptions import Description
 from dess.base.errors import InputError, check_type, form_of, shown, unknown_name, validated
 from dess.base.files.reading import Shipped, parse_toml
 from dess.physics.section import Integer, Section
@@ -158,13 +159,21 @@ class Scenario(Constants):
         InputError: From ``Scenario.of``, for unknown keys, wrong types and values out of range.
     """
 
-    uavs: Integer = Field(2, ge=1, description="number of UAVs (I)")
-    flying_time: Integer = Field(75, ge=1, le=100, description="battery at the start [%] (b(0))")
+    uavs: Integer = Field(2, ge=1, description=Description("number of UAVs", symbol="I"))
+    flying_time: Integer = Field(
+        75, ge=1, le=100, description=Description("battery at the start", unit="%", symbol="b(0)")
+    )
     charge_start: Integer = Field(
-        30, ge=10, le=100, description="battery at which charging may start [%] (C_S)"
+        30,
+        ge=10,
+        le=100,
+        description=Description("battery at which charging may start", unit="%", symbol="C_S"),
     )
     charge_complete: Integer = Field(
-        80, ge=10, le=100, description="battery at which charging ends [%] (C_C)"
+        80,
+        ge=10,
+        le=100,
+        description=Description("battery at which charging ends", unit="%", symbol="C_C"),
     )
 
 
@@ -178,16 +187,33 @@ class ScenarioSpace(Constants):
     other parameters do not change.
     """
 
-    uavs: IntegerRange = Field((1, 3), description="number of UAVs (I): an integer or [low, high]")
+    uavs: IntegerRange = Field(
+        (1, 3),
+        description=Description("number of UAVs", symbol="I", form="an integer or [low, high]"),
+    )
     flying_time: IntegerRange = Field(
-        (70, 80), description="battery at the start [%] (b(0)): an integer or [low, high]"
+        (70, 80),
+        description=Description(
+            "battery at the start", unit="%", symbol="b(0)", form="an integer or [low, high]"
+        ),
     )
     charge_start: IntegerRange = Field(
         (10, 50),
-        description="battery at which charging may start [%] (C_S): an integer or [low, high]",
+        description=Description(
+            "battery at which charging may start",
+            unit="%",
+            symbol="C_S",
+            form="an integer or [low, high]",
+        ),
     )
     charge_complete: IntegerRange = Field(
-        (60, 100), description="battery at which charging ends [%] (C_C): an integer or [low, high]"
+        (60, 100),
+        description=Description(
+            "battery at which charging ends",
+            unit="%",
+            symbol="C_C",
+            form="an integer or [low, high]",
+        ),
     )
 
     def scenario_at(self, **parameters: int) -> Scenario:
