@@ -16,7 +16,7 @@ nox.options.sessions = ["tests"]
 # The studies that the reports read, and the options of those whose default budget takes long. The
 # pages say what their studies were made with.
 STUDIES = {
-    "table4 fig1 fig4 sensitivity verification fig5-paper sweet-spot-paper": "",
+    "table4 fig1 fig4 sensitivity fig5-paper sweet-spot-paper": "",
     "pads": "--missions 200",
     "fig5": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
     "comparison failures": "--missions 400",

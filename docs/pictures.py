@@ -36,7 +36,7 @@ TEMPLATES = HERE.parent / "reports" / "templates"
 SIZE = (1280, 800)
 PAGES = (
     *("index", "mission", "performance", "learning", "parameters"),
-    *("comparison", "what-if", "own-sea", "explorer", "verification"),
+    *("comparison", "what-if", "own-sea", "explorer"),
 )
 # What the first screen of every page is made with.
 LOOK = (

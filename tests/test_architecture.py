@@ -32,7 +32,7 @@ ROOMS = {
     "analysis": (
         *("numbers", "names", "metrics", "stats", "tables", "bound", "study", "results"),
         *("execution", "figures", "answers.settings", "answers.fleet", "answers", "paper"),
-        *("verification", "ask"),
+        "ask",
     ),
     "reports": (
         *("pages", "player", "explorer", "crate"),

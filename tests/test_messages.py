@@ -18,7 +18,6 @@ from dess.analysis.answers.comparison import Times
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.results.resimulate import Evidence
 from dess.analysis.study.study import Study
-from dess.analysis.verification.measurements import CrossCheck
 from dess.base.files.documents import Document
 from dess.model.record import MISSION_RECORD
 from dess.policies.learner.checkpoint import Header
@@ -117,9 +116,6 @@ def tables() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
             "curve": [ROW | {f"evaluation_{metric}": 0.5 for metric in METRICS}],
         },
     )
-    mission = {"policy": "greedy", "replication": 0, "differs": ""}
-    lists = {"missions": [mission], "rates": [0.5], "slots": [0.5, 0.5]}
-    yield CrossCheck, {"study": "0" * 16} | lists
 
 
 FLOORS = ("dess", "policies", "analysis", "reports")

@@ -138,7 +138,7 @@ def _process_environment(home: Path) -> dict[str, str]:
     }
 
 
-COMPARISON, VERIFICATION = "comparison", "verification"  # names of the pages and of their studies
+COMPARISON = "comparison"  # the name of the page and of its study
 # The pages that show times of decisions, and their studies.
 TIMED = {COMPARISON: COMPARISON, "planner": "planning", "seas": "seas"}
 
@@ -160,11 +160,10 @@ def simulate_missing(
     Raises:
         InputError: If results are damaged, a parameter is refused or nothing can be written.
     """
-    if not {COMPARISON, VERIFICATION, *TIMED} & {*pages}:
+    if not {COMPARISON, *TIMED} & {*pages}:
         return  # what follows takes its time to import
     from dess.analysis.answers import comparison
     from dess.analysis.answers.missions import keep_logs
-    from dess.analysis.verification import measurements
 
     def show(done: int, total: int) -> None:
         if progress:
@@ -177,5 +176,3 @@ def simulate_missing(
         keep_logs(study, drawn, results, show)
     for page in TIMED.keys() & {*pages}:
         comparison.ensure_decision_times(results, load_results(results / TIMED[page]), show)
-    if VERIFICATION in pages:
-        measurements.ensure_cross_check(results, load_results(results / VERIFICATION), show)

@@ -32,7 +32,6 @@ GROUPS = {
     "Our sea, our fleet": ("own-sea", "sweep", "what-if", "pads", "failures", "age", "explorer"),
     "The policies": ("seas", "planner", "comparison", "mission", "learning"),
     "The paper": ("performance", SCORECARD, "parameters"),
-    "Is it right?": ("verification",),
 }
 NAMES = tuple(name for names in GROUPS.values() for name in names)
 LARGEST = 512 * 2**20  # bytes of a notebook with its outputs

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from dess.analysis import load_study, run_study
 from dess.analysis.answers.missions import FOLDER
-from dess.analysis.verification import measurements
 from dess.policies import registry
 from dess.reports.pages import kernels
 from dess.reports.pages.notebook import NAMES
@@ -77,9 +76,7 @@ def _make_reports(folder: Path) -> None:
     with quick():
         for name, changes in STUDIES.items():
             fewer = {key: min(value, 8) for key, value in changes.items() if key == "missions"}
-            study = run_study(load_study(name, **changes | fewer), folder / name)
-            if name == measurements.STUDY:
-                measurements.write(measurements.simulate_missions(study, 2), folder)
+            run_study(load_study(name, **changes | fewer), folder / name)
         kernels.simulate_missing(NAMES, folder, {})
 
 

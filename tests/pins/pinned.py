@@ -12,7 +12,11 @@ def pinned(name: str, text: str) -> None:
     A change that is meant renews the files: run the tests with ``DESS_WRITE_PINS=1``, and read the
     difference before it is committed.
     """
-    file = KEPT / name
+    check_kept(KEPT / name, text)
+
+
+def check_kept(file: Path, text: str) -> None:
+    """As ``pinned``, of a file that is kept elsewhere."""
     if os.environ.get("DESS_WRITE_PINS"):
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text, "utf-8")

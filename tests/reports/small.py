@@ -16,7 +16,6 @@ import pytest
 from dess.analysis import load_study, run_study
 from dess.analysis.bound import Bound
 from dess.analysis.execution import jobs
-from dess.analysis.verification import measurements
 from dess.policies.planner import Budget, Planner
 from dess.reports.pages import html
 from dess.reports.pages.notebook import Report, read_report
@@ -35,7 +34,6 @@ STUDIES: dict[str, dict[str, Any]] = {
     "table4": {"policies": POLICIES, "missions": 40},
     "fig1": {"missions": 8},
     "comparison": {"policies": POLICIES, "missions": 40},
-    "verification": {"missions": 200, "logged": 8},
     "fig4": {"policies": POLICIES, "missions": 8, "logged": 2},
     "fig5": {"policies": POLICIES, "missions": 8},
     "explorer": {"policies": POLICIES, "missions": 8, "design": _CORNERS},
@@ -87,15 +85,10 @@ def quick() -> Iterator[None]:
 
 
 def run_small_studies(folder: Path, *names: str) -> Path:
-    """Run the studies, all or some, each into a folder of its name.
-
-    Beside the study verification stand missions of its cross-check, fewer than a page has.
-    """
+    """Run the studies, all or some, each into a folder of its name."""
     for name in names or STUDIES:
         with quick():
-            study = run_study(load_study(name, **STUDIES[name]), folder / name)
-        if name == measurements.STUDY:
-            measurements.write(measurements.simulate_missions(study, 2), folder)
+            run_study(load_study(name, **STUDIES[name]), folder / name)
     return folder
 
 

@@ -9,13 +9,13 @@ import pytest
 import tomli_w
 
 from dess import InputError, load_scenario, simulate
-from dess.analysis.verification import closed_forms
 from dess.model.channel import world_of
 from dess.model.state import constants_of
 from dess.physics.wind import MOST, largest_wind, moves_in
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
 from tests.drawn import Script
+from tests.verification import closed_forms
 
 SHEET = {
     **{"endurance": "35 min", "cruise": "15 m/s", "charging": "40 min", "data_rate": "3 MB/h"},

@@ -13,7 +13,6 @@ from tests.fuzz.strategies.values import texts, toml_values
 _RESULTS = "out/results"
 # Folders that a report reads beside those of its studies.
 _BESIDE = {
-    "verification": (ready.KEPT, "fig4"),
     "comparison": (ready.KEPT,),
     "planner": (ready.KEPT,),
     "performance": ("gap",),

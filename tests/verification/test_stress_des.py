@@ -3,12 +3,15 @@
 import re
 from typing import Any
 
-from dess.analysis import load_study
+from dess.analysis import load_study, study_names
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.stats.intervals import LEVEL
-from dess.reports.pages import stress_des
 from dess.scenario.fields import GEOMETRY, LANDING, SECTIONS
 from dess.scenario.scenario import Scenario
+from tests.pins.pinned import check_kept
+from tests.verification import stress_des
+from tests.verification.page import DOCS
+from tests.verification.suite import STUDY
 
 # Another value of every field of the paper's scenario.
 OTHER: dict[str, Any] = {
@@ -44,13 +47,13 @@ OTHER: dict[str, Any] = {
 # What has numbers of its own: citations, mathematics, and names.
 CITED = re.compile(
     r"eq\. [\d-]+(, \d+)*|EAAI-22-4101|Philox 4x32-10|`[^`]*`|<sub>\d+</sub>|1 \+ SNR|time 0"
-    r"|from 0 on|^\d  |^### \d|^\*\*[\d.]+",
+    r"|from 0 on|^\d  |^## \d|^\*\*[\d.]+",
     re.M,
 )
 
 
 def manifest(**changes: Any) -> dict[str, Any]:
-    return Manifest.of(load_study("verification", **changes)).data
+    return Manifest.of(load_study(STUDY, **changes)).data
 
 
 def words(data: dict[str, Any], *others: dict[str, Any]) -> str:
@@ -58,12 +61,7 @@ def words(data: dict[str, Any], *others: dict[str, Any]) -> str:
     description = stress_des.describe_model(data, others)
     steps, *rest = description.overview
     texts = [*description.sections.values(), *rest, *(word for step in steps for word in step)]
-    return in_backticks("\n".join([*texts, *description.parameters["Value"]]))
-
-
-def in_backticks(text: str) -> str:
-    """Code in backticks, as it stands in the template."""
-    return re.sub("</?code>", "`", text)
+    return "\n".join([*texts, *description.parameters["Value"]])
 
 
 def test_every_input_parameter_is_in_the_table():
@@ -84,3 +82,9 @@ def test_no_number_of_the_model_is_typed():
         numbers.append(set(re.findall(r"\d+(?:[.,]\d+)*", text)))
     assert set.intersection(*numbers) == {f"{100 * LEVEL:g}"}
     assert all(len(of_scenario) > 30 for of_scenario in numbers)
+
+
+def test_the_page_of_the_docs_describes_the_shipped_studies():
+    """``DESS_WRITE_PINS=1`` writes it."""
+    others = [Manifest.of(load_study(name)).data for name in study_names() if name != STUDY]
+    check_kept(DOCS / "stress-des.md", stress_des.render_model(manifest(), others))

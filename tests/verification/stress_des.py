@@ -1,10 +1,10 @@
 """The description of the model by the STRESS-DES checklist, with the values of the studies.
 
 All sentences stand in the template ``stress_des.md``, with a heading per section of the checklist;
-this module passes numbers and lists to it:
+this module passes numbers and lists to it, and makes a page of the docs:
 
-    description = describe(results.manifest)
-    Markdown(description.sections["4"])
+    description = describe_model(manifest)
+    description.sections["4"]
 
 Monks, Currie, Onggo, Robinson, Kunc, Taylor (2019), "Strengthening the reporting of empirical
 simulation studies: Introducing the STRESS guidelines", Journal of Simulation 13(1), 55-67.
@@ -13,21 +13,29 @@ simulation studies: Introducing the STRESS guidelines", Journal of Simulation 13
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import metadata
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import pandas as pd
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from dess.analysis import numbers
 from dess.analysis.numbers import format_level
 from dess.analysis.stats.intervals import LEVEL
 from dess.model.events import EVENT_NAMES
-from dess.reports.pages.html import Marked, escape_text, fill_markdown, format_code, load_template
 from dess.scenario.fields import SAMPLED, fields_of
 from dess.scenario.scenario import Scenario, ScenarioSpace
+from tests.verification.page import markdown_table
 
 Manifest = Mapping[str, Any]
 
-_HEADING = re.compile(r"^(?=### )", re.M)
+_TITLE = """# The model by the STRESS-DES checklist
+
+The checklist of Monks and others (2019, *Strengthening the reporting of empirical simulation
+studies*, Journal of Simulation 13(1), 55-67). A test writes this page; every number in it is read
+from the scenario and the shipped studies."""
+
+_HEADING = re.compile(r"^(?=## )", re.M)
 
 
 class Description(NamedTuple):
@@ -37,7 +45,7 @@ class Description(NamedTuple):
         sections: The sections as Markdown, by their number: ``"1"`` to ``"6"``.
         studies: The studies, the table of item 1.3.
         overview: The order of events in a slot (Section III-C of the paper, item 2.1 of the
-            checklist), which ``verification.figures.plot_slot`` draws.
+            checklist): the names of the steps and what happens in each, then what follows.
         parameters: All input parameters with their values, the table of item 3.3.
     """
 
@@ -56,7 +64,6 @@ def describe_model(manifest: Manifest, others: Sequence[Manifest] = ()) -> Descr
     """
     space = ScenarioSpace.of(**manifest["scenario"])
     x, y, width, height = space.zone
-    libraries = dict(manifest["libraries"])
     about = metadata.metadata("dess")
     ranges = {field: getattr(space, field) for field in SAMPLED}
     values = {
@@ -67,38 +74,68 @@ def describe_model(manifest: Manifest, others: Sequence[Manifest] = ()) -> Descr
         "zone_x": (x, x + width - 1),
         "zone_y": (y, y + height - 1),
         "drawn": [
-            fill_markdown("{field} {span}", field=format_code(field), span=_format_span(ends))
+            f"{_format_code(field)} {_format_span(ends)}"
             for field, ends in ranges.items()
             if ends[0] < ends[1]
         ],
-        "swept": [format_code(field) for field in _find_swept_fields([manifest, *others])],
-        "policies": [format_code(name) for name in _find_policies([manifest, *others])],
-        "events": [format_code(name) for name in EVENT_NAMES],
+        "swept": [_format_code(field) for field in _find_swept_fields([manifest, *others])],
+        "policies": [_format_code(name) for name in _find_policies([manifest, *others])],
+        "events": [_format_code(name) for name in EVENT_NAMES],
         "level": format_level(LEVEL),
-        "python": libraries.pop("python"),
-        "libraries": [f"{library} {version}" for library, version in libraries.items()],
+        "libraries": [name for name in manifest["libraries"] if name != "python"],
         "licence": about["License-Expression"] or about["License"],
     }
-    page = load_template(
-        "stress_des.md",
-        words=_join_names,
-        code=format_code,
-        number=_format_number,
-        span=_format_span,
-        counted=_format_count,
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        trim_blocks=True,
+        undefined=StrictUndefined,
     )
-    module: Any = page.make_module(values)
-    sections = {part[4]: part.strip() for part in _HEADING.split(str(module)) if part.strip()}
+    environment.filters |= {
+        "words": numbers.join_words,
+        "code": _format_code,
+        "number": _format_number,
+        "span": _format_span,
+        "counted": _format_count,
+    }
+    module: Any = environment.get_template("stress_des.md").make_module(values)
+    sections = {part[3]: part.strip() for part in _HEADING.split(str(module)) if part.strip()}
     overview = module.steps, module.repeated, module.end
     studies = pd.DataFrame(_describe_study(of_study) for of_study in (manifest, *others))
     return Description(sections, studies, overview, _list_parameters(space))
 
 
-def _join_names(names: Iterable[str]) -> Marked:
-    """A list of names as ``a, b and c`` in Markdown."""
-    return Marked(
-        numbers.join_words([n if isinstance(n, Marked) else escape_text(n) for n in names])
-    )
+def _format_code(name: str) -> str:
+    return f"`{name}`"
+
+
+def render_model(manifest: Manifest, others: Sequence[Manifest]) -> str:
+    """The page of the docs that describes the model, as Markdown.
+
+    Args:
+        manifest: As for ``describe_model``.
+        others: As for ``describe_model``.
+    """
+    model = describe_model(manifest, others)
+    steps, repeated, end = model.overview
+    lines = [f"- **{name}**: {text}." for name, text in steps]
+    lines += [f"- {repeated[0].upper()}{repeated[1:]}.", f"- {end}."]
+    parts = [
+        _TITLE,
+        model.sections["1"],
+        _table_of(model.studies),
+        model.sections["2"],
+        "\n".join(
+            ["A mission slot:", "", *lines, f"- {repeated[0].upper()}{repeated[1:]}.", f"- {end}."]
+        ),
+        model.sections["3"],
+        _table_of(model.parameters),
+        *(model.sections[number] for number in "456"),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _table_of(frame: pd.DataFrame) -> str:
+    return markdown_table([*frame], frame.to_numpy().tolist())
 
 
 def _describe_study(manifest: Manifest) -> dict[str, str]:

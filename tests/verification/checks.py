@@ -1,10 +1,9 @@
-"""Checks of the simulator, the verdict on all of them together, and tests of whole distributions.
+"""Checks of the simulator, the verdict on each of them, and tests of whole distributions.
 
 A statistical check has a p-value; an exact check has an error and an upper bound of it::
 
-    checks = [z_check(CHANNEL, "Mean", known=0, estimate=0.1, error=0.2, n=50), ...]
+    checks = [Check.normal(CHANNEL, "Mean", known=0, estimate=0.1, error=0.2, n=50), ...]
     table = judge_checks(checks)
-    checks_summary(table)  # "**2 of 2 checks hold**. 1 is exact ..."
 """
 
 from collections.abc import Sequence
@@ -22,7 +21,7 @@ from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 ARRIVALS, CHANNEL, DRAWS, COVERAGE = "Arrivals", "Channel", "Draws", "Intervals"
 CONSERVATION, ENERGY, RECORDS = "Conservation", "Energy", "Records"
 REALISATIONS, ENGINES = "Realisations", "Engines"
-BOOKKEEPING = (CONSERVATION, ENERGY, RECORDS, REALISATIONS, ENGINES)
+TOPICS = (ARRIVALS, CHANNEL, CONSERVATION, ENERGY, RECORDS, REALISATIONS, ENGINES, DRAWS, COVERAGE)
 
 # The probability that any statistical check fails although the simulator is correct.
 ALPHA = 0.01
@@ -99,7 +98,7 @@ def judge_checks(checks: Sequence[Check], alpha: float = ALPHA) -> pd.DataFrame:
     """The verdicts on checks: by p-values corrected by Holm, and by the bounds of exact checks.
 
     Args:
-        checks: The checks of a page; their p-values are corrected together.
+        checks: All checks; their p-values are corrected together.
         alpha: Probability that any check is refuted although the simulator is correct.
 
     Returns:
@@ -115,26 +114,8 @@ def judge_checks(checks: Sequence[Check], alpha: float = ALPHA) -> pd.DataFrame:
     return table.assign(verdict=verdicts)
 
 
-def as_text(judged: pd.DataFrame) -> pd.DataFrame:
-    """The table on the page: a row of text per check.
-
-    Args:
-        judged: The result of ``judge_checks``.
-    """
-    return pd.DataFrame(
-        {
-            "Test": judged["test"],
-            "Verdict": judged["verdict"],
-            "Known": judged["known"],
-            "Seen": judged["seen"],
-            "p-value or error": [_reason_in_words(row) for _, row in judged.iterrows()],
-            "n": judged["n"].map("{:,}".format),
-        }
-    )
-
-
-def _reason_in_words(row: pd.Series) -> str:
-    """The p-value and its correction, or the error and its bound."""
+def reason_in_words(row: pd.Series) -> str:
+    """The p-value of a judged check and its correction, or its error and the bound."""
     if not np.isnan(row["p"]):
         adjusted = numbers.format_p_value(row["p_adjusted"])
         return f"p {numbers.format_p_value(row['p'])}, Holm {adjusted}"
@@ -143,68 +124,6 @@ def _reason_in_words(row: pd.Series) -> str:
     if not row["bound"]:
         return f"error {row['error']:g}"
     return f"error {row['error']:.2g}, allowed {row['bound']:.2g}"
-
-
-def checks_sentence(judged: pd.DataFrame) -> str:
-    """How many checks hold, in a sentence."""
-    holding, refuted = (len(_tests_with_verdict(judged, verdict)) for verdict in (HOLDS, REFUTED))
-    exact = judged["error"].count()
-    chance = judged["p"].count()
-    return (
-        f"{holding} of {len(judged)} comparisons with theory hold and {refuted} do not; {exact} "
-        f"are exact, {chance} are statistical."
-    )
-
-
-def checks_summary(judged: pd.DataFrame) -> str:
-    """A summary of all checks, as Markdown.
-
-    Args:
-        judged: The result of ``judge_checks``.
-    """
-    refuted, open_tests = (
-        _tests_with_verdict(judged, verdict) for verdict in (REFUTED, INCONCLUSIVE)
-    )
-    n = len(judged)
-    exact = judged["error"].count()
-    chance = judged["p"].count()
-    if refuted:
-        verdict = f"**{len(refuted)} of {n} checks do not hold**: {numbers.join_words(refuted)}."
-    else:
-        if open_tests:
-            others = "; the others are inconclusive."
-        else:
-            others = "."
-        verdict = f"**{len(_tests_with_verdict(judged, HOLDS))} of {n} checks hold**{others}"
-    few = ""
-    if open_tests:
-        few = f" Too few observations for: {numbers.join_words(open_tests)}."
-    alarm = f"any of them fails for at most one seed in {1 / ALPHA:.0f}"
-    return (
-        f"{verdict}{few} {exact} are exact. {chance} are statistical, judged at a level of "
-        f"{numbers.format_level(ALPHA)}: if the simulator is correct, {alarm}."
-    )
-
-
-def on_topics(judged: pd.DataFrame, *topics: str) -> str:
-    """How many checks of some topics hold, and which do not, as Markdown.
-
-    Args:
-        judged: The result of ``judge_checks``.
-        topics: Constants of this module.
-    """
-    rows = judged[judged["topic"].isin(topics)]
-    others = "".join(
-        f"; {verdict}: {numbers.join_words(tests)}"
-        for verdict in (REFUTED, INCONCLUSIVE)
-        if (tests := _tests_with_verdict(rows, verdict))
-    )
-    return f"**{len(_tests_with_verdict(rows, HOLDS))} of {len(rows)} checks hold**{others}."
-
-
-def _tests_with_verdict(judged: pd.DataFrame, verdict: str) -> list[str]:
-    """The names of the tests with a verdict."""
-    return judged.loc[judged["verdict"] == verdict, "test"].tolist()
 
 
 LEAST = 5.0  # expected observations that each class needs for the chi-square test to be accurate

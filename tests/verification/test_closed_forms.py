@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 
 from dess.analysis.stats.intervals import wilson_interval
-from dess.analysis.verification import closed_forms
 from dess.scenario.scenario import Scenario
+from tests.verification import closed_forms
 
 
 def test_initial_data_of_few_nodes_by_hand():

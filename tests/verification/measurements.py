@@ -1,40 +1,27 @@
-"""The missions that the page on verification compares: event logs, and missions simulated for it.
-
-``dess report`` simulates missions of the study ``verification`` again with the SimPy engine, and
-missions of a single UAV near a single node with both engines. The page reads them and simulates
-nothing::
-
-    ensure_cross_check("results", results)
-    missions = read_cross_check("results", results)
-    balances.engine_check(results, missions)
+"""What is compared with theory: event logs, and missions simulated for it.
 
 In a mission, UAVs serve the node with the highest SNR, so the data that they collect are not a
 random sample of the channel. With one node there is no choice, and the data of every communication
 slot are one random draw of the rate.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from functools import cached_property
-from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from dess import InputError, simulate, simulate_batch
-from dess.analysis.answers.missions import FOLDER, of_nodes
+from dess import simulate, simulate_batch
+from dess.analysis.answers.missions import of_nodes
 from dess.analysis.results import event_log
 from dess.analysis.results.resimulate import Mission, difference_in_words, stored_record
 from dess.analysis.results.tables import Results
-from dess.analysis.study.stopping import Text
-from dess.analysis.verification import closed_forms
-from dess.base.files.documents import Document, Outdated
-from dess.base.files.reading import Missing
-from dess.base.files.writing import check_target, write_file
 from dess.model.state import HOVER
 from dess.model.view import View
-from dess.policies.registry import load_team, python_files_in
+from dess.policies.registry import load_team
 from dess.scenario.scenario import ScenarioSpace
+from tests.verification import closed_forms
 
 
 class Log(Mission):
@@ -196,17 +183,10 @@ def _draws_per_distance(space: ScenarioSpace) -> int:
     return PER_DISTANCE * SLOTS * space.communication_slots
 
 
-STUDY = "verification"
-FILE = Path(FOLDER, "engines.json")  # in the folder of all results
 MISSIONS = 50  # missions of every policy to simulate again, spread over its replications
 
-# Called with the number of steps done and of all steps.
-Progress = Callable[[int, int], None]
 
-_ALLOWED = "what is made by: dess report verification"
-
-
-class SimulatedAgain(Document):
+class SimulatedAgain(NamedTuple):
     """A mission of a study, simulated again with the SimPy engine.
 
     Attributes:
@@ -215,118 +195,34 @@ class SimulatedAgain(Document):
         differs: In which fields the record differs from the stored one, in words; empty if in none.
     """
 
-    policy: Text
+    policy: str
     replication: int
     differs: str
 
 
-class CrossCheck(Document):
-    """Missions simulated in addition to those of a study.
-
-    Attributes:
-        study: The key of the study, a hash of all that its records depend on.
-        missions: Missions simulated again, each compared with its record in the study.
-        rates: The result of ``simulate_rates``.
-        slots: The result of ``simulate_slots``.
-    """
-
-    study: str
-    missions: list[SimulatedAgain]
-    rates: list[float]
-    slots: list[float]
-
-
-def simulate_missions(
-    results: Results, count: int = MISSIONS, progress: Progress | None = None
-) -> CrossCheck:
-    """Simulate the missions, and compare records; those of policies of Python files are left out.
+def simulate_again(results: Results, count: int = MISSIONS) -> list[SimulatedAgain]:
+    """Simulate missions of a study with the SimPy engine, and compare their records.
 
     Args:
         results: The results of the study.
         count: Missions of every policy to simulate again, all of them if there are fewer.
-        progress: Called after every mission.
     """
     space = results.scenario()
     seed = results.store.manifest.seed
-    teams = {name: load_team(name) for name in results.policies if not python_files_in(name)}
     missions = []
-    chosen = [*_missions_to_repeat(results, teams, count)]
-    for done, (policy, replication) in enumerate(chosen, 1):
-        record = simulate(space, teams[policy], seed, replication)
-        differs = difference_in_words(record, stored_record(results, policy, 0, replication))
-        missions.append(SimulatedAgain(policy=policy, replication=replication, differs=differs))
-        if progress:
-            progress(done, len(chosen))
-    return CrossCheck(
-        study=results.store.manifest.key,
-        missions=missions,
-        rates=simulate_rates(space, seed),
-        slots=simulate_slots(space, seed),
-    )
-
-
-def _missions_to_repeat(
-    results: Results, policies: Iterable[str], count: int
-) -> Iterator[tuple[str, int]]:
-    """The policies and replications of the missions to simulate again, at the first point."""
-    missions = results.missions[results.missions["point"] == 0]
-    for policy in policies:
-        replications = missions.loc[missions["policy"] == policy, "replication"].to_numpy()
-        rows = np.unique(np.linspace(0, len(replications) - 1, count).astype(int))
-        yield from ((policy, int(replication)) for replication in replications[rows])
-
-
-def ensure_cross_check(
-    folder: str | Path, results: Results, progress: Progress | None = None
-) -> None:
-    """Simulate the missions and write them, unless the folder has those of these results.
-
-    Args:
-        folder: A folder that contains a results folder per study.
-        results: The results of the study.
-        progress: Called after every mission.
-
-    Raises:
-        InputError: If those of the folder are damaged, or new ones cannot be written.
-    """
-    try:
-        read_cross_check(folder, results)
-    except (Missing, Outdated):
-        check_target(Path(folder) / FILE)
-        write(simulate_missions(results, progress=progress), folder)
-
-
-def write(missions: CrossCheck, folder: str | Path) -> Path:
-    """Write missions, in place of earlier ones, and return the file.
-
-    Args:
-        missions: The missions.
-        folder: A folder that contains a results folder per study.
-
-    Raises:
-        InputError: If it cannot be written.
-    """
-    path = Path(folder) / FILE
-    write_file(path, missions.model_dump_json(indent=1))
-    return path
-
-
-def read_cross_check(folder: str | Path, results: Results) -> CrossCheck:
-    """Read missions.
-
-    Args:
-        folder: A folder that contains a results folder per study.
-        results: The results of the study to which the missions must belong.
-
-    Raises:
-        Missing: If there are none.
-        Outdated: If they belong to other results.
-        InputError: If they are damaged.
-    """
-    path = Path(folder) / FILE
-    space = results.scenario()
-    key = results.store.manifest.key
-    missions = CrossCheck.load(path, _ALLOWED, fixed={"study": key})
-    if len(missions.rates) != len(offsets_of_node(space)):
-        raise InputError(f"{path}: rates", "are not those of the study", _ALLOWED)
+    for policy in results.policies:
+        team = load_team(policy)
+        for replication in _replications_to_repeat(results, policy, count):
+            record = simulate(space, team, seed, replication)
+            differs = difference_in_words(record, stored_record(results, policy, 0, replication))
+            missions.append(SimulatedAgain(policy, replication, differs))
     return missions
+
+
+def _replications_to_repeat(results: Results, policy: str, count: int) -> list[int]:
+    """The replications of the missions to simulate again, at the first point."""
+    missions = results.missions
+    chosen = missions[(missions["point"] == 0) & (missions["policy"] == policy)]
+    replications = chosen["replication"].to_numpy()
+    rows = np.unique(np.linspace(0, len(replications) - 1, count).astype(int))
+    return [int(replication) for replication in replications[rows]]

@@ -1,17 +1,18 @@
 """Exact checks: data and batteries balance, and logs add up to records."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from dess import InputError
-from dess.analysis.numbers import join_words
 from dess.analysis.results import event_log
-from dess.analysis.results.chunks import MANIFEST
-from dess.analysis.results.tables import Results, load_results
-from dess.analysis.verification.checks import (
+from dess.analysis.results.tables import Results
+from dess.model.state import EAST, NORTH, SOUTH, WEST
+from dess.physics.fleet import type_of
+from dess.physics.wind import surcharges
+from dess.scenario.fields import SAMPLED
+from dess.scenario.scenario import Scenario
+from tests.verification.checks import (
     CONSERVATION,
     ENERGY,
     ENGINES,
@@ -19,36 +20,11 @@ from dess.analysis.verification.checks import (
     RECORDS,
     Check,
 )
-from dess.analysis.verification.measurements import CrossCheck, Log, longest_logs
-from dess.base.files.reading import paths_in
-from dess.model.state import EAST, NORTH, SOUTH, WEST
-from dess.physics.fleet import type_of
-from dess.physics.wind import surcharges
-from dess.scenario.fields import SAMPLED
-from dess.scenario.scenario import Scenario
+from tests.verification.measurements import Log, SimulatedAgain, longest_logs
 
 EPSILON = np.finfo(float).eps
 
 _KEPT = "initial + arrived = collected + residual (+ lost)"
-
-
-def studies_in(folder: Path, *, but: str = "") -> tuple[dict[str, Results], list[str]]:
-    """The results of all studies in a folder, and the names of those that cannot be loaded.
-
-    Args:
-        folder: A folder that contains a results folder per study.
-        but: A study to leave out.
-    """
-    loaded = {}
-    damaged = []
-    for path in paths_in(folder, f"*/{MANIFEST}"):
-        name = path.parent.name
-        if name != but:
-            try:
-                loaded[name] = load_results(path.parent)
-            except InputError:
-                damaged.append(name)
-    return loaded, damaged
 
 
 def conservation_check(studies: Mapping[str, Results]) -> Check:
@@ -247,18 +223,15 @@ def _same_realisation(log: Log, other: Log) -> bool:
     )
 
 
-def engine_check(results: Results, again: CrossCheck) -> Check:
+def engine_check(results: Results, again: Sequence[SimulatedAgain]) -> Check:
     """Check that missions of a study are the same, bit for bit, by the SimPy engine.
 
     Args:
         results: The results of a study that the batch engine simulated.
         again: Some of its missions, simulated again with the SimPy engine.
     """
-    n = len(again.missions)
-    differing = sum(bool(mission.differs) for mission in again.missions)
+    n = len(again)
+    differing = sum(bool(mission.differs) for mission in again)
     seen = f"{n - differing:,} of {n:,} missions"
-    test = f"Record of the {results.manifest['study']['engine']} engine, simulated again with SimPy"
-    simulated = {mission.policy for mission in again.missions}
-    if left_out := [policy for policy in results.policies if policy not in simulated]:
-        test += f"; not simulated again: {join_words(left_out)}"
+    test = f"Record of the {results.study.engine} engine, simulated again with SimPy"
     return Check.exact(ENGINES, test, "equal, bit for bit", seen, n, differing)

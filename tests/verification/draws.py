@@ -11,8 +11,12 @@ from scipy import special, stats
 from dess.analysis.names import field_named
 from dess.analysis.numbers import format_decimals, format_interval, format_minus
 from dess.analysis.stats.intervals import Interval, mean_interval, wilson_interval
-from dess.analysis.verification import closed_forms
-from dess.analysis.verification.checks import (
+from dess.physics import streams
+from dess.physics.fleet import type_of
+from dess.scenario.fields import SAMPLED
+from dess.scenario.scenario import ScenarioSpace
+from tests.verification import closed_forms
+from tests.verification.checks import (
     ARRIVALS,
     CHANNEL,
     COVERAGE,
@@ -24,11 +28,7 @@ from dess.analysis.verification.checks import (
     poisson_fit,
     uniform_fit,
 )
-from dess.analysis.verification.measurements import Log
-from dess.physics import streams
-from dess.physics.fleet import type_of
-from dess.scenario.fields import SAMPLED
-from dess.scenario.scenario import ScenarioSpace
+from tests.verification.measurements import Log
 
 _FEWEST = 30  # with this many values or more, their sum is taken as normal
 
@@ -354,7 +354,7 @@ def coverage_check(metric: str, values: np.ndarray, size: int, share: bool) -> C
     """Compare the observed coverage of the blocks' intervals with the known coverage.
 
     Args:
-        metric: The name of the metric on the page.
+        metric: The name of the metric.
         values: (n,) a metric of missions; those after the last complete block are left out.
         size: Number of missions in a block.
         share: Whether the metric is 0 or 1 in each mission.

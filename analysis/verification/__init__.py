@@ -1,1 +1,0 @@
-"""Verification of the simulator against exact theory: statistical checks and exact checks."""
