@@ -37,14 +37,7 @@ from dess.physics import age, fleet, streams, wind
 from dess.physics.charging import gain, is_before, share_power
 from dess.physics.chart import is_open
 from dess.physics.failures import strike_if_on, take_pad, working_pads
-from dess.physics.landing import (
-    flies,
-    has_filled,
-    has_landed,
-    is_over,
-    lands,
-    stands,
-)
+from dess.physics.landing import flies, has_finished, is_over, lands, next_latch, stands
 from dess.physics.section import for_sections
 
 
@@ -121,18 +114,8 @@ def _start_place(mission, i):
 
 @inlined
 def _update_latch(mission, u):
-    """Set or clear the charging latch iota (eq. 3) by the battery at the start of a slot.
-
-    In missions that end on the ground, every UAV may charge that is not charged and has not filled
-    its quota.
-    """
-    if lands(mission):
-        u.latch = u.battery < mission.charge_complete and not has_filled(u)
-        return
-    if u.battery <= mission.charge_start:
-        u.latch = True
-    if u.battery >= mission.charge_complete:
-        u.latch = False
+    """Set or clear the charging latch iota (eq. 3) by the battery at the start of a slot."""
+    u.latch = next_latch(mission, u.latch, u.battery, u.quota, u.communications)
 
 
 @inlined
@@ -426,10 +409,9 @@ def settle(mission, uavs):
         u.reward = 0.0
         if not u.active:
             continue
-        if lands(mission) and has_landed(mission, u):
-            u.end = LANDED
-        elif not lands(mission) and u.communications >= u.quota:
-            u.end = QUOTA
+        is_on_ground = u.charging or stands(mission, u)
+        if has_finished(mission, mission.slot, is_on_ground, u.quota, u.communications):
+            u.end = LANDED if lands(mission) else QUOTA
         elif u.battery <= 0:
             u.end = BATTERY
         elif mission.slot >= mission.max_slots:

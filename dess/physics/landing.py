@@ -1,6 +1,7 @@
 """Missions that end on the ground: where a UAV stands, and when it has landed.
 
-A UAV that hovers on a zone cell stands: it spends nothing and serves no node.
+A UAV that hovers on a zone cell stands: it spends nothing and serves no node. The rules that take
+numbers in place of a UAV are those of the planner as well, whose UAVs are other records.
 """
 
 from dess.base.kernels import inlined
@@ -26,21 +27,51 @@ def stands(mission, u):
 
 
 @inlined
-def has_filled(u):
+def has_filled(quota, communications):
     """Whether a UAV has a quota, and has filled it."""
-    return u.quota > 0 and u.communications >= u.quota
+    return quota > 0 and communications >= quota
 
 
 @inlined
-def has_landed(mission, u):
-    """Whether a UAV has landed with the present slot, which ``mission.slot`` counts already.
+def has_finished(mission, slots, is_on_ground, quota, communications):
+    """Whether a UAV has done its work with the present slot.
 
-    A UAV that has filled its quota lands where it stands. One without a quota works to the last
-    slot of the mission, and must be on the ground then.
+    In missions that end on the ground it has landed then: with a filled quota where it stands or
+    charges; without a quota it works to the last slot of the mission, and must be on the ground.
+
+    Args:
+        mission: ``MISSION`` record.
+        slots: The slots of the mission so far, the present one included.
+        is_on_ground: Whether the UAV stands or charges.
+        quota: Its quota [communication slots].
+        communications: The communication slots that it has filled.
     """
-    if not (u.charging or stands(mission, u)):
+    if not lands(mission):
+        return communications >= quota
+    if not is_on_ground:
         return False
-    return has_filled(u) or (u.quota == 0 and mission.slot >= mission.max_slots)
+    return has_filled(quota, communications) or (quota == 0 and slots >= mission.max_slots)
+
+
+@inlined
+def next_latch(mission, latch, battery, quota, communications):
+    """The charging latch iota (eq. 3) by the battery at the start of a slot.
+
+    In missions that end on the ground, every UAV may charge that is not charged and has not filled
+    its quota.
+
+    Args:
+        mission: ``MISSION`` record.
+        latch: The latch in the slot before.
+        battery: The battery [%].
+        quota: The quota of the UAV [communication slots].
+        communications: The communication slots that it has filled.
+    """
+    if lands(mission):
+        return battery < mission.charge_complete and not has_filled(quota, communications)
+    if battery >= mission.charge_complete:
+        return False
+    return battery <= mission.charge_start or latch != 0
 
 
 @for_sections

@@ -28,7 +28,7 @@ from dess.physics.charging import gain
 from dess.physics.chart import distance, in_zone, is_open
 from dess.physics.failures import working_pads
 from dess.physics.fleet import leg
-from dess.physics.landing import lands
+from dess.physics.landing import has_finished, lands, next_latch
 from dess.physics.radio import has_range
 from dess.physics.section import for_sections
 
@@ -297,7 +297,7 @@ def simulate_flight(mission, rates, plan, source, first, flight, slots, lag):
             if v.charging == 0 and not _stands_on_ground(mission, rates.chart, v):
                 left = present + arriving * t - collected
                 collected += _collect_data(mission, rates, sea, v, t, wait, left)
-            penalty += _end_slot(mission, rates.chart, v)
+            penalty += _end_slot(mission, rates.chart, v, t)
             if v.charging != 0 and v.latch == 0:
                 v.charging = 0
                 if v.next < v.waypoints and waypoints[i, v.next].stay == CHARGE:
@@ -517,23 +517,17 @@ def _begin_to_charge(mission, v, active):
 
 
 @inlined
-def _end_slot(mission, chart, v):
-    """End the slot of a UAV, and return the penalty if its battery is depleted."""
+def _end_slot(mission, chart, v, t):
+    """End slot ``t`` of a UAV, and return the penalty if its battery is depleted."""
     penalty = 0.0
-    has_landed = _has_filled(v) and _stands_on_ground(mission, chart, v)
-    if has_landed or (v.counted >= v.quota and not lands(mission)):
+    is_on_ground = v.charging != 0 or _stands_on_ground(mission, chart, v)
+    if has_finished(mission, mission.slot + t + 1, is_on_ground, v.quota, v.counted):
         v.active = v.charging = 0
     elif v.battery <= 0:
         lacking = max(v.quota - v.counted, 0) / mission.communication_slots
         penalty = _DEPLETED + _SLOT_MISSED * lacking
         v.active = v.charging = 0
-    if lands(mission):
-        v.latch = v.battery < mission.charge_complete and not _has_filled(v)
-        return penalty
-    if v.battery <= mission.charge_start:
-        v.latch = 1
-    if v.battery >= mission.charge_complete:
-        v.latch = 0
+    v.latch = next_latch(mission, v.latch, v.battery, v.quota, v.counted)
     return penalty
 
 
@@ -541,11 +535,6 @@ def _end_slot(mission, chart, v):
 def _stands_on_ground(mission, chart, v):
     """Whether a UAV stands on the ground (``dess.physics.landing``)."""
     return lands(mission) and v.charging == 0 and v.action == HOVER and in_zone(chart, v.x, v.y)
-
-
-@inlined
-def _has_filled(v):
-    return v.quota > 0 and v.counted >= v.quota
 
 
 @inlined
