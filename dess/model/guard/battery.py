@@ -13,6 +13,8 @@ MARGIN_PER_TEAMMATE = 2
 # Data [data units] that a UAV collects in a slot near an average node, and the communication slots
 # that each UAV can fill with a data unit that arrives at an empty sea.
 MEAN_RATE, SLOTS_PER_PACKET = 0.3, 1.0
+# The same [data units] of UAVs that collect the last data of a sea together.
+LARGE_RATE = 0.6
 # Margin [slots] for the quota when little data is left, as some slots may find no data to collect.
 SCARCE_SLOTS = 6
 # Further margin [slots] of a UAV with teammates in missions that end on the ground.
@@ -44,14 +46,29 @@ def slots_expected(mission, u, data):
     needed = slots_needed(mission, u)
     if has_range(mission):
         return mission.max_slots
-    if data >= MEAN_RATE * needed * mission.active:
+    rate = _rate(mission, u)
+    if data >= rate * needed:
         return needed
-    served = data / (MEAN_RATE * mission.active)
+    served = data / rate
     arriving = SLOTS_PER_PACKET * mission.arrival_rate * mission.nodes
     share = min(arriving / mission.communication_slots, 1.0)
     if (needed - served) >= share * mission.max_slots:
         return mission.max_slots
     return int(math.ceil(served + (needed - served) / share)) + SCARCE_SLOTS
+
+
+@inlined
+def _rate(mission, u):
+    """The data units that all UAVs together may collect in a slot.
+
+    At or below C_S, a UAV that waits for data in vain may not come home any more. So there it
+    expects that the UAVs collect as fast as until now, up to ``LARGE_RATE`` each.
+    """
+    rate = MEAN_RATE * mission.active
+    if not u.latch:
+        return rate
+    before = mission.collected / max(mission.slot, 1)
+    return min(max(rate, before), LARGE_RATE * mission.active)
 
 
 @inlined

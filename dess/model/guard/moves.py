@@ -10,6 +10,7 @@ from dess.model.guard.ways import battery_home, is_parked
 from dess.model.rules import data_left
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
+from dess.physics.charging import slots_to_charge
 from dess.physics.chart import distance, in_zone, is_open
 from dess.physics.landing import lands
 from dess.physics.wind import is_calm, move_surcharge, reach_of
@@ -51,13 +52,47 @@ def contest(levels, action):
 
 
 @inlined
-def _is_in_the_way(mission, uavs, i):
-    """Whether UAV ``i`` has just overruled a teammate that must charge and has less battery."""
+def _ceded(mission, uavs, i):
+    """The actions of UAV ``i`` that may hinder teammates with less battery which come to charge.
+
+    Returns:
+        A bit for each action.
+    """
+    u = uavs[i]
+    actions = 0
     for j in range(mission.uavs):
         o = uavs[j]
-        blocked = o.overruled and o.overruled_by == i and o.battery < uavs[i].battery
-        if blocked and will_charge(mission, o):
-            return True
+        east, south = o.x - u.x, o.y - u.y
+        goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
+        if j == i or not goes_first or abs(east) + abs(south) > 2:
+            continue
+        if not o.latch or not will_charge(mission, o) or is_parked(mission, o):
+            continue
+        for action in range(5):
+            slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
+            if slots <= 1:
+                actions |= 1 << action
+    return actions
+
+
+@inlined
+def _is_in_the_way(mission, uavs, i):
+    """Whether UAV ``i`` has just overruled a teammate that must charge and has less battery.
+
+    Or it has overruled one that could not leave its cell for such a teammate, and so on.
+    """
+    for j in range(mission.uavs):
+        if uavs[j].battery >= uavs[i].battery or not will_charge(mission, uavs[j]):
+            continue
+        blocked = j
+        for _ in range(mission.uavs):
+            if not uavs[blocked].active or not uavs[blocked].overruled:
+                break
+            blocked = uavs[blocked].overruled_by
+            if blocked == i:
+                return True
+            if blocked < 0:
+                break
     return False
 
 
@@ -90,9 +125,9 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         return 1 << HOVER  # it would lose its place in the queue, or on the ground
     reserve = margin(mission, u) + home.wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
-    # that lead nearest to the parking cell, and those after which it is reached if the margin and
-    # the slots for a pad are spent.
-    clear = nearest = in_time = 0
+    # that lead nearest to the parking cell, those after which it is reached if the margin and the
+    # slots for a pad are spent, and those that lead to a cell that no teammate contests.
+    clear = nearest = in_time = empty = 0
     least = 1_000_000  # battery [%] that lacks on the way to the parking cell
     fewest = 1_000_000  # battery [%] that a move and the way from there need
     levels = contests(mission, uavs, i)
@@ -111,12 +146,15 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
             kept = reserve
             if not is_calm(reach) and home.cells > 0:
                 # The cheapest way may lead through a parked teammate; a move must do as well.
-                needed = max(needed, fewest + 1) if action == HOVER else needed
+                if action == HOVER and not _is_shut_out(mission, u, chart, home):
+                    needed = max(needed, fewest + 1)
                 fewest = min(fewest, needed)
                 kept = max(kept, _wait(mission, u, chart, action, x, y, home))
             # One slot is the charging slot itself; the battery must not be depleted before it.
             late = max(needed + 1 + kept - slots_left(mission, u), 0)
         bit = 1 << action
+        if contested == 0:
+            empty |= bit
         if contested < 2:
             clear |= bit
         if late <= reserve:
@@ -125,17 +163,26 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
             least, nearest = late, 0
         if late == least:
             nearest |= bit
+    elsewhere = nearest & ~(1 << HOVER)
+    if elsewhere and not is_parked(mission, u) and _is_in_the_way(mission, uavs, i):
+        # a teammate may stay where it is, unless it is told to leave its cell, too
+        leaves = elsewhere & empty or elsewhere & clear
+        if not leaves and mission.slot % 2 == 1:  # in the other slots, it lets them go first
+            leaves = elsewhere & ~_ceded(mission, uavs, i)
+        if leaves:
+            return leaves
+    if nearest & empty and least == 0 and u.overruled:
+        return nearest & empty
     if nearest & clear and (least > 0 or u.overruled):
         return nearest & clear
-    elsewhere = nearest & clear & ~(1 << HOVER)
-    if elsewhere and not is_parked(mission, u) and _is_in_the_way(mission, uavs, i):
-        return elsewhere
     if least > 0 and clear & in_time:
         # these slots are there to wait or step aside until the teammate has passed
         return clear & in_time
     # Two UAVs that both insist block each other: the one without the right of way waits a slot.
     if u.overruled and not nearest & clear and (least > 0 or nearest >> HOVER & 1):
         return 1 << HOVER
+    if least == 0 and levels > 0:
+        nearest = nearest & ~_ceded(mission, uavs, i) or nearest
     return nearest or 1 << HOVER  # who gives way may have nowhere to go
 
 
@@ -143,6 +190,13 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
 def called_safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     """``safe_moves`` as a function that is called, not inlined: its code is long to compile."""
     return safe_moves(mission, uavs, i, chart, charge, home, planned, reach)
+
+
+@inlined
+def _is_shut_out(mission, u, chart, home):
+    """Whether UAV ``u`` can only wait until a teammate has charged that is parked on its way."""
+    detour = home.cells - distance(chart, u.x, u.y, home.x, home.y)
+    return detour >= slots_to_charge(mission, mission.charge_complete - mission.charge_start)
 
 
 @inlined

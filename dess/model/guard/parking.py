@@ -5,20 +5,26 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel
+from dess.model.guard.battery import slots_left
 from dess.model.guard.queues import QUEUE, TURN, Plan, may_wait, plan_pads, waits_in_zone
 from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
 from dess.physics.chart import distance
 from dess.physics.failures import working_pads
+from dess.physics.landing import lands
 from dess.physics.section import for_sections
 from dess.physics.wind import is_calm
 from dess.scenario.fields import MOST_ZONES
+
+# What teammates do with a zone cell: nothing; one is on it that may leave it, as it is not parked;
+# one takes it.
+_FREE, _OCCUPIED, _TAKEN = range(3)
 
 
 class Parking(NamedTuple):
     """Working memory of ``parking_cell``.
 
     Attributes:
-        taken: (zone cells,) whether a teammate takes the cell.
+        taken: (zone cells,) whether a cell is ``_FREE``, ``_OCCUPIED`` or ``_TAKEN``.
         planned: (I,) the zone cell of each teammate that chooses before the UAV, or -1.
         order: (I,) the UAVs in the order in which they choose.
         plan: The plan of pads; its zones are -1 where no UAV may have to wait for a pad.
@@ -54,7 +60,7 @@ class Home(NamedTuple):
 def parking_memory(chart, uavs):
     """Working memory for missions with so many UAVs."""
     return Parking(
-        np.empty(len(chart.parking), np.bool_),
+        np.empty(len(chart.parking), np.int64),
         np.empty(uavs, np.int64),
         np.empty(uavs, np.int64),
         Plan(np.empty(uavs, TURN), np.empty(MOST_ZONES, QUEUE)),
@@ -157,13 +163,15 @@ def _choose(mission, uavs, i, chart, memory, reach):
         The ``Home``, without waits; the UAV's own cell if all are taken.
     """
     u, taken = uavs[i], memory.taken
-    taken[:] = False
+    taken[:] = _FREE
     for j in range(mission.uavs):
         o = uavs[j]
         memory.planned[j] = -1
-        keeps = is_parked(mission, o) or waits_in_zone(mission, o)
-        if o.active and o.zone >= 0 and (j == i or keeps or not is_crowded(mission, chart, o.zone)):
-            taken[chart.nearest[o.y, o.x]] = True
+        if not o.active or o.zone < 0:
+            continue
+        stands = j == i or is_parked(mission, o) or waits_in_zone(mission, o)
+        keeps = stands or not is_crowded(mission, chart, o.zone)
+        taken[chart.nearest[o.y, o.x]] = _TAKEN if keeps else _OCCUPIED
     for place in range(_sort(mission, uavs, memory.plan.turns, memory.order)):
         j = memory.order[place]
         o = uavs[j]
@@ -175,7 +183,7 @@ def _choose(mission, uavs, i, chart, memory, reach):
                 break
             return _home(chart.parking[cell, 0], chart.parking[cell, 1], cells)
         if cell >= 0:
-            taken[cell] = True
+            taken[cell] = _TAKEN
             memory.planned[j] = cell
     return stays(u)
 
@@ -184,31 +192,50 @@ def _choose(mission, uavs, i, chart, memory, reach):
 def _soonest_free(mission, uavs, i, chart, memory, reach):
     """The number of the best parking cell that is not taken (-1 if none), and the way to it.
 
-    It is in the zone that the plan of pads tells, unless this is full.
+    It is in the zone that the plan of pads tells, unless this is full. A mission may end on the
+    ground before a teammate has left its cell, so there a UAV counts on the cells of teammates only
+    if no other is in reach.
     """
     u, zone = uavs[i], memory.plan.turns[i].zone
+    most = _FREE if lands(mission) else _OCCUPIED
     # The nearest cell of all is free most of the time, so this one is tried first.
     cell = np.int64(chart.nearest[u.y, u.x])
     x, y = chart.parking[cell, 0], chart.parking[cell, 1]
     cells, nearest_zone = distance(chart, u.x, u.y, x, y), np.int64(chart.zones[y, x])
-    free = (cells == 0 or not memory.taken[cell]) and not _is_given_up(mission, nearest_zone)
+    free = (cells == 0 or memory.taken[cell] <= most) and not _is_given_up(mission, nearest_zone)
     free = free and is_calm(reach) and (zone < 0 or zone == nearest_zone)
     if free and path_length(mission, uavs, i, chart, None, u.x, u.y, x, y) == cells:
         return cell, cells
-    cell, cells = _best_cell(mission, uavs, i, zone, chart, memory, reach)
-    if cell < 0 and zone >= 0:
-        cell, cells = _best_cell(mission, uavs, i, -1, chart, memory, reach)
+    cell, cells, spent = _best_cell(mission, uavs, i, zone, most, chart, memory, reach)
+    is_in_reach = cell >= 0 and (not lands(mission) or spent < slots_left(mission, u))
+    if not is_in_reach and (zone >= 0 or lands(mission)):
+        cell, cells, spent = _best_cell(mission, uavs, i, -1, _OCCUPIED, chart, memory, reach)
     return cell, cells
 
 
 @kernel
-def _best_cell(mission, uavs, i, only, chart, memory, reach):
-    """The free cell of one zone, or of all (-1), that takes least battery; -1 if none is free."""
+def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
+    """The cell of one zone, or of all (-1), that takes least battery.
+
+    Args:
+        mission: ``MISSION`` record.
+        uavs: (I,) ``UAV`` records.
+        i: Index of the UAV.
+        only: The zone, or -1.
+        most: ``_FREE`` for a cell without a teammate, or ``_OCCUPIED``.
+        chart: ``Chart``.
+        memory: ``parking_memory``.
+        reach: The table of ``reach_of``.
+
+    Returns:
+        The number of the cell, -1 if there is none; the way to it [cells]; the battery [%] for it.
+    """
     u, best, best_zone, way, least = uavs[i], -1, -1, -1, -1
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
-        if (memory.taken[cell] and not (u.x == x and u.y == y)) or _is_given_up(mission, zone):
+        is_elsewhere = u.x != x or u.y != y
+        if (memory.taken[cell] > most and is_elsewhere) or _is_given_up(mission, zone):
             continue
         # no detour makes a cell better than a nearer one of the same zone
         is_far = zone == best_zone and distance(chart, u.x, u.y, x, y) >= way
@@ -218,7 +245,7 @@ def _best_cell(mission, uavs, i, only, chart, memory, reach):
         spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach)
         if best < 0 or spent < least or (spent == least and cells < way):
             best, best_zone, way, least = cell, zone, cells, spent
-    return best, way
+    return best, way, least
 
 
 @for_sections

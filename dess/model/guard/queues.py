@@ -88,7 +88,7 @@ def waits_in_zone(mission, u):
 
     It hardly ever moves on, so it keeps its cell, and keeps no teammate out of the cells beside it.
     """
-    if not u.active or u.zone < 0 or u.executed != HOVER or lands(mission):
+    if not u.active or u.zone < 0 or u.executed != HOVER or u.overruled or lands(mission):
         return False
     return mission.plans_waits and mission.uavs > mission.zone_pads[u.zone]
 

@@ -7,7 +7,6 @@ from dess.model.guard.battery import ends_soon, lasts
 from dess.physics.charging import slots_to_charge
 from dess.physics.chart import distance, length_around
 from dess.physics.landing import lands
-from dess.physics.wind import is_calm
 
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
 CELLS_PER_UAV = 4
@@ -104,9 +103,10 @@ def battery_home(mission, uavs, i, chart, planned, x, y, home, reach):
         reach: The table of ``reach_of``. A detour around parked teammates is not in it; each of
             its cells may cost the most.
     """
-    if is_calm(reach) and is_crowded(mission, chart, chart.zones[home.y, home.x]):
-        return path_length(mission, uavs, i, chart, planned, x, y, home.x, home.y)
-    cells = path_length(mission, uavs, i, chart, None, x, y, home.x, home.y)
+    if is_crowded(mission, chart, chart.zones[home.y, home.x]):
+        cells = path_length(mission, uavs, i, chart, planned, x, y, home.x, home.y)
+    else:
+        cells = path_length(mission, uavs, i, chart, None, x, y, home.x, home.y)
     return battery_of_way(mission, uavs[i], chart, x, y, home.x, home.y, cells, reach)
 
 

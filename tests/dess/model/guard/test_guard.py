@@ -71,6 +71,46 @@ def test_who_has_been_overruled_leaves_contested_cells_to_the_right_of_way():
     assert collided[1, [EAST, SOUTH, WEST, HOVER]].all()
 
 
+# --- teammates that block each other ---
+
+# A UAV, and one north of it that must charge and has just been overruled by it.
+IN_THE_WAY: dict[str, Any] = {"x": 10, "y": 10, "battery": 70}
+BLOCKED = {"x": 10, "y": 9, "battery": 20, "overruled": True, "overruled_by": 0}
+EASTERN: dict[str, Any] = {"x": 11, "y": 10, "battery": 80}
+OVERRULED = {"overruled": True, "overruled_by": 2}
+# Two UAVs that come home with equal batteries; the first has the right of way.
+NORTHERN, SOUTHERN = ({"x": 20 + k, "y": 10 + k, "battery": 29, "latch": True} for k in (0, 1))
+# A UAV that hovers in a zone with one pad, and one that the way to its goal leads past.
+CHARGED: dict[str, Any] = {"x": 27, "y": 3, "battery": 50, "executed": HOVER}
+BESIDE = {"x": 27, "y": 5, "battery": 60, "overruled": True, "overruled_by": 0}
+
+
+@pytest.mark.parametrize(
+    ("i", "uavs", "moves"),
+    [
+        # Who has been overruled does not insist on a cell where a teammate stays.
+        (0, [IN_THE_WAY | OVERRULED, {"x": 11, "y": 10, "battery": 80}], [0, 2, 3, 4]),
+        # Who is in the way leaves its cell, and not to one where a teammate stays.
+        (0, [IN_THE_WAY, BLOCKED, EASTERN], [SOUTH, WEST]),
+        (0, [IN_THE_WAY | OVERRULED, BLOCKED, EASTERN], [SOUTH, WEST]),
+        # Who keeps it from leaving leaves its cell, too.
+        (2, [IN_THE_WAY | OVERRULED, BLOCKED, EASTERN], [EAST, SOUTH]),
+        # A UAV with time left does not cross the way of one that comes to charge.
+        (1, [NORTHERN, SOUTHERN], [EAST, SOUTH, HOVER]),
+        (1, [NORTHERN | {"latch": False, "battery": 31}, SOUTHERN | {"battery": 32}], [*range(5)]),
+    ],
+)
+def test_a_uav_makes_room_for_one_that_must_charge(i, uavs, moves):
+    assert np.nonzero(_mask(*uavs)[i])[0].tolist() == moves
+
+
+def test_a_uav_whose_move_was_overruled_does_not_wait_in_its_zone():
+    """It will try again, so the cells beside it are not left to its teammate."""
+    for overruled in (False, True):
+        mask = _mask(CHARGED | {"overruled": overruled}, BESIDE, pads=1)
+        assert mask[1, NORTH] == (not overruled)
+
+
 # --- islands and zones ---
 
 ROW = [[x, 5] for x in range(17, 24)]  # 4 cells around either end
@@ -115,6 +155,14 @@ def test_a_uav_charges_at_the_cell_where_it_can_soonest(uavs, scenario, home):
     assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[:3] == home
 
 
+@pytest.mark.parametrize(("battery", "home"), [(60, (26, 4, 6)), (5, (20, 8, 4))])
+def test_where_missions_end_on_the_ground_a_uav_counts_on_no_cell_of_a_teammate(battery, home):
+    """Unless it reaches no other: the teammate is charged, and may leave its cell or not."""
+    uavs = [HERE | {"battery": battery}, THERE | {"battery": 90, "latch": False}]
+    state, chart = placed(uavs, **NEAR, landing=True)
+    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[:3] == home
+
+
 def test_the_battery_to_a_zone_farther_than_the_nearest_is_that_of_the_way_there():
     for uavs, needed in (([HERE, {}], 8), ([HERE, THERE], 12)):  # two slots per cell
         states = compact_states(*placed(uavs, **NEAR, fleet=[{"slots_per_cell": 2}]), True)
@@ -140,6 +188,28 @@ def test_two_parked_teammates_side_by_side_are_flown_around():
     side_by_side = [{"x": x, "y": 5, "latch": True} for x in (26, 27)]
     state, chart = placed([{"x": 27, "y": 6}, *side_by_side])
     assert compiled.path(state.missions[0], state.uavs[0], 0, chart, 26, 4) == 5
+
+
+BREEZE: dict[str, Any] = {"wind": {"strength": 0.7, "direction": 270, "seed": 1}}
+
+
+def test_in_wind_a_uav_hovers_before_a_teammate_that_it_cannot_fly_around():
+    """To and fro costs more, and brings it nowhere."""
+    waiting = {"x": 4, "y": 0, "battery": 12, "latch": True}
+    assert _mask(waiting, MOUTH | {"battery": 9}, **CORRIDOR, **BREEZE)[0, HOVER]
+
+
+def test_in_wind_a_uav_flies_around_the_cell_that_a_teammate_will_take():
+    """The teammate is not parked while it flies about, but will be when the UAV arrives."""
+    sea: dict[str, Any] = {"grid": 20, "rows": 26, "zone": [16, 7, 2, 2], "pads": 2}
+    sea |= {"nodes": [[0, 0]], "charge_start": 29, "charge_complete": 74}
+    team: list[dict[str, Any]] = [
+        {"x": 16, "y": 8, "battery": 26, "charging": True, "pad_request": 3},
+        {"x": 16, "y": 6, "battery": 17},
+        {"x": 15, "y": 6, "battery": 9},
+    ]
+    mask = _mask(*({"latch": True} | u for u in team), **sea, **BREEZE)
+    assert np.nonzero(mask[2])[0].tolist() == [EAST]
 
 
 def test_a_uav_stays_in_its_parking_cell_whoever_is_near():
@@ -212,6 +282,16 @@ def test_a_uav_must_charge_if_no_data_are_left_for_its_quota_unless_it_lives_to_
     assert compiled.must_charge(mission, u, 0.0)
     mission["slot"] += 1
     assert not compiled.must_charge(mission, u, 0.0)
+
+
+@pytest.mark.parametrize(("latch", "data", "must"), [(False, 5, 0), (True, 5, 1), (True, 7, 0)])
+def test_a_uav_below_c_s_counts_on_no_data_that_will_be_collected_before(latch, data, must):
+    """The UAV needs 10 slots, for which 3 data units are enough on average, and 6 near nodes."""
+    state, _ = placed([{"battery": 20, "latch": latch}], arrival_rate=0.0, quota=440)
+    mission, u = state.missions[0], state.uavs[0, 0]
+    u["communications"] = 400
+    mission["slot"], mission["collected"] = 50, 100.0
+    assert compiled.must_charge(mission, u, data) == must
 
 
 def test_a_uav_that_can_reach_two_zones_leaves_the_pad_to_one_that_can_reach_one():
