@@ -30,7 +30,7 @@ from dess.analysis.names import PARAMETERS, field_named, value_text
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import add_adjusted, compare, compare_pairs, for_choice
-from dess.analysis.stats.intervals import LEVEL, by_replication, values_within, wilson_interval
+from dess.analysis.stats.intervals import LEVEL, by_replication, share_interval, values_within
 from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, on_front, position_by_test
 from dess.analysis.study.stopping import Text
 from dess.base.errors import unknown_name
@@ -234,7 +234,7 @@ def pair_outcome_table(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
         f"only {pair.baseline} fails": more > 0,
     }
     counts = pd.DataFrame(cases).sum()
-    shares = [numbers.format_interval(*wilson_interval(count, len(missions))) for count in counts]
+    shares = [numbers.format_interval(*share_interval(count, len(missions))) for count in counts]
     columns = {"Outcome": counts.index, "Missions": counts.map("{:,}".format), "Share": shares}
     return pd.DataFrame(columns).reset_index(drop=True)
 

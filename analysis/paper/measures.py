@@ -21,7 +21,7 @@ from dess.analysis.stats.intervals import (
     Interval,
     bounded_interval,
     mean_interval,
-    wilson_interval,
+    share_interval,
 )
 from dess.analysis.stats.intervals import summary as means_of
 from dess.analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
@@ -498,7 +498,7 @@ def _mean_of(missions: pd.DataFrame, metric: str) -> Quantity:
 
 def _share_of(occurs: np.ndarray, name: str) -> Quantity:
     """The share of missions in which something occurs."""
-    return Quantity(wilson_interval(int(occurs.sum()), len(occurs)), len(occurs), name=name)
+    return Quantity(share_interval(int(occurs.sum()), len(occurs)), len(occurs), name=name)
 
 
 def _mean_share(values: np.ndarray, name: str) -> Quantity:

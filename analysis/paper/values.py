@@ -7,7 +7,7 @@ from dess.analysis.answers import summary
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.intervals import Interval, wilson_interval
+from dess.analysis.stats.intervals import Interval, share_interval
 
 # Table IV: means over TABLE_IV_MISSIONS random missions of the scenario space of Table II.
 TABLE_IV_MISSIONS = 1000
@@ -38,7 +38,7 @@ CROSSING, LEVEL_FROM = 800_000, 500_000
 
 def interval_of_share(share: float, missions: int) -> Interval:
     """A printed share of missions with its Wilson interval, which the paper does not print."""
-    return Interval(share, *wilson_interval(round(share * missions), missions)[1:])
+    return Interval(share, *share_interval(round(share * missions), missions)[1:])
 
 
 def setting_in_symbols(results: Results, point: int) -> dict[str, str]:

@@ -237,7 +237,7 @@ class Moments(NamedTuple):
         """The mean of a metric with the interval of ``interval_of``."""
         measure = metric_of(metric)
         if measure.is_outcome and self._are_outcomes:
-            return wilson_interval(int(self.total), self.n, level)
+            return share_interval(int(self.total), self.n, level)
         if measure.is_bounded:
             return self.bounded(level)
         mean, *ends = self.skewed(level)
@@ -274,19 +274,19 @@ class Moments(NamedTuple):
         return Interval(self.mean, *map(float, ends))
 
 
-def wilson_half_width(successes: Any, n: Any, level: float = LEVEL) -> Any:
+def share_half_width(successes: Any, n: Any, level: float = LEVEL) -> Any:
     """Half the length of the Wilson score interval of a share of successes, or of an array."""
     share = successes / n
     z = ndtri(0.5 + 0.5 * level)
     return z / (2 * (n + z**2)) * np.sqrt(4 * n * share * (1 - share) + z**2)
 
 
-def wilson_interval(successes: int, n: int, level: float = LEVEL) -> Interval:
+def share_interval(successes: int, n: int, level: float = LEVEL) -> Interval:
     """Share of successes with its Wilson score interval, which holds near 0 and 1 as well."""
     share = successes / n
     z = ndtri(0.5 + 0.5 * level)
     centre = (2 * n * share + z**2) / (2 * (n + z**2))
-    half = wilson_half_width(successes, n, level)
+    half = share_half_width(successes, n, level)
     low = 0.0
     if successes:
         low = float(centre - half)
@@ -427,7 +427,7 @@ def column_intervals(
         successes = (mean * n)[rows].round().astype(int)
         samples = [*zip(successes, n[rows], level[rows], strict=True)]
         measures = {
-            sample: wilson_interval(*sample)[1:] for sample in {*samples}
+            sample: share_interval(*sample)[1:] for sample in {*samples}
         }  # each takes its time
         table.loc[rows, ["low", "high"]] = np.array([measures[s] for s in samples]).reshape(-1, 2)
     return table

@@ -22,8 +22,8 @@ from dess.analysis.stats.intervals import (
     LEVEL,
     bounded_ends,
     ends_by_quantile,
+    share_half_width,
     skewness_of,
-    wilson_half_width,
 )
 from dess.base.errors import listed, shown, to_input_error, unknown_name
 from dess.physics.section import Integer, Number, plain
@@ -296,7 +296,7 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
     counts = np.arange(1, len(sample) + 1)
     if metric_of(metric).is_outcome:
         successes = np.cumsum(sample)
-        return successes / counts, wilson_half_width(successes, counts)
+        return successes / counts, share_half_width(successes, counts)
     # The values are shifted by the first one, so that equal values give a width of exactly 0.
     shifted = sample - sample[:1]
     means = np.cumsum(shifted) / counts

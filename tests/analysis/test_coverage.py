@@ -22,8 +22,8 @@ from dess.analysis.stats.intervals import (
     column_intervals,
     level_after,
     mean_interval,
+    share_interval,
     stratified_interval,
-    wilson_interval,
 )
 from dess.analysis.stats.learners import compare_crossed
 from dess.analysis.study.cheapest import Cheapest, Setting
@@ -182,7 +182,7 @@ def test_intervals_cover_after_a_search_has_decided_how_many_missions_there_are(
         samples = [{"success": s, "cost": c} for s, c in zip(success, costs, strict=True)]
         choice = rule.choice(samples, settings)
         for point, (n, looks) in enumerate(zip(choice.counts, choice.looks, strict=True)):
-            _, low, high = wilson_interval(
+            _, low, high = share_interval(
                 int(success[point][:n].sum()), n, float(level_after(looks))
             )
             covers[trial, point] = low <= shares[point] <= high

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import integrate, stats
 
-from dess.analysis.stats.intervals import LEVEL, wilson_interval
+from dess.analysis.stats.intervals import LEVEL, share_interval
 from dess.scenario.scenario import Scenario, ScenarioSpace
 
 World = Scenario | ScenarioSpace
@@ -90,7 +90,7 @@ def wilson_coverage(successes: int, missions: int, block: int, level: float = LE
         level: Confidence level of the interval.
     """
     numbers = np.arange(block + 1)
-    ends = [wilson_interval(x, block, level) for x in range(block + 1)]
+    ends = [share_interval(x, block, level) for x in range(block + 1)]
     holds = np.array([e.low <= successes / missions <= e.high for e in ends])
     return float(stats.hypergeom(missions, successes, block).pmf(numbers)[holds].sum())
 

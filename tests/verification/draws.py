@@ -10,7 +10,7 @@ from scipy import special, stats
 
 from dess.analysis.names import field_named
 from dess.analysis.numbers import format_decimals, format_interval, format_minus
-from dess.analysis.stats.intervals import Interval, mean_interval, wilson_interval
+from dess.analysis.stats.intervals import Interval, mean_interval, share_interval
 from dess.physics import streams
 from dess.physics.fleet import type_of
 from dess.scenario.fields import SAMPLED
@@ -341,7 +341,7 @@ def intervals_of_blocks(values: np.ndarray, size: int, share: bool) -> pd.DataFr
         ``holds``.
     """
     whole = values[: len(values) // size * size].reshape(-1, size)
-    rows = [wilson_interval(int(b.sum()), size) if share else mean_interval(b) for b in whole]
+    rows = [share_interval(int(b.sum()), size) if share else mean_interval(b) for b in whole]
     table = pd.DataFrame(rows, columns=Interval._fields)
     reference = np.nan
     if whole.size:
@@ -370,6 +370,6 @@ def coverage_check(metric: str, values: np.ndarray, size: int, share: bool) -> C
         coverage = closed_forms.wilson_coverage(round(values[:missions].sum()), missions, size)
     else:
         coverage = closed_forms.t_coverage(missions, size)
-    seen = f"{hits:,} of {n:,}: {format_interval(*wilson_interval(hits, n))}"
+    seen = f"{hits:,} of {n:,}: {format_interval(*share_interval(hits, n))}"
     p = float(stats.binomtest(hits, n, min(coverage, 1.0)).pvalue)
     return Check(COVERAGE, test, f"{100 * coverage:.1f} %", seen, n, p)

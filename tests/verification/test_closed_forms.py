@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dess.analysis.stats.intervals import wilson_interval
+from dess.analysis.stats.intervals import share_interval
 from dess.scenario.scenario import Scenario
 from tests.verification import closed_forms
 
@@ -24,7 +24,7 @@ def test_initial_data_of_few_nodes_by_hand():
 def test_coverage_of_wilson_counts_all_ways_to_draw_a_block(successes):
     missions = [1] * successes + [0] * (9 - successes)
     blocks = [sum(block) for block in combinations(missions, 4)]
-    ends = [wilson_interval(x, 4, 0.5) for x in blocks]
+    ends = [share_interval(x, 4, 0.5) for x in blocks]
     held = np.mean([e.low <= successes / 9 <= e.high for e in ends])
     assert closed_forms.wilson_coverage(successes, 9, 4, 0.5) == pytest.approx(held)
 

@@ -20,10 +20,10 @@ from dess.analysis.stats.intervals import (
     interval_of,
     mean_interval,
     post_stratified,
+    share_interval,
     skewness_of,
     stratified_interval,
     summary,
-    wilson_interval,
 )
 from dess.scenario.scenario import ScenarioSpace
 
@@ -47,7 +47,7 @@ def test_it_has_a_length_holds_the_mean_and_ends_where_shares_do(values, level):
 
 @pytest.mark.parametrize(
     ("metric", "expected"),
-    [(SUCCESS, wilson_interval(7, 8)), (RATIO, bounded_interval([1.0] * 7 + [0.0]))]
+    [(SUCCESS, share_interval(7, 8)), (RATIO, bounded_interval([1.0] * 7 + [0.0]))]
     # Hall's slope is -2.82843 / (3 sqrt(8)) = -1 / 3, t(0.975, 7) = 2.36462: the cube roots are
     # those of 1 - (2.36462 + 1 / 6) and 1 - (-2.36462 + 1 / 6), and s / sqrt(8) is 0.125
     + [(REWARD, (0.875, 0.875 - 0.125 * 6.45786, 0.875 + 0.125 * 1.41990))],
@@ -147,10 +147,10 @@ def test_the_moments_of_parts_are_those_of_the_whole():
     [
         # z = 1.95996: centre (0.9 + z^2/20) / (1 + z^2/10) = 0.78899,
         # half width z sqrt(0.009 + z^2/400) / (1 + z^2/10) = 0.19314
-        (wilson_interval(9, 10), (0.9, 0.59585, 0.98213)),
+        (share_interval(9, 10), (0.9, 0.59585, 0.98213)),
         # n / (n + z^2) for n of n, and its mirror image for none
-        (wilson_interval(10, 10), (1.0, 0.72247, 1.0)),
-        (wilson_interval(0, 10), (0.0, 0.0, 0.27753)),
+        (share_interval(10, 10), (1.0, 0.72247, 1.0)),
+        (share_interval(0, 10), (0.0, 0.0, 0.27753)),
         # mean 2, s = 1, t(0.975, 2) = 4.30265: 2 -+ 4.30265 / sqrt(3); t(0.95, 2) = 2.91999
         (mean_interval([1.0, 2.0, 3.0]), (2.0, -0.48414, 4.48414)),
         (mean_interval([1.0, 2.0, 3.0], 0.9), (2.0, 0.31414, 3.68586)),
@@ -184,7 +184,7 @@ def test_summary_has_a_row_per_group_and_metric():
     assert list(table["policy"].unique()) == ["tour", "greedy"]
     rows = table.set_index(["policy", "metric"])
     ends = ["mean", "low", "high"]
-    assert tuple(rows.loc[("tour", "success"), ends]) == wilson_interval(2, 3)
+    assert tuple(rows.loc[("tour", "success"), ends]) == share_interval(2, 3)
     assert tuple(rows.loc[("tour", "reward"), ends]) == mean_interval([1.0, 2.0, 3.0])
     assert tuple(rows.loc[("greedy", "collection_ratio"), ends]) == bounded_interval([0.5, 0.5])
     assert rows.loc["tour", "n"].tolist() == [3] * 4

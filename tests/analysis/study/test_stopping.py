@@ -3,7 +3,7 @@ import pytest
 from pydantic import ValidationError
 
 from dess.analysis.metrics import ALWAYS, METRICS, metric_of
-from dess.analysis.stats.intervals import interval_of, wilson_interval
+from dess.analysis.stats.intervals import interval_of, share_interval
 from dess.analysis.study.stopping import Precision, running_interval
 
 
@@ -36,7 +36,7 @@ def slow_stop(rule, data):
         for metric, target in rule.targets.items():
             values = data[metric][:n]
             share = metric_of(metric).is_outcome
-            interval = wilson_interval(values.sum(), n) if share else interval_of(metric, values)
+            interval = share_interval(values.sum(), n) if share else interval_of(metric, values)
             half = (interval.high - interval.low) / 2
             if n == 1 and not share:
                 return False

@@ -9,7 +9,7 @@ from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings, prices_in_words
 from dess.analysis.answers.settings.baseline import compare_with_baseline
 from dess.analysis.stats.differences import compare_pairs
-from dess.analysis.stats.intervals import level_after, wilson_interval
+from dess.analysis.stats.intervals import level_after, share_interval
 from dess.analysis.study.study import CHECK
 from tests.analysis.answers.fleet.test_costs import DESIGN, PRICES
 from tests.analysis.small import small_study
@@ -69,7 +69,7 @@ def test_an_answer_quotes_the_check_and_a_table_allows_for_the_search(searched):
         missions = searched.missions.query("policy == @policy and point == @point")
         level = float(level_after(searched.looks(policy)[point]))
         assert level > 0.95
-        _, *ends = wilson_interval(int(missions["success"].sum()), len(missions), level)
+        _, *ends = share_interval(int(missions["success"].sum()), len(missions), level)
         assert [row["success_low"], row["success_high"]] == pytest.approx(ends)
 
 
