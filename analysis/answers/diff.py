@@ -20,7 +20,6 @@ import pandas as pd
 from dess import InputError
 from dess.analysis.answers.settings.points import points_in_words
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, REWARD
-from dess.analysis.results.chunks import check_parts
 from dess.analysis.results.provenance import differing_modules
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import Paired, add_adjusted, compare, compare_unpaired
@@ -263,7 +262,7 @@ def _uavs_of_missions(
     manifest = results.store.manifest
     tables = [results.uavs]
     for number, policy in enumerate(results.policies):
-        if parts := check_parts(manifest, number):
+        if parts := manifest.parts_of_check(number):
             tables.append(results.store.uavs(parts).assign(policy=policy))
     which = missions[["policy", "point", *_KEYS]].merge(numbered, on=_KEYS)
     which = which[["policy", "point", "replication", "mission"]]

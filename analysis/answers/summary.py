@@ -21,7 +21,6 @@ from dess.analysis.metrics import (
     metric_in_missions,
     metric_of,
 )
-from dess.analysis.results.chunks import parts_of
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare
@@ -525,7 +524,7 @@ def reached_precisions(results: Results) -> pd.DataFrame:
     if (rule := manifest.study.precision) is None:
         return pd.DataFrame()
     tables = {
-        policy: pd.DataFrame(rule.reached(results.store.samples(parts_of(manifest, team))))
+        policy: pd.DataFrame(rule.reached(results.store.samples(manifest.parts(team))))
         for team, policy in enumerate(results.policies)
     }
     return stack_by_policy(tables)

@@ -1,9 +1,10 @@
 """How long missions take and how much memory, which policies to ask, and plans of runs."""
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import cache, partial, reduce
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import reduce
 from math import ceil
 from pathlib import Path
 from statistics import mean
@@ -12,12 +13,10 @@ from typing import NamedTuple, Self
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.execution.jobs import simulate_missions
-from dess.analysis.results.chunks import bound_parts, check_parts, missions_in, parts_of
 from dess.analysis.results.store import Store, source_folders
-from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.study import Study
 from dess.base.files.memory import check_memory
-from dess.policies.registry import folder_of, load_team
+from dess.policies.registry import Policy, folder_of, load_team
 from dess.policies.shipped import SHIPPED
 from dess.scenario.scenario import ScenarioSpace
 
@@ -274,9 +273,10 @@ def plan_study(
     store = Store.peek(study, out, accept_code)
     for source in source_folders(reuse, store.manifest):
         store.count(source)
-    return [
-        replace(p, seconds=_seconds_of_missing(study, p)) for p in _count_missions(study, store)
-    ]
+    plan = [_plan_team(study, store, team) for team in range(len(study.policies))]
+    if study.bounds:
+        plan.append(_plan_bounds(study, store))
+    return plan
 
 
 def total_time(plan: Sequence[Planned], workers: int) -> Range:
@@ -339,65 +339,60 @@ def _check_policies(study: Study) -> None:
     """
     places = {(s.size, s.rectangles, s.no_fly, s.nodes): s for s in study.scenarios}
     largest = max(space.uavs[1] for space in places.values())
-    loaded = cache(partial(load_team, uavs=largest, run_files=study.run_files))
+    teams = _load_teams(study, largest)
     first, *others = places.values()
     by_size = sorted(others, key=lambda space: len(space.nodes) * math.prod(space.size))
     for number, space in enumerate([first, *by_size[-1:]]):
         first_slot = space.model_copy(update={"max_slots": 1})
-        for policy in study.policies:
-            try:
-                team = loaded(policy)
+        for team in teams:
+            with _failures_left_to_the_run():
                 simulate_missions(study.engine, [first_slot], team, study.seed, [number])
-            except InputError:
-                raise
-            except Exception:  # the run will record it as a failure
-                continue
 
 
-def _count_missions(study: Study, store: Store) -> list[Planned]:
-    """What is needed for now, and what of it is present: of every policy, then of the bounds."""
+def _load_teams(study: Study, uavs: int) -> list[list[Policy]]:
+    """The policies of every team for so many UAVs; without those that fail when they are made."""
+    teams = []
+    for policy in study.policies:
+        with _failures_left_to_the_run():
+            teams.append(load_team(policy, uavs, run_files=study.run_files))
+    return teams
+
+
+@contextmanager
+def _failures_left_to_the_run() -> Iterator[None]:
+    """Ignore errors that a run records as failures: all but ``InputError``."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception:  # a policy is anybody's code
+        return
+
+
+def _plan_team(study: Study, store: Store, team: int) -> Planned:
+    """What a run would do for a team, as far as it is known now."""
     manifest = store.manifest
-    logged = [study.logged] * study.size
-    plan = []
-    for team, policy in enumerate(study.policies):
-        parts = parts_of(manifest, team) + check_parts(manifest, team)
-        needed = missions_in(parts)
-        missing = missions_in(store.missing("missions", parts))
-        logs = missions_in(store.missing("events", parts_of(manifest, team, logged)))
-        if study.rule and missing:
-            most = _most_missions(study)
-        else:
-            most = needed
-        plan.append(Planned(policy, needed, needed - missing, logs, max(most, needed)))
-    if study.bounds:
-        parts = bound_parts(manifest)
-        needed = missions_in(parts)
-        missing = missions_in(store.missing("bounds", parts))
-        plan.append(Planned("upper bounds", needed, needed - missing, most=needed))
-    return plan
-
-
-def largest_budget(study: Study) -> int:
-    """Largest number of missions that a study may need, which a rule decides if it has one."""
-    return len(study.policies) * _most_missions(study)
-
-
-def _most_missions(study: Study) -> int:
-    """The largest number of missions of a policy."""
-    if not study.selection:
-        return study.most * study.size
-    checked = 1
-    if isinstance(study.selection, Cheapest):
-        checked = study.size
-    return study.selection.budget + study.selection.check * checked
-
-
-def _seconds_of_missing(study: Study, planned: Planned) -> Range:
-    """Estimated time on one core of the missing missions and event logs, or of the bounds."""
     spaces = study.scenarios
-    if planned.policy not in study.policies:
-        decisions = planned.missing * sum(map(estimate_decisions, spaces)) / len(spaces)
-        return Range(*(decisions * seconds for seconds in BOUND))
-    logs = seconds_of(spaces, planned.policy, (planned.logs, planned.logs), "events")
-    missions = planned.missing, planned.most - planned.present
-    return seconds_of(spaces, planned.policy, missions, study.engine).plus(logs)
+    policy = study.policies[team]
+    parts = manifest.parts(team) + manifest.parts_of_check(team)
+    needed = sum(map(len, parts))
+    missing = sum(map(len, store.missing("missions", parts)))
+    logged = manifest.parts(team, [study.logged] * study.size)
+    logs = sum(map(len, store.missing("events", logged)))
+    most = needed
+    if study.rule and missing:
+        most = max(needed, study.most_missions)
+    present = needed - missing
+    of_logs = seconds_of(spaces, policy, (logs, logs), "events")
+    seconds = seconds_of(spaces, policy, (missing, most - present), study.engine).plus(of_logs)
+    return Planned(policy, needed, present, logs, most, seconds)
+
+
+def _plan_bounds(study: Study, store: Store) -> Planned:
+    """What a run would do for the upper bounds."""
+    parts = store.manifest.parts_with_bounds()
+    needed = sum(map(len, parts))
+    missing = sum(map(len, store.missing("bounds", parts)))
+    decisions = missing * sum(map(estimate_decisions, study.scenarios)) / study.size
+    seconds = Range(*(decisions * of_decision for of_decision in BOUND))
+    return Planned("upper bounds", needed, needed - missing, most=needed, seconds=seconds)

@@ -20,9 +20,9 @@ from dess.analysis.execution.jobs import (
     simulate_missions,
 )
 from dess.analysis.execution.workers import Here, Pool
-from dess.analysis.metrics import ALWAYS, HOME, SUCCESS, columns_in_units, measured_in
-from dess.analysis.results.chunks import Part, split_into_chunks
-from dess.analysis.results.manifest import Cell
+from dess.analysis.metrics import RECORDED, columns_in_units, measured_in
+from dess.analysis.results.chunks import split_into_chunks
+from dess.analysis.results.manifest import Cell, Part
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.intervals import Moments
 from dess.base.errors import check_type

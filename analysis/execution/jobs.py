@@ -12,8 +12,8 @@ import numpy as np
 from dess import InputError, simulate, simulate_batch
 from dess.analysis.bound import Bound, upper_bound
 from dess.analysis.results import parquet
-from dess.analysis.results.chunks import Chunk, Part
-from dess.analysis.results.manifest import Cell
+from dess.analysis.results.chunks import Chunk
+from dess.analysis.results.manifest import Cell, Part
 from dess.analysis.results.provenance import Member, bound_code, members_of
 from dess.analysis.results.store import Store
 from dess.model.record import Records, empty_records

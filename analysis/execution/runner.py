@@ -27,8 +27,8 @@ from dess.analysis.execution.jobs import (
 )
 from dess.analysis.execution.workers import Cluster, Here, Pool
 from dess.analysis.results import chunks, tables
-from dess.analysis.results.manifest import Selected
-from dess.analysis.results.store import Failure, Store, source_folders
+from dess.analysis.results.manifest import Part, Selected
+from dess.analysis.results.store import Failure, Present, Store, gaps_between, source_folders
 from dess.analysis.results.tables import Results, results_of
 from dess.analysis.study.cheapest import Setting
 from dess.analysis.study.stopping import Samples
@@ -134,10 +134,10 @@ class _Run:
         points = len(self.study.points)
         before = [[0] * points for _ in teams]
         counts = [[self.study.first] * points for _ in teams]
-        logs = [chunks.parts_of(manifest, team, [self.study.logged] * points) for team in teams]
-        asked: chunks.Present = defaultdict(list)
+        logs = [manifest.parts(team, [self.study.logged] * points) for team in teams]
+        asked: Present = defaultdict(list)
         while counts != before:
-            of_teams = (chunks.parts_of(manifest, team, counts[team]) for team in teams)
+            of_teams = (manifest.parts(team, counts[team]) for team in teams)
             parts = new_parts(of_teams, asked)
             self._round(parts, new_parts(logs, defaultdict(list)))
             before = counts
@@ -145,14 +145,14 @@ class _Run:
             counts = [self._more(team, counts[team]) for team in teams]
         selected = [self._select(team, counts[team]) for team in teams]
         chosen = manifest.model_copy(update={"selected": selected})
-        checks = [chunks.check_parts(chosen, team) for team in teams]
+        checks = [chosen.parts_of_check(team) for team in teams]
         self._round([part for of_team in checks for part in of_team])
         if self.study.rule and not manifest.accepted:  # files of other code may have other columns
             for team in teams:
-                all_of_team = chunks.parts_of(manifest, team, counts[team]), checks[team]
+                all_of_team = manifest.parts(team, counts[team]), checks[team]
                 parts = new_parts(all_of_team, defaultdict(list))
                 self.store.merge([*chunks.split_into_chunks(parts, CHUNK[self.study.engine])])
-        self._make((BoundsJob, new_parts([chunks.bound_parts(manifest, counts)], asked)))
+        self._make((BoundsJob, new_parts([manifest.parts_with_bounds(counts)], asked)))
         self.store.finish(counts, selected)
 
     def _more(self, team: int, counts: list[int]) -> list[int]:
@@ -172,9 +172,9 @@ class _Run:
     def _samples(self, team: int, counts: list[int]) -> tuple[Samples, Sequence[Setting]]:
         """The missions and the settings of all design points, by which a rule decides."""
         manifest = self.store.manifest
-        return self.store.samples(chunks.parts_of(manifest, team, counts)), manifest.settings
+        return self.store.samples(manifest.parts(team, counts)), manifest.settings
 
-    def _round(self, parts: Sequence[chunks.Part], logs: Sequence[chunks.Part] = ()) -> None:
+    def _round(self, parts: Sequence[Part], logs: Sequence[Part] = ()) -> None:
         """Simulate the missing missions of a round with these parts, then make the event logs."""
         if self.reuse and self.store.missing("missions", parts):
             for source in self._sources:
@@ -185,16 +185,14 @@ class _Run:
     def _sources(self) -> list[Store]:
         return source_folders(self.reuse, self.store.manifest)
 
-    def _make(self, *works: tuple[type[Job], Sequence[chunks.Part]]) -> None:
+    def _make(self, *works: tuple[type[Job], Sequence[Part]]) -> None:
         """One kind of work after the other: find what is missing of its parts, run and store it.
 
         Raises:
             ChunkError: If some could not be computed, after all others.
         """
         failures: dict[Path, Failure] = {}
-        needs = [
-            (kind, chunks.missions_in(parts), [*self._jobs(kind, parts)]) for kind, parts in works
-        ]
+        needs = [(kind, sum(map(len, parts)), [*self._jobs(kind, parts)]) for kind, parts in works]
         for kind, needed, jobs in needs:
             if needed:
                 self._begin(needed, needed - sum(job.missions for job in jobs), kind.work)
@@ -202,7 +200,7 @@ class _Run:
         if failures:
             raise ChunkError(failures)
 
-    def _jobs(self, kind: type[Job], parts: Sequence[chunks.Part]) -> Iterator[Job]:
+    def _jobs(self, kind: type[Job], parts: Sequence[Part]) -> Iterator[Job]:
         """The jobs for what is missing of some parts, cut as if nothing were present."""
         study = self.study
         for team, of_team in groupby(parts, lambda part: part.cell.team):
@@ -255,7 +253,7 @@ class _Run:
         return Failure(job.policy, job.missions, problem.error, command, problem.traceback)
 
 
-def new_parts(wanted: Iterable[Iterable[chunks.Part]], asked: chunks.Present) -> list[chunks.Part]:
+def new_parts(wanted: Iterable[Iterable[Part]], asked: Present) -> list[Part]:
     """The missions that are needed in addition to those asked for before, each once, in order.
 
     Args:
@@ -265,7 +263,7 @@ def new_parts(wanted: Iterable[Iterable[chunks.Part]], asked: chunks.Present) ->
     parts = []
     for part in (part for of_team in wanted for part in of_team):
         earlier = asked[part.cell.key]
-        new = chunks.gaps_between(part.replications, earlier)
-        parts += [chunks.Part(part.cell, gap) for gap in new]
+        new = gaps_between(part.replications, earlier)
+        parts += [Part(part.cell, gap) for gap in new]
         earlier += new
     return parts

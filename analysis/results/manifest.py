@@ -1,8 +1,8 @@
 """The manifest of a results folder: the study, what it was run with, and the keys of its cells."""
 
 import json
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
 from hashlib import sha256
 from pathlib import Path, PurePath
@@ -40,6 +40,18 @@ class Cell(NamedTuple):
     point: int
     key: str
     first: int
+
+
+@dataclass(frozen=True)
+class Part:
+    """Consecutive replications of a cell."""
+
+    cell: Cell
+    replications: range
+
+    def __len__(self) -> int:
+        """The number of missions."""
+        return len(self.replications)
 
 
 class Manifest(provenance.Origin):
@@ -264,6 +276,32 @@ class Manifest(provenance.Origin):
             return self._cells(NO_TEAM, run)
         return ()
 
+    def parts(self, team: int, counts: Sequence[int] | None = None) -> list[Part]:
+        """The first missions of every cell of a team: so many, or as many as were needed."""
+        return _first_parts(self.cells[team], counts or self.missions[team])
+
+    def parts_of_check(self, team: int) -> list[Part]:
+        """The missions that check the design points selected for a team.
+
+        The selection was not based on any of these missions.
+        """
+        check = 0
+        if self.study.selection:
+            check = self.study.selection.check
+        cells = self.cells[team]
+        replications = range(CHECK, CHECK + check)
+        return [Part(cells[point], replications) for point in self.selected_points(team)]
+
+    def parts_with_bounds(self, counts: Sequence[Sequence[int]] | None = None) -> list[Part]:
+        """The missions that need bounds, at every design point those of any team; or none.
+
+        Args:
+            counts: The missions of every team and design point; by default as many as were needed.
+        """
+        if not self.bound_cells:
+            return []
+        return _first_parts(self.bound_cells, np.max(counts or self.missions, axis=0).tolist())
+
     def _cells(self, team: int, run: dict[str, Any]) -> tuple[Cell, ...]:
         """The cells of what is made with the same code and seed at every design point."""
         texts = (_canonical_json(run) + text for text in self._scenario_texts)
@@ -280,6 +318,10 @@ class Manifest(provenance.Origin):
         """The manifest as JSON, with a line for each of its parts."""
         lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in self.data.items())
         return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _first_parts(cells: Sequence[Cell], counts: Sequence[int]) -> list[Part]:
+    return [Part(c, range(c.first, c.first + n)) for c, n in zip(cells, counts, strict=True)]
 
 
 # Where else a run can write, in the words of a message.

@@ -292,9 +292,9 @@ def _column_limits(name: str, kind: pa.DataType) -> tuple[float, float] | None:
     return None
 
 
-def files_in(folder: Path) -> list[Path]:
-    """The files in a folder that a run may have written."""
-    paths = (path for path in paths_in(folder, "*.parquet") if NAME.fullmatch(path.name))
+def files_in(folder: Path, pattern: str = "*.parquet") -> list[Path]:
+    """The files in a folder that a run may have written, of those that match a pattern."""
+    paths = (path for path in paths_in(folder, pattern) if NAME.fullmatch(path.name))
     return [path for path in paths if path.is_file() and not path.is_symlink()]
 
 
@@ -345,5 +345,5 @@ def _name_in(table: pa.Table) -> str:
 
 def missions_in(folder: Path) -> int:
     """The number of missions in a results folder, without those in damaged files."""
-    files = (path for part in paths_in(folder, "missions/policy=*") for path in files_in(part))
-    return sum(len(table) for path in files if (table := read(path, "missions")) is not None)
+    tables = (read(path, "missions") for path in files_in(folder, "missions/policy=*/*.parquet"))
+    return sum(len(table) for table in tables if table is not None)

@@ -26,7 +26,14 @@ from dess import InputError
 from dess.analysis.bound import Bound
 from dess.analysis.metrics import MOST_LOST, MOST_SLOTS, columns_in_units
 from dess.analysis.results import chunks, parquet
-from dess.analysis.results.manifest import ELSEWHERE, NO_TEAM, Cell, Manifest, Selected
+from dess.analysis.results.manifest import (
+    ELSEWHERE,
+    NO_TEAM,
+    Cell,
+    Manifest,
+    Part,
+    Selected,
+)
 from dess.analysis.study.study import Study
 from dess.base.files.reading import paths_in
 from dess.base.files.writing import check_folder, delete, locked, make_folder, write_file
@@ -38,6 +45,7 @@ _BUSY = ("in use by another run", f"{ELSEWHERE}, or wait for its end")
 TABLES = {"missions": ("missions", "uavs"), "bounds": ("bounds",), "events": ("events",)}
 
 Place = tuple[int, int]  # a design point and a replication
+Present = defaultdict[str, list[range]]  # replications by the key of their cell
 
 
 @dataclass(frozen=True)
@@ -77,7 +85,7 @@ class Store:
 
     def _clear(self) -> None:
         """Know of no missions, until the folder is scanned."""
-        self._present: dict[str, chunks.Present] = {kind: defaultdict(list) for kind in TABLES}
+        self._present: dict[str, Present] = {kind: defaultdict(list) for kind in TABLES}
         # By kind and key of a cell, the tables that contain it: missions and UAVs, or bounds alone.
         self._tables: dict[tuple[str, str], list[Sequence[pa.Table]]] = defaultdict(list)
         # The rows of several tables, until there are new ones: every round of a rule needs them.
@@ -117,9 +125,8 @@ class Store:
         Raises:
             InputError: If it is not a results folder, or one of another version.
         """
-        store = cls(Path(out), Manifest.read(Path(out) / chunks.MANIFEST))
-        store._scan()
-        return store
+        folder = Path(out)
+        return cls.scanned(folder, Manifest.read(folder / chunks.MANIFEST))
 
     @classmethod
     def peek(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
@@ -128,7 +135,13 @@ class Store:
         Raises:
             InputError: If the folder holds something else, or cannot be written.
         """
-        store = cls(Path(out), _extended_manifest(Path(out), Manifest.of(study), accept_code))
+        folder = Path(out)
+        return cls.scanned(folder, _extended_manifest(folder, Manifest.of(study), accept_code))
+
+    @classmethod
+    def scanned(cls, folder: Path, manifest: Manifest) -> Self:
+        """A folder whose manifest is known, to load from it; nothing is written or locked."""
+        store = cls(folder, manifest)
         store._scan()
         return store
 
@@ -200,14 +213,14 @@ class Store:
         folders = [*paths_in(self.folder, "*/policy=*"), self.folder / chunks.BOUNDS]
         return [path for folder in folders for path in parquet.files_in(folder)]
 
-    def missing(self, kind: str, parts: Iterable[chunks.Part]) -> list[chunks.Part]:
+    def missing(self, kind: str, parts: Iterable[Part]) -> list[Part]:
         """What of some parts is missing.
 
         Args:
             kind: ``missions``, ``bounds`` or ``events``.
             parts: The parts.
         """
-        return chunks.absent_parts(parts, self._present[kind])
+        return _absent_parts(parts, self._present[kind])
 
     def keep(self, kind: str, chunk: chunks.Chunk, tables: Sequence[pa.Table]) -> None:
         """Store the tables of a chunk."""
@@ -223,7 +236,7 @@ class Store:
         path = parquet.write(folder, f"{cell.key}-{replication:06}", pa.table(columns))
         self._enter_log(cell.key, replication, path)
 
-    def take_over(self, other: "Store", parts: Iterable[chunks.Part]) -> None:
+    def take_over(self, other: "Store", parts: Iterable[Part]) -> None:
         """Copy missing missions of some parts from another folder, as far as it has them.
 
         Cells with equal keys have equal records, so this only saves time. Nothing is copied from a
@@ -263,7 +276,7 @@ class Store:
             name
             for name, of_file in large_files.items()
             if not any(
-                chunks.gaps_between(range(start, stop), merged[key]) for key, start, stop in of_file
+                gaps_between(range(start, stop), merged[key]) for key, start, stop in of_file
             )
         }
         for folder, _ in self._places("missions", large[0].team):
@@ -272,16 +285,16 @@ class Store:
                     delete(path)
         self._scan()
 
-    def _frames(self, parts: Iterable[chunks.Part]) -> list[pd.DataFrame]:
+    def _frames(self, parts: Iterable[Part]) -> list[pd.DataFrame]:
         """The rows of the files with missions of some parts, and those of the files with UAVs."""
-        return [*map(chunks.stack_tables, zip(*self._tables_with("missions", parts), strict=True))]
+        return [*map(stack_tables, zip(*self._tables_with("missions", parts), strict=True))]
 
-    def _held(self, parts: Sequence[chunks.Part]) -> list[chunks.Part]:
+    def _held(self, parts: Sequence[Part]) -> list[Part]:
         """What of the missions of some parts is present."""
-        missing: chunks.Present = defaultdict(list)
+        missing: Present = defaultdict(list)
         for part in self.missing("missions", parts):
             missing[part.cell.key].append(part.replications)
-        return chunks.absent_parts(parts, missing)
+        return _absent_parts(parts, missing)
 
     def count(self, other: "Store") -> None:
         """Count the missions of another folder as if they were here, to plan a run."""
@@ -308,7 +321,7 @@ class Store:
         for path in self._failures():
             delete(path)
 
-    def missions(self, parts: Sequence[chunks.Part]) -> pd.DataFrame:
+    def missions(self, parts: Sequence[Part]) -> pd.DataFrame:
         """The missions of some parts, with their ``point``, in the order of the parts.
 
         ``most_slots`` is the longest that each may last. If the study has prices, the missions have
@@ -329,7 +342,7 @@ class Store:
             missions = missions.assign(**columns_in_units(missions, units))
         return missions
 
-    def uavs(self, parts: Sequence[chunks.Part]) -> pd.DataFrame:
+    def uavs(self, parts: Sequence[Part]) -> pd.DataFrame:
         """The UAVs of these missions, in the same order.
 
         Raises:
@@ -337,7 +350,7 @@ class Store:
         """
         return self._rows("missions", parts, 1)
 
-    def bounds_of(self, parts: Sequence[chunks.Part]) -> dict[Place, Bound]:
+    def bounds_of(self, parts: Sequence[Part]) -> dict[Place, Bound]:
         """The bounds of some parts, by design point and replication.
 
         Raises:
@@ -355,7 +368,7 @@ class Store:
             for row in self._rows("bounds", parts).to_dict("records")
         }
 
-    def samples(self, parts: Sequence[chunks.Part]) -> list[dict[str, np.ndarray]]:
+    def samples(self, parts: Sequence[Part]) -> list[dict[str, np.ndarray]]:
         """For each part, the metrics of its missions.
 
         Raises:
@@ -366,7 +379,7 @@ class Store:
         columns = {name: np.split(missions[name].to_numpy(), ends[:-1]) for name in missions}
         return [{name: values[k] for name, values in columns.items()} for k in range(len(parts))]
 
-    def _rows(self, kind: str, parts: Sequence[chunks.Part], table: int = 0) -> pd.DataFrame:
+    def _rows(self, kind: str, parts: Sequence[Part], table: int = 0) -> pd.DataFrame:
         """The rows of some parts, all of which must be present, in the tables of their kind."""
         for gap in self.missing(kind, parts)[:1]:
             whole = next(part for part in parts if part.cell == gap.cell)
@@ -374,16 +387,16 @@ class Store:
         frames = [tables[table] for tables in self._tables_with(kind, parts)]
         key = kind, table, *map(id, frames)
         if key not in self._stacked:
-            self._stacked[key] = chunks.stack_tables(frames)
-        rows = chunks.rows_of(parts, self._stacked[key])
+            self._stacked[key] = stack_tables(frames)
+        rows = rows_of(parts, self._stacked[key])
         return rows.drop(columns="cell")
 
-    def _tables_with(self, kind: str, parts: Iterable[chunks.Part]) -> list[Sequence[pa.Table]]:
+    def _tables_with(self, kind: str, parts: Iterable[Part]) -> list[Sequence[pa.Table]]:
         """The tables that contain some parts."""
         tables_of_parts = (tables for part in parts for tables in self._tables[kind, part.cell.key])
         return [*{id(tables): tables for tables in tables_of_parts}.values()]
 
-    def _incomplete(self, part: chunks.Part, gap: range) -> InputError:
+    def _incomplete(self, part: Part, gap: range) -> InputError:
         team = part.cell.team
         values = self.manifest.points[part.cell.point].values
         where = ""
@@ -412,9 +425,71 @@ class Store:
         return parquet.read(path) if path else None
 
 
+def gaps_between(wanted: range, present: list[range]) -> list[range]:
+    """The parts of a range that are in none of the present ranges."""
+    missing = []
+    begin = wanted.start
+    for part in sorted(present, key=lambda r: r.start):
+        if part.start > begin:
+            missing.append(range(begin, min(part.start, wanted.stop)))
+        begin = max(begin, part.stop)
+        if begin >= wanted.stop:
+            break
+    return [gap for gap in [*missing, range(begin, wanted.stop)] if len(gap)]
+
+
+def _absent_parts(parts: Iterable[Part], present: Present) -> list[Part]:
+    """What of some parts is not present."""
+    return [
+        Part(p.cell, gap)
+        for p in parts
+        for gap in gaps_between(p.replications, present[p.cell.key])
+    ]
+
+
+def rows_of(parts: Sequence[Part], stacked: pd.DataFrame) -> pd.DataFrame:
+    """The rows of the missions of the parts, with the ``point`` and ``cell`` of each.
+
+    Args:
+        parts: The parts.
+        stacked: The rows of these missions, and of others, as ``stacked`` returns them.
+    """
+    lengths = [len(part.replications) for part in parts]
+    keys = pd.DataFrame(
+        {
+            "point": np.repeat([part.cell.point for part in parts], lengths),
+            "cell": np.repeat([part.cell.key for part in parts], lengths),
+            "replication": np.concatenate([part.replications for part in parts]),
+        }
+    )
+    rows = keys.merge(stacked, on=["cell", "replication"], how="left")
+    return rows[["point", *stacked]]
+
+
+def stack_tables(tables: Sequence[pa.Table]) -> pd.DataFrame:
+    """The rows of all tables; nan in columns that only others of them have.
+
+    Args:
+        tables: Tables with the columns ``cell`` and ``replication``.
+
+    Raises:
+        InputError: If two tables have different rows for the same mission.
+    """
+    frame = pa.concat_tables(tables, promote_options="default").to_pandas().astype({"cell": str})
+    key = [name for name in ("cell", "replication", "uav") if name in frame]
+    if frame.duplicated(key).any():  # such as after files of two folders were merged
+        hashable = frame.map(lambda v: v.tobytes() if isinstance(v, np.ndarray) else v)
+        frame = frame[~hashable.duplicated()]
+        if frame.duplicated(key).any():
+            raise InputError(
+                "results", "two files have different records of a mission", "one of them"
+            )
+    return frame
+
+
 def _tables_of(chunk: chunks.Chunk, frames: Iterable[pd.DataFrame]) -> list[pa.Table]:
     """The tables of a chunk, from frames that have its missions and UAVs among others."""
-    rows = (chunks.rows_of(chunk.parts, frame) for frame in frames)
+    rows = (rows_of(chunk.parts, frame) for frame in frames)
     columns = ({str(name): of_kind[name].to_numpy() for name in of_kind} for of_kind in rows)
     return parquet.tables_with(chunk, *columns)
 
@@ -456,7 +531,7 @@ def _source_folder(folder: Path, keys: set[str]) -> Store | None:
         manifest = Manifest.read(folder / chunks.MANIFEST)
         if manifest.accepted or not keys & _cell_keys(manifest):
             return None
-        return Store.read(folder)
+        return Store.scanned(folder, manifest)
     except (InputError, FileNotFoundError):  # another run may merge its files
         return None
 

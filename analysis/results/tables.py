@@ -15,7 +15,6 @@ from dess import InputError
 from dess.analysis.bound import Bound
 from dess.analysis.metrics import BOUND, EITHER, GAP, PRODUCT
 from dess.analysis.names import SWEEP, SWEEPS
-from dess.analysis.results.chunks import bound_parts, check_parts, parts_of
 from dess.analysis.results.manifest import Cell, Manifest
 from dess.analysis.results.provenance import Origin
 from dess.analysis.results.store import Place, Store
@@ -216,7 +215,7 @@ class Results:
         rule = self.study.selection
         if not rule or not isinstance(rule, kind):
             return None
-        parts = parts_of(manifest, self.policies.index(policy))
+        parts = manifest.parts(self.policies.index(policy))
         return rule.choice(self.store.samples(parts), manifest.settings)
 
     def looks(self, policy: str) -> np.ndarray:
@@ -284,10 +283,10 @@ def results_of(store: Store) -> Results:
     manifest = store.manifest
     missions, uavs, checks = {}, {}, {}
     for number, team in enumerate(manifest.policies):
-        parts = parts_of(manifest, number)
+        parts = manifest.parts(number)
         missions[team.policy] = store.missions(parts)
         uavs[team.policy] = store.uavs(parts)
-        if checked := check_parts(manifest, number):
+        if checked := manifest.parts_of_check(number):
             checks[team.policy] = store.missions(checked)
     if not manifest.complete:
         raise InputError(store.folder, "incomplete", "run the study again to complete it")
@@ -296,7 +295,7 @@ def results_of(store: Store) -> Results:
         all_checks = _label_missions(manifest, checks)
     else:
         all_checks = all_missions[:0]
-    bounds = store.bounds_of(bound_parts(manifest))
+    bounds = store.bounds_of(manifest.parts_with_bounds())
     if bounds:
         all_missions = _with_gaps(all_missions, bounds)
     return Results(store, all_missions, _of_policies(uavs), all_checks, bounds)

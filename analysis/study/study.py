@@ -157,6 +157,16 @@ class StudyData(StrictTable):
         return self.design.count if self.design else 1
 
 
+    @property
+    def most_missions(self) -> int:
+        """The largest number of missions of a policy that the study may need."""
+        if not self.selection:
+            return self.most * self.size
+        checked = 1
+        if isinstance(self.selection, Cheapest):
+            checked = self.size
+        return self.selection.budget + self.selection.check * checked
+
 class Study(StudyData):
     """A study: every policy at every design point, in a number of replications.
 

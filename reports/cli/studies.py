@@ -120,7 +120,7 @@ def _run_and_summarize(
 
 def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
     """Print the missions that a run would simulate, and the range of its time."""
-    from dess.analysis.execution.effort import largest_budget, total_time
+    from dess.analysis.execution.effort import total_time
     from dess.analysis.numbers import format_count
 
     rows = [[p.policy, f"{p.missions:,}", f"{p.present:,}", str(p.seconds)] for p in plan]
@@ -128,7 +128,8 @@ def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -
     per_cell = format_count(study.first, "replication")
     if study.rule:
         rule = "selection" if study.selection else "precision"
-        per_cell += f" and more, up to {largest_budget(study):,} missions, as {rule} asks"
+        most = len(study.policies) * study.most_missions
+        per_cell += f" and more, up to {most:,} missions, as {rule} asks"
     missions = sum(p.missions for p in plan[: len(study.policies)])
     policies = format_count(len(study.policies), "policy")
     points = format_count(study.size, "design point")

@@ -13,17 +13,9 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from dess.analysis.results import parquet
-from dess.analysis.results.chunks import (
-    FOLDERS,
-    Chunk,
-    Part,
-    check_parts,
-    parts_of,
-    rows_of,
-    stack_tables,
-)
-from dess.analysis.results.manifest import Manifest
-from dess.analysis.results.store import Store
+from dess.analysis.results.chunks import FOLDERS, Chunk
+from dess.analysis.results.manifest import Manifest, Part
+from dess.analysis.results.store import Store, rows_of, stack_tables
 
 LONGEST = 120  # bytes of a file's name that are made of the text
 
@@ -52,7 +44,7 @@ def hostile_folder(sound: Path, into: Path, text: str) -> Path:
     for name in FOLDERS:
         (into / name).mkdir()
     for team, cells in enumerate(manifest.cells):
-        for parts in (parts_of(source.manifest, team), check_parts(source.manifest, team)):
+        for parts in (source.manifest.parts(team), source.manifest.parts_of_check(team)):
             if parts:
                 _copy(source, store, parts, [cells[part.cell.point] for part in parts])
     for cell, replication in source.logged:

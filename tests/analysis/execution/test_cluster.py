@@ -17,8 +17,8 @@ from dess.analysis.execution import workers
 from dess.analysis.execution.jobs import MissionsJob
 from dess.analysis.execution.runner import CHUNK
 from dess.analysis.execution.workers import Cluster, _check_and_run
-from dess.analysis.results.chunks import Chunk, Part
-from dess.analysis.results.manifest import Manifest
+from dess.analysis.results.chunks import Chunk
+from dess.analysis.results.manifest import Manifest, Part
 from dess.analysis.results.provenance import engine_code, members_of
 from dess.reports import cli
 from tests.analysis.small import environment, files_of, small_study

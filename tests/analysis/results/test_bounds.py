@@ -11,7 +11,8 @@ from dess import InputError
 from dess.analysis import load_results, run_study
 from dess.analysis.bound import Bound
 from dess.analysis.execution import jobs, runner
-from dess.analysis.results.chunks import Chunk, Part
+from dess.analysis.results.chunks import Chunk
+from dess.analysis.results.manifest import Part
 from dess.analysis.results.parquet import table_of_bounds, write
 from dess.analysis.results.store import Store
 from tests.analysis.small import files_of, small_study

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from dess import InputError, simulate_batch
 from dess.analysis import load_results, load_study, run_study
 from dess.analysis.results import parquet, provenance
-from dess.analysis.results.chunks import Chunk, Part, gaps_between, split_into_chunks
-from dess.analysis.results.manifest import Cell
-from dess.analysis.results.store import Failure, Store
+from dess.analysis.results.chunks import Chunk, split_into_chunks
+from dess.analysis.results.manifest import Cell, Part
+from dess.analysis.results.store import Failure, Store, gaps_between
 from dess.policies import load
 from tests.analysis.small import files_of, small_study, write_scenario
 from tests.reports.small import quick
