@@ -383,15 +383,26 @@ def correct_for_all_tests(results: Results, table: pd.DataFrame) -> pd.DataFrame
     return table.assign(p_adjusted=(table["p"] * count_tests(results)).clip(upper=1))
 
 
+def has_policies_to_compare(results: Results) -> bool:
+    """Whether a study has several policies, with the same missions in spite of a stopping rule."""
+    return len(results.policies) > 1 and _same_missions(results)
+
+
+def has_learned_to_compare(results: Results) -> bool:
+    """Whether a study has learned policies and others, with the same missions."""
+    trained = trained_policies_by_learner(results).values()
+    learned = {policy for trainings in trained for policy in trainings}
+    return bool(learned) and learned < {*results.policies} and _same_missions(results)
+
+
 def compare_with_best(results: Results) -> pd.DataFrame:
     """Every policy compared with the best one on the same missions, over all design points.
 
     Returns:
         A row per policy and metric, as ``dess.analysis.compare`` returns it,
-        ``correct_for_all_tests``. Empty if there is only one policy, or if a stopping rule gave the
-        policies different missions.
+        ``correct_for_all_tests``. Empty unless the study ``has_policies_to_compare``.
     """
-    if len(results.policies) < 2 or not _same_missions(results):
+    if not has_policies_to_compare(results):
         return pd.DataFrame()
     best = best_policy(results.missions)
     return correct_for_all_tests(
@@ -412,13 +423,12 @@ def compare_learned_with_heuristic(results: Results) -> pd.DataFrame:
     Returns:
         A row per learner and metric, as ``dess.analysis.compare_learners`` returns it: about the
         learner if it has several trainings, otherwise about this one checkpoint,
-        ``correct_for_all_tests``. Empty if there is nothing to compare, or if a stopping rule gave
-        the policies different missions.
+        ``correct_for_all_tests``. Empty unless the study ``has_learned_to_compare``.
     """
+    if not has_learned_to_compare(results):
+        return pd.DataFrame()
     trained = trained_policies_by_learner(results)
     _, heuristics = rank_learned_and_others(results)
-    if not trained or not heuristics or not _same_missions(results):
-        return pd.DataFrame()
     table = compare_learners(results.missions, trained, heuristics[0], [*METRICS], correction=None)
     return correct_for_all_tests(results, table)
 

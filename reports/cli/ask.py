@@ -101,7 +101,7 @@ def sweep(
     def render(progress: "Progress") -> Path:
         from dess.reports.pages.render import render_study
 
-        return render_study(answer.question.out, out, progress, parameters)
+        return render_study(answer.results, out, progress, parameters)
 
     _print_answer(answer, parameters.get("metric"), render, as_json, "sweep")
 

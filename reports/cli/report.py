@@ -75,6 +75,7 @@ def report(
         values.setdefault("baseline", {})  # the scenario itself, not that of the default question
     if yes:  # a parameter of the notebooks that simulate missions
         values["yes"] = True
+    from dess.analysis.results.tables import load_results
     from dess.reports.pages.notebook import NAMES
     from dess.reports.pages.render import render, render_study
 
@@ -84,7 +85,8 @@ def report(
         if reports or not folders:
             console.print_text(render(reports, results, out, progress, values, formats=formats))
         for folder in folders:
-            console.print_text(render_study(folder, out, progress, values, formats))
+            results_of_study = load_results(folder)
+            console.print_text(render_study(results_of_study, out, progress, values, formats))
     if formats:
         console.print_text(f"figures: {out / '*-figures'}")
 

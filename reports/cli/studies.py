@@ -94,11 +94,13 @@ def run(
     for study, folder in runs:
         _run_and_summarize(study, folder, workers, scheduler, accept_code)
     if page:
+        from dess.analysis.results.tables import load_results
         from dess.reports.pages.render import render_study
 
         with rendering_bar() as progress:
             for folder in folders:
-                console.print_text(render_study(folder, options.PAGES, progress))
+                page_file = render_study(load_results(folder), options.PAGES, progress)
+                console.print_text(page_file)
 
 
 def _run_and_summarize(
@@ -356,7 +358,7 @@ def export(
     with console.open_outputs([crate]) as (temporary,), TemporaryDirectory() as pages:
         if page is None:
             with rendering_bar() as progress:
-                page = render_study(folder, pages, progress)
+                page = render_study(results, pages, progress)
         write_crate(results, page, temporary, date.today(), licence)
     if not console.is_stdout(crate):
         missions = format_count(len(results.missions), "mission")

@@ -6,7 +6,8 @@ begins with a second-level heading begins a section. Here are the filters of the
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from base64 import b64decode
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -129,6 +130,15 @@ def find_parts(cells: Iterable[NotebookNode]) -> list[dict[str, Any]]:
     """The parts that cells show, in the order of the page."""
     outputs = [output.get("data", {}) for cell in cells for output in cell.get("outputs", [])]
     return [data[PART] for data in outputs if PART in data]
+
+
+def figure_files(report: Report) -> Iterator[tuple[str, bytes]]:
+    """The files with the figures of a report that has been run, by the numbers on its page."""
+    for figure in (
+        figure for part in find_parts(report.cells) for figure in part.get("figures", [])
+    ):
+        for kind, content in figure.get("files", {}).items():
+            yield f"{figure['name']}.{kind}", b64decode(content)
 
 
 def split_sections(cells: Iterable[NotebookNode]) -> list[tuple[Markup, list[NotebookNode]]]:

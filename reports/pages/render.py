@@ -8,9 +8,8 @@ import logging
 import os
 import re
 import sys
-from base64 import b64decode
 from collections import Counter
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from hashlib import sha256
@@ -26,6 +25,7 @@ import dess
 from dess import InputError
 from dess.analysis.results.chunks import MANIFEST
 from dess.analysis.results.manifest import Manifest
+from dess.analysis.results.tables import Results
 from dess.base.files.documents import LIMIT
 from dess.base.files.reading import Missing, paths_in, read_bytes
 from dess.base.files.writing import delete, locked, write_files
@@ -248,21 +248,24 @@ def render(
     reports = [report for report in reports if not lacking[report.name]]
     for report in reports:
         report.set_parameters({"results": str(results.absolute()), **values})
+    check_pages(out, *(report.name for report in reports))
+    changed = [report.name for report in reports if not report.is_current]
+    kernels.simulate_missing(changed, results, values, progress)
     _write_pages(reports, results, out, progress, values, left_out)
     return out / INDEX
 
 
 def render_study(
-    folder: str | Path,
+    results: Results,
     out: str | Path,
     progress: Progress | None = None,
     parameters: Mapping[str, Any] | None = None,
     formats: Sequence[str] = (),
 ) -> Path:
-    """Write the page of a results folder of any study, its notebook and the index.
+    """Write the page of any study, its notebook and the index.
 
     Args:
-        folder: The results folder.
+        results: The study.
         out: The folder to write to.
         progress: Called after every cell.
         parameters: Values for the parameters of the notebook, beside ``results``.
@@ -272,18 +275,19 @@ def render_study(
         The path of the page, ``study-NAME.html``.
 
     Raises:
-        InputError: If the folder holds no complete results, a parameter is unknown or refused, or
-            ``out`` cannot be written. Nothing is written then.
+        InputError: If a parameter is unknown or refused, or ``out`` cannot be written. Nothing is
+            written then.
         ReportError: If the notebook fails, as in ``render``.
     """
-    folder = Path(folder)
+    folder = results.store.folder
     out = Path(out)
     values = parameters or {}
-    report = make_study_report(folder, values)
+    report = make_study_report(results, values)
     notebook.check_parameters([report], values)
     report.set_parameters({"results": str(folder.absolute()), **values})
     report.formats = (*formats,)
     _find_finished_page(report, folder, out, values)
+    check_pages(out, report.name)
     _write_pages([report], folder, out, progress, values)
     return out / report.page
 
@@ -297,46 +301,32 @@ def _write_pages(
     left_out: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> None:
     """Run reports in the folder of their results, and write the pages and the index."""
-    check_pages(out, *(report.name for report in reports))
     changed = [report for report in reports if not report.is_current]
-    kernels.simulate_missing([report.name for report in changed], results, values, progress)
     read_by = Counter(f for report in changed for f in _find_results(report, results).values())
     kernels.run_reports(
         changed, progress, [folder for folder, count in read_by.items() if count > 1]
     )
     new_pages = {}
+    files: dict[str, str | bytes] = {}
     if changed:
-        from dess.reports.pages.body import make_page  # imports nbconvert
+        from dess.reports.pages.body import figure_files, make_page  # imports nbconvert
 
         new_pages = {report.page: make_page(report) for report in changed}
-    complete = [report for report in reports if not report.failure]
-    files: dict[str, str | bytes] = {
-        f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete if not r.is_current
-    }
-    for report in complete:
-        files |= {f"{report.folder}/{name}": picture for name, picture in _decode_figures(report)}
+        for report in (report for report in changed if not report.failure):
+            files[f"{report.name}.ipynb"] = report.for_jupyter(results, out, values)
+            pictures = figure_files(report)
+            files |= {f"{report.folder}/{name}": picture for name, picture in pictures}
     with locked(out / LOCK, *_BUSY, PATIENCE):
         others = find_pages(out, but=new_pages)
         pages = add_bars(others | new_pages)
         files |= {name: page.text for name, page in pages.items() if page != others.get(name)}
         files[INDEX] = make_index(pages, left_out)
         write_files({out / name: text for name, text in files.items()})
-        for report in complete:
+        for report in (report for report in reports if not report.failure):
             delete(out / f"{report.name}.partial.html")
     if failed := [report for report in reports if report.failure]:
         lines = [f"{r.failure}; partial page: {out / r.page}" for r in failed]
         raise ReportError("; ".join(lines))
-
-
-def _decode_figures(report: notebook.Report) -> Iterator[tuple[str, bytes]]:
-    """The files with the figures of a report that has been run, by the numbers on its page."""
-    from dess.reports.pages.body import find_parts
-
-    for figure in (
-        figure for part in find_parts(report.cells) for figure in part.get("figures", [])
-    ):
-        for kind, content in figure.get("files", {}).items():
-            yield f"{figure['name']}.{kind}", b64decode(content)
 
 
 def _find_finished_page(

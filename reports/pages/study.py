@@ -1,6 +1,6 @@
 """The page of a study: which sections it has, their sentences, figures and tables."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -13,12 +13,12 @@ from dess.analysis.answers import summary
 from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.fleet.costs import has_running_cost, prices_in_words
 from dess.analysis.answers.fleet.requirements import requirements_of
-from dess.analysis.answers.settings.baseline import baseline_in_words
+from dess.analysis.answers.settings.baseline import check_baseline
 from dess.analysis.answers.settings.points import metrics_of_page, varied_values
 from dess.analysis.answers.settings.ranking import ranking_metric
 from dess.analysis.ask import around
 from dess.analysis.names import field_named, value_text
-from dess.analysis.results.tables import Results, load_results
+from dess.analysis.results.tables import Results
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.selection import Selection
 from dess.policies.registry import list_departures
@@ -67,9 +67,14 @@ def list_notes(results: Results) -> html.Marked:
     return html.Marked("\n".join(lines))
 
 
-def page_title(results: Results) -> str:
-    """The question that a study answers."""
-    fields = [field_named(field).within for field in varied_values(results)]
+def page_title(results: Results, varied: Iterable[str]) -> str:
+    """The question that a study answers.
+
+    Args:
+        results: The study.
+        varied: The fields that have several values.
+    """
+    fields = [field_named(field).within for field in varied]
     if isinstance(results.study.selection, Cheapest):
         question = "Which fleet is the cheapest on {}?"
     elif results.design == "saltelli":
@@ -187,23 +192,22 @@ def _format_set_value(value: Any) -> str:
 NOTEBOOK = "study"
 
 
-def make_study_report(folder: Path, values: Mapping[str, Any] = MappingProxyType({})) -> Report:
-    """The report of a results folder, with the sections and the title of its study.
+def make_study_report(results: Results, values: Mapping[str, Any] = MappingProxyType({})) -> Report:
+    """The report of a study, with its sections and its title.
 
     Args:
-        folder: The results folder.
+        results: The study.
         values: Values for the parameters of the notebook, to be checked.
 
     Raises:
-        InputError: If the folder holds no results, or they are incomplete or damaged; if the study
-            has no such metric or baseline.
+        InputError: If the study has no such metric or baseline.
     """
-    results = load_results(folder)
     ranking_metric(results, values.get("metric"))
-    baseline_in_words(results, values.get("baseline", 0))
+    check_baseline(results, values.get("baseline", 0))
     study = results.study
     original = notebook.parse_notebook(NOTEBOOK)
-    kept = find_shown_parts(results)
+    varied = [*varied_values(results)]
+    kept = find_shown_parts(results, varied)
     original.cells = [
         cell for cell in original.cells if all(kept.get(tag, True) for tag in cell_tags(cell))
     ]
@@ -212,18 +216,23 @@ def make_study_report(folder: Path, values: Mapping[str, Any] = MappingProxyType
     if points > 1:
         where = f"{points:,} design points"
     description = study.description or f"{numbers.join_words(results.policies)} at {where}."
-    title = page_title(results)
+    title = page_title(results, varied)
     original.cells[0].source = f"# {html.escape_text(title)}\n\n{html.escape_text(description)}"
     report = notebook.make_report(f"{PREFIX}{study.name}", original)
     return replace(report, title=title, description=" ".join(description.split()))
 
 
-def find_shown_parts(results: Results) -> dict[str, bool]:
-    """For each tag, whether the page of a study has the cells of the notebook with this tag."""
+def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]:
+    """For each tag, whether the page of a study has the cells of the notebook with this tag.
+
+    Args:
+        results: The study.
+        varied: The fields that have several values.
+    """
     manifest = results.store.manifest
     study = results.study
     several = len(manifest.points) > 1
-    fields = len(varied_values(results))
+    fields = len(varied)
     kind = results.design
     if fields <= 1 and kind not in ("saltelli", "latin-hypercube"):
         kind = "grid"  # it varies one field at most
@@ -251,8 +260,8 @@ def find_shown_parts(results: Results) -> dict[str, bool]:
         "if-sampled": kind == "latin-hypercube" or (kind == "table" and fields > 2),
         "if-sensitivity": not is_ranked,
         # Several policies with the same missions; some of them learned, some not.
-        "if-policies": not summary.compare_with_best(results).empty,
-        "if-learned": not summary.compare_learned_with_heuristic(results).empty,
+        "if-policies": summary.has_policies_to_compare(results),
+        "if-learned": summary.has_learned_to_compare(results),
         # Tables of the study.
         "if-selection": isinstance(study.selection, Selection),
         "if-cheapest": is_search,

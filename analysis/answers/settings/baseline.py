@@ -30,16 +30,25 @@ from dess.analysis.tables import (
 )
 
 
+def check_baseline(results: Results, point: int) -> None:
+    """Refuse a baseline that is no design point of a study.
+
+    Raises:
+        InputError: If it is none.
+    """
+    points = len(results.store.manifest.points)
+    if point not in range(points):
+        raise InputError("baseline", f"{point!r} is not a design point", f"0..{points - 1}")
+
+
 def baseline_in_words(results: Results, point: int) -> str:
     """The design point with which all others are compared, in words.
 
     Raises:
         InputError: If there is no such design point.
     """
-    words = points_in_words(results)
-    if point not in range(len(words)):
-        raise InputError("baseline", f"{point!r} is not a design point", f"0..{len(words) - 1}")
-    return words[point]
+    check_baseline(results, point)
+    return points_in_words(results)[point]
 
 
 def compare_with_baseline(
@@ -62,7 +71,7 @@ def compare_with_baseline(
     Raises:
         InputError: If there is no such point or metric.
     """
-    baseline_in_words(results, point)
+    check_baseline(results, point)
     tables = []
     for metric in metrics:
         parts = []

@@ -61,9 +61,9 @@ def unrendered(monkeypatch):
     """No page is made, which takes seconds; of what pages would be made, where, and with what."""
     pages = []
 
-    def note_study(folder, out, progress=None, parameters=None, formats=()):
-        pages.append((str(folder), str(out), parameters))
-        return Path(out, f"study-{Path(folder).name}.html")
+    def note_study(results, out, progress=None, parameters=None, formats=()):
+        pages.append((str(results.store.folder), str(out), parameters))
+        return Path(out, f"study-{results.study.name}.html")
 
     def note(names, results, out, progress=None, parameters=None, formats=()):
         notebook.check_parameters([notebook.read_report(name) for name in names], parameters)

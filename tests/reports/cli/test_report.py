@@ -2,26 +2,38 @@
 
 from pathlib import Path
 
+import pytest
+
 from dess.reports.pages import notebook, render
 
 
-def test_names_are_reports_and_folders_are_studies(dess, unrendered, tmp_path):
-    (tmp_path / "fleets").mkdir()
+@pytest.fixture
+def run_trial(dess):
+    """Runs a small study into a folder."""
+
+    def run(folder):
+        assert dess("study", "run", "trial.toml", "--missions", 2, "--out", folder)[0] == 0
+
+    return run
+
+
+def test_names_are_reports_and_folders_are_studies(dess, unrendered, run_trial):
+    run_trial("fleets")
     code, out, _ = dess(
         "report", "mission", "fleets", "--out", "pages", "--parameter", "policy='tour'"
     )
-    assert (code, out.split()) == (0, ["pages/mission.html", "pages/study-fleets.html"])
+    assert (code, out.split()) == (0, ["pages/mission.html", "pages/study-trial.html"])
     assert unrendered == [
         ("mission", "results", "pages", {"policy": "tour"}),
         ("fleets", "pages", {"policy": "tour"}),
     ]
 
 
-def test_a_folder_that_is_called_like_a_report_needs_a_separator(dess, unrendered, tmp_path):
-    (tmp_path / "learning").mkdir()
+def test_a_folder_that_is_called_like_a_report_needs_a_separator(dess, unrendered, run_trial):
+    run_trial("learning")
     assert dess("report", "learning")[0] == dess("report", "./learning")[0] == 0
     pages = str(Path("build", "reports"))
-    assert unrendered == [("learning", "results", pages, {}), ("./learning", pages, {})]
+    assert unrendered == [("learning", "results", pages, {}), ("learning", pages, {})]
 
 
 def test_without_arguments_all_reports_are_rendered(dess, unrendered):
@@ -36,12 +48,13 @@ def test_a_study_is_run_and_its_page_rendered(dess, unrendered):
     assert [page[0] for page in unrendered] == [str(Path("results", "trial"))]
 
 
-def test_a_notebook_that_fails_is_one_line(dess, monkeypatch, tmp_path):
+def test_a_notebook_that_fails_is_one_line(dess, run_trial, monkeypatch):
     def fail(*arguments, **options):
         raise render.ReportError("report study-fleets: cell 3 of 9 (x): ValueError: no such number")
 
     monkeypatch.setattr(render, "render_study", fail)
-    code, out, err = dess("report", tmp_path / "fleets")
+    run_trial("fleets")
+    code, out, err = dess("report", "./fleets")
     assert (code, out) == (1, "")
     assert err.splitlines()[-1].startswith("dess: error: report study-fleets: cell 3 of 9")
 
@@ -60,12 +73,14 @@ def test_formats_of_figures_are_named(dess, unrendered, refusal):
     assert (code, out) == (0, f"{where / 'mission.html'}\nfigures: {where / '*-figures'}\n")
 
 
-def test_a_parameter_that_the_study_refuses_is_refused_before_any_cell(dess, refusal, monkeypatch):
+def test_a_parameter_that_a_study_refuses_is_refused_before_any_cell(
+    run_trial, refusal, monkeypatch
+):
     def fail(*_):
         raise AssertionError("a cell runs")
 
     monkeypatch.setattr("dess.reports.pages.kernels.run_reports", fail)
-    assert dess("study", "run", "trial.toml", "--missions", 2, "--out", "out")[0] == 0
+    run_trial("out")
     for value, words in {
         "baseline=99": "baseline: 99 is not a design point; allowed: 0..0",
         "metric='speed'": "metric: 'speed' is unknown",

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from nbconvert.filters import markdown2html
 
-from dess.analysis import numbers
+from dess.analysis import load_results, numbers
 from dess.analysis.figures import style
 from dess.reports.pages import html
 from dess.reports.pages.notebook import assigned_values, replace_values
@@ -37,7 +37,7 @@ def page(studied, tmp_path_factory):
     """The page of a study all of whose free strings are an attack."""
     folder = tmp_path_factory.mktemp("hostile")
     made = hostile_folder(studied().store.folder, folder / "made", ATTACK)
-    return render_study(made, folder / "out")
+    return render_study(load_results(made), folder / "out")
 
 
 def test_a_hostile_study_is_text_on_its_page_and_in_the_index(page):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dess.analysis import run_study
+from dess.analysis import load_results, run_study
 from dess.reports.pages import kernels, render
 from dess.reports.pages.render import render as render_pages
 from dess.reports.pages.render import render_study
@@ -110,5 +110,5 @@ def test_pages_with_parameters_are_always_rendered(folder):
 
 def test_the_page_of_a_study_is_rendered_once(results, tmp_path, rendered):
     for _ in range(2):
-        render_study(results / "trial", tmp_path)
+        render_study(load_results(results / "trial"), tmp_path)
     assert rendered == ["study-trial"]

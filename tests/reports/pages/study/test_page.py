@@ -10,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from dess.analysis import load_results
 from dess.reports.pages import html
 from dess.reports.pages.page import STUDY, Page
 from dess.reports.pages.render import render_study
@@ -49,7 +50,7 @@ def out(tmp_path_factory):
 @pytest.fixture(scope="module")
 def page(folder, out):
     """The page, rendered once."""
-    assert render_study(folder, out) == out / "study-trial.html"
+    assert render_study(load_results(folder), out) == out / "study-trial.html"
     return (out / "study-trial.html").read_text("utf-8")
 
 

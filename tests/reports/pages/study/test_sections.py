@@ -5,6 +5,7 @@ from html import unescape
 
 import pytest
 
+from dess.analysis import load_results
 from dess.reports.pages.notebook import SHIPPED
 from dess.reports.pages.study import find_shown_parts, make_study_report
 from tests.analysis.small import grid
@@ -70,7 +71,7 @@ STUDIES = {
 
 def page_of(folder, **parameters):
     """The texts of the page and of its drawings, without rendering it."""
-    report = make_study_report(folder)
+    report = make_study_report(load_results(folder))
     texts = [cell.source for cell in report.notebook.cells if cell.cell_type == "markdown"]
     shown = re.sub("<script.*?</script>", "", shown_by(report, results=str(folder), **parameters))
     bare = re.sub(r"[`*]|<[^>]*>", "", " ".join([*texts, shown]))
@@ -90,7 +91,7 @@ def test_the_page_says_what_the_study_can_answer(name, studied):
 
 def test_tags_of_the_notebook_are_those_that_have_a_meaning(studied):
     used = {*re.findall(r'"(if-[a-z-]+)"', (SHIPPED / "study.py").read_text("utf-8"))}
-    assert used == {*find_shown_parts(studied())}
+    assert used == {*find_shown_parts(studied(), [])}
 
 
 def test_parameters_choose_the_metric_and_the_baseline(studied):

@@ -17,8 +17,8 @@ def test_a_sheet_needs_no_prices_and_prices_no_requirement(tmp_path):
     for prices in (None, {"uav": 20_000}):
         asked = {"prices": prices, "folder": tmp_path / "results"}
         question = sweep_question({"uavs": (1, 2)}, scenario, ["greedy"], 10, **asked)
-        question.ask()
-        said = said_by(make_study_report(question.out), results=str(question.out))
+        report = make_study_report(question.ask())
+        said = said_by(report, results=str(question.out))
         assert "The best setting is greedy with " in said
         assert "Who flies: the policy greedy" in said
         assert ("Prices: 20,000 EUR for a UAV." in said) == bool(prices)
@@ -36,7 +36,7 @@ def test_the_answer_the_figure_and_what_is_assumed_are_one_sheet_of_paper(tmp_pa
     )
     found = question.ask()
     around.question_around(found, question.study.scenario, 5).ask()
-    path = render_study(question.out, tmp_path / "reports")
+    path = render_study(found, tmp_path / "reports")
     text = words_of(path.read_text("utf-8"))
     for words in ("A slot is 21 s", "A cell is 315 m", "mean time between failures 100 h"):
         assert words in text
