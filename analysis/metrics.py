@@ -8,7 +8,7 @@ from typing import Any, Literal
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.model.record import OPERATIONS
+from dess.model.record import OPERATIONS, measures_of
 from dess.scenario.data_sheet import Units
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
@@ -165,21 +165,27 @@ BOUND, GAP = "upper_bound", "optimality_gap"
 
 _SLOTS, _DATA = "mission slots", "data units"
 _SIZES = {"min": 60.0, "h": 3600.0, "MB": 8e6, "km": 1000.0}  # [s], [bit], [m]
-# The paper's metrics, in its order (Section VI-A). It calls them successful communication,
-# collection ratio, and collection ratio and communication; the last is here the product of each
-# mission.
+# A metric is declared once, in the list of the missions that have it: wherever metrics are chosen,
+# they come from these lists. Every mission has the paper's metrics, in its order (Section VI-A). It
+# calls them successful communication, collection ratio, and collection ratio and communication; the
+# last is here the product of each mission.
 _PAPER = (
     Metric(SUCCESS, "Success", kind="outcome", in_percent=True),
     Metric(RATIO, "Collection ratio", kind="share", in_percent=True),
     Metric(PRODUCT, "Product", kind="share", in_percent=True),
 )
-_OTHERS = (
-    Metric(HOME, "Battery for the way home", kind="outcome", in_percent=True),
-    Metric(REWARD, "Reward", failure=FAILURE_COST),
+# What policies are compared by.
+_OF_MISSIONS = (*_PAPER, Metric(REWARD, "Reward", failure=FAILURE_COST))
+# What every mission has beside these.
+_BESIDE = (Metric(HOME, "Battery for the way home", kind="outcome", in_percent=True),)
+# What only the missions of studies with bounds have, and those of studies with prices.
+_OF_BOUNDS = (
     Metric(BOUND, "Upper bound", least=0.0, most=1.0),
     Metric(GAP, "Optimality gap", less_is_better=True, least=-1.0, most=1.0),
-    Metric(COST, "Cost", kind="cost", less_is_better=True, least=0.0, grows=True),
 )
+_OF_PRICES = (Metric(COST, "Cost", kind="cost", less_is_better=True, least=0.0, grows=True),)
+# The columns that results of earlier versions lack, the latest first.
+ADDED = (HOME,)
 # The columns of the longest that each mission may last, and of what a loss of its UAVs costs.
 MOST_SLOTS, MOST_LOST = "most_slots", "most_lost"
 
@@ -237,16 +243,19 @@ _RECORDED = (
     _time_metric("charging_per_uav", "Charging per UAV", "min"),
     _time_metric("waiting_per_uav", "Waiting per UAV", "min"),
 )
-_IN_UNITS = {metric.in_units.column: metric.in_units for metric in _MEASURED}
-_IN_SHEET_UNIT = {metric.column: metric.in_units.column for metric in (*_MEASURED, *_RECORDED)}
-_KNOWN = {metric.column: metric for metric in (*_PAPER, *_OTHERS, *_MEASURED)}
-_KNOWN |= _IN_UNITS | {metric.column: metric for metric in _RECORDED}
-_KNOWN |= {metric.in_units.column: metric.in_units for metric in _RECORDED}
+_ALL = (*_OF_MISSIONS, *_BESIDE, *_OF_BOUNDS, *_OF_PRICES, *_MEASURED, *_RECORDED)
+_IN_SHEET_UNIT = {metric.column: metric.in_units.column for metric in _ALL}
+_KNOWN = {metric.column: metric for metric in _ALL}
+_KNOWN |= {metric.in_units.column: metric.in_units for metric in _ALL}
 
 METRICS = {metric.column: metric.name for metric in _PAPER}  # the paper's metrics, with their names
 MEASURES = {metric.column: metric for metric in _MEASURED}
-EITHER = MEASURES | _IN_UNITS  # as they are measured, and in the units of data sheets
-ALWAYS = (*METRICS, REWARD)  # the metrics of every mission
+# As they are measured, and in the units of data sheets.
+EITHER = MEASURES | {metric.in_units.column: metric.in_units for metric in _MEASURED}
+ALWAYS = tuple(metric.column for metric in _OF_MISSIONS)  # the metrics of every mission
+BESIDE = {metric.column: metric.name for metric in _BESIDE}  # also of every mission, with names
+# All of every mission, in the order in which means are listed.
+RECORDED = tuple(dict.fromkeys((SUCCESS, *BESIDE, *ALWAYS)))
 # Short names of metrics on the command line.
 ALIASES = {"ratio": RATIO, "product": PRODUCT}
 
@@ -317,7 +326,7 @@ def columns_in_units(missions: Mapping[str, Any], units: Units) -> dict[str, Any
         missions: The columns of the missions, as records have them.
         units: What a slot and a data unit are, numbers or an array of one for each mission.
     """
-    metrics = [m for m in (*_MEASURED, *_RECORDED) if m.sheet_unit and m.column in missions]
+    metrics = [m for m in _ALL if m.sheet_unit and m.column in missions]
     return {m.in_units.column: missions[m.column] * size_of(m.sheet_unit, units) for m in metrics}
 
 
@@ -346,5 +355,16 @@ def measured_in(missions: Container[str]) -> list[str]:
 
 def metrics_in(missions: Container[str]) -> list[str]:
     """The metrics that a table of missions has: those of the paper, then all others."""
-    others = [name for name in (HOME, BOUND, GAP) if name in missions]
+    others = [m.column for m in (*_BESIDE, *_OF_BOUNDS) if m.column in missions]
+    others = [column_in_sheet_unit(column, missions) for column in others]
     return [*ALWAYS, *others, *measured_in(missions)]
+
+
+def ranking_metrics(missions: Container[str]) -> list[str]:
+    """The metrics by which settings can be ranked: those that missions have, then their cost."""
+    return [*metrics_in(missions), *(m.column for m in _OF_PRICES if m.column in missions)]
+
+
+def metrics_of_scenario(space: ScenarioSpace) -> list[str]:
+    """The metrics of the missions of a scenario, as they are measured."""
+    return metrics_in([*BESIDE, *measures_of(space)])

@@ -8,10 +8,9 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.metrics import (
-    HOME,
+    BESIDE,
     METRICS,
     PRODUCT,
-    metric_of,
 )
 from dess.analysis.names import field_named, value_text
 from dess.analysis.stats.intervals import LEVEL
@@ -23,7 +22,7 @@ CHECKED = f"The check of the selected settings: means with {INTERVALS}"
 MOST_PRINTED = 20  # the largest number of rows of a table that the terminal prints
 MOST_ROWS = 25  # the largest number of rows of a table on a page; its data have all rows
 WIDER = 1.5  # times as wide as without the allowance for failures: what is explained in words
-_HEADS = {"policy": "Policy", "n": "Missions", **METRICS, HOME: metric_of(HOME).name}
+_HEADS = {"policy": "Policy", "n": "Missions", **METRICS, **BESIDE}
 
 
 class Table(NamedTuple):

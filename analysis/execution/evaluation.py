@@ -166,7 +166,7 @@ def of_results(results: Results) -> list[Evaluation]:
     """The evaluations of the teams of a study that has the scenario as its only design point."""
     evaluations = []
     for team, rows in results.missions.groupby("policy", sort=False):
-        metrics = {name: rows[name].to_numpy(float) for name in (SUCCESS, HOME, *ALWAYS)}
+        metrics = {name: rows[name].to_numpy(float) for name in RECORDED}
         measured = [name for name in OPERATIONS.names or () if name in rows]
         for name in (*measured, *measured_in(rows)):  # as they are measured, then in units
             metrics[name] = rows[name].to_numpy(float)
@@ -201,7 +201,7 @@ def _over_space(moments: ByFleet, space: ScenarioSpace, missions: int) -> dict[s
 
 def _metric_values(records: Records, space: ScenarioSpace) -> dict[str, np.ndarray]:
     """The values of every metric that some of the missions have measured, in units as well."""
-    values = {metric: records.missions[metric] for metric in (SUCCESS, HOME, *ALWAYS)}
+    values = {metric: records.missions[metric] for metric in RECORDED}
     if len(records.operations):
         values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
     if space.units:

@@ -8,8 +8,9 @@ bytes, by which a damaged file is noticed.
 import json
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,6 +21,7 @@ import pyarrow.parquet as pq
 from pydantic import Field, TypeAdapter
 
 from dess.analysis.bound import Bound
+from dess.analysis.metrics import ADDED
 from dess.analysis.results.chunks import Chunk, name_of, short_hash
 from dess.base.files.reading import paths_in, read_bytes
 from dess.base.files.tables import LIMIT, parquet_of
@@ -71,23 +73,29 @@ EVENTS = pa.schema(
     for name, kind in EVENT_COLUMNS.items()
 )
 
+# The columns that files of earlier versions lack, the latest first. Version 0.2 had no ways home,
+# and fewer columns of the event log; earlier ones of version 0.3 do not say what was charged and
+# which UAVs are down.
+_ADDED_TO_MISSIONS = [(column,) for column in ADDED]
+_ADDED_TO_UAVS = (("charged", "down"), ("way_home",))
+_ADDED_TO_EVENTS = (tuple(EVENTS.names[7:]),)
 
-def _without_cell(schema: pa.Schema, *names: str) -> pa.Schema:
-    return pa.schema([field for field in schema if field.name not in names])
+
+def _with_earlier(schema: pa.Schema, added: Iterable[Sequence[str]]) -> list[pa.Schema]:
+    """A schema, and those of earlier versions: each lacks what was added next."""
+    schemas = [schema]
+    for names in added:
+        schemas.append(pa.schema([field for field in schemas[-1] if field.name not in names]))
+    return schemas
 
 
-# The schemas that files may have; those of version 0.2 have no ways home, and fewer columns of the
-# event log, and earlier ones of version 0.3 do not say what was charged and which UAVs are down.
+_OF_MISSIONS = (_with_earlier(kind, _ADDED_TO_MISSIONS) for kind in (MISSIONS, EXTENDED_MISSIONS))
+# The schemas that files may have.
 SCHEMAS = {
-    "missions": [MISSIONS, EXTENDED_MISSIONS]
-    + [_without_cell(schema, "home") for schema in (MISSIONS, EXTENDED_MISSIONS)],
-    "uavs": [
-        UAVS,
-        _without_cell(UAVS, "charged", "down"),
-        _without_cell(UAVS, "way_home", "charged", "down"),
-    ],
+    "missions": [*chain(*zip(*_OF_MISSIONS, strict=True))],
+    "uavs": _with_earlier(UAVS, _ADDED_TO_UAVS),
     "bounds": [BOUNDS],
-    "events": [EVENTS, pa.schema([EVENTS.field(name) for name in EVENTS.names[:7]])],
+    "events": _with_earlier(EVENTS, _ADDED_TO_EVENTS),
 }
 # The least and the largest value of the columns that are used as indices and as sizes.
 INDICES = {

@@ -20,7 +20,14 @@ from pydantic import (
 
 from dess import InputError
 from dess.analysis.bound import check_scenario
-from dess.analysis.metrics import BOUND, COST, GAP, HOME, metric_of, metrics_in
+from dess.analysis.metrics import (
+    BOUND,
+    COST,
+    GAP,
+    metric_of,
+    metrics_of_scenario,
+    ranking_metrics,
+)
 from dess.analysis.study.cheapest import AnySelection, Cheapest
 from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
 from dess.analysis.study.prices import Costs
@@ -30,7 +37,6 @@ from dess.base.descriptions import Description
 from dess.base.errors import cut, listed, to_input_error, unknown_name
 from dess.base.files.reading import Shipped
 from dess.model.batch import check_slotted
-from dess.model.record import measures_of
 from dess.physics.section import Integer, plain, tuples
 from dess.physics.streams import MAX_SEED
 from dess.policies.registry import list_teams, load_team
@@ -152,12 +158,6 @@ class StudyData(StrictTable):
         return self.missions
 
     @property
-    def size(self) -> int:
-        """The number of design points, computed without making them."""
-        return self.design.count if self.design else 1
-
-
-    @property
     def most_missions(self) -> int:
         """The largest number of missions of a policy that the study may need."""
         if not self.selection:
@@ -166,6 +166,12 @@ class StudyData(StrictTable):
         if isinstance(self.selection, Cheapest):
             checked = self.size
         return self.selection.budget + self.selection.check * checked
+
+    @property
+    def size(self) -> int:
+        """The number of design points, computed without making them."""
+        return self.design.count if self.design else 1
+
 
 class Study(StudyData):
     """A study: every policy at every design point, in a number of replications.
@@ -220,13 +226,14 @@ class Study(StudyData):
     @property
     def metrics(self) -> list[str]:
         """The metrics that missions of the study have, be it only at some design points."""
-        measured = {HOME, *(name for space in self.scenarios for name in measures_of(space))}
+        measured = {name for space in self.scenarios for name in metrics_of_scenario(space)}
         if all(space.units for space in self.scenarios):
             measured |= {metric_of(name).in_units.column for name in measured}
-        of_bounds = set()
         if self.bounds:
-            of_bounds = {BOUND, GAP}
-        return [*metrics_in(measured | of_bounds), *([COST] if self.costs else [])]
+            measured |= {BOUND, GAP}
+        if self.costs:
+            measured |= {COST}
+        return ranking_metrics(measured)
 
     def _choose_engine(self) -> None:
         """Take the SimPy engine if the study does not say which and a design point needs it."""
@@ -270,7 +277,7 @@ class Study(StudyData):
         else:
             return
         for space in self.scenarios:
-            measured = metrics_in([HOME, *measures_of(space)])
+            measured = metrics_of_scenario(space)
             if absent := sorted(asked - {*measured}):
                 raise InputError(
                     key, f"{absent[0]} is not measured at every design point", listed(measured)

@@ -10,11 +10,7 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from dess.analysis import numbers
-from dess.analysis.metrics import (
-    COST,
-    METRICS,
-    metrics_in,
-)
+from dess.analysis.metrics import METRICS, ranking_metrics
 from dess.analysis.names import field_named
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.tables import (
@@ -133,7 +129,7 @@ def intervals_in_words(results: Results) -> str:
 
 def check_metric(results: Results, metric: str) -> None:
     """Raise ``InputError`` if the missions do not have the metric."""
-    metrics = [*metrics_in(results.missions), *([COST] if COST in results.missions else [])]
+    metrics = ranking_metrics(results.missions)
     if metric not in metrics:
         raise unknown_name("metric", f"{metric!r} is unknown", metric, metrics)
 
