@@ -356,15 +356,17 @@ def list_departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) ->
         policies: The names of policies and teams.
         spaces: The scenarios in which they act.
     """
+    folders = {name: folder_of(name) for team in policies for name in team.split(",")}
+    trained = {name: folder for name, folder in folders.items() if folder}
+    if not trained:
+        return []
     lines = []
     present = field_ranges(spaces)
-    for name in dict.fromkeys(name for team in policies for name in team.split(",")):
+    for name, folder in trained.items():
         with suppress(InputError):  # whoever loads it says what is wrong
-            folder = folder_of(name)
-            trained = read_description(folder).ranges if folder else {}
             beyond = [
                 f"{field} {_format_range(present[field])} (trained on {_format_range([low, high])})"
-                for field, (low, high) in trained.items()
+                for field, (low, high) in read_description(folder).ranges.items()
                 if field in present and not low <= present[field][0] <= present[field][1] <= high
             ]
             if beyond:

@@ -534,7 +534,7 @@ def reached_precisions(results: Results) -> pd.DataFrame:
     if (rule := manifest.study.precision) is None:
         return pd.DataFrame()
     tables = {
-        policy: pd.DataFrame(rule.reached(results.store.samples(manifest.parts(team))))
+        policy: pd.DataFrame(rule.reached(results.store.samples(manifest.parts_of_team(team))))
         for team, policy in enumerate(results.policies)
     }
     return stack_by_policy(tables)

@@ -15,7 +15,6 @@ import pandas as pd
 from dess import InputError
 from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.fleet.costs import (
-    currency_of,
     fleets_in_words,
     priced_settings,
     setting_cells,
@@ -136,7 +135,7 @@ def table_around(results: Results) -> Table:
     columns = [requirement.column for requirement in requirements]
     cells = setting_cells(data.assign(condition="", fleet=data["change"]), columns)
     cells = cells.drop(columns="Policy").rename(columns={"Fleet": "What if"})
-    cells = cells.rename(columns={"Cost": f"Cost [{currency_of(results)}]"})
+    cells = cells.rename(columns={"Cost": f"Cost [{results.prices.currency}]"})
     differences = compare(changed_results.missions, 0, columns, correction=None, of="point")
     differences = differences.set_index(["metric", "point"])[["difference", "low", "high"]]
     for metric in map(metric_of, columns):

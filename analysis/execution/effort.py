@@ -374,10 +374,10 @@ def _plan_team(study: Study, store: Store, team: int) -> Planned:
     manifest = store.manifest
     spaces = study.scenarios
     policy = study.policies[team]
-    parts = manifest.parts(team) + manifest.parts_of_check(team)
+    parts = manifest.parts_of_team(team) + manifest.parts_of_check(team)
     needed = sum(map(len, parts))
     missing = sum(map(len, store.missing("missions", parts)))
-    logged = manifest.parts(team, [study.logged] * study.size)
+    logged = manifest.parts_of_team(team, [study.logged] * study.size)
     logs = sum(map(len, store.missing("events", logged)))
     most = needed
     if study.rule and missing:

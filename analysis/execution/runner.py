@@ -134,10 +134,10 @@ class _Run:
         points = len(self.study.points)
         before = [[0] * points for _ in teams]
         counts = [[self.study.first] * points for _ in teams]
-        logs = [manifest.parts(team, [self.study.logged] * points) for team in teams]
+        logs = [manifest.parts_of_team(team, [self.study.logged] * points) for team in teams]
         asked: Present = defaultdict(list)
         while counts != before:
-            of_teams = (manifest.parts(team, counts[team]) for team in teams)
+            of_teams = (manifest.parts_of_team(team, counts[team]) for team in teams)
             parts = new_parts(of_teams, asked)
             self._round(parts, new_parts(logs, defaultdict(list)))
             before = counts
@@ -149,7 +149,7 @@ class _Run:
         self._round([part for of_team in checks for part in of_team])
         if self.study.rule and not manifest.accepted:  # files of other code may have other columns
             for team in teams:
-                all_of_team = manifest.parts(team, counts[team]), checks[team]
+                all_of_team = manifest.parts_of_team(team, counts[team]), checks[team]
                 parts = new_parts(all_of_team, defaultdict(list))
                 self.store.merge([*chunks.split_into_chunks(parts, CHUNK[self.study.engine])])
         self._make((BoundsJob, new_parts([manifest.parts_with_bounds(counts)], asked)))
@@ -172,7 +172,7 @@ class _Run:
     def _samples(self, team: int, counts: list[int]) -> tuple[Samples, Sequence[Setting]]:
         """The missions and the settings of all design points, by which a rule decides."""
         manifest = self.store.manifest
-        return self.store.samples(manifest.parts(team, counts)), manifest.settings
+        return self.store.samples(manifest.parts_of_team(team, counts)), manifest.settings
 
     def _round(self, parts: Sequence[Part], logs: Sequence[Part] = ()) -> None:
         """Simulate the missing missions of a round with these parts, then make the event logs."""

@@ -276,7 +276,7 @@ class Manifest(provenance.Origin):
             return self._cells(NO_TEAM, run)
         return ()
 
-    def parts(self, team: int, counts: Sequence[int] | None = None) -> list[Part]:
+    def parts_of_team(self, team: int, counts: Sequence[int] | None = None) -> list[Part]:
         """The first missions of every cell of a team: so many, or as many as were needed."""
         return _first_parts(self.cells[team], counts or self.missions[team])
 

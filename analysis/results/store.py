@@ -126,7 +126,7 @@ class Store:
             InputError: If it is not a results folder, or one of another version.
         """
         folder = Path(out)
-        return cls.scanned(folder, Manifest.read(folder / chunks.MANIFEST))
+        return cls.scan_folder(folder, Manifest.read(folder / chunks.MANIFEST))
 
     @classmethod
     def peek(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
@@ -136,10 +136,10 @@ class Store:
             InputError: If the folder holds something else, or cannot be written.
         """
         folder = Path(out)
-        return cls.scanned(folder, _extended_manifest(folder, Manifest.of(study), accept_code))
+        return cls.scan_folder(folder, _extended_manifest(folder, Manifest.of(study), accept_code))
 
     @classmethod
-    def scanned(cls, folder: Path, manifest: Manifest) -> Self:
+    def scan_folder(cls, folder: Path, manifest: Manifest) -> Self:
         """A folder whose manifest is known, to load from it; nothing is written or locked."""
         store = cls(folder, manifest)
         store._scan()
@@ -531,7 +531,7 @@ def _source_folder(folder: Path, keys: set[str]) -> Store | None:
         manifest = Manifest.read(folder / chunks.MANIFEST)
         if manifest.accepted or not keys & _cell_keys(manifest):
             return None
-        return Store.scanned(folder, manifest)
+        return Store.scan_folder(folder, manifest)
     except (InputError, FileNotFoundError):  # another run may merge its files
         return None
 

@@ -19,6 +19,7 @@ from dess.analysis.results.manifest import Cell, Manifest
 from dess.analysis.results.provenance import Origin
 from dess.analysis.results.store import Place, Store
 from dess.analysis.study.cheapest import Cheapest, CheapestChoice
+from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Choice, Selection
 from dess.analysis.study.study import StudyData
 from dess.base.errors import unknown_name
@@ -135,6 +136,20 @@ class Results:
         """The study, with the name of its scenario in place of a path."""
         return self.store.manifest.study
 
+    @property
+    def prices(self) -> Costs:
+        """The prices of the study.
+
+        Raises:
+            InputError: If it has none.
+        """
+        prices = self.study.costs
+        if prices is None:
+            raise InputError(
+                self.store.folder, "the study has no prices", "one with a table [costs]"
+            )
+        return prices
+
     @cached_property
     def policies(self) -> list[str]:
         """The teams, as the study names them."""
@@ -215,7 +230,7 @@ class Results:
         rule = self.study.selection
         if not rule or not isinstance(rule, kind):
             return None
-        parts = manifest.parts(self.policies.index(policy))
+        parts = manifest.parts_of_team(self.policies.index(policy))
         return rule.choice(self.store.samples(parts), manifest.settings)
 
     def looks(self, policy: str) -> np.ndarray:
@@ -283,7 +298,7 @@ def results_of(store: Store) -> Results:
     manifest = store.manifest
     missions, uavs, checks = {}, {}, {}
     for number, team in enumerate(manifest.policies):
-        parts = manifest.parts(number)
+        parts = manifest.parts_of_team(number)
         missions[team.policy] = store.missions(parts)
         uavs[team.policy] = store.uavs(parts)
         if checked := manifest.parts_of_check(number):

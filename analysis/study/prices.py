@@ -60,6 +60,11 @@ class Costs(StrictTable):
         if self.hour and self.slot_seconds is None and not follows:
             raise InputError(where, "is missing", "with hour, the seconds of a slot")
 
+    @property
+    def pays_for_missions(self) -> bool:
+        """Whether missions have a price, not the purchase alone."""
+        return any((self.charge, self.hour, self.lost_uav))
+
     def of_lost(self, uavs: Any) -> Any:
         """What it costs if every mission loses this number of UAVs, in the currency."""
         return self.missions * self.lost_uav * uavs

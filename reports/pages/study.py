@@ -11,7 +11,7 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.answers.fleet import cheapest
-from dess.analysis.answers.fleet.costs import has_running_cost, prices_in_words
+from dess.analysis.answers.fleet.costs import prices_in_words
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.settings.baseline import check_baseline
 from dess.analysis.answers.settings.points import metrics_of_page, varied_values
@@ -268,7 +268,7 @@ def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]
         "if-conditions": is_search and cheapest.has_conditions(results),
         "if-precision": study.precision is not None,
         "if-costs": study.costs is not None and not is_search,
-        "if-priced-search": is_search and has_running_cost(results),
+        "if-priced-search": is_search and results.prices.pays_for_missions,
         # A scenario in units, and what changes a little around the cheapest fleet.
         "if-sheet": all(space.units for space in manifest.scenarios),
         "if-around": is_search and around.is_known(results),

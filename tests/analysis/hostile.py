@@ -44,7 +44,7 @@ def hostile_folder(sound: Path, into: Path, text: str) -> Path:
     for name in FOLDERS:
         (into / name).mkdir()
     for team, cells in enumerate(manifest.cells):
-        for parts in (source.manifest.parts(team), source.manifest.parts_of_check(team)):
+        for parts in (source.manifest.parts_of_team(team), source.manifest.parts_of_check(team)):
             if parts:
                 _copy(source, store, parts, [cells[part.cell.point] for part in parts])
     for cell, replication in source.logged:

@@ -21,15 +21,11 @@ from dess.analysis import numbers
 from dess.analysis.answers.fleet.costs import (
     conditions_in_words,
     cost_parts_in_words,
-    currency_of,
     fleets_in_words,
     format_amount,
-    has_running_cost,
     mean_cost_parts,
-    pays_for_hours,
     priced_settings,
     prices_in_words,
-    prices_of,
     purchase_prices,
     setting_cells,
 )
@@ -281,7 +277,7 @@ class FleetAnswer:
         """Which fleet is the cheapest that meets the requirements, and what it costs."""
         if not self.points:
             return f"{self._where}, no fleet is known to meet the requirements."
-        amount = numbers.format_money(self.cost, currency_of(self.results))
+        amount = numbers.format_money(self.cost, self.results.prices.currency)
         return (
             f"{self._where}, the cheapest fleet that meets the requirements is **{self.fleet}** "
             f"for {amount}{cost_parts_in_words(self.results, self.policy, self.points)}."
@@ -388,7 +384,7 @@ class FleetAnswer:
         if other.empty:
             return ""
         row = other.iloc[0]
-        amount = numbers.format_money(row[COST], currency_of(self.results))
+        amount = numbers.format_money(row[COST], self.results.prices.currency)
         measured = [
             f"{r.metric.within} {r.metric.written(*row[_ends_of(r.column)])}"
             for r in self._required
@@ -495,7 +491,7 @@ def other_policies_sentences(results: Results) -> list[str]:
             if best.points:
                 sentences.append(f"With the policy `{other.policy}`, it is the same fleet.")
         elif other.points:
-            amount = numbers.format_money(other.cost, currency_of(results))
+            amount = numbers.format_money(other.cost, results.prices.currency)
             sentences.append(
                 f"With the policy `{other.policy}`, it would be **{other.fleet}** for {amount}."
             )
@@ -524,7 +520,7 @@ def reason_sentences(results: Results) -> list[str]:
 def _length_dependent_metrics(results: Results) -> list[str]:
     """The metrics by which fleets are compared that may depend on the length of a mission."""
     asked = [requirement.column for requirement in requirements_of(results)]
-    if pays_for_hours(results):
+    if results.prices.hour:
         return [*asked, COST]
     return asked
 
@@ -613,9 +609,9 @@ def fleet_cells(results: Results, rows: pd.DataFrame, further: str = SUCCESS) ->
         further: A metric that is shown beside those of the requirements.
     """
     cells = setting_cells(rows.assign(condition=""), [])
-    cells = cells.rename(columns={"Cost": f"Cost [{currency_of(results)}]"})
+    cells = cells.rename(columns={"Cost": f"Cost [{results.prices.currency}]"})
     place = cells.shape[1]
-    if has_running_cost(results):
+    if results.prices.pays_for_missions:
         cells.insert(place, "Purchase", rows["purchase"].map(format_amount))
         cells.insert(place + 1, "Missions' cost", rows["running"].map(format_amount))
     is_answer = rows["answer"] == "answer"
@@ -694,7 +690,7 @@ def _ends_of_values(results: Results, point: int) -> dict[str, str]:
     """
     table = values_of_points(results)
     space = results.scenario(point)
-    prices = prices_of(results)
+    prices = results.prices
     price_of = {"uavs": prices.uav, "pads": prices.pad, ZONE_PADS: prices.pad * len(space.zones)}
     price_of = {field: price for field, price in price_of.items() if field in table}
     spent = {

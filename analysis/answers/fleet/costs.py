@@ -15,7 +15,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import pandas as pd
 
-from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.settings.points import (
@@ -28,7 +27,7 @@ from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of
 from dess.analysis.names import DECISIONS, field_named, single_value
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.verdict import front_membership, on_front
-from dess.analysis.study.prices import PARTS, PURCHASE, Costs, stranded_uavs
+from dess.analysis.study.prices import PARTS, PURCHASE, stranded_uavs
 from dess.analysis.tables import MOST_ROWS, Table
 from dess.base.errors import unknown_name
 from dess.scenario.fields import ZONE_PADS
@@ -59,10 +58,9 @@ def priced_settings(results: Results) -> pd.DataFrame:
     Raises:
         InputError: If the study has no prices.
     """
-    prices_of(results)
+    words = fleets_in_words(results)
     table = rank_settings(results, COST).drop(columns=["rank", "tied"])
     of_points = conditions_in_words(results)
-    words = fleets_in_words(results)
     table.insert(0, "condition", [of_points[point] for point in table["point"]])
     table.insert(1, "fleet", [words[point] for point in table["point"]])
     order = {"kind": "stable", "key": lambda texts: texts.map(of_points.index)}
@@ -81,7 +79,7 @@ def mean_cost_parts(results: Results) -> pd.DataFrame:
     Raises:
         InputError: If the study has no prices.
     """
-    prices = prices_of(results)
+    prices = results.prices
     missions = results.missions
     uavs = results.uavs
     amounts = prices.parts(results.store.manifest.scenarios, missions, uavs)
@@ -128,36 +126,6 @@ def cost_front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def prices_of(results: Results) -> Costs:
-    """The prices of a study.
-
-    Raises:
-        InputError: If it has none.
-    """
-    prices = results.study.costs
-    if prices is None:
-        raise InputError(
-            results.store.folder, "the study has no prices", "one with a table [costs]"
-        )
-    return prices
-
-
-def currency_of(results: Results) -> str:
-    """The currency of the prices of a study."""
-    return prices_of(results).currency
-
-
-def has_running_cost(results: Results) -> bool:
-    """Whether missions have a price, not the purchase alone."""
-    prices = prices_of(results)
-    return any(getattr(prices, price) for price in _PRICE_OF_PART.values())
-
-
-def pays_for_hours(results: Results) -> bool:
-    """Whether the cost of a mission depends on its length."""
-    return bool(prices_of(results).hour)
-
-
 @compute_once
 def purchase_prices(results: Results) -> list[float]:
     """The price of the UAVs and pads at every design point, the same with every policy."""
@@ -177,8 +145,8 @@ def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> 
         policy: The policy.
         fleet: Its design points, one for each condition.
     """
-    prices = prices_of(results)
-    if not has_running_cost(results):
+    prices = results.prices
+    if not results.prices.pays_for_missions:
         return ""
     table = mean_cost_parts(results)
     rows = table[(table["policy"] == policy) & table["point"].isin(fleet)]
@@ -201,7 +169,7 @@ def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> 
 
 def prices_in_words(results: Results) -> str:
     """The prices of a study, the missions that are paid for, and what has no price."""
-    prices = prices_of(results)
+    prices = results.prices
     paid, free = [], []
     for price, thing in _PAID_FOR.items():
         value = getattr(prices, price)
@@ -210,7 +178,7 @@ def prices_in_words(results: Results) -> str:
         else:
             free.append(thing)
     text = f"Prices: {numbers.join_words(paid)}."
-    if has_running_cost(results):
+    if results.prices.pays_for_missions:
         text += f" The fleet is to make {numbers.format_count(prices.missions, 'mission')}."
     if free:
         text += f" Nothing is paid for {numbers.join_words(free, 'or')}."
@@ -228,7 +196,7 @@ def _mission_values(results: Results, rows: pd.DataFrame, name: str) -> np.ndarr
 @compute_once
 def fleets_in_words(results: Results) -> list[str]:
     """The fleet of every design point in words: all that has a price or varies."""
-    prices = prices_of(results)
+    prices = results.prices
     table = values_of_points(results)
     fleets = []
     for point, others in enumerate(_fields_in_words(results, True)):
@@ -285,7 +253,7 @@ def cost_front_table(results: Results) -> Table:
         head = f"On the front of {metric_of(metric).within}"
         shown[head] = shares.loc[top.index, metric].map(numbers.format_percent)
     caption = (
-        f"Settings that may be on a front: mean cost [{currency_of(results)}] and metrics "
+        f"Settings that may be on a front: mean cost [{results.prices.currency}] and metrics "
         f"with {intervals_in_words(results)}, and the probability that they are on it"
     )
     data = first.drop(columns=["on_front", "probability"])
@@ -301,5 +269,5 @@ def cost_parts_table(results: Results) -> Table:
     shown = setting_cells(top, [])
     for part in PARTS:
         shown[part.capitalize()] = top[part].map("{:,.0f}".format)
-    caption = f"The mean cost of the settings [{currency_of(results)}], and its parts"
+    caption = f"The mean cost of the settings [{results.prices.currency}], and its parts"
     return Table(shown, caption, rows)
