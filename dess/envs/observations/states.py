@@ -14,11 +14,10 @@ import numpy as np
 
 from dess.base.errors import InputError
 from dess.base.kernels import kernel
-from dess.model.guard.battery import must_charge, slots_needed
-from dess.model.guard.moves import called_safe_moves
-from dess.model.guard.parking import parking_cell, parking_memory
+from dess.model.guard.battery import slots_needed
+from dess.model.guard.moves import guide
 from dess.model.guard.ways import battery_home
-from dess.model.rules import data_left, legal_moves, may_act
+from dess.model.rules import legal_moves, may_act
 from dess.model.state import HOVER, State
 from dess.physics.chart import Chart, zones_of
 from dess.physics.wind import reach_of
@@ -113,20 +112,38 @@ def compact_states(state: State, chart: Chart, guarded: bool) -> CompactStates:
     """
     states = empty_states(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
     reach = reach_of(state.missions, chart)
-    _fill(state.missions, state.uavs, state.residual, guarded, chart, reach, *states)
+    rows = _active_rows(state.missions, state.uavs)
+    guidance = guide(state.missions, state.uavs, state.residual, *rows, chart, reach, True)
+    _fill(state.missions, state.uavs, state.residual, guarded, chart, reach, *guidance, *states)
     return states
 
 
 @kernel
-def _fill(missions, uavs, residual, guarded, chart, reach, out_missions, out_uavs, out_residual):
-    memory = parking_memory(chart, uavs.shape[1])
+def _active_rows(missions, uavs):
+    """The (R,) missions and (R,) UAV indices of all active UAVs."""
+    rows_mission = np.empty(uavs.size, np.int64)
+    rows_uav = np.empty(uavs.size, np.int64)
+    count = 0
+    for b in range(len(missions)):
+        for i in range(missions[b].uavs):
+            if uavs[b, i].active:
+                rows_mission[count], rows_uav[count] = b, i
+                count += 1
+    return rows_mission[:count], rows_uav[:count]
+
+
+@kernel
+def _fill(
+    missions, uavs, residual, guarded, chart, reach, charge, home, safe,
+    out_missions, out_uavs, out_residual,
+):  # fmt: skip
+    guided = 0  # the active UAVs so far
     for b in range(len(missions)):
         mission = missions[b]
         team = uavs[b]
         out_missions[b, CHARGE_START] = mission.charge_start
         out_missions[b, CHARGE_COMPLETE] = mission.charge_complete
         out_residual[b] = residual[b]
-        data = data_left(mission, residual[b])
         for i in range(mission.uavs):
             u = team[i]
             row = out_uavs[b, i]
@@ -136,18 +153,12 @@ def _fill(missions, uavs, residual, guarded, chart, reach, out_missions, out_uav
             row[MASK] = 1 << HOVER
             if not u.active:
                 continue
-            row[MUST_CHARGE] = must_charge(mission, u, data)
-            home = parking_cell(mission, team, i, data, chart, memory, reach)
-            battery = battery_home(mission, team, i, chart, None, u.x, u.y, home, reach)
+            row[MUST_CHARGE] = charge[guided]
+            battery = battery_home(mission, team, i, chart, None, u.x, u.y, home[guided], reach)
             row[HOME] = min(battery, _MOST)
             if may_act(u):
-                if guarded:
-                    charge = row[MUST_CHARGE] != 0
-                    row[MASK] = called_safe_moves(
-                        mission, team, i, chart, charge, home, memory.planned, reach
-                    )
-                else:
-                    row[MASK] = legal_moves(chart, u)
+                row[MASK] = safe[guided] if guarded else legal_moves(chart, u)
+            guided += 1
 
 
 def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:

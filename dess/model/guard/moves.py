@@ -1,10 +1,12 @@
 """The safe moves: those after which a UAV still reaches the charging zone in time."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from dess.base.kernels import inlined, kernel
 from dess.model.guard.battery import lasts, margin, must_charge, slots_left, will_charge
-from dess.model.guard.parking import parking_cell, parking_memory, stays
+from dess.model.guard.parking import HOME, parking_cell, parking_memory, stays, write_home
 from dess.model.guard.queues import waits_in_zone
 from dess.model.guard.ways import battery_home, is_parked
 from dess.model.rules import data_left
@@ -186,12 +188,6 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     return nearest or 1 << HOVER  # who gives way may have nowhere to go
 
 
-@kernel
-def called_safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
-    """``safe_moves`` as a function that is called, not inlined: its code is long to compile."""
-    return safe_moves(mission, uavs, i, chart, charge, home, planned, reach)
-
-
 @inlined
 def _is_shut_out(mission, u, chart, home):
     """Whether UAV ``u`` can only wait until a teammate has charged that is parked on its way."""
@@ -221,22 +217,68 @@ def _cost(mission, u, chart, action, x, y):
     return u.slots_per_cell + move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
 
 
+class Guidance(NamedTuple):
+    """What the guard tells UAVs, one row for each.
+
+    Attributes:
+        charge: (R,) whether the UAV must charge.
+        home: (R,) ``HOME`` records: where it will charge.
+        safe: (R,) its safe actions, a bit for each.
+    """
+
+    charge: np.ndarray
+    home: np.ndarray
+    safe: np.ndarray
+
+
 @kernel
-def _mask(missions, uavs, residual, rows_mission, rows_uav, chart, reach):
-    masks = np.zeros((len(rows_mission), 5), np.bool_)
+def guide(missions, uavs, residual, rows_mission, rows_uav, chart, reach, find_all):
+    """The ``Guidance`` for UAVs.
+
+    Everything that asks the guard calls this function from Python, since each compiled function
+    that called it would be compiled with the whole guard, which takes seconds.
+
+    Args:
+        missions: (B,) ``MISSION`` records.
+        uavs: (B, I) ``UAV`` records.
+        residual: (B, K) data of the nodes [data units].
+        rows_mission: (R,) index of each row's mission, in ascending order.
+        rows_uav: (R,) index of each row's UAV in its mission.
+        chart: ``Chart``.
+        reach: The table of ``reach_of``.
+        find_all: Whether to find the parking cells of UAVs that need not charge, too; without, such
+            a UAV has its present cell.
+    """
+    rows = len(rows_mission)
+    guidance = Guidance(np.empty(rows, np.bool_), np.empty(rows, HOME), np.empty(rows, np.int64))
     memory = parking_memory(chart, uavs.shape[1])
-    for row in range(len(rows_mission)):
+    last = -1
+    data = 0.0
+    for row in range(rows):
         b, i = rows_mission[row], rows_uav[row]
         mission, team = missions[b], uavs[b]
-        data = data_left(mission, residual[b])
+        if b != last:
+            last = b
+            data = data_left(mission, residual[b])
         charge = must_charge(mission, team[i], data)
         home = stays(team[i])
-        if charge:
+        if charge or find_all:
             home = parking_cell(mission, team, i, data, chart, memory, reach)
-        safe = called_safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
-        for action in range(5):
-            masks[row, action] = safe >> action & 1
-    return masks
+        guidance.charge[row] = charge
+        write_home(guidance.home[row], home)
+        guidance.safe[row] = safe_moves(
+            mission, team, i, chart, charge, home, memory.planned, reach
+        )
+    return guidance
+
+
+def guidance_of(view: View) -> Guidance:
+    """The ``Guidance`` for the UAVs of a view."""
+    state, chart = view.state, view.world.chart
+    reach = reach_of(state.missions, chart)
+    return guide(
+        state.missions, state.uavs, state.residual, view.mission, view.uav, chart, reach, False
+    )
 
 
 def guard(view: View) -> np.ndarray:
@@ -244,6 +286,4 @@ def guard(view: View) -> np.ndarray:
 
     Every row allows at least one action. Any policy can restrict its choice to the mask.
     """
-    state, chart = view.state, view.world.chart
-    reach = reach_of(state.missions, chart)
-    return _mask(state.missions, state.uavs, state.residual, view.mission, view.uav, chart, reach)
+    return (guidance_of(view).safe[:, None] >> np.arange(5) & 1).astype(bool)

@@ -56,6 +56,17 @@ class Home(NamedTuple):
     gives_way: int
 
 
+# A ``Home`` in an array of them.
+HOME = np.dtype([(name, np.int64) for name in Home._fields])
+
+
+@inlined
+def write_home(record, home):
+    """Write a ``Home`` into a ``HOME`` record."""
+    record.x, record.y, record.cells = home.x, home.y, home.cells
+    record.wait, record.begins, record.gives_way = home.wait, home.begins, home.gives_way
+
+
 @kernel
 def parking_memory(chart, uavs):
     """Working memory for missions with so many UAVs."""
