@@ -10,9 +10,11 @@ from functools import lru_cache
 import numpy as np
 
 from dess.base.kernels import inlined, kernel
-from dess.model.guard.battery import margin, slots_left, slots_needed
-from dess.model.guard.moves import contest, contests, guard, guidance_of
+from dess.model.guard.battery import margin, must_charge, slots_left, slots_needed
+from dess.model.guard.moves import contest, contests, guard, safe_moves
+from dess.model.guard.parking import parking_cell, parking_memory, stays
 from dess.model.guard.ways import path_length, round_trip
+from dess.model.rules import data_left
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
 from dess.physics import streams
@@ -75,7 +77,7 @@ class _Heuristic:
             circuit = _plan_circuit(nodes.tobytes(), chart.zones.tobytes(), chart.zones.shape)
         return _choose_actions(
             self._kind, state.missions, state.uavs, state.residual, state.sensors, nodes, circuit,
-            *chart, reach_of(state.missions, chart), view.mission, view.uav, *guidance_of(view),
+            *chart, reach_of(state.missions, chart), view.mission, view.uav,
         )  # fmt: skip
 
 
@@ -145,22 +147,45 @@ def _choose_at_random(missions, uavs, allowed, rows_mission, rows_uav):
 @kernel
 def _choose_actions(
     kind, missions, uavs, residual, sensors, nodes, circuit,
-    zones, parking, sizes, nearest, ways, rows, reach, rows_mission, rows_uav, charge, home, safe,
+    zones, parking, sizes, nearest, ways, rows, reach, rows_mission, rows_uav,
 ):  # fmt: skip
     chart = Chart(zones, parking, sizes, nearest, ways, rows)  # takes longer as an argument
     actions = np.empty(len(rows_mission), np.int64)
+    memory = parking_memory(chart, uavs.shape[1])
+    last = -1
+    left = 0.0
     for row in range(len(rows_mission)):
-        b, i = rows_mission[row], rows_uav[row]
-        mission, team = missions[b], uavs[b]
-        goal_x, goal_y = home[row].x, home[row].y
-        node = _choose_goal(
-            kind, mission, team, i, residual[b], sensors[b], nodes, circuit, chart, charge[row],
-            home[row], reach,
+        b = rows_mission[row]
+        i = rows_uav[row]
+        if b != last:
+            last = b
+            left = data_left(missions[b], residual[b])
+        actions[row] = _choose_action(
+            kind, missions[b], uavs[b], i, residual[b], left, sensors[b], nodes, circuit, chart,
+            reach, memory,
         )  # fmt: skip
-        if node >= 0:
-            goal_x, goal_y = np.int64(nodes[node, 0]), np.int64(nodes[node, 1])
-        actions[row] = step_towards(mission, team, i, chart, safe[row], goal_x, goal_y)
     return actions
+
+
+@inlined
+def _choose_action(
+    kind, mission, team, i, data, left, sensors, nodes, circuit, chart, reach, memory
+):
+    """The action of UAV ``i``; ``left`` are all data, ``memory`` is that of its parking cell."""
+    u = team[i]
+    charge = must_charge(mission, u, left)
+    home = stays(u)
+    if charge:
+        home = parking_cell(mission, team, i, left, chart, memory, reach)
+    safe = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
+    goal_x, goal_y = home.x, home.y
+    node = _choose_goal(
+        kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach
+    )
+    if node >= 0:
+        goal_x = np.int64(nodes[node, 0])
+        goal_y = np.int64(nodes[node, 1])
+    return step_towards(mission, team, i, chart, safe, goal_x, goal_y)
 
 
 @inlined

@@ -113,7 +113,7 @@ def compact_states(state: State, chart: Chart, guarded: bool) -> CompactStates:
     states = empty_states(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
     reach = reach_of(state.missions, chart)
     rows = _active_rows(state.missions, state.uavs)
-    guidance = guide(state.missions, state.uavs, state.residual, *rows, chart, reach, True)
+    guidance = guide(state.missions, state.uavs, state.residual, *rows, *chart, reach, True)
     _fill(state.missions, state.uavs, state.residual, guarded, chart, reach, *guidance, *states)
     return states
 

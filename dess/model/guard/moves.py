@@ -13,7 +13,7 @@ from dess.model.rules import data_left
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
 from dess.physics.charging import slots_to_charge
-from dess.physics.chart import distance, in_zone, is_open
+from dess.physics.chart import Chart, distance, in_zone, is_open
 from dess.physics.landing import lands
 from dess.physics.wind import is_calm, move_surcharge, reach_of
 
@@ -232,11 +232,14 @@ class Guidance(NamedTuple):
 
 
 @kernel
-def guide(missions, uavs, residual, rows_mission, rows_uav, chart, reach, find_all):
+def guide(
+    missions, uavs, residual, rows_mission, rows_uav,
+    zones, parking, sizes, nearest, ways, rows, reach, find_all,
+):  # fmt: skip
     """The ``Guidance`` for UAVs.
 
-    Everything that asks the guard calls this function from Python, since each compiled function
-    that called it would be compiled with the whole guard, which takes seconds.
+    Call it from Python: a compiled function that called it would be compiled with the whole guard,
+    which takes seconds.
 
     Args:
         missions: (B,) ``MISSION`` records.
@@ -244,17 +247,20 @@ def guide(missions, uavs, residual, rows_mission, rows_uav, chart, reach, find_a
         residual: (B, K) data of the nodes [data units].
         rows_mission: (R,) index of each row's mission, in ascending order.
         rows_uav: (R,) index of each row's UAV in its mission.
-        chart: ``Chart``.
+        zones, parking, sizes, nearest, ways, rows: Those of the ``Chart``, which takes longer as
+            one argument.
         reach: The table of ``reach_of``.
         find_all: Whether to find the parking cells of UAVs that need not charge, too; without, such
             a UAV has its present cell.
     """
-    rows = len(rows_mission)
-    guidance = Guidance(np.empty(rows, np.bool_), np.empty(rows, HOME), np.empty(rows, np.int64))
+    chart = Chart(zones, parking, sizes, nearest, ways, rows)
+    charges = np.empty(len(rows_mission), np.bool_)
+    homes = np.empty(len(rows_mission), HOME)
+    safe = np.empty(len(rows_mission), np.int64)
     memory = parking_memory(chart, uavs.shape[1])
     last = -1
     data = 0.0
-    for row in range(rows):
+    for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         mission, team = missions[b], uavs[b]
         if b != last:
@@ -264,21 +270,10 @@ def guide(missions, uavs, residual, rows_mission, rows_uav, chart, reach, find_a
         home = stays(team[i])
         if charge or find_all:
             home = parking_cell(mission, team, i, data, chart, memory, reach)
-        guidance.charge[row] = charge
-        write_home(guidance.home[row], home)
-        guidance.safe[row] = safe_moves(
-            mission, team, i, chart, charge, home, memory.planned, reach
-        )
-    return guidance
-
-
-def guidance_of(view: View) -> Guidance:
-    """The ``Guidance`` for the UAVs of a view."""
-    state, chart = view.state, view.world.chart
-    reach = reach_of(state.missions, chart)
-    return guide(
-        state.missions, state.uavs, state.residual, view.mission, view.uav, chart, reach, False
-    )
+        charges[row] = charge
+        write_home(homes[row], home)
+        safe[row] = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
+    return Guidance(charges, homes, safe)
 
 
 def guard(view: View) -> np.ndarray:
@@ -286,4 +281,9 @@ def guard(view: View) -> np.ndarray:
 
     Every row allows at least one action. Any policy can restrict its choice to the mask.
     """
-    return (guidance_of(view).safe[:, None] >> np.arange(5) & 1).astype(bool)
+    state, chart = view.state, view.world.chart
+    reach = reach_of(state.missions, chart)
+    guidance = guide(
+        state.missions, state.uavs, state.residual, view.mission, view.uav, *chart, reach, False
+    )
+    return (guidance.safe[:, None] >> np.arange(5) & 1).astype(bool)
