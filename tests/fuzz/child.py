@@ -7,13 +7,14 @@ import signal
 import sys
 import tempfile
 import threading
+from contextlib import nullcontext
 from pathlib import Path
 
 import matplotlib
 
 from dess.reports.cli import main
-from tests.fuzz import kernel
 from tests.fuzz.case import CWD, HOME, LOG, TEMPORARY, Case
+from tests.reports.here import notebooks_here
 
 STDOUT, STDERR, STARTED = "stdout", "stderr", "started"  # files in the folder ``log`` of the case
 DATA = 1536 * 2**20  # bytes that a process may allocate, besides those of the loaded libraries
@@ -31,8 +32,6 @@ def run(case: Case, box: Path) -> None:
     os.environ |= {"HOME": str(box / HOME), "TMPDIR": str(box / TEMPORARY)}
     os.environ["MPLCONFIGDIR"] = matplotlib.get_cachedir()  # fonts are not listed again
     tempfile.tempdir = None
-    if not case.kernels:
-        kernel.run_here()
     sys.argv = ["dess", *case.arguments]
     _redirect(case, box / LOG)
     _limit(resource.RLIMIT_DATA, _data_now() + DATA)
@@ -40,7 +39,8 @@ def run(case: Case, box: Path) -> None:
     _limit(resource.RLIMIT_CORE, 0)
     (box / LOG / STARTED).touch()
     _limit(resource.RLIMIT_FSIZE, case.file_size or FILE)
-    code = main()
+    with nullcontext() if case.kernels else notebooks_here():
+        code = main()
     # The end of an interpreter, which a process of multiprocessing has in another order: workers
     # are stopped before anything waits for them.
     threading._shutdown()

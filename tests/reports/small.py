@@ -1,6 +1,5 @@
 """Small results of the studies that the reports read, and what is looked for in pages."""
 
-import ast
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,7 +8,6 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
-import IPython.display
 import numpy as np
 import pytest
 
@@ -22,6 +20,7 @@ from dess.reports.pages.notebook import Report, read_report
 from dess.reports.player import player_script
 from dess.scenario.scenario import ScenarioSpace
 from tests.analysis.small import grid
+from tests.reports.here import run_cells
 
 EMBEDDED = re.compile("data:image/svg\\+xml;base64,([A-Za-z0-9+/=]+)")
 
@@ -136,19 +135,11 @@ def shown_by(source: str | Report, **parameters: Any) -> str:
 
     A kernel of its own and the drawings take most of the time that a page takes.
     """
-    report, shown, scope = read_report(source) if isinstance(source, str) else source, [], {}
+    report = read_report(source) if isinstance(source, str) else source
     report.set_parameters(parameters)
     with pytest.MonkeyPatch.context() as patch:
-        for module in (IPython.display, html):
-            patch.setattr(module, "display", lambda *pieces: shown.extend(pieces))
         patch.setattr(html, "encode_figure", lambda drawing, kind: b"")
-        for cell in report.cells:
-            tree = ast.parse(cell.source)
-            last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
-            exec(compile(tree, report.name, "exec"), scope)
-            if last:
-                shown.append(eval(compile(ast.Expression(last.value), report.name, "eval"), scope))
-    return "\n".join(piece.data for piece in shown if piece is not None)
+        return "\n".join(piece.data for _, pieces in run_cells(report) for piece in pieces)
 
 
 def said_by(source: str | Report, **parameters: Any) -> str:

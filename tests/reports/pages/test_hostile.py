@@ -17,6 +17,7 @@ from dess.reports.pages.notebook import assigned_values, replace_values
 from dess.reports.pages.page import CARD, Page
 from dess.reports.pages.render import add_bars, find_pages, make_index, render_study
 from tests.analysis.hostile import hostile_folder
+from tests.reports.here import notebooks_here
 from tests.reports.small import Links
 
 ATTACK = (
@@ -37,7 +38,8 @@ def page(studied, tmp_path_factory):
     """The page of a study all of whose free strings are an attack."""
     folder = tmp_path_factory.mktemp("hostile")
     made = hostile_folder(studied().store.folder, folder / "made", ATTACK)
-    return render_study(load_results(made), folder / "out")
+    with notebooks_here(is_drawn=True):
+        return render_study(load_results(made), folder / "out")
 
 
 def test_a_hostile_study_is_text_on_its_page_and_in_the_index(page):

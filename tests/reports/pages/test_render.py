@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from dess.reports.pages.body import make_page
 from dess.reports.pages.notebook import PARAMETERS, Report, read_report, report_names
 from dess.reports.pages.render import ReportError, render
 from tests.analysis.small import small_study
+from tests.reports.here import notebooks_here
 from tests.reports.small import Links, words_of
 
 HEAD = """
@@ -87,6 +89,7 @@ raise ArithmeticError("no such number")
 "the cell after"
 """
 FORMATS = ("svg", "pdf", "png")
+LONG = [pytest.mark.slow, pytest.mark.brief]
 TINY = {"mission": MISSION, "scorecard": SCORECARD}
 # What Python, IPython, Jupyter and the libraries would import or run in a working directory.
 MODULES = ("pandas", "sitecustomize", "matplotlib", "joblib", "typer")
@@ -134,6 +137,12 @@ def notebooks(tmp_path_factory):
 @pytest.fixture(scope="module")
 def progress():
     return []
+
+
+@pytest.fixture
+def unrun(monkeypatch):
+    """Pages are made of notebooks that have not been run, since a process takes seconds."""
+    monkeypatch.setattr(kernels, "run_reports", lambda reports, *_: None)
 
 
 @pytest.fixture(scope="module")
@@ -271,6 +280,7 @@ def test_the_command_imports_nothing_of_the_working_directory(trap):
 # --- input that is refused ---
 
 
+@pytest.mark.usefixtures("unrun")
 def test_pages_without_results_are_left_out_with_a_note(results, tmp_path, caplog):
     """Of all pages; a page that is named must have its results."""
     lacking = MISSION.replace("[trial]", "[trial, fleets, pads]")
@@ -294,9 +304,11 @@ def test_results_of_another_study_are_refused(results, tmp_path):
         render(["performance"], tmp_path, tmp_path / "out")
 
 
-def test_a_notebook_that_refuses_its_input_leaves_nothing(results, notebooks, tmp_path):
-    values = {"policy": "nobody"}
-    with pytest.raises(InputError, match="^report mission: policy: nobody is not in the study"):
+@pytest.mark.parametrize("runs", [notebooks_here, pytest.param(nullcontext, marks=LONG)])
+def test_a_notebook_that_refuses_its_input_leaves_nothing(runs, results, notebooks, tmp_path):
+    """Also one that runs in another process, as all do but in these tests."""
+    values, line = {"policy": "nobody"}, "^report mission: policy: nobody is not in the study"
+    with pytest.raises(InputError, match=line), runs():
         render([], results, tmp_path / "a" / "out", parameters=values, notebooks=notebooks)
     assert os.listdir(tmp_path) == []
 
@@ -321,7 +333,8 @@ def test_a_path_is_relative_in_the_notebook_and_a_name_on_the_page(
     assert str(tmp_path) not in page and "sea.toml" in page
 
 
-def test_a_notebook_that_is_missing_is_written_again(results, notebooks, tmp_path, progress):
+@pytest.mark.usefixtures("unrun")
+def test_a_notebook_that_is_missing_is_written_again(results, notebooks, tmp_path):
     """And one that is there, with the changes of its reader, is left as it is."""
     render(["mission"], results, tmp_path, notebooks=notebooks)
     file = tmp_path / "mission.ipynb"

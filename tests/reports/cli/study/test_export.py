@@ -4,12 +4,15 @@ from zipfile import ZipFile
 
 import pytest
 
+from tests.reports.here import notebooks_here
+
 
 @pytest.fixture
 def run(dess):
-    """The command, after a study has been run."""
+    """The command, after a study has been run; pages are made in this process."""
     assert dess("study", "run", "trial.toml", "--out", "out")[0] == 0
-    return dess
+    with notebooks_here():
+        yield dess
 
 
 def test_results_and_page_are_bundled(run, refusal, tmp_path):

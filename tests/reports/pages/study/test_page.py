@@ -15,6 +15,7 @@ from dess.reports.pages import html
 from dess.reports.pages.page import STUDY, Page
 from dess.reports.pages.render import render_study
 from tests.analysis.small import files_of, grid
+from tests.reports.here import notebooks_here
 from tests.reports.small import Links
 
 
@@ -50,7 +51,8 @@ def out(tmp_path_factory):
 @pytest.fixture(scope="module")
 def page(folder, out):
     """The page, rendered once."""
-    assert render_study(load_results(folder), out) == out / "study-trial.html"
+    with notebooks_here(is_drawn=True):
+        assert render_study(load_results(folder), out) == out / "study-trial.html"
     return (out / "study-trial.html").read_text("utf-8")
 
 

@@ -5,6 +5,7 @@ from dess.analysis.ask.question import sweep_question
 from dess.reports.pages.render import render_study
 from dess.reports.pages.study import make_study_report
 from tests.analysis.small import SHEET, write_scenario
+from tests.reports.here import notebooks_here
 from tests.reports.small import said_by, words_of
 
 A4 = 182, 269  # less the margins [mm]
@@ -36,7 +37,8 @@ def test_the_answer_the_figure_and_what_is_assumed_are_one_sheet_of_paper(tmp_pa
     )
     found = question.ask()
     around.question_around(found, question.study.scenario, 5).ask()
-    path = render_study(found, tmp_path / "reports")
+    with notebooks_here(is_drawn=True):
+        path = render_study(found, tmp_path / "reports")
     text = words_of(path.read_text("utf-8"))
     for words in ("A slot is 21 s", "A cell is 315 m", "mean time between failures 100 h"):
         assert words in text
