@@ -1,6 +1,7 @@
 """What the distribution asks for, read from pyproject.toml, and what that asks for in turn."""
 
 import tomllib
+from functools import cache
 from importlib.metadata import PackageNotFoundError, packages_distributions, requires
 from pathlib import Path
 
@@ -42,6 +43,7 @@ def closure(*lines: str) -> set[str]:
     return {name for name, _ in seen}
 
 
+@cache
 def homes() -> dict[str, set[str]]:
     """The installed distributions, by canonical names, of every package that can be imported."""
     found = packages_distributions()

@@ -112,6 +112,7 @@ SIMULATING |= {"measure_decision_times", "mission_of", "sweep", "what_if"}
 ASKING = {"what_if", "sweep", "own_sea"}  # the notebooks that ask, and so simulate
 
 
+@cache
 def imports_of(name: str) -> set[str]:
     """The modules that a module imports, anywhere in it; its own package's in full."""
     found = set()
@@ -267,6 +268,8 @@ def test_the_command_line_loads_nothing_heavy():
     assert not HEAVY & loaded_by("from dess.reports.cli import main; main(['--help'])")
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_torch_is_loaded_only_for_trainings():
     script = "import dess.policies, dess.analysis; from dess.reports.cli import main\n"
     script += "dess.policies.load_team('greedy,any,ddqn,ddqn-paper'), dess.policies.names()\n"

@@ -4,6 +4,7 @@ import json
 import re
 import shlex
 import tomllib
+from functools import cache
 from pathlib import Path
 from textwrap import indent
 from typing import Any
@@ -58,9 +59,15 @@ def command_lines(program: str) -> list[list[str]]:
     return [words[1:] for words in parts if words and Path(words[0]).name == program]
 
 
+@cache
+def whole_command() -> Any:
+    """The command ``dess``, which takes a while to put together."""
+    return typer.main.get_command(commands.app)
+
+
 def leaf(arguments: list[str]) -> tuple[Any, list[str]]:
     """The subcommand that arguments name, and those that are left for it."""
-    command: Any = typer.main.get_command(commands.app)
+    command: Any = whole_command()
     while hasattr(command, "commands"):
         if not arguments and command.invoke_without_command:  # such as dess policies
             break

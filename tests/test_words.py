@@ -3,6 +3,7 @@
 import io
 import re
 import tokenize
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,7 @@ PATTERNS = {re.compile(rf"\b{word}(\b|(?<=`))", re.I): term for word, term in PR
 TEXT = (tokenize.COMMENT, tokenize.STRING, getattr(tokenize, "FSTRING_MIDDLE", -1))
 
 
+@cache
 def words_in(path: Path) -> str:
     """The text of a file that people read: of Python, only strings and comments."""
     source = path.read_text("utf-8")

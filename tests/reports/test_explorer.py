@@ -1,5 +1,8 @@
 """The explorer shows the means of the grid, wherever its sliders stand, in a real browser."""
 
+from functools import cache
+from pathlib import Path
+
 import pandas as pd
 import pytest
 from playwright.sync_api import Locator, Page
@@ -35,13 +38,19 @@ def document(results, tmp_path_factory):
     return path
 
 
+@cache
+def stored_missions(folder: Path) -> pd.DataFrame:
+    """The missions in the files of the results."""
+    return pd.read_parquet(folder / "missions")
+
+
 def estimate(results: Results, places: tuple[int, ...], policy: str, metric: str) -> list[float]:
     """A mean and its interval in percent, of the files of the results."""
     sliders = zip(DESIGN.items(), places, strict=True)
     values = {field: values[place] for (field, values), place in sliders}
     manifest = results.store.manifest
     (point,) = (n for n, p in enumerate(manifest.points) if p.values == values)
-    missions = pd.read_parquet(results.store.folder / "missions")
+    missions = stored_missions(results.store.folder)
     cell = manifest.cells[POLICIES.index(policy)][point].key
     sample = missions.loc[missions["cell"].astype(str) == cell, metric]
     assert len(sample) == MISSIONS

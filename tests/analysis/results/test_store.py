@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from dess import InputError, simulate_batch
 from dess.analysis import load_results, load_study, run_study
+from dess.analysis.execution import runner
 from dess.analysis.results import parquet, provenance
 from dess.analysis.results.chunks import Chunk, split_into_chunks
 from dess.analysis.results.manifest import Cell, Part
@@ -17,11 +18,20 @@ from tests.analysis.small import files_of, small_study, write_scenario
 from tests.reports.small import quick
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A results folder, made once."""
+    folder = tmp_path_factory.mktemp("made")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(runner.CHUNK, "batch", 4)  # as in the tests
+        return run_study(small_study(folder, logged=1), folder / "out").store.folder
+
+
 @pytest.fixture
-def out(tmp_path):
-    """A results folder."""
-    run_study(small_study(tmp_path, logged=1), tmp_path / "out")
-    return tmp_path / "out"
+def out(made, tmp_path):
+    """A results folder, and the study beside it."""
+    small_study(tmp_path)
+    return shutil.copytree(made, tmp_path / "out")
 
 
 def _flip(path):
