@@ -5,6 +5,8 @@ Tests run side by side, where the threads of one would be in the way of the othe
 By default properties draw few examples, always the same. With ``--hypothesis-profile=verify`` they
 draw many fresh ones, and count as slow tests, so that ``nox -s verify`` runs them too.
 
+What opens a page in a browser is a brief proof, as the start of a browser takes a second or two.
+
 ``pytest -m quick`` runs the tests of ``QUICK`` and imports no other file, as that takes longest.
 """
 
@@ -76,6 +78,9 @@ def rank_of(path: Path) -> int:
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
+    if "chromium" in getattr(item, "fixturenames", ()) and not item.get_closest_marker("slow"):
+        item.add_marker(pytest.mark.slow)
+        item.add_marker(pytest.mark.brief)
     deep = item.config.getoption("hypothesis_profile") == "verify"
     if deep and is_hypothesis_test(getattr(item, "obj", None)):
         item.add_marker(pytest.mark.slow)

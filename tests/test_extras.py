@@ -122,6 +122,8 @@ def test_what_an_extra_adds_is_missed_in_one_line(folder, plain):
     assert not {"run", "new", "mission.png"} & {path.name for path in folder.iterdir()}
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_packages_are_imported_without_any_extra(folder):
     script = (
         "import json, sys; from tests.hiding import hide; hide(json.loads(sys.argv[1]))\n"

@@ -62,6 +62,8 @@ def tree(tmp_path_factory):
     return unpacked(tmp_path_factory.mktemp("archive"))
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_an_unpacked_archive_gives_the_same_wheel(tree, wheel, tmp_path):
     assert (tree / "dess/policies").read_text("utf-8") == "../policies"
     theirs = ZipFile(built("wheel", tmp_path, tree))

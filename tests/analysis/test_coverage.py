@@ -31,7 +31,7 @@ from dess.analysis.study.cheapest import Cheapest, Setting
 Drawing = tuple[Callable[[np.random.Generator, tuple[int, int]], np.ndarray], float]
 
 TRIALS = 2000
-QUICK = [300, pytest.param(TRIALS, marks=pytest.mark.slow)]
+QUICK = [150, pytest.param(TRIALS, marks=pytest.mark.slow)]
 
 
 def rng(*seed: int) -> np.random.Generator:
@@ -325,7 +325,7 @@ def of_watches(metric: str, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, n
     return np.array([row.low for row in rows]), np.array([row.high for row in rows])
 
 
-@pytest.mark.parametrize("trials", [200, pytest.param(TRIALS, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("trials", [150, pytest.param(TRIALS, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("n", [100, 300, 500])
 @pytest.mark.parametrize("metric", [AGE, "slots"])
 def test_paired_intervals_of_ages_and_lengths_cover_where_failures_are_rare(metric, n, trials):

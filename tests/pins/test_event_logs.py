@@ -69,6 +69,10 @@ CASES: dict[str, dict[str, Any]] = {
 # The last hovers in the zone from the start.
 POLICIES = [Wanderer(), Commuter(), Fidget(), Script(*[""] * 6)]
 
+# Those that make for the pads, and leave queues; the others are left to the longer proofs.
+QUICK = ("commuter", "fidget")
+LONG = [pytest.mark.slow, pytest.mark.brief]
+
 
 def _digest(columns: dict[str, np.ndarray]) -> str:
     """A hash of a table, whose words are hashed as text."""
@@ -80,7 +84,11 @@ def _digest(columns: dict[str, np.ndarray]) -> str:
     return digest.hexdigest()[:16]
 
 
-@pytest.mark.parametrize("policy", POLICIES, ids=lambda policy: policy.name)
+@pytest.mark.parametrize(
+    "policy",
+    [pytest.param(p, marks=[] if p.name in QUICK else LONG) for p in POLICIES],
+    ids=lambda policy: policy.name,
+)
 def test_the_event_logs_of_contested_pads_are_the_kept_ones(policy):
     lines = []
     for name, changes in CASES.items():

@@ -78,6 +78,8 @@ OF_THE_PUBLISHER = {
 }
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 @pytest.mark.filterwarnings("ignore:ConjunctiveGraph is deprecated")
 def test_a_validator_accepts_it(tmp_path, monkeypatch):
     """The validator reads the context that the library rocrate has, not that of the network."""

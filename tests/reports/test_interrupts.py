@@ -147,6 +147,8 @@ sys.exit(main())
 """
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_a_signal_ends_a_command_that_is_in_code_that_notices_none(tmp_path):
     """As the compiler of functions: the main thread runs no Python for a long time."""
     words, pipe = [sys.executable, "-c", BUSY], subprocess.PIPE

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from scipy import stats
 
 from dess import load_scenario
@@ -164,6 +164,7 @@ def test_starts_rates_and_shadowing_of_another_simulator_are_found_out():
     assert failing(draws.shadowing_checks(np.repeat(deviates[::2], 2)))
 
 
+@settings(max_examples=settings().max_examples // 3)
 @given(extended_spaces(landing=False), policies, seeds, replications)
 def test_the_batteries_of_every_scenario_follow_the_rules(space, policy, seed, replication):
     """With wind, fleets, shared power and failures; a battery that is off by one is noticed."""

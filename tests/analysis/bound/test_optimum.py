@@ -79,7 +79,7 @@ def test_the_optimum_is_reached_where_hovering_is_best():
         arrival_rate=0.0,
     )  # fmt: skip
     ratios = simulate_batch(space, load("greedy"), 3, 4000).missions["collection_ratio"]
-    best = TinySea(space, 3, contraction(24)).optimum
+    best = TinySea(space, 3, contraction(12)).optimum
     assert ratios.mean() == pytest.approx(best, abs=4 * ratios.std() / len(ratios) ** 0.5)
     assert best <= upper_bound(space, 3, 0).ratio <= 1.01 * best
 
@@ -158,10 +158,11 @@ def shadings(space: dict) -> Iterator[tuple[ScenarioSpace, int]]:
 
 
 @pytest.mark.parametrize("sea", some_slow(SEAS, "two nodes beside the zone"))
-def test_the_bound_is_above_the_optimum_where_uavs_charge(sea):
+@pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.slow)])
+def test_the_bound_is_above_the_optimum_where_uavs_charge(sea, seed):
     gaps = [
         check(space, seed, count)
-        for values, seed in product(CASES, (4, 5))
+        for values in CASES
         for space, count in shadings(SEAS[sea] | values)
     ]
     assert np.mean(gaps) <= 0.25
@@ -226,10 +227,10 @@ def drawn_seas(seed: int) -> Iterator[dict]:
 
 
 @pytest.mark.parametrize(
-    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))]
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 8))]
 )
 def test_the_bound_is_above_the_optimum_on_drawn_seas(seed):
-    seas = islice(drawn_seas(seed), 12)
+    seas = islice(drawn_seas(seed), 6)
     gaps = [check(space, seed, count) for sea in seas for space, count in shadings(sea)]
     assert np.mean(gaps) <= 0.1
 

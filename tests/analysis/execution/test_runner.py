@@ -110,7 +110,7 @@ def precise(folder):
     return small_study(folder, precision=rule, design=grid(quota=[20, 60]))
 
 
-def selecting(folder, design=None, budget=400):
+def selecting(folder, design=None, budget=160):
     """A study that selects the best of some settings."""
     rule = {"procedure": "kn", "metric": "collection_ratio", "indifference": 0.02}
     rule |= {"first": 8, "budget": budget, "check": 5}
@@ -143,11 +143,11 @@ def test_an_interrupt_in_compiled_code_is_an_interrupt(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("kind", [precise, selecting])
 @pytest.mark.parametrize(
-    "after",
-    [pytest.param(11, marks=pytest.mark.slow), 47, pytest.param(71, marks=pytest.mark.slow)],
+    ("after", "workers"),
+    [(47, 1), *(pytest.param(after, 2, marks=pytest.mark.slow) for after in (11, 47, 71))],
 )
-def test_an_interrupted_run_of_rounds_is_completed(kind, after, tmp_path):
-    check_that_an_interrupted_run_is_completed(kind(tmp_path), tmp_path, after, workers=2)
+def test_an_interrupted_run_of_rounds_is_completed(kind, after, workers, tmp_path):
+    check_that_an_interrupted_run_is_completed(kind(tmp_path), tmp_path, after, workers)
 
 
 def test_a_saltelli_design_runs_every_point_at_its_own_replication(tmp_path):

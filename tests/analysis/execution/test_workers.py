@@ -48,6 +48,8 @@ def test_a_chunk_that_raises_is_recorded_and_the_rest_goes_on(trouble, tmp_path)
     check_that_the_rest_is_there(study, tmp_path / "out", raising, 4)
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_a_killed_worker_is_replaced(trouble, tmp_path):
     policies = [f"{trouble}:KilledOnce", f"{trouble}:Raising", "greedy"]
     study = small_study(tmp_path, policies=policies)

@@ -111,7 +111,9 @@ def test_a_course_is_a_line_per_value_in_the_panel_of_its_rows():
     assert drawn == {"One": [1.0, 0.5], "Two": [1.0, 0.0]}
 
 
-@pytest.mark.parametrize("name", ["bay", "jade-bight"])
+@pytest.mark.parametrize(
+    "name", ["bay", pytest.param("jade-bight", marks=[pytest.mark.slow, pytest.mark.brief])]
+)
 def test_names_of_nodes_are_readable_and_keep_clear_of_each_other(name):
     sea = dess.load_scenario(name)
     (ax,) = missions.sea_figure(sea).axes

@@ -40,7 +40,7 @@ from tests.analysis.small import grid
 
 NOTEBOOKS = Path(__file__).parents[3] / "reports" / "notebooks"
 POLICIES = ["greedy", "random", "random-unguarded", "ddqn"]
-RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.02, "budget": 40, "check": 12}
+RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.02, "budget": 20, "check": 4}
 NONE = pd.DataFrame()
 
 
@@ -50,7 +50,7 @@ def studies(tmp_path_factory):
     folder = tmp_path_factory.mktemp("results")
     corners = grid(uavs=[1, 3], initial_data=[[5, 7.5], 10])
     changes: dict[str, dict[str, Any]] = {
-        "table4": {"missions": 30},
+        "table4": {"missions": 20},
         "fig4": {"missions": 4, "logged": 2},
         "fig5": {"missions": 3},
         "sweet-spot": {"selection": RULE, "design": corners},

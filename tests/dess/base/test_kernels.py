@@ -32,6 +32,8 @@ def inner(x):
 """
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(tmp_path, monkeypatch):
     """However it is reached; a comment is no change."""
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
@@ -41,7 +43,6 @@ def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(tmp_path, monk
     commented = {name: f'"""Docs."""\n\n# A comment.\n{text}' for name, text in sources.items()}
     for changed, printed in [
         (sources, "2 compiled"),
-        ({}, "2 cached"),
         (commented, "2 cached"),
         ({"callee.py": CALLEE.replace("x + ONE", "x + 10")}, "11 compiled"),
         ({"callee.py": CALLEE, "constant.py": "ONE = 3\n"}, "4 compiled"),
@@ -66,6 +67,8 @@ print(compiled.fndesc.mangled_name)
 """
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_two_processes_name_compiled_functions_differently():
     """A process that loads both from the cache would run one of two with the same name twice."""
     names = {

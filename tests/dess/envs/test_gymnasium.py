@@ -20,6 +20,8 @@ from tests.dess.envs.episodes import PAPER
 NAME = "dess.envs:dess/Paper-v0"
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_gymnasium_finds_the_environments_by_their_name():
     """In a new process, which has imported nothing of dess."""
     script = f"import gymnasium; gymnasium.make('{NAME}'); gymnasium.make('dess/Paper-v0'); "

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dess.model import batch
@@ -64,8 +64,8 @@ def test_both_engines_agree_where_everything_happens(sections):
     space = ScenarioSpace.of(BUSY, forbid_swaps=not sections, **sections)
     seen, ends, fleets, waited = set(), set(), set(), 0
     for policy in (Wanderer(), Commuter(), Fidget()):
-        records = simulate_batch(space, policy, 2**64 - 1, 25)
-        for job in range(25):
+        records = simulate_batch(space, policy, 2**64 - 1, 15)
+        for job in range(15):
             single = simulate(space, policy, 2**64 - 1, job, events=True)
             assert is_same(records, job, single) and single.events is not None
             seen.update(single.events.event)
@@ -156,6 +156,7 @@ def test_a_batch_is_small_where_a_mission_is_large(monkeypatch):
     assert BATCH_SIZE * batch.work_of(load_scenario("paper")) < MOST_WORK
 
 
+@settings(max_examples=settings().max_examples // 3)  # an example has six missions or more
 @given(st.lists(spaces(), min_size=2, max_size=3), st.data(), seeds, st.integers(1, 2))
 def test_scenarios_of_different_worlds_fly_in_one_batch(worlds, data, seed, workers):
     # The same worlds again with other fleets, which share a world, and with nodes in another order.

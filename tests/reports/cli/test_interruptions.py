@@ -123,6 +123,8 @@ def results(tmp_path):
     return tmp_path / "results"
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_a_report_that_is_terminated_leaves_no_page_no_process_and_no_file(results, tmp_path):
     command = a_page(tmp_path / "pages", results)
     assert command.kill(signal.SIGTERM, lambda: renderings(command) > 0, 0.5)

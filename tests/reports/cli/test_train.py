@@ -125,7 +125,8 @@ def test_a_large_training_has_to_be_confirmed(dess, monkeypatch):
 
 BEGUN = "any sea, begun with a policy"
 KINDS = {"double DQN": (), "any sea": (), BEGUN: ("--from", "begun")}
-ENDS = [("double DQN", False), ("any sea", True)]
+ENDS = [("double DQN", False), ("double DQN", True)]
+ENDS += [pytest.param("any sea", True, marks=[pytest.mark.slow, pytest.mark.brief])]
 ENDS += [pytest.param(BEGUN, True, marks=pytest.mark.slow)]
 
 

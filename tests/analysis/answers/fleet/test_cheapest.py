@@ -191,7 +191,7 @@ def test_the_answer_is_the_cheapest_fleet_of_any_policy(first, tmp_path):
     """The other policy meets the requirement, but with a dearer fleet."""
     policies, values = ["greedy", "nearest"], {"uavs": [1, 3], "pads": [1], "quota": [30]}
     asked = {"collection_ratio": 0.365}
-    found = searched_sea(tmp_path, policies[:: 1 - 2 * first], asked, values, tolerance=0.01)
+    found = searched_sea(tmp_path, policies[:: 1 - 2 * first], asked, values, tolerance=0.03)
     fleets = cheapest.selected_fleets(found).set_index("policy")["setting"].to_dict()
     one, three = (f"{uavs}, 1 pad and 1 pad in zone 2" for uavs in ("1 UAV", "3 UAVs"))
     # Or this test says little.

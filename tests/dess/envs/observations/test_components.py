@@ -13,7 +13,7 @@ from tests.dess.envs.episodes import play, small
 from tests.drawn import extended_spaces, seeds, spaces
 
 
-@given(spaces() | extended_spaces(fleet=[]), seeds)
+@given(spaces(max_slots=40) | extended_spaces(fleet=[], max_slots=40), seeds)
 def test_observations_lie_in_their_space_and_masks_name_the_moves_on_the_grid(space, seed):
     env = dess.parallel_env(space, seed, observation="state")
     names, zones = component_names(space), np.pad(space.chart.zones, 1, constant_values=NO_FLY)

@@ -69,6 +69,11 @@ STUDIES = {
 }  # fmt: skip
 
 
+# The other studies are left to the longer proofs: every page takes a second or two.
+QUICK = ("two fields", "a selection", "a search for a fleet")
+LONG = [pytest.mark.slow, pytest.mark.brief]
+
+
 def page_of(folder, **parameters):
     """The texts of the page and of its drawings, without rendering it."""
     report = make_study_report(load_results(folder))
@@ -78,7 +83,10 @@ def page_of(folder, **parameters):
     return " ".join(unescape(bare).split())
 
 
-@pytest.mark.parametrize("name", STUDIES)
+@pytest.mark.parametrize(
+    "name",
+    [n if n in QUICK else pytest.param(n, marks=LONG) for n in STUDIES],
+)
 def test_the_page_says_what_the_study_can_answer(name, studied):
     changes, said, unsaid = STUDIES[name]
     text = page_of(studied(**changes).store.folder)
@@ -101,6 +109,8 @@ def test_parameters_choose_the_metric_and_the_baseline(studied):
     assert re.search(r"The best setting is greedy with \d UAVs?: reward −?[\d,.]+ ", text)
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_pages_say_when_a_trained_policy_acts_outside_of_its_training(tmp_path, studied):
     """That of a study, and of a what-if question, be it on one side only."""
     question = {"settings": {"quota": 600}, "baseline": {}, "policies": ["ddqn"], "missions": 2}
