@@ -3,6 +3,8 @@
 import re
 from typing import Any
 
+import pytest
+
 from dess.analysis import load_study, study_names
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.stats.intervals import LEVEL
@@ -84,6 +86,8 @@ def test_no_number_of_the_model_is_typed():
     assert all(len(of_scenario) > 30 for of_scenario in numbers)
 
 
+@pytest.mark.slow
+@pytest.mark.brief
 def test_the_page_of_the_docs_describes_the_shipped_studies():
     """``DESS_WRITE_PINS=1`` writes it."""
     others = [Manifest.of(load_study(name)).data for name in study_names() if name != STUDY]
