@@ -8,7 +8,7 @@ from dess.base.kernels import inlined, kernel
 from dess.model.guard.battery import lasts, margin, must_charge, slots_left, will_charge
 from dess.model.guard.parking import HOME, parking_cell, parking_memory, stays, write_home
 from dess.model.guard.queues import waits_in_zone
-from dess.model.guard.ways import battery_home, is_parked
+from dess.model.guard.ways import battery_around, battery_home, is_late, is_parked
 from dess.model.rules import data_left
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
@@ -133,6 +133,9 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     least = 1_000_000  # battery [%] that lacks on the way to the parking cell
     fewest = 1_000_000  # battery [%] that a move and the way from there need
     levels = contests(mission, uavs, i)
+    searches = charge and not is_calm(reach)
+    if searches:
+        searches = is_late(mission, uavs, i, chart, planned, home, reserve, reach)
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
         # Teammates fly around a parked UAV, so it need not leave its cell for any.
@@ -143,7 +146,10 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
             continue
         late = 0
         if charge:
-            needed = battery_home(mission, uavs, i, chart, planned, x, y, home, reach)
+            if searches:
+                needed = battery_around(mission, uavs, i, chart, planned, x, y, home, reach)
+            else:
+                needed = battery_home(mission, uavs, i, chart, planned, x, y, home, reach)
             needed += 1 if is_calm(reach) else _cost(mission, u, chart, action, x, y)
             kept = reserve
             if not is_calm(reach) and home.cells > 0:

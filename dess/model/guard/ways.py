@@ -1,12 +1,16 @@
 """The ways to a charging zone around parked teammates, and the battery that they take."""
 
+import heapq
+
 import numpy as np
 
 from dess.base.kernels import inlined, kernel
-from dess.model.guard.battery import ends_soon, lasts
+from dess.model.guard.battery import ends_soon, lasts, slots_left
+from dess.model.state import STEP_X, STEP_Y
 from dess.physics.charging import slots_to_charge
-from dess.physics.chart import distance, length_around
+from dess.physics.chart import distance, is_open, length_around
 from dess.physics.landing import lands
+from dess.physics.wind import FAR, move_surcharge
 
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
 CELLS_PER_UAV = 4
@@ -73,6 +77,19 @@ def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     Or, if that is shorter, the way through and the time that a teammate charges in it, unless none
     leaves its cell any more.
     """
+    closed = _closed_cells(mission, uavs, i, chart, planned, to_x, to_y)
+    zones, ways, rows = chart.zones, chart.ways, chart.rows
+    around = length_around(zones, ways, rows, closed, x, y, to_x, to_y)
+    if ends_soon(mission, uavs[i]):
+        return around
+    lacking = mission.charge_complete - mission.charge_start
+    through = distance(chart, x, y, to_x, to_y)
+    return min(around, through + slots_to_charge(mission, lacking))
+
+
+@kernel
+def _closed_cells(mission, uavs, i, chart, planned, to_x, to_y):
+    """The numbers of the cells, counted row by row, that teammates close on the way to a cell."""
     width = chart.zones.shape[1]
     closed, count = np.empty(mission.uavs, np.int64), 0
     for j in range(mission.uavs):
@@ -80,13 +97,7 @@ def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
         if closed_x >= 0 and not (closed_x == to_x and closed_y == to_y):
             closed[count] = closed_y * width + closed_x
             count += 1
-    zones, ways, rows = chart.zones, chart.ways, chart.rows
-    around = length_around(zones, ways, rows, closed[:count], x, y, to_x, to_y)
-    if ends_soon(mission, uavs[i]):
-        return around
-    lacking = mission.charge_complete - mission.charge_start
-    through = distance(chart, x, y, to_x, to_y)
-    return min(around, through + slots_to_charge(mission, lacking))
+    return closed[:count]
 
 
 @inlined
@@ -108,6 +119,66 @@ def battery_home(mission, uavs, i, chart, planned, x, y, home, reach):
     else:
         cells = path_length(mission, uavs, i, chart, None, x, y, home.x, home.y)
     return battery_of_way(mission, uavs[i], chart, x, y, home.x, home.y, cells, reach)
+
+
+@kernel
+def is_late(mission, uavs, i, chart, planned, home, kept, reach):
+    """Whether the battery of UAV ``i`` is too low for its way home and the slots that it keeps.
+
+    In missions that end on the ground, no UAV is: there the time may lack, and not the battery.
+    """
+    if lands(mission):
+        return False
+    u = uavs[i]
+    spent = battery_home(mission, uavs, i, chart, planned, u.x, u.y, home, reach)
+    return spent + 1 + kept > slots_left(mission, u)
+
+
+@kernel
+def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
+    """The battery [%] that UAV ``i`` needs to its parking cell, as it is and not as it may be most.
+
+    ``battery_home`` takes the detour of the shortest ways around closed cells, and the battery of
+    the cheapest way, which may be another. By this, each cell of two may seem to be on the better
+    way, and a UAV flies to and fro between them. Here the cheapest way around all closed cells is
+    found, by A*: the battery without closed cells is a lower bound. The arguments are those of
+    ``battery_home``.
+    """
+    if reach is None or reach.size == 0:
+        return np.int64(battery_home(mission, uavs, i, chart, planned, x, y, home, reach))
+    if is_crowded(mission, chart, chart.zones[home.y, home.x]):
+        closed = _closed_cells(mission, uavs, i, chart, planned, home.x, home.y)
+    else:
+        closed = _closed_cells(mission, uavs, i, chart, None, home.x, home.y)
+    width, slots = chart.zones.shape[1], uavs[i].slots_per_cell
+    least = reach[chart.nearest[home.y, home.x], slots - 1].ravel()
+    lacking = mission.charge_complete - mission.charge_start
+    start = np.int64(y * width + x)
+    through = np.int64(least[start]) + slots_to_charge(mission, lacking)
+    spent = np.full(chart.zones.size, FAR, np.int64)
+    spent[closed] = -1
+    spent[start] = 0
+    # Of cells with equal bounds, the one that is nearest to the parking cell comes first.
+    bounds = [(np.int64(least[start]), np.int64(least[start]), start)]
+    while bounds:
+        bound, left, cell = heapq.heappop(bounds)
+        if left == 0 or bound >= through:
+            return min(bound, through)
+        if bound > spent[cell] + left:
+            continue  # a cheaper way to this cell has been found since it was put there
+        for action in range(4):
+            next_x = cell % width + STEP_X[action]
+            next_y = cell // width + STEP_Y[action]
+            if not is_open(chart, next_x, next_y):
+                continue
+            to = next_y * width + next_x
+            cost = move_surcharge(mission, STEP_X[action], STEP_Y[action], next_x, next_y)
+            cost += spent[cell] + slots
+            if cost < spent[to]:
+                spent[to] = cost
+                left = np.int64(least[to])
+                heapq.heappush(bounds, (cost + left, left, np.int64(to)))
+    return through
 
 
 @inlined

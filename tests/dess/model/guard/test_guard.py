@@ -1,5 +1,6 @@
 """The return guard: UAVs that follow it reach the charger in time."""
 
+import heapq
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,8 +11,9 @@ from dess import policies
 from dess.envs.observations.states import HOME, compact_states
 from dess.model.batch import simulate_batch
 from dess.model.guard import guard
-from dess.model.state import BATTERY, HOVER
+from dess.model.state import BATTERY, HOVER, STEP_X, STEP_Y
 from dess.model.view import View
+from dess.physics.wind import FIELDS, surcharges
 from dess.scenario.scenario import load_scenario
 from tests import compiled
 from tests.dess.envs.episodes import placed
@@ -210,6 +212,50 @@ def test_in_wind_a_uav_flies_around_the_cell_that_a_teammate_will_take():
     ]
     mask = _mask(*({"latch": True} | u for u in team), **sea, **BREEZE)
     assert np.nonzero(mask[2])[0].tolist() == [EAST]
+
+
+def _cheapest(extras, closed, start, end):
+    """The battery of the cheapest way between two cells that avoids a third."""
+    spent = {start: 0}
+    waiting = [(0, start)]
+    while waiting:
+        battery, (x, y) = heapq.heappop(waiting)
+        for action in range(4):
+            to = (int(x + STEP_X[action]), int(y + STEP_Y[action]))
+            if not (0 <= to[0] < 16 and 0 <= to[1] < 16) or to == closed:
+                continue
+            more = battery + 1 + int(extras[action, to[1], to[0]])
+            if more < spent.get(to, more + 1):
+                spent[to] = more
+                heapq.heappush(waiting, (more, to))
+    return spent[end]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_in_wind_a_late_uav_takes_the_cheapest_way_around_a_parked_teammate(seed):
+    """The zone is two cells in a row, and the teammate charges in the front one.
+
+    The cheapest way without the teammate leads through its cell. The battery of that one and the
+    detour of the shortest way, taken together, let UAVs fly to and fro or along a dear row.
+    """
+    wind = {"strength": 0.5, "direction": 90, "gusts": 0.4, "seed": seed}
+    sea: dict[str, Any] = {"grid": 16, "rows": 16, "zone": [12, 8, 2, 1], "pads": 2, "wind": wind}
+    sea |= {"nodes": [[0, 0]], "charge_start": 29, "charge_complete": 100}
+    parked = {"x": 12, "y": 8, "battery": 20, "charging": True, "pad_request": 3, "latch": True}
+    state, chart = placed([parked, {"x": 2, "y": 9, "latch": True}], **sea)
+    extras = surcharges((16, 16), *(state.missions[0][field].item() for field in FIELDS))
+    u = state.uavs[0, 1]
+    u["battery"] = _cheapest(extras, (12, 8), (2, 9), (13, 8)) + 1
+    view = View(state, SimpleNamespace(chart=chart), np.zeros(1, int), np.ones(1, int))
+    while u["zone"] < 0 and u["battery"] > 0:
+        action = np.nonzero(guard(view)[0])[0][0]
+        if action != HOVER:
+            u["x"] += STEP_X[action]
+            u["y"] += STEP_Y[action]
+            u["battery"] -= extras[action, u["y"], u["x"]]
+        u["battery"] -= 1
+        u["zone"] = chart.zones[u["y"], u["x"]]
+    assert u["battery"] == 1
 
 
 def test_a_uav_stays_in_its_parking_cell_whoever_is_near():
