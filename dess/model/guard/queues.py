@@ -378,7 +378,8 @@ def _gives_way(mission, uavs, i, plan):
         return False
     for j in range(mission.uavs):
         begins_first = plan.turns[j].zone == zone and plan.turns[j].begins < plan.turns[i].begins
+        has_asked = uavs[j].pad_request >= 0
         asks_after = plan.turns[j].asks > 0 or (j > i and not mission.lowest_battery_first)
-        if begins_first and asks_after:
+        if begins_first and asks_after and not has_asked:
             return True
     return False

@@ -118,6 +118,13 @@ def test_a_uav_that_comes_in_the_same_slot_as_one_with_less_battery_gives_way_to
     assert _plan([_uav(0, 20), _uav(0, 5, y=2)])[1][2] == 1
 
 
+@pytest.mark.parametrize(("i", "way"), [(0, 1), (1, 0)])
+def test_no_uav_gives_way_to_one_that_is_charging(i, way):
+    """The pad is taken for 3 slots; then the first could wait for 7 slots more, the second not."""
+    team = [_uav(0, 20), _uav(0, 8, y=2), _uav(1, 50, x=0, **CHARGING)]
+    assert _plan(team, i)[1][2] == way
+
+
 @pytest.mark.parametrize(
     ("uavs", "zones"),
     [
