@@ -9,7 +9,6 @@ Changes of comments and line numbers do not count.
 
 import gc
 import inspect
-import math
 import secrets
 from collections.abc import Callable
 from functools import lru_cache, partial
@@ -17,7 +16,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numba import config, njit
 from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import IndexDataCacheFile
@@ -164,9 +162,3 @@ def _code_behind(module: str, path: str) -> str:
     """A hash of the code that the functions of a module may call; empty without a source file."""
     code = code_of(Path(path).stem if module == "__main__" else module)
     return combined(code) if code else ""
-
-
-# Functions of the C library on arrays. NumPy's own differ in their last bits between processors
-# with and without AVX-512, and with them records and decisions would.
-exp = np.vectorize(math.exp, otypes=[float])
-log10 = np.vectorize(math.log10, otypes=[float])

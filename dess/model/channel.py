@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dess.base.kernels import inlined, kernel, log10
+from dess.base.elementary import exp, hypot, log1p, log10
+from dess.base.kernels import inlined, kernel
 from dess.model.state import STEP_X, STEP_Y
 from dess.physics import fleet, streams
 from dess.physics.chart import Chart, read_only
@@ -23,8 +24,8 @@ from dess.scenario.scenario import ScenarioSpace
 GROUP = 4  # communication slots whose shadowing one Philox block holds
 _BATCH = 8  # nodes whose shadowing is drawn together: as many as a vector register holds
 
-_DB_TO_LOG = math.log(10.0) / 10.0
-_PER_LOG_2 = 1.0 / math.log(2.0)
+_DB_TO_LOG = 2.302585092994046 / 10.0  # ln 10
+_PER_LOG_2 = 1.0 / 0.6931471805599453  # ln 2
 
 # Eight nodes that a UAV may serve in a group of communication slots.
 BATCH = np.dtype(
@@ -141,8 +142,8 @@ def _world_of(scenario: ScenarioSpace, thread: int) -> World:
     mean_snr = np.empty((longest, len(fine)))
     for row in range(longest):  # each takes a moment, all of a large grid may take seconds
         # From an integer: at equal distances, the SNR is equal to the bit.
-        horizontal = scenario.cell_size * (np.sqrt((places * row) ** 2 + fine**2) / places)
-        distance = np.hypot(horizontal, scenario.altitude)
+        horizontal = scenario.cell_size * (np.sqrt((places * row) ** 2 + fine * fine) / places)
+        distance = hypot(horizontal, scenario.altitude)
         loss = 10 * scenario.path_loss_exponent * log10(distance / edge)
         mean_snr[row] = np.where(distance <= reach, scenario.edge_snr - loss, -math.inf)
     nodes = np.array(scenario.nodes, np.int64)
@@ -344,6 +345,11 @@ def rate(mission, snr):
     """Data units per communication slot at an SNR [dB] (eq. 9)."""
     length = mission.communication_slot_length
     if has_max_rate(mission):
-        efficiency = _PER_LOG_2 * math.log1p(math.exp(snr * _DB_TO_LOG))
-        return length * min(efficiency, mission.max_rate)
-    return length * _PER_LOG_2 * math.log1p(math.exp(snr * _DB_TO_LOG))
+        return length * min(efficiency(snr), mission.max_rate)
+    return length * efficiency(snr)
+
+
+@inlined
+def efficiency(snr):
+    """``log2(1 + SNR)`` [bit/s/Hz] at an SNR [dB]."""
+    return _PER_LOG_2 * log1p(exp(snr * _DB_TO_LOG))

@@ -15,6 +15,7 @@ import math
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import astuple, dataclass, fields
+from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -121,12 +122,12 @@ class Buffers:
         out["generated"], out["delivered"], out["lost_packets"] = counts
         if len(done):
             latency = done["left"] - done["generated"]
-            out["latency"] = latency.mean()
+            out["latency"] = fmean(latency)
             out["latency_p99"] = np.quantile(latency, 0.99, method="inverted_cdf")
         if with_age:
             lows, highs, peaks = teeth_of(done, len(self.queues), end)
             out["age"], out["age_p99"] = age_of_teeth(lows, highs, np.ones(len(lows)))
-            out["peak_age"] = highs[:peaks].mean() if peaks else math.nan
+            out["peak_age"] = fmean(highs[:peaks]) if peaks else math.nan
 
 
 def teeth_of(done: np.ndarray, nodes: int, end: float) -> tuple[np.ndarray, np.ndarray, int]:

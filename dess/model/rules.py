@@ -17,8 +17,7 @@ With ``quota = 0`` a mission lasts until ``max_slots``: after its last UAV has e
 three go on (see ``advance_without_uavs``).
 """
 
-import math
-
+from dess.base.elementary import exp
 from dess.base.kernels import inlined, kernel
 from dess.model import channel
 from dess.model.state import (
@@ -347,7 +346,7 @@ def arrive(mission, residual, sensors, arrivals, batches, search):
     if mission.continuous != 0:  # then they are events of their own (dess.model.packets)
         return
     rate = mission.arrival_rate
-    probability_of_none = math.exp(-rate)
+    probability_of_none = exp(-rate)
     batch = batches[0, 0]
     for k in range(mission.nodes):
         block = k // 4 % len(batch.node)
@@ -362,7 +361,7 @@ def arrive(mission, residual, sensors, arrivals, batches, search):
         arrivals[k] = 0
         if _has_own_rates(mission):
             rate = sensors[k].rate
-            probability_of_none = math.exp(-rate)
+            probability_of_none = exp(-rate)
         if streams.uniform(word) > probability_of_none:
             arrivals[k] = streams.poisson(word, rate)
             residual[k] += arrivals[k]

@@ -7,6 +7,7 @@ state.uavs[0, 0]["battery"], state.residual[0]
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from statistics import fmean
 from typing import NamedTuple
 
 import numpy as np
@@ -201,7 +202,7 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         "charge_slots": scenario.charge_fraction.denominator,
         **{"range": scenario.radio.range, "max_rate": scenario.radio.max_rate},
         "age_reward": scenario.age.reward,
-        **({"arrival_rate": np.mean(scenario.node_rates)} if own_rates else {}),
+        **({"arrival_rate": fmean(scenario.node_rates)} if own_rates else {}),
         **wind.constants(scenario.wind, scenario.size),
         **scenario.charging.constants(),
         **scenario.failures.constants(),

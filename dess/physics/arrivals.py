@@ -16,6 +16,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dess.base.descriptions import Description
+from dess.base.elementary import log
 from dess.base.errors import InputError
 from dess.base.kernels import kernel
 from dess.physics import streams
@@ -143,7 +144,7 @@ def draw_arrival(missions, sources, starts, factors, k):
             mission.seed, mission.replication, streams.ARRIVAL_TIME, 0, k, source.candidate
         )
         source.candidate += 1
-        source.time -= math.log(streams.uniform(words[0])) / (source.rate * highest)
+        source.time -= log(streams.uniform(words[0])) / (source.rate * highest)
         if not source.time < mission.max_slots:
             source.time = math.inf
             return

@@ -17,6 +17,7 @@ import math
 
 import numpy as np
 
+from dess.base.elementary import exp, log
 from dess.base.kernels import kernel
 
 # The stream is the purpose of a draw. Different streams never share a counter value.
@@ -156,7 +157,7 @@ def poisson(word, rate):
     """
     u = uniform(word)
     count = 0
-    term = math.exp(-rate)
+    term = exp(-rate)
     total = term
     while u > total and term > 0.0:
         count += 1
@@ -220,7 +221,7 @@ def normal(word):
     q = uniform(word) - 0.5
     if abs(q) <= CENTRAL:
         return central_normal(q)
-    r = math.sqrt(-math.log(0.5 - abs(q)))
+    r = math.sqrt(-log(0.5 - abs(q)))
     r -= 1.6
     numerator = (
         ((((((7.74545014278341407640e-4 * r + 2.27238449892691845833e-2) * r

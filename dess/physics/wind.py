@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import Field
 
 from dess.base.descriptions import Description
+from dess.base.elementary import cos, sin
 from dess.base.kernels import inlined, kernel
 from dess.physics import streams
 from dess.physics.chart import NO_FLY, Chart, read_only
@@ -64,8 +65,8 @@ class Wind(Section):
         """What the mean wind takes of moves to the north, east, south and west [% per cell]."""
         towards = math.radians(self.direction)
         north, east, south, west = self.moves
-        x = -self.strength * math.sin(towards)
-        y = self.strength * math.cos(towards)
+        x = -self.strength * sin(towards)
+        y = self.strength * cos(towards)
         return y + north, -x + east, -y + south, x + west
 
 
@@ -82,7 +83,7 @@ def moves_in(wind: float, direction: float, cruise: float) -> Moves:
     extra_slots = []
     for course in (0, 90, 180, 270):
         angle = math.radians(direction - course)
-        ground = math.sqrt(cruise**2 - (wind * math.sin(angle)) ** 2) - wind * math.cos(angle)
+        ground = _along(cruise, wind, angle)
         extra_slots.append(max(cruise / ground - 1, 0.0))
     north, east, south, west = extra_slots
     return north, east, south, west
@@ -93,7 +94,13 @@ def largest_wind(direction: float, cruise: float) -> float:
     ground = cruise / (MOST + 1)
     turn = math.radians(direction % 90)
     angle = min(turn, math.pi / 2 - turn)
-    return math.sqrt(cruise**2 - (ground * math.sin(angle)) ** 2) - ground * math.cos(angle)
+    return _along(cruise, ground, angle)
+
+
+def _along(cruise: float, speed: float, angle: float) -> float:
+    """What a cruising speed has left along a course, with so much speed at an angle to it."""
+    across = speed * sin(angle)
+    return math.sqrt(cruise * cruise - across * across) - speed * cos(angle)
 
 
 @inlined

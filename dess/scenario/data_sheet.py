@@ -11,11 +11,13 @@ at cruising speed, and a data unit what the bandwidth carries in a slot at 1 bit
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from statistics import fmean
 from typing import Any, NamedTuple, NoReturn, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from dess.base.descriptions import Description, description_of
+from dess.base.elementary import log10
 from dess.base.errors import InputError, shown
 from dess.physics.section import Section
 from dess.physics.wind import Moves, largest_wind, moves_in
@@ -276,7 +278,7 @@ class DataSheet(Section):
         if isinstance(amount, str):
             texts = (amount,)
         values = tuple(measured(text, units)[0] / size for text in texts)
-        return sum(values) / len(values), () if isinstance(amount, str) else values
+        return fmean(values), () if isinstance(amount, str) else values
 
     def _radio(self) -> dict[str, Any]:
         """The SNR at a distance, the range and the largest rate."""
@@ -284,8 +286,8 @@ class DataSheet(Section):
             snr, anchor = measured(self.snr, "dB at m")
         else:  # Friis' equation, and thermal noise at 290 K
             anchor = self.number("free_space", 1.0)
-            loss = 20 * math.log10(4 * math.pi * anchor * self.number("frequency") / 299_792_458)
-            noise = 10 * math.log10(1.380649e-20 * 290 * self.number("bandwidth"))
+            loss = 20 * log10(4 * math.pi * anchor * self.number("frequency") / 299_792_458)
+            noise = 10 * log10(1.380649e-20 * 290 * self.number("bandwidth"))
             snr = self.number("tx_power") - loss - noise - self.number("noise_figure")
         reach = self.number("range")
         cell = self.units.cell

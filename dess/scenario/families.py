@@ -9,7 +9,6 @@ other have 1 or 2, 3 or 4, and 5 or 6 UAVs, so that a set of seas has each numbe
 charged battery lasts for the way from a charging zone to any node and back, with a fifth to spare.
 """
 
-import math
 import re
 from collections.abc import Callable, Sequence
 from functools import lru_cache
@@ -19,6 +18,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from dess.base.elementary import log10
 from dess.base.errors import InputError, check_known, shown, unknown_name
 from dess.physics import streams
 from dess.physics.chart import FAR, NO_FLY, OPEN, Cell, Rectangle, parking_of, spread, zones_of
@@ -386,7 +386,7 @@ def _workload(draws: Draws, rows: int, columns: int, nodes: int, uavs: int) -> d
     data = 160 * (2 * uavs - 1) * slots // (2 * 110)  # of all nodes [data units]
     low = max((4 * data + 5 * nodes) // (10 * nodes), 1)
     # The paper's SNR some cells away, give or take 2 dB; it is given at half the diagonal.
-    decades = math.log10((32**2 + 32**2) / (rows**2 + columns**2)) / 2
+    decades = log10((32**2 + 32**2) / (rows**2 + columns**2)) / 2
     return {
         "quota": 4 * slots,
         "initial_data": (low, 4 * low),

@@ -2,6 +2,7 @@
 
 from fractions import Fraction
 from functools import cache
+from math import fsum
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
@@ -356,7 +357,7 @@ class Fields(Strict):
         if not self.needs_events:
             return 0.0
         highest = max([1.0, *(factor for _, factor in self.arrivals.schedule)])
-        return sum(self.node_rates) * highest * self.max_slots
+        return fsum(self.node_rates) * highest * self.max_slots
 
     @property
     def node_rates(self) -> tuple[float, ...]:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dess.base.elementary import hypot
 from dess.base.errors import InputError, shown, unknown_name, validated
 from dess.scenario.data_sheet import LINK_BUDGET, DataSheet
 from dess.scenario.nodes import MAX_GRID, RATES, NodesFile, NodesFound
@@ -117,7 +118,7 @@ class NewScenario:
         """The way from a place to the nearest node [km]."""
         projection = Projection.about(self.nodes.spots, (0, 0), 1000.0)
         ways = projection.cells(self.nodes.spots) - projection.cells(np.array([degrees]))
-        return float(np.hypot(*ways.T).min())
+        return float(hypot(*ways.T).min())
 
     def _check_no_fly(self, answer: str) -> None:
         if answer and not (self.path.parent / answer).is_file():

@@ -17,6 +17,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
+from dess.base.elementary import cos
 from dess.base.errors import InputError, shown, unknown_name, validated
 from dess.base.files.documents import Document
 from dess.base.files.reading import TEXT_LIMIT, read_text
@@ -71,7 +72,7 @@ class Projection(NamedTuple):
     def _degree(self) -> np.ndarray:
         """A degree to the east and one to the north [cells]; y grows south."""
         degree = math.radians(1) * EARTH_RADIUS / self.cell_size
-        return np.array([degree * math.cos(math.radians(self.centre[1])), -degree])
+        return np.array([degree * cos(math.radians(self.centre[1])), -degree])
 
     def cells(self, degrees: np.ndarray) -> np.ndarray:
         """The (K, 2) places on the grid [cells] of (K, 2) places on the Earth."""

@@ -5,13 +5,13 @@
 ``UNITS`` lists every unit that is read, and its size. A number may have a decimal comma.
 """
 
-import math
 import re
 from collections.abc import Iterator
 from fractions import Fraction
 from functools import cache, lru_cache
 from typing import NoReturn
 
+from dess.base.elementary import log10
 from dess.base.errors import InputError, shown, suggestion
 
 # What a quantity is and an example, by its units. A word in between parts two quantities.
@@ -178,7 +178,7 @@ def _decibels(amount: Fraction, name: str, text: str) -> Fraction:
         return amount + (size if name == "dBW" else 0)
     if amount <= 0:
         refuse(text, "is not above 0", "dBm")
-    return Fraction(10 * math.log10(amount * size))
+    return Fraction(10 * log10(float(amount * size)))
 
 
 def _refuse_unit(text: str, name: str, unit: str, units: str) -> NoReturn:

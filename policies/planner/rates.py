@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.files.memory import check_memory
+from dess.base.kernels import kernel
+from dess.model.channel import efficiency
 from dess.model.state import STEP_X, STEP_Y
 from dess.model.view import View
 from dess.physics import wind
@@ -21,8 +23,18 @@ from dess.physics.chart import Chart
 
 # Nodes kept per step. The farther ones give next to no data, and nothing is planned with them.
 _RANKS = 12
-# Points of the Gauss-Hermite rule for the mean over the shadowing.
-_POINTS = 16
+# The Gauss-Hermite rule of 16 points for the mean over the shadowing: its positive points and their
+# weights. A library would compute them, with other last bits on another machine.
+_RULE = (
+    (0.3867606045005573, 0.28656852123801213),
+    (1.1638291005549648, 0.1583383727509496),
+    (1.9519803457163334, 0.047284752354014026),
+    (2.7602450476307014, 0.007266937601184733),
+    (3.600873624171548, 0.0005259849265739092),
+    (4.492955302520011, 1.5300032162487272e-05),
+    (5.472225705949343, 1.3094732162868227e-07),
+    (6.630878198393129, 1.4978147231618397e-10),
+)
 
 
 # A node that a UAV may serve in a slot, and its mean rate [data units per communication slot].
@@ -113,9 +125,12 @@ def _mean_rates_of_steps(
         step = STEP_Y[action]
         along = dy
         across = dx
-    fine = np.abs(parts * along[..., None] - step * ahead)
     farthest = rates.shape[1] - 1  # beyond it are moves that begin off the grid
-    return rates[np.abs(across)[..., None], np.minimum(fine, farthest)].mean(-1)
+    total = np.zeros(across.shape)
+    for places in ahead:
+        fine = np.abs(parts * along - step * places)
+        total += rates[np.abs(across), np.minimum(fine, farthest)]
+    return total / len(ahead)
 
 
 def _mean_rate(snr: np.ndarray, length: float, deviation: float, most: float) -> np.ndarray:
@@ -123,12 +138,17 @@ def _mean_rate(snr: np.ndarray, length: float, deviation: float, most: float) ->
 
     It is computed once for each SNR, so that nodes at equal distances have equal rates.
     """
-    points, weights = np.polynomial.hermite_e.hermegauss(_POINTS)
-    weights /= weights.sum()
     distinct, places = np.unique(snr, return_inverse=True)
-    rates = np.empty_like(distinct)
-    for part in np.array_split(np.arange(len(distinct)), len(snr)):  # all would take gigabytes
-        levels = distinct[part, None] + deviation * points
-        efficiency = np.minimum(np.log2(1.0 + 10.0 ** (levels / 10.0)), most)
-        rates[part] = length * efficiency @ weights
+    rates = np.zeros(len(distinct))
+    _add_rates(distinct, length, deviation, most, rates)
     return rates[places].reshape(snr.shape)
+
+
+@kernel
+def _add_rates(snr, length, deviation, most, rates):
+    """Add the mean rate at each mean SNR [dB] to ``rates``."""
+    for number in range(len(snr)):
+        for point, weight in _RULE:
+            for deviate in (-point, point):
+                level = snr[number] + deviation * deviate
+                rates[number] += length * weight * min(efficiency(level), most)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dess.base.elementary import exp, log
 from dess.base.kernels import inlined, kernel
 from dess.model.state import STEP_X, STEP_Y
 from dess.physics import streams
@@ -101,7 +102,7 @@ def improve_plan(mission, uavs, residual, nodes, rates, plan, workspace, steps, 
     value, best, heat = course[VALUE], course[BEST], course[HEAT]
     lag = _LAG if mission.uavs > 1 else math.inf
     words = np.empty(4, np.uint64)
-    cooling = (_COLDEST / hottest) ** (1.0 / max(steps, 1))
+    cooling = exp(log(_COLDEST / hottest) / max(steps, 1))
     last = min(first + most, steps)
     for step in range(first, last):
         heat *= cooling
@@ -117,7 +118,7 @@ def improve_plan(mission, uavs, residual, nodes, rates, plan, workspace, steps, 
             fluid.copy_plan(mission, present, trial)
             continue
         luck = streams.uniform(words[0] >> _HIGH << _HIGH | words[3] & _LOW)
-        least = heat * math.log(luck)
+        least = heat * log(luck)
         snapshot = slot // fluid.STRIDE
         behind = lag - least
         new = fluid.simulate_flight(mission, rates, trial, flight, snapshot, ahead, slots, behind)

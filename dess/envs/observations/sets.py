@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dess.base.kernels import exp, inlined, kernel, log10
+from dess.base.elementary import exp_of_each, log, log10
+from dess.base.kernels import inlined, kernel
 from dess.envs.observations import states as column
 from dess.envs.observations.states import CompactStates
-from dess.model.channel import World
+from dess.model.channel import World, efficiency
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.physics.chart import Chart, is_open, spread
 
@@ -29,8 +30,9 @@ MOVES = 9
 SCALES = np.array([1.5, 4.0, 12.0])
 _NORMS = np.array([1.0, 2.5, 8.0], np.float32)  # by which sums of data x nearness are divided
 # By which the nearness changes if the way is one cell shorter, and longer.
-_FACTORS = np.stack([exp(1 / SCALES), exp(-1 / SCALES)]).astype(np.float32)
+_FACTORS = np.stack([exp_of_each(1 / SCALES), exp_of_each(-1 / SCALES)]).astype(np.float32)
 _FARTHEST = 255  # [cells]; all longer ways count as this one
+_efficiency_of_each = np.vectorize(efficiency, otypes=[float])
 # Euclidean distances [cells] at which the rate tells what the channel is like.
 _PROBES = (1.0, 3.0, 8.0)
 
@@ -76,7 +78,7 @@ def sea_of(mission: Any, world: World) -> Sea:
     low, high, arriving = (mission[n] for n in ("initial_low", "initial_high", "arrival_rate"))
     unit = max(0.75 * low + 0.25 * high, 40 * arriving, 1e-3)
     most = length * (float(mission["max_rate"]) or np.inf)
-    rates = np.minimum(length * log10(1 + 10 ** (snr / 10)) / np.log10(2), most) / unit
+    rates = np.minimum(length * _efficiency_of_each(snr), most) / unit
     probes = np.interp(_PROBES, np.arange(len(rates)), rates)
     charging = mission["charge_rate"] / mission["charge_slots"]
     others = [40 * arriving / unit, charging / 10]
@@ -136,7 +138,8 @@ def _tables(zones: bytes, shape: tuple[int, int], cells: bytes) -> _Tables:
     zone_ways = np.stack([spread(chart, rectangle)[0] for rectangle in rectangles], 1)
     ways = np.minimum(ways, _FARTHEST)
     zone_ways = np.minimum(zone_ways, _FARTHEST)
-    near = np.pad(exp(-np.arange(_FARTHEST + 1)[:, None] / SCALES), ((0, 0), (0, 1)))
+    nearness = exp_of_each(-np.arange(_FARTHEST + 1)[:, None] / SCALES)
+    near = np.pad(nearness, ((0, 0), (0, 1)))
     places = nodes @ [1, shape[1]]
     around = near[ways[places], :3].transpose(1, 2, 0) / _NORMS[:, None]
     around *= (1 - np.eye(len(nodes)))[:, None]
@@ -381,7 +384,7 @@ def _own(mission, team, i, sea, mean, total, line):
     line[15] = active == 1
     line[16] = min(mean, np.float32(4.0))
     line[17] = min(total / slots * np.float32(2.5), np.float32(5.0))
-    line[18] = np.log(np.float32(len(sea.nodes))) / np.float32(4.0)
+    line[18] = log(np.float64(len(sea.nodes))) / 4.0
     line[19] = others / np.float32(4.0)
     line[20] = min(len(sea.pads), 4) / 4.0
     line[21] = min(max(start - home, -20), 40) / 40.0

@@ -8,7 +8,8 @@ are described one by one, and all of them affect the data that is left for this 
 
 import numpy as np
 
-from dess.base.kernels import exp, inlined, kernel
+from dess.base.elementary import exp_of_each
+from dess.base.kernels import inlined, kernel
 from dess.envs.observations import states as column
 from dess.envs.observations.states import CompactStates, Layout
 from dess.model.state import HOVER, STEP_X, STEP_Y
@@ -43,7 +44,7 @@ class Vector:
     def __init__(self, layout: Layout):
         self.layout = layout
         slots = np.arange(2 * layout.grid + 2)
-        self._nearness = exp(-slots / SCALES[1])
+        self._nearness = exp_of_each(-slots / SCALES[1])
         self._around = _around(slots)
         self._home = layout.zone_slots(layout.nodes)
         own_columns = _OWN + 2 * layout.grid + _NODE * len(layout.nodes)
@@ -71,7 +72,7 @@ def _around(slots: np.ndarray) -> np.ndarray:
         vector registers.
     """
     table = np.zeros((len(slots), 3, 3, _WIDTH))
-    near = exp(-slots / SCALES[:, None]) / _NORMS[:, None]
+    near = exp_of_each(-slots / SCALES[:, None]) / _NORMS[:, None]
     for east, south in np.ndindex(3, 3):  # 0 for a node to the west or north, 2 for the opposite
         for action in range(5):
             nearer = (STEP_X[action], STEP_Y[action]) in ((east - 1, 0), (0, south - 1))
