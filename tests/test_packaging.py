@@ -56,6 +56,14 @@ def test_the_wheel_holds_the_packages_with_all_their_files_and_nothing_else(whee
     assert "dess/py.typed" in held
 
 
+def test_the_wheel_has_the_notice_of_the_coefficients_that_it_uses(wheel):
+    [name] = [name for name in wheel.namelist() if name.endswith("licenses/LICENSE-fdlibm")]
+    notice = wheel.read(name).decode().partition("\n\n")[2]
+    source = wheel.read("dess/base/elementary.py").decode()
+    assert "Sun Microsystems" in notice
+    assert " ".join(notice.split()) in " ".join(source.split())
+
+
 @pytest.fixture(scope="module")
 def tree(tmp_path_factory):
     """This source tree as an unpacked archive."""

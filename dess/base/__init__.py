@@ -1,1 +1,1 @@
-"""What all else stands on: errors, files, compiled functions, optional libraries."""
+"""What all else stands on: errors, files, compiled and elementary functions, optional libraries."""

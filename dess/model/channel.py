@@ -136,13 +136,15 @@ def _world_of(scenario: ScenarioSpace, thread: int) -> World:
     places = m * fleet.places_per_slot(scenario.fleet)
     longest = max(columns, rows)
     fine = np.arange(places * (longest - 1) + 1)
-    diagonal = np.sqrt(2) * np.sqrt((columns**2 + rows**2) / 2) * scenario.cell_size
+    diagonal = np.sqrt(2) * np.sqrt((columns * columns + rows * rows) / 2) * scenario.cell_size
     edge = scenario.radio.anchor or diagonal / 2
     reach = scenario.radio.range or math.inf
     mean_snr = np.empty((longest, len(fine)))
     for row in range(longest):  # each takes a moment, all of a large grid may take seconds
         # From an integer: at equal distances, the SNR is equal to the bit.
-        horizontal = scenario.cell_size * (np.sqrt((places * row) ** 2 + fine * fine) / places)
+        coarse = places * row
+        squares = coarse * coarse + fine * fine
+        horizontal = scenario.cell_size * (np.sqrt(squares) / places)
         distance = hypot(horizontal, scenario.altitude)
         loss = 10 * scenario.path_loss_exponent * log10(distance / edge)
         mean_snr[row] = np.where(distance <= reach, scenario.edge_snr - loss, -math.inf)

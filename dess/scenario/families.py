@@ -386,7 +386,7 @@ def _workload(draws: Draws, rows: int, columns: int, nodes: int, uavs: int) -> d
     data = 160 * (2 * uavs - 1) * slots // (2 * 110)  # of all nodes [data units]
     low = max((4 * data + 5 * nodes) // (10 * nodes), 1)
     # The paper's SNR some cells away, give or take 2 dB; it is given at half the diagonal.
-    decades = log10((32**2 + 32**2) / (rows**2 + columns**2)) / 2
+    decades = log10(2 * 32 * 32 / (rows * rows + columns * columns)) / 2
     return {
         "quota": 4 * slots,
         "initial_data": (low, 4 * low),

@@ -9,6 +9,7 @@ points are taken.
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from math import fsum
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Self
 
@@ -176,7 +177,7 @@ class NodesFound(NamedTuple):
             both = f"the scenario lists {kind.field}"
             raise InputError(self.path, f"has the column {column}, and {both}", "one")
         values = [self._amount(row, column, kind) for row in self.rows]
-        sums = [sum(values[number] for number in group) for group in groups]
+        sums = [fsum(values[number] for number in group) for group in groups]
         if kind.unit:
             return [f"{total!r} {kind.unit}" for total in sums]
         return sums
@@ -295,7 +296,8 @@ def _nearest_free(
         free = np.argwhere(is_free)[:, ::-1]
         if not len(free):
             raise InputError("nodes", "there are more than open cells", "a larger grid")
-        x, y = free[((free + 0.5 - spots[number]) ** 2).sum(1).argmin()].tolist()
+        across = free + 0.5 - spots[number]
+        x, y = free[(across * across).sum(1).argmin()].tolist()
         cells[number] = (x, y)
         is_free[y, x] = False
     return cells, moved
