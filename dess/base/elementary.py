@@ -142,18 +142,15 @@ def log(x):
 @kernel
 def log1p(x):
     """``log(1 + x)``, which does not lose the digits of a small ``x``; nan below -1."""
-    if x <= -1.0:
-        return -np.inf if x == -1.0 else np.nan
-    if not x < np.inf or abs(x) < 2.0**-53:
-        return x
-    if -0.2928932188134524 < x < 0.4142135623730950:
-        return _log_of_parts(0.0, x, 0.0)
+    if not -1.0 < x < np.inf or x == 0.0:
+        if x == -1.0:
+            return -np.inf
+        return np.nan if x < -1.0 else x
+    # One way for all other numbers, since the compiler makes vectors of code without branches.
     y = 1.0 + x
     bits = np.float64(y).view(np.int64)
     k = _exponent(bits)
-    lost = 0.0  # by the sum, relative to it
-    if k < 54:
-        lost = (1.0 - (y - x) if k > 1 else x - (y - 1.0)) / y
+    lost = (1.0 - (y - x) if x > 1.0 else x - (y - 1.0)) / y  # by the sum, relative to it
     f = np.int64(bits - (k << 52)).view(np.float64) - 1.0
     return _log_of_parts(np.float64(k), f, lost)
 
