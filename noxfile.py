@@ -45,6 +45,8 @@ SIDE_BY_SIDE = ("-n", "2", "--dist", "loadfile", "--no-loadscope-reorder")
 # The tests and the fuzzer simulate little and compile much, so they compile with less optimization,
 # which changes no number, into a cache of their own. All other sessions compile as users do.
 QUICK_COMPILING = {"NUMBA_OPT": "1", "NUMBA_CACHE_DIR": str(Path("build/numba").resolve())}
+# They start many processes, each of which would compile all modules for Python.
+QUICK_COMPILING["PYTHONDONTWRITEBYTECODE"] = ""
 RESULTS, REPORTS = Path("results"), Path("build/reports")
 # Beside the quick tests, what shows the lowest versions of the libraries for pages and commands.
 LOWEST = ("tests/reports/pages/test_body.py", "tests/reports/cli/test_lists.py")

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.model.record import OPERATIONS, measures_of
+from dess.model.record import MISSION_RECORD, measures_of
 from dess.scenario.data_sheet import Units
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
@@ -176,7 +176,7 @@ _PAPER = (
 )
 # What policies are compared by.
 _OF_MISSIONS = (*_PAPER, Metric(REWARD, "Reward", failure=FAILURE_COST))
-# What every mission has beside these.
+# The shares that every mission has beside these.
 _BESIDE = (Metric(HOME, "Battery for the way home", kind="outcome", in_percent=True),)
 # What only the missions of studies with bounds have, and those of studies with prices.
 _OF_BOUNDS = (
@@ -213,7 +213,8 @@ def _amount_metric(
     return Metric(column, name, unit, less_is_better=less, sheet_unit=sheet_unit, least=0.0)
 
 
-# Those of ``OPERATIONS``, which only extended scenarios measure.
+# Numbers beyond the paper: those of ``OPERATIONS``, which only extended scenarios measure, and, if
+# there are such, those of ``MISSION_RECORD`` that are shown like these.
 _MEASURED = (
     # An age grows with time, so the mean of a node that nothing reaches is half of the horizon.
     _time_metric(AGE, "Age of information", horizons=0.5, grows=True),
@@ -344,13 +345,11 @@ def format_length(slots: int, units: Units | None) -> str:
 
 
 def measured_in(missions: Container[str]) -> list[str]:
-    """The metrics of extended scenarios that a table of missions, or a row of it, has.
+    """The numbers beyond the paper that a table of missions, or a row of it, has.
 
     Those in units of a data sheet come in the place of those in slots and data units.
     """
-    return [
-        column_in_sheet_unit(name, missions) for name in OPERATIONS.names or () if name in missions
-    ]
+    return [column_in_sheet_unit(name, missions) for name in MEASURES if name in missions]
 
 
 def metrics_in(missions: Container[str]) -> list[str]:
@@ -367,4 +366,5 @@ def ranking_metrics(missions: Container[str]) -> list[str]:
 
 def metrics_of_scenario(space: ScenarioSpace) -> list[str]:
     """The metrics of the missions of a scenario, as they are measured."""
-    return metrics_in([*BESIDE, *measures_of(space)])
+    recorded = [name for name in MISSION_RECORD.names or () if name in MEASURES]
+    return metrics_in([*BESIDE, *recorded, *measures_of(space)])
