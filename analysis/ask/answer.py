@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from dess import InputError
-from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet import cheapest, verdicts
+from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.costs import priced_settings, prices_in_words
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import (
@@ -85,7 +86,7 @@ class Answer:
         if study.costs is None:
             return table
         if study.selection:
-            priced = cheapest.judge_settings(self.results)
+            priced = verdicts.judge_settings(self.results)
         else:
             priced = priced_settings(self.results)
         key = ["policy", "point"]
@@ -96,9 +97,9 @@ class Answer:
         """With requirements: the fleets that the answer was chosen from, the cheapest first.
 
         Returns:
-            A row per policy and fleet, as ``answers.fleet.cheapest.fleet_rows`` returns it.
+            A row per policy and fleet, as ``answers.fleet.tables.fleet_rows`` returns it.
         """
-        return cheapest.fleet_rows(self.results)
+        return fleet_tables.fleet_rows(self.results)
 
     def best(self, metric: str | None = None) -> pd.DataFrame:
         """The best setting of every policy, the best policy first.
@@ -156,7 +157,7 @@ class Answer:
             return [self.variation.measures_table(policy) for policy in self.results.policies]
         if not self.question.study.selection:
             return [ranked_table(self.results, self.table(metric), metric or PRODUCT)]
-        tables = [cheapest.brief_fleet_table(self.results, metric or SUCCESS)]
+        tables = [fleet_tables.brief_fleet_table(self.results, metric or SUCCESS)]
         if around.is_known(self.results):
             tables.append(around.table_around(self.results)._replace(caption=""))
         return tables

@@ -30,7 +30,8 @@ yes = False  # True if the sweep may take more than an hour
 from dess import load_scenario
 from dess.analysis import sweep
 from dess.analysis.answers import summary
-from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet import cheapest, verdicts
+from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.costs import cost_parts_table, fleets_in_words
 from dess.analysis.answers.fleet.figures import draw_cheapest
 from dess.analysis.answers.missions import map_caption
@@ -62,7 +63,8 @@ html.render_part("assumptions.html", lines=assumption_sentences(found)) if sea.u
 
 # %%
 html.show_parts(
-    cheapest.fleet_table(found), html.write_markdown("{reasons}", reasons=study.list_reasons(found))
+    fleet_tables.fleet_table(found),
+    html.write_markdown("{reasons}", reasons=study.list_reasons(found)),
 )
 
 # %%
@@ -93,14 +95,14 @@ if asked := around.question_around(found, scenario):
 
 # %%
 no_check = html.write_markdown("No fleet was checked.")
-html.show_parts(no_check if found.checks.empty else cheapest.check_table(found))
+html.show_parts(no_check if found.checks.empty else fleet_tables.check_table(found))
 
 # %% [markdown]
 # ## Tables
 
 # %%
-if cheapest.has_conditions(found):
-    html.show_parts(cheapest.condition_table(found))
+if verdicts.has_conditions(found):
+    html.show_parts(fleet_tables.condition_table(found))
 html.show_parts(cost_parts_table(found))
 
 # %%

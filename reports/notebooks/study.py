@@ -26,6 +26,7 @@ import numpy as np
 from dess.analysis import distribution, load_results, tables
 from dess.analysis.answers import summary
 from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.costs import cost_front_table, cost_parts_table, prices_in_words
 from dess.analysis.answers.fleet.figures import draw_cost_fronts
 from dess.analysis.answers.main_effects import draw_one_at_a_time
@@ -96,12 +97,12 @@ html.render_part("assumptions.html", lines=assumption_sentences(study, by))
 
 # %% tags=["if-cheapest"]
 html.show_parts(
-    cheapest.fleet_table(study, by if metric else SUCCESS),
+    fleet_tables.fleet_table(study, by if metric else SUCCESS),
     html.write_markdown("{answers}", answers=page.list_reasons(study)),
 )
 
 # %% tags=["if-conditions"]
-html.show_parts(cheapest.condition_table(study))
+html.show_parts(fleet_tables.condition_table(study))
 
 # %% [markdown] tags=["if-around"]
 # ## What if
@@ -121,7 +122,7 @@ html.show_parts(around.table_around(study))
 
 # %% tags=["if-cheapest"]
 no_check = html.write_markdown("No setting was checked.")
-html.show_parts(no_check if study.checks.empty else cheapest.check_table(study))
+html.show_parts(no_check if study.checks.empty else fleet_tables.check_table(study))
 
 # %% [markdown] tags=["if-settings"]
 # ## The best settings

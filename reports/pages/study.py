@@ -10,7 +10,7 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers import summary
-from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet import cheapest, verdicts
 from dess.analysis.answers.fleet.costs import prices_in_words
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.settings.baseline import check_baseline
@@ -265,7 +265,7 @@ def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]
         # Tables of the study.
         "if-selection": isinstance(study.selection, Selection),
         "if-cheapest": is_search,
-        "if-conditions": is_search and cheapest.has_conditions(results),
+        "if-conditions": is_search and verdicts.has_conditions(results),
         "if-precision": study.precision is not None,
         "if-costs": study.costs is not None and not is_search,
         "if-priced-search": is_search and results.prices.pays_for_missions,

@@ -2,175 +2,61 @@
 
     results = load_results("results/fleets")  # of a study that searches for the cheapest fleet
     cheapest_sentence(results)  # in words
-    fleet_table(results)  # the fleets by cost, with the answer marked
+    tables.fleet_table(results)  # the fleets by cost, with the answer marked
 
 A fleet is searched for every policy and under every condition and, if there are several conditions,
 under all of them together. The answer is the cheapest fleet of any policy under all conditions.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.costs import (
     conditions_in_words,
     cost_parts_in_words,
     fleets_in_words,
-    format_amount,
     mean_cost_parts,
-    priced_settings,
     prices_in_words,
-    purchase_prices,
-    setting_cells,
 )
 from dess.analysis.answers.fleet.requirements import (
     Requirement,
     Verdict,
     least_spare,
     relative_spare,
-    requirements_in_words,
     requirements_of,
+)
+from dess.analysis.answers.fleet.verdicts import (
+    ALL_CONDITIONS,
+    cheapest_choice,
+    interval_columns,
+    judge_fleets_everywhere,
+    judge_settings,
+    quoted_settings,
 )
 from dess.analysis.answers.settings.home import (
     may_end_in_the_air,
     stranded_sentence,
     way_home_sentence,
-    with_way_home,
 )
-from dess.analysis.answers.settings.points import (
-    ends_of_point,
-    ends_sentence,
-    intervals_in_words,
-    values_of_points,
-)
+from dess.analysis.answers.settings.points import ends_of_point, ends_sentence, values_of_points
 from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
 from dess.analysis.metrics import COST, HOME, SUCCESS, metric_of
 from dess.analysis.names import DECISIONS
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.study.cheapest import Answer, Cheapest, CheapestChoice
-from dess.analysis.tables import INTERVALS, MOST_PRINTED, MOST_ROWS, Table, format_counts
 from dess.scenario.fields import ZONE_PADS
 
-ALL_CONDITIONS = "all conditions"
 _WHY_NOT = {
     Verdict.MET: "meets the requirements as well, and saves less than matters",
     Verdict.OPEN: "is not known to meet the requirements",
     Verdict.MISSED: "misses the requirements",
 }
-# For tables with a column of verdicts.
-VERDICTS_EXPLAINED = (
-    "met or missed: what the search has shown of all requirements together; open: what it did not "
-    "need to decide, or could not"
-)
-
-
-@compute_once
-def judge_settings(results: Results) -> pd.DataFrame:
-    """Which settings meet the requirements, and the cheapest of these under each condition.
-
-    Args:
-        results: A study that searches for the cheapest fleet.
-
-    Returns:
-        The rows of ``costs.priced_settings`` with two more columns: ``verdict`` (``met``,
-        ``missed`` or ``open``), and ``selected``, which is true for the cheapest setting of each
-        policy under each condition whose verdict is ``met``. Both have the guarantee of the search.
-    """
-    tables = []
-    for policy, rows in priced_settings(results).groupby("policy", sort=False):
-        choice = _cheapest_choice(results, str(policy))
-        selected = [a.points[0] for a in choice.answers if a.condition is not None and a.points]
-        verdicts = rows["point"].map(dict(enumerate(choice.verdicts)))
-        tables.append(rows.assign(verdict=verdicts, selected=rows["point"].isin(selected)))
-    return pd.concat(tables).sort_index()
-
-
-@compute_once
-def judge_fleets_everywhere(results: Results) -> pd.DataFrame:
-    """The fleets under all conditions together.
-
-    Returns:
-        A row per policy and fleet that the design has under every condition, the cheapest first,
-        with the columns of ``judge_settings``: ``cost`` is the mean over the conditions,
-        ``verdict`` holds under all of them, and a metric is that of the condition under which the
-        fleet is worst at it. ``n`` is the least number of missions under a condition.
-    """
-    table = judge_settings(results)
-    rows = []
-    conditions = table["condition"].nunique()
-    for (policy, _), under_conditions in table.groupby(["policy", "fleet"], sort=False):
-        if len(under_conditions) == conditions:
-            rows.append(_judge_under_all_conditions(results, str(policy), under_conditions))
-    fleets = pd.DataFrame(rows, columns=table.columns)
-    return fleets.sort_values(COST, kind="stable", ignore_index=True)
-
-
-def _judge_under_all_conditions(results: Results, policy: str, rows: pd.DataFrame) -> pd.Series:
-    """The row of ``judge_fleets_everywhere`` of a fleet, of its rows under all conditions."""
-    together = rows.iloc[0].copy()
-    for column in _reported_metrics(results):
-        less = metric_of(column).less_is_better
-        if less:
-            worst = rows[column].idxmax()
-        else:
-            worst = rows[column].idxmin()
-        ends_of = _ends_of(column)
-        together[ends_of] = rows.loc[worst, ends_of]
-    together[_ends_of(COST)] = rows[_ends_of(COST)].mean()
-    together["condition"] = ALL_CONDITIONS
-    together["verdict"] = Verdict.of_all([*rows["verdict"]])
-    together["n"] = rows["n"].min()
-    selected = _cheapest_choice(results, policy).answers[-1].points
-    together["selected"] = {*selected} == {*rows["point"]}
-    return together
-
-
-def _reported_metrics(results: Results) -> list[str]:
-    """What the tables and sentences of a search tell of a fleet: success, and what is required."""
-    asked = [requirement.column for requirement in requirements_of(results)]
-    return with_way_home(results, [SUCCESS, *asked])
-
-
-def _ends_of(column: str) -> list[str]:
-    """The columns of a mean and the ends of its interval."""
-    return [column, f"{column}_low", f"{column}_high"]
-
-
-@compute_once
-def checked_settings(results: Results) -> pd.DataFrame:
-    """The check of the selected settings on missions that were not used for the selection.
-
-    Returns:
-        A row per policy and selected design point, with the columns of ``costs.priced_settings``.
-    """
-    return priced_settings(replace(results, missions=results.checks))
-
-
-@compute_once
-def quoted_settings(results: Results) -> pd.DataFrame:
-    """The settings with the estimates that answers quote.
-
-    A search gives most missions to a setting whose results were good so far. The check had no part
-    in the search, so its means are unbiased.
-
-    Returns:
-        The rows of ``judge_settings``. The metrics, the cost and ``n`` of settings that were
-        checked are those of ``checked_settings``.
-    """
-    table = judge_settings(results)
-    setting = ["policy", "point"]
-    if results.checks.empty:
-        return table
-    rows = table.set_index(setting)
-    checked = checked_settings(results).set_index(setting)
-    rows.loc[checked.index, checked.columns] = checked
-    return rows.reset_index()[[*table]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +77,7 @@ class FleetAnswer:
 
     @cached_property
     def _choice(self) -> CheapestChoice:
-        return _cheapest_choice(self.results, self.policy)
+        return cheapest_choice(self.results, self.policy)
 
     @property
     def _answer(self) -> Answer:
@@ -293,14 +179,14 @@ class FleetAnswer:
         texts = []
         for requirement in self.tightest_first:
             row = self.estimates(requirement.column)
-            measured = requirement.metric.written(*row[_ends_of(requirement.column)])
+            measured = requirement.metric.written(*row[interval_columns(requirement.column)])
             texts.append(
                 f"its {requirement.metric.within} is {measured} ({requirement.bound_in_words} "
                 "required)"
             )
         if SUCCESS not in [requirement.column for requirement in self.tightest_first]:
             row = self.estimates(SUCCESS)
-            success = metric_of(SUCCESS).written(*row[_ends_of(SUCCESS)])
+            success = metric_of(SUCCESS).written(*row[interval_columns(SUCCESS)])
             texts.append(f"its success is {success} (none is required)")
         missions = f"{int(row['n']):,} missions"
         is_checked = not self.results.checks.empty
@@ -322,7 +208,7 @@ class FleetAnswer:
         if not self.points or not may_end_in_the_air(self.results):
             return ""
         row = self.estimates(HOME)
-        share = way_home_sentence(*row[_ends_of(HOME)])
+        share = way_home_sentence(*row[interval_columns(HOME)])
         parts = mean_cost_parts(self.results)
         rows = parts[(parts["policy"] == self.policy) & parts["point"].isin(self.points)]
         return f"{share} {stranded_sentence(self.results, rows['stranded'].mean())}".strip()
@@ -386,7 +272,7 @@ class FleetAnswer:
         row = other.iloc[0]
         amount = numbers.format_money(row[COST], self.results.prices.currency)
         measured = [
-            f"{r.metric.within} {r.metric.written(*row[_ends_of(r.column)])}"
+            f"{r.metric.within} {r.metric.written(*row[interval_columns(r.column)])}"
             for r in self._required
         ]
         return (
@@ -470,11 +356,6 @@ def shown_missions(results: Results) -> pd.DataFrame:
     return missions[is_shown]
 
 
-def has_conditions(results: Results) -> bool:
-    """Whether fleets have to work under several conditions."""
-    return len({*conditions_in_words(results)}) > 1
-
-
 def cheapest_sentence(results: Results) -> str:
     """In words: the cheapest fleet of all policies, and which the others would have named."""
     return " ".join([cheapest_answer(results).headline(), *other_policies_sentences(results)])
@@ -548,7 +429,7 @@ def selected_fleets(results: Results) -> pd.DataFrame:
     """
     rows = []
     for fleet_answer in fleet_answers(results):
-        choice = _cheapest_choice(results, fleet_answer.policy)
+        choice = cheapest_choice(results, fleet_answer.policy)
         of_one = choice.answers[fleet_answer.number]
         is_point = of_one.points and of_one.condition is not None
         rows.append(
@@ -564,123 +445,6 @@ def selected_fleets(results: Results) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows).astype({"point": "Int64"})
-
-
-# --- tables ---
-
-
-def fleet_rows(results: Results) -> pd.DataFrame:
-    """The fleets that the answer was chosen from, of all policies, the cheapest first.
-
-    Returns:
-        Rows of ``judge_settings``, or of ``judge_fleets_everywhere`` if there are several
-        conditions, with the parts of the cost (``purchase`` and ``running``) and ``answer``:
-        ``answer`` for the answer, ``selected`` for the cheapest fleet of another policy that meets
-        the requirements.
-    """
-    if has_conditions(results):
-        rows = judge_fleets_everywhere(results)
-    else:
-        rows = judge_settings(results)
-    rows = rows.sort_values(COST, kind="stable", ignore_index=True)
-    best = cheapest_answer(results)
-    is_answer = rows["selected"] & (rows["policy"] == best.policy)
-    marks = np.where(is_answer, "answer", np.where(rows["selected"], "selected", ""))
-    purchase = purchase_prices(results)
-    bought = [purchase[point] for point in rows["point"]]
-    return rows.assign(purchase=bought, running=rows[COST] - bought, answer=marks)
-
-
-def shown_rows(rows: pd.DataFrame, most: int) -> pd.DataFrame:
-    """At most so many rows of ``fleet_rows``: the first ones, or those around the answer."""
-    place = int(np.argmax(rows["answer"] == "answer"))
-    first = 0
-    if place >= most:
-        first = max(0, min(place - most // 2, len(rows) - most))
-    return rows.iloc[first : first + most]
-
-
-def fleet_cells(results: Results, rows: pd.DataFrame, further: str = SUCCESS) -> pd.DataFrame:
-    """Rows of ``fleet_rows`` as text, for page and terminal.
-
-    Args:
-        results: The study.
-        rows: The rows.
-        further: A metric that is shown beside those of the requirements.
-    """
-    cells = setting_cells(rows.assign(condition=""), [])
-    cells = cells.rename(columns={"Cost": f"Cost [{results.prices.currency}]"})
-    place = cells.shape[1]
-    if results.prices.pays_for_missions:
-        cells.insert(place, "Purchase", rows["purchase"].map(format_amount))
-        cells.insert(place + 1, "Missions' cost", rows["running"].map(format_amount))
-    is_answer = rows["answer"] == "answer"
-    cells["Requirements"] = rows["verdict"].where(~is_answer, rows["verdict"] + ": the answer")
-    for metric in map(metric_of, dict.fromkeys([*_reported_metrics(results), further])):
-        if metric.column != COST:
-            cells[metric.name] = numbers.format_estimates(rows, metric.column, metric.written)
-    return cells.assign(n=format_counts(rows["n"]))
-
-
-def fleet_table(results: Results, further: str = SUCCESS) -> Table:
-    """The fleets by cost, with their verdicts, the required metrics, and the answer marked.
-
-    Args:
-        results: The study.
-        further: A metric that is shown beside those of the requirements.
-    """
-    rows = fleet_rows(results)
-    top = shown_rows(rows, MOST_ROWS)
-    requirements = requirements_in_words(requirements_of(results))
-    caption = f"The fleets, the cheapest first. Required: {requirements}. "
-    if len(top) < len(rows):
-        caption += f"{len(top)} of {len(rows):,} rows, those about the answer; the data have all. "
-    if has_conditions(results):
-        caption += (
-            "All conditions together: costs are means over them, a metric is that of the condition "
-            "under which the fleet is worst at it. "
-        )
-    caption += f"{VERDICTS_EXPLAINED.capitalize()}. Means with {intervals_in_words(results)}"
-    return Table(fleet_cells(results, top, further), caption, rows)
-
-
-def brief_fleet_table(results: Results, further: str = SUCCESS) -> Table:
-    """The fleets by cost, with the answer marked, as the terminal prints them.
-
-    Args:
-        results: The study.
-        further: A metric that is shown beside those of the requirements.
-    """
-    rows = fleet_rows(results)
-    pairs = f"{len(rows):,} pairs of a fleet and a policy"
-    if len(rows) > MOST_PRINTED:
-        pairs += f", {MOST_PRINTED} of them shown"
-    required = f"required: {requirements_in_words(requirements_of(results))}"
-    caption = f"{pairs}, the cheapest first; {required}; {VERDICTS_EXPLAINED}"
-    return Table(fleet_cells(results, shown_rows(rows, MOST_PRINTED), further), caption, rows)
-
-
-def condition_table(results: Results) -> Table:
-    """The fleets under every condition, whether they meet the requirements there."""
-    rows = judge_settings(results)
-    top = rows.head(MOST_ROWS)
-    shown = setting_cells(top, _reported_metrics(results))
-    shown.insert(shown.columns.get_loc("Cost") + 1, "Requirements", top["verdict"])
-    shown["Cheapest that meets them"] = top["selected"].map({True: "yes", False: ""})
-    shown["n"] = format_counts(top["n"])
-    caption = f"The fleets under every condition; means with {intervals_in_words(results)}"
-    return Table(shown, caption, rows)
-
-
-def check_table(results: Results) -> Table:
-    """The check of the selected fleets: all that is required, and the way home."""
-    rows = checked_settings(results)
-    shown = setting_cells(rows, _reported_metrics(results)).assign(n=format_counts(rows["n"]))
-    caption = (
-        "The check of the selected fleets on missions that had no part in the search: means with "
-        f"{INTERVALS}"
-    )
-    return Table(shown, caption, rows)
 
 
 def _ends_of_values(results: Results, point: int) -> dict[str, str]:
@@ -709,17 +473,6 @@ def _ends_of_values(results: Results, point: int) -> dict[str, str]:
         for field, end in ends_of_point(results, point).items()
         if field in DECISIONS and may_be_cheaper(field, end)
     }
-
-
-def _cheapest_choice(results: Results, policy: str) -> CheapestChoice:
-    choice = results.cheapest(policy)
-    if choice is None:
-        raise InputError(
-            results.store.folder,
-            "does not search for the cheapest setting",
-            'a study with the procedure "cheapest"',
-        )
-    return choice
 
 
 def tightest_requirement(results: Results) -> tuple[Requirement, str]:

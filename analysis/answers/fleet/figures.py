@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet import cheapest, verdicts
 from dess.analysis.answers.fleet.costs import cost_fronts
 from dess.analysis.answers.fleet.requirements import Verdict, requirements_in_words, requirements_of
 from dess.analysis.answers.settings.figures import counted_missions
@@ -105,7 +105,7 @@ def draw_cheapest(results: Results) -> Drawing:
     """The cost against the metric of the tightest requirement of a search, with the answer."""
     answer = cheapest.cheapest_answer(results)
     requirement, condition = cheapest.tightest_requirement(results)
-    rows = cheapest.judge_settings(results)
+    rows = verdicts.judge_settings(results)
     rows = rows[(rows["policy"] == answer.policy) & (rows["condition"] == condition)]
     is_answer = rows["point"].isin(answer.points)
     is_met = rows["verdict"] == Verdict.MET

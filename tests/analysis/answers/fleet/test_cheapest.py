@@ -5,7 +5,8 @@ import pytest
 
 from dess.analysis import numbers, run_study
 from dess.analysis.answers import summary
-from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet import cheapest, verdicts
+from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings, prices_in_words
 from dess.analysis.answers.settings.baseline import compare_with_baseline
 from dess.analysis.stats.differences import compare_pairs
@@ -30,7 +31,7 @@ def searched(studied):
     return studied(selection=RULE, design=DESIGN, costs=PRICES)
 
 
-ASKED = (cheapest.judge_settings, cheapest.quoted_settings, cheapest.checked_settings)
+ASKED = (verdicts.judge_settings, verdicts.quoted_settings, verdicts.checked_settings)
 
 
 def test_a_search_is_kept_told_and_checked(searched):
@@ -49,7 +50,7 @@ def test_a_search_is_kept_told_and_checked(searched):
         # Two conditions, and both.
         assert (selections["policy"] == policy).sum() == 3
     assert manifest.selected[0]  # or this test says little
-    assert len(cheapest.checked_settings(searched)) == len(searched.checks) / 6
+    assert len(verdicts.checked_settings(searched)) == len(searched.checks) / 6
     assert searched.choice("greedy") is None
     texts = "\n".join(cheapest.cheapest_sentences(searched))
     assert "With the policy `greedy` and under all conditions, the cheapest fleet" in texts
@@ -63,7 +64,7 @@ def test_an_answer_quotes_the_check_and_a_table_allows_for_the_search(searched):
     others = found.index.difference(checks.index)
     assert quoted.loc[checks.index, checks.columns].equals(checks)
     assert quoted.loc[others].equals(found.loc[others])
-    assert "intervals that allow for the search" in cheapest.fleet_table(searched).caption
+    assert "intervals that allow for the search" in fleet_tables.fleet_table(searched).caption
     assert "In 6 missions that check it" in " ".join(cheapest.cheapest_sentences(searched))
     for (policy, point), row in found.iterrows():
         missions = searched.missions.query("policy == @policy and point == @point")
@@ -95,9 +96,9 @@ def test_the_guarantee_is_of_each_policy_and_says_what_it_takes_of_costs(searche
 
 
 def test_the_table_has_the_fleets_by_cost_with_verdicts_and_the_answer_marked(searched):
-    rows = cheapest.fleet_rows(searched)
+    rows = fleet_tables.fleet_rows(searched)
     assert rows["cost"].is_monotonic_increasing
-    cells, caption, _ = cheapest.fleet_table(searched)
+    cells, caption, _ = fleet_tables.fleet_table(searched)
     assert [text.split(":")[0] for text in cells["Requirements"]] == [*rows["verdict"]]
     marked = cells[cells["Requirements"] == "met: the answer"]
     best = cheapest.cheapest_answer(searched)
@@ -106,7 +107,7 @@ def test_the_table_has_the_fleets_by_cost_with_verdicts_and_the_answer_marked(se
     # Missions of the paper may end in the air; the required metric, the way home and n are there.
     assert [*cells][-3:] == ["Success", "Battery for the way home", "n"]
     worst = (
-        cheapest.judge_settings(searched).groupby(["policy", "fleet"])[["success", "home"]].min()
+        verdicts.judge_settings(searched).groupby(["policy", "fleet"])[["success", "home"]].min()
     )
     for row in rows.itertuples():
         assert (row.success, row.home) == tuple(worst.loc[row.policy, row.fleet])
@@ -115,9 +116,9 @@ def test_the_table_has_the_fleets_by_cost_with_verdicts_and_the_answer_marked(se
 
 def test_a_long_table_shows_the_rows_about_the_answer():
     rows = pd.DataFrame({"answer": [""] * 40 + ["answer"] + [""] * 20})
-    assert [*cheapest.shown_rows(rows, 20).index] == [*range(30, 50)]
-    assert [*cheapest.shown_rows(rows[40:], 20).index] == [*range(40, 60)]
-    assert [*cheapest.shown_rows(rows[:42], 20).index] == [*range(22, 42)]
+    assert [*fleet_tables.shown_rows(rows, 20).index] == [*range(30, 50)]
+    assert [*fleet_tables.shown_rows(rows[40:], 20).index] == [*range(40, 60)]
+    assert [*fleet_tables.shown_rows(rows[:42], 20).index] == [*range(22, 42)]
 
 
 def test_the_price_is_told_in_its_parts(searched):

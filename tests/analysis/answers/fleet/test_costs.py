@@ -3,7 +3,7 @@
 import pytest
 
 from dess import InputError
-from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet import verdicts
 from dess.analysis.answers.fleet.costs import (
     cost_front,
     mean_cost_parts,
@@ -41,14 +41,14 @@ def test_bad_questions_get_one_line(fixed, studied):
         mean_cost_parts,
         cost_front,
         prices_in_words,
-        cheapest.judge_settings,
+        verdicts.judge_settings,
     ):
         with pytest.raises(InputError, match=r"no prices"):
             ask(free)
     with pytest.raises(InputError, match="metric: 'reward' is unknown"):
         cost_front(fixed, "reward")
     with pytest.raises(InputError, match="does not search for the cheapest setting"):
-        cheapest.judge_settings(fixed)
+        verdicts.judge_settings(fixed)
 
 
 def test_prices_of_zero_leave_what_is_paid_for(studied):
