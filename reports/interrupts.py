@@ -10,14 +10,19 @@ import sys
 import threading
 import time
 from contextlib import AbstractContextManager
+from types import FrameType
 from typing import Any
 
 NUMBERS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
 AGAIN = 0.25  # seconds until an interrupt that something has swallowed is raised again
+SOON = 0.01  # seconds until an interrupt that had to wait is raised
 UNNOTICED = 1.0  # seconds of CPU time until a signal that is not noticed ends the process
 EXIT_CODE = 130  # after a signal, as shells and typer have it: 128 + SIGINT
+# Modules of Python that compiled code and its compiler call, and that share objects with them: an
+# exception in one of them may crash the process.
+FRAGILE = ("numba.core.serialize", "llvmlite.binding")
 LINE = "interrupted: run the same command again to complete it"
 
 
@@ -26,7 +31,8 @@ class Interrupts(AbstractContextManager["Interrupts"]):
 
     A finalizer, a callback or a library may swallow the interrupt. So it is raised again and again
     until the block ends, but not while it is handled: a cleanup is left in peace, also by a second
-    signal. A signal that was ignored before, as SIGHUP under ``nohup``, stays ignored.
+    signal. It waits while compiled code or its compiler calls Python, where it might crash the
+    process. A signal that was ignored before, as SIGHUP under ``nohup``, stays ignored.
 
     While functions are compiled, and in other code that is not Python, the main thread notices no
     signal for seconds. If the process is to end after the block, it then ends as after a kill,
@@ -34,6 +40,8 @@ class Interrupts(AbstractContextManager["Interrupts"]):
 
     Attributes:
         received: Whether there was a signal.
+        is_over: Whether the work of the block is done, which is said by whoever does it. A signal
+            then comes too late, and raises nothing.
     """
 
     def __init__(self, is_last: bool = False):
@@ -45,6 +53,7 @@ class Interrupts(AbstractContextManager["Interrupts"]):
         """
         self.is_last = is_last
         self.received = False
+        self.is_over = False
         self._hook = sys.unraisablehook
         self._handlers: dict[int, Any] = {}
 
@@ -73,13 +82,18 @@ class Interrupts(AbstractContextManager["Interrupts"]):
         if threading.current_thread() is threading.main_thread():
             sys.unraisablehook = self._hook
 
-    def _receive_signal(self, number: int, frame: Any) -> None:
-        if not self.received and hasattr(signal, "setitimer"):
+    def _receive_signal(self, number: int, frame: FrameType | None) -> None:
+        has_timer = hasattr(signal, "setitimer")
+        if not (self.received or self.is_over) and has_timer:
             self._handlers[signal.SIGALRM] = signal.signal(signal.SIGALRM, self._receive_signal)
             signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
         self.received = True
-        if not _is_handled():
-            raise KeyboardInterrupt
+        if self.is_over or _is_handled():
+            return
+        if has_timer and _is_fragile(frame):
+            signal.setitimer(signal.ITIMER_REAL, SOON, AGAIN)
+            return
+        raise KeyboardInterrupt
 
     def _watch_main_thread(self, seen: int) -> None:
         """End the process if the main thread does not notice a signal."""
@@ -105,3 +119,12 @@ def _is_handled() -> bool:
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__context__
     return error is not None
+
+
+def _is_fragile(frame: FrameType | None) -> bool:
+    """Whether a frame, or one that has called it, is of a fragile module."""
+    while frame is not None:
+        if str(frame.f_globals.get("__name__")).startswith(FRAGILE):
+            return True
+        frame = frame.f_back
+    return False

@@ -32,10 +32,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _check_text(words)
             code = app(words, prog_name="dess", standalone_mode=False) or 0
             sys.stdout.flush()  # an error of the output is an error of the command
-            if code != EXIT_CODE:  # as typer ends a command after a Ctrl-C
-                return code
-            raise KeyboardInterrupt
+            if code == EXIT_CODE:  # as typer ends a command after a Ctrl-C
+                raise KeyboardInterrupt
+            interrupts.is_over = True
+            return code
         except BaseException as error:
+            # Signals are noticed at calls, so none comes between the error and this assignment.
+            interrupts.is_over = True
             return _report_error(error, words, interrupts.received)
 
 

@@ -9,6 +9,7 @@ import threading
 import time
 
 import pytest
+from numba.core import serialize
 
 from dess.reports import cli
 from dess.reports.interrupts import AGAIN, Interrupts
@@ -92,6 +93,37 @@ def test_a_signal_is_not_lost(lose, monkeypatch, capsys):
     begin = time.monotonic()
     assert during(lost, monkeypatch, capsys) == (130, "", LINE)
     assert time.monotonic() - begin < 30
+
+
+def test_a_signal_waits_while_compiled_code_calls_python(monkeypatch, capsys):
+    class Signalling(dict):
+        def __getitem__(self, key):
+            signal.raise_signal(signal.SIGTERM)
+            return "object"
+
+    monkeypatch.setattr(serialize, "_unpickled_memo", Signalling())
+    unpickled = []
+
+    def call():
+        unpickled.append(serialize._numba_unpickle(0, b"", b""))  # as what boxes an array does
+        threading.Event().wait(60)
+
+    assert during(call, monkeypatch, capsys) == (130, "", LINE)
+    assert unpickled == ["object"]
+
+
+@pytest.mark.parametrize("words", [["--version"], ["simulate", "--policy", "nobody"]])
+def test_a_signal_after_a_command_comes_too_late(words, monkeypatch, capsys):
+    expected = cli.main(words), *capsys.readouterr()
+    leave = Interrupts.__exit__
+
+    def leave_late(interrupts, *error):
+        signal.raise_signal(signal.SIGTERM)
+        time.sleep(2 * AGAIN)
+        leave(interrupts, *error)
+
+    monkeypatch.setattr(Interrupts, "__exit__", leave_late)
+    assert (cli.main(words), *capsys.readouterr()) == expected
 
 
 def test_a_signal_that_was_ignored_stays_ignored(monkeypatch, capsys):
