@@ -27,7 +27,9 @@ def run(case: Case, box: Path) -> None:
     if "tests.fuzz.preload" not in sys.modules:  # multiprocessing does not say why
         raise RuntimeError("tests.fuzz.preload was not loaded: import it to see why")
     os.setsid()
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup it is ignored
+    # Under nohup the one is ignored, and by a shell the other, for jobs in its background.
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     os.chdir(box / CWD)
     os.environ |= {"HOME": str(box / HOME), "TMPDIR": str(box / TEMPORARY)}
     os.environ["MPLCONFIGDIR"] = matplotlib.get_cachedir()  # fonts are not listed again

@@ -1,10 +1,12 @@
 """Fixed cases keep the contract, and every command and option is among the cases."""
 
+import signal
 import sys
 
 import pytest
 
 from tests.fuzz import drawing, ready
+from tests.fuzz.case import Case
 from tests.fuzz.forks import Forks
 from tests.fuzz.judge import _NEWS, findings
 from tests.fuzz.strategies import commands
@@ -23,13 +25,24 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.fixture
+def ignored():
+    """SIGINT is ignored, as in some jobs of a shell; cases have to heed it."""
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    yield
+    signal.signal(signal.SIGINT, handler)
+
+
 @pytest.mark.slow
 @pytest.mark.brief
-def test_fixed_cases_keep_the_contract(folder):
+def test_fixed_cases_keep_the_contract(folder, ignored):
     drawn = [case for kind, _ in drawing.ROUND[-9:] for case in drawing.draw(kind, SEED, 20)]
     drawn = [case for case in drawn if case.kind in KINDS]
     cases = [drawn[n * len(drawn) // 50] for n in range(50)]
     assert {case.kind for case in cases} == {*KINDS}
+    words = ("evaluate", "--scenario", f"../in/{ready.SCENARIO}", "--policy", "greedy")
+    many, sent = ("--missions", "200000"), (0.5, int(signal.SIGINT))
+    cases.append(Case("signal", (*words, *many), ready.INPUTS, signals=(sent,), code=130))
     outcomes = [outcome for _, outcome in Forks(folder).outcomes(enumerate(cases))]
     codes = {outcome.code for outcome in outcomes}
     assert 2 in codes
