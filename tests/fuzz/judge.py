@@ -15,6 +15,7 @@ from PIL import Image
 from tests.fuzz.case import SECRET
 from tests.fuzz.child import STDERR, STDOUT
 from tests.fuzz.forks import Outcome
+from tests.reports.here import FOLDER
 
 CODES = {0: "done", 1: "failed", 2: "bad input", 130: "interrupted"}
 LINE = 300  # characters
@@ -34,8 +35,9 @@ _NEWS = re.compile(
     r"|.*\[\d+:[\d:]+[<,] ?.*\]|on this machine: .* to go|replay memory: .*|curves: tensorboard .*"
     r"|.*: this training is not finished .*"
 )
-# Folders that libraries make and use again, and that have the name of the user.
-_CACHES = ("tmp/torchinductor_",)
+# Folders of others: one that a library makes and uses again, which has the name of the user; and
+# those in which the fuzzer runs notebooks, as a signal may come before one is removed.
+_FOREIGN = ("tmp/torchinductor_", f"tmp/{FOLDER}")
 # A page of numbers that nobody measured may fail, and then names the error of its notebook.
 _OF_PAGE = re.compile(r"report [\w-]+: ")
 _FORGING = ("forge(", "change_json(", "change_page(")  # steps that change numbers of results
@@ -122,7 +124,7 @@ def _files(outcome: Outcome) -> Iterator[str]:
     for path in sorted(outcome.before.keys() | outcome.after.keys()):
         before, after = outcome.before.get(path), outcome.after.get(path)
         is_allowed = any(_is_in(path, folder) for folder in outcome.case.allowed)
-        if before == after or path.startswith(_CACHES):
+        if before == after or path.startswith(_FOREIGN):
             continue
         if path.endswith((".ran", ".pyc")):
             yield f"{path}: code of the input was run"

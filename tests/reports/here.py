@@ -22,6 +22,8 @@ from dess.reports.pages.html import PART, Part
 from dess.reports.pages.kernels import Progress
 from dess.reports.pages.notebook import Report
 
+FOLDER = "notebooks-"  # what the names of the folders begin with in which notebooks run
+
 
 @contextmanager
 def notebooks_here(is_drawn: bool = False) -> Iterator[None]:
@@ -40,7 +42,11 @@ def run_reports(
     for report in reports:
         try:
             # As another process, not among the files of the caller, and without bars.
-            with TemporaryDirectory() as folder, chdir(folder), redirect_stderr(io.StringIO()):
+            with (
+                TemporaryDirectory(prefix=FOLDER) as folder,
+                chdir(folder),
+                redirect_stderr(io.StringIO()),
+            ):
                 for cell, pieces in run_cells(report):
                     cell.outputs = [new_output("display_data", _data_of(p)) for p in pieces]
         except InputError as error:
