@@ -36,7 +36,14 @@ from dess.analysis.results.manifest import (
 )
 from dess.analysis.study.study import Study
 from dess.base.files.reading import paths_in
-from dess.base.files.writing import check_folder, delete, locked, make_folder, write_file
+from dess.base.files.writing import (
+    check_folder,
+    check_place,
+    delete,
+    locked,
+    make_folder,
+    write_file,
+)
 
 # What is said if another process writes into the folder, and what is allowed then.
 _BUSY = ("in use by another run", f"{ELSEWHERE}, or wait for its end")
@@ -152,7 +159,11 @@ class Store:
         self._lock.close()
 
     def _prepare(self) -> None:
-        """Write the manifest, remove temporary files of a killed run, and scan the folder."""
+        """Write the manifest, remove temporary files of a killed run, and scan the folder.
+
+        Raises:
+            InputError: If something else is in the place of a file that a run may write.
+        """
         write_file(self.folder / chunks.MANIFEST, self.manifest.text)
         places = [self.folder / name for name in chunks.FOLDERS]
         for place in places:
@@ -160,6 +171,9 @@ class Store:
         places += [self.folder, *paths_in(self.folder, "*/policy=*")]
         for path in (path for place in places for path in paths_in(place, ".*.tmp")):
             delete(path)
+        for path in (path for place in places for path in paths_in(place, "*.parquet")):
+            if parquet.NAME.fullmatch(path.name) and not path.is_symlink():
+                check_place(path)  # a run would find out only when its missions are done
         self._scan()
         while self.damaged:
             delete(self.damaged.pop())

@@ -121,7 +121,7 @@ def replacing_all(paths: Sequence[Path]) -> Iterator[list[Path]]:
 def _temporary(path: Path) -> Iterator[Path]:
     """An empty file in the folder of ``path``, deleted at the end."""
     with writable(path):
-        _check_place(path)
+        check_place(path)
         temporary = path.with_name(f".dess-{os.getpid()}-{secrets.token_hex(4)}.tmp")
         _OWN.add(temporary)
         _sweep(path.parent.absolute())
@@ -147,10 +147,10 @@ def check_target(path: Path) -> None:
     """
     check_folder(path.parent)
     with writable(path):
-        _check_place(path)
+        check_place(path)
 
 
-def _check_place(path: Path) -> None:
+def check_place(path: Path) -> None:
     """Refuse to replace anything but a regular file, or a link to one."""
     _check_name(path)
     try:

@@ -206,6 +206,17 @@ def test_foreign_files_stay(out, tmp_path):
     assert not [*out.rglob("*.tmp")]
 
 
+def test_what_is_in_the_place_of_a_file_is_refused_before_missions_are_simulated(out, tmp_path):
+    next((out / "missions").rglob("*.parquet")).unlink()
+    log = next((out / "events").rglob("*.parquet"))
+    log.unlink()
+    log.mkdir()
+    before = files_of(out)
+    with pytest.raises(InputError, match="is a folder; allowed: a file"):
+        run_study(small_study(tmp_path, logged=1), out)
+    assert {*files_of(out)} == {*before}
+
+
 def test_a_long_team_has_a_short_folder(tmp_path):
     team = ",".join(["greedy", "random"] * 30)
     fleet = {"zone": [0, 0, 8, 8], "uavs": 60}
