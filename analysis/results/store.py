@@ -162,7 +162,7 @@ class Store:
         """Write the manifest, remove temporary files of a killed run, and scan the folder.
 
         Raises:
-            InputError: If something else is in the place of a file that a run may write.
+            InputError: If something else is in the place of an event log of the study.
         """
         write_file(self.folder / chunks.MANIFEST, self.manifest.text)
         places = [self.folder / name for name in chunks.FOLDERS]
@@ -171,8 +171,10 @@ class Store:
         places += [self.folder, *paths_in(self.folder, "*/policy=*")]
         for path in (path for place in places for path in paths_in(place, ".*.tmp")):
             delete(path)
-        for path in (path for place in places for path in paths_in(place, "*.parquet")):
-            if parquet.NAME.fullmatch(path.name) and not path.is_symlink():
+        keys = {cell.key for cells in self.manifest.cells for cell in cells}
+        for path in paths_in(self.folder, "events/policy=*/*.parquet"):
+            is_log = parquet.NAME.fullmatch(path.name) and path.name.partition("-")[0] in keys
+            if is_log and not path.is_symlink():
                 check_place(path)  # a run would find out only when its missions are done
         self._scan()
         while self.damaged:
