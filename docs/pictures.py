@@ -27,8 +27,8 @@ from dess.analysis.figures import missions, style
 from dess.analysis.results import event_log
 from dess.base.errors import InputError
 from dess.reports.pages import INDEX, html
+from dess.reports.pages.index import TILES
 from dess.reports.pages.page import Page
-from dess.reports.pages.render import TILES
 
 HERE = Path(__file__).parent
 GALLERY, MODEL = HERE / "gallery", HERE / "model"

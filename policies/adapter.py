@@ -8,13 +8,12 @@ class Mine(Adapter):   # in my_policies.py, for dess evaluate --policy my_polici
 from ast import literal_eval
 from collections.abc import Callable
 from functools import lru_cache
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dess.base.files.reading import read_bytes
+from dess.base.files.reading import hash_file
 from dess.envs.observations.observer import Observer
 from dess.envs.stepper import checked_actions
 from dess.model.view import View
@@ -62,7 +61,7 @@ class Adapter:
         self.observation = observation
         self.guarded = guarded
         self._choose = act
-        self.weights = sha256(read_bytes(Path(weights), LIMIT)).hexdigest() if weights else ""
+        self.weights = hash_file(Path(weights), LIMIT) if weights else ""
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view.

@@ -19,7 +19,7 @@ from dess.analysis.results.provenance import Origin
 from dess.analysis.results.tables import Results
 from dess.analysis.study.stopping import Text
 from dess.base.files.documents import Document
-from dess.base.files.reading import paths_in, read_bytes
+from dess.base.files.reading import hash_file, paths_in
 from dess.base.files.tables import LIMIT
 from dess.model.record import MISSION_RECORD, UAV_RECORD, MissionRecord
 from dess.model.state import END_NAMES, sample_scenario
@@ -273,7 +273,7 @@ def learned_files(folder: Path = TRAINED) -> dict[str, str]:
     """The files of learned policies and their curves, with the hashes of their bytes."""
     kinds = (".safetensors", ".json", ".parquet")
     paths = [path for path in paths_in(folder, "**/*") if path.suffix in kinds]
-    hashes = (sha256(read_bytes(path, LIMIT)).hexdigest() for path in paths)
+    hashes = (hash_file(path, LIMIT) for path in paths)
     return {p.relative_to(folder).as_posix(): h for p, h in zip(paths, hashes, strict=True)}
 
 

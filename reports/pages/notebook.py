@@ -14,13 +14,14 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import nbformat
 from nbformat import NotebookNode
 
+from dess.analysis.results.chunks import MANIFEST
 from dess.base.errors import InputError, shown, unknown_name
 from dess.base.files.reading import paths_in, read_text
 from dess.policies.registry import is_path
@@ -65,6 +66,8 @@ class Report:
         scripts: Whether the page has scripts, such as those of sliders.
         original: The complete notebook, as in its file.
         notebook: The cells of the page, with values for the parameters.
+        results: The results folders that it reads, by the names that the page has for them; those
+            that ``find_results`` has found.
         formats: Formats of the files with its figures that are asked for.
         key: What its page depends on; empty if it has other parameters than by default.
         is_current: Whether its page is there, and has this key.
@@ -81,6 +84,7 @@ class Report:
     scripts: bool
     original: NotebookNode
     notebook: NotebookNode
+    results: dict[str, Path] = field(default_factory=dict)
     formats: tuple[str, ...] = ()
     key: str = ""
     is_current: bool = False
@@ -115,6 +119,21 @@ class Report:
         names |= {"results": "."}
         changed = _parameters_cell(self.notebook)
         return [replace_values(c.source, names) if c is changed else c.source for c in self.cells]
+
+    def find_results(self, folder: Path) -> None:
+        """Find the results that it reads, and those of the optional ones that are there.
+
+        Args:
+            folder: The folder that holds a results folder per study.
+
+        Raises:
+            InputError: If the folder cannot be read.
+        """
+        manifests = [
+            path for name in self.optional for path in paths_in(folder, f"{name}/{MANIFEST}")
+        ]
+        names = [*self.studies, *(path.parent.name for path in manifests)]
+        self.results = {name: folder / name for name in names}
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
         """Set parameters to other values; parameters of other notebooks are ignored."""

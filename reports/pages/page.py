@@ -7,6 +7,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from dess import InputError
 from dess.analysis.results.resimulate import Evidence
 from dess.base.files.documents import Document
 from dess.base.files.reading import read_text
@@ -117,3 +118,12 @@ class Page:
         """The page with links to all pages of its folder, sealed again."""
         before, begin, rest = self.text.partition(_BAR)
         return Page(f"{before}{begin}{bar}{_END}{rest.partition(_END)[2]}").sealed
+
+
+def has_key(path: Path, key: str) -> bool:
+    """Whether a file is a page with this key that has not been altered."""
+    try:
+        page = Page.read(path)
+        return bool(key) and page.card.key == key and page.is_sealed
+    except (OSError, InputError):
+        return False

@@ -1,177 +1,27 @@
-"""Render notebooks to pages, leave those that are up to date as they are, and write their index.
-
-The index has tiles, the figure of the scorecard, and a card per page. Anybody may have made a page
-in the folder. So of older pages, the index takes only what cannot run.
-"""
+"""Render notebooks to pages, leave those that are up to date as they are, and write their index."""
 
 import logging
 import os
-import re
-import sys
 from collections import Counter
-from collections.abc import Container, Iterable, Mapping, Sequence
-from contextlib import suppress
-from functools import lru_cache
-from hashlib import sha256
-from importlib import metadata
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from shlex import quote
 from types import MappingProxyType
 from typing import Any
 
-import nbformat
-
-import dess
 from dess import InputError
 from dess.analysis.results.chunks import MANIFEST
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.results.tables import Results
-from dess.base.files.documents import LIMIT
-from dess.base.files.reading import Missing, paths_in, read_bytes
+from dess.base.files.reading import Missing
 from dess.base.files.writing import delete, locked, write_files
-from dess.base.floors import FLOORS
-from dess.reports.pages import INDEX, LOCK, PREFIX, check_pages, kernels, notebook
-from dess.reports.pages.html import fill_page, load_template
+from dess.reports.pages import INDEX, LOCK, check_pages, kernels, notebook
+from dess.reports.pages.finished import find_finished_page
+from dess.reports.pages.index import add_bars, find_pages, make_index
 from dess.reports.pages.kernels import Progress
-from dess.reports.pages.page import Page
 from dess.reports.pages.study import make_study_report
 
-TILES = {  # pages whose number has a tile, and what it is
-    "performance.html": "Against the paper's policy",
-    "planner.html": "Planning against learning",
-    "own-sea.html": "The cheapest fleet of the example",
-}
-_OF_STUDY = re.compile(rf"{PREFIX}.+(?<!\.partial)\.html")
-
-
-def make_index(
-    pages: Mapping[str, Page], left_out: Mapping[str, Sequence[str]] = MappingProxyType({})
-) -> str:
-    """The index of pages.
-
-    Args:
-        pages: The pages, by file name.
-        left_out: Titles of reports whose results are missing, with the commands that make these.
-    """
-    cards = {name: pages[name].card for name in sort_pages(pages)}
-    scorecard = cards.get(f"{notebook.SCORECARD}.html")
-    return fill_page(
-        INDEX,
-        cards=cards,
-        tiles=[
-            (text, page) for page, text in TILES.items() if page in cards and cards[page].number
-        ],
-        picture=scorecard and scorecard.picture,
-        groups=group_pages(pages),
-        left_out=left_out,
-    )
-
-
-def sort_pages(pages: Iterable[str], group: str | None = None) -> list[str]:
-    """File names of pages in the order of the index: those of a group, or all."""
-    present = {*pages}
-    studies = sorted(name for name in present if _OF_STUDY.fullmatch(name))
-    order = []
-    for heading, names in notebook.GROUPS.items():
-        if group in (None, heading):
-            if heading == next(iter(notebook.GROUPS)):
-                order += studies
-            order += [f"{name}.html" for name in names]
-    return [name for name in order if name in present]
-
-
-def group_pages(pages: Iterable[str]) -> list[tuple[str, list[str]]]:
-    """The headings of the groups that have a page, each with the file names of its pages."""
-    names = {heading: sort_pages(pages, heading) for heading in notebook.GROUPS}
-    return [(heading, of_group) for heading, of_group in names.items() if of_group]
-
-
-def add_bars(pages: Mapping[str, Page]) -> dict[str, Page]:
-    """The pages of a folder, with the links to all of them, by group, in their bars."""
-    labels = {}
-    for name in sort_pages(pages):
-        labels[name] = name.removesuffix(".html").replace("-", " ").capitalize()
-        if _OF_STUDY.fullmatch(name):
-            labels[name] = pages[name].card.title
-    shown = {"groups": group_pages(pages), "labels": labels}
-    bar = load_template("bar.html")
-    return {n: page.replace_bar(bar.render(page=n, **shown)) for n, page in pages.items()}
-
-
-def find_pages(out: Path, but: Container[str] = ()) -> dict[str, Page]:
-    """The pages in a folder, by file name; pages that were altered are left out, with a warning.
-
-    Args:
-        out: The folder.
-        but: File names that are left out without a warning.
-    """
-    pages = {}
-    names = sort_pages(path.name for path in paths_in(out, "*.html"))
-    for path in (out / name for name in names if name not in but):
-        is_sound = False
-        with suppress(InputError):
-            page = Page.read(path)
-            is_sound = page.is_sealed and bool(page.card) and page.evidence is not None
-        if is_sound:
-            pages[path.name] = page
-        else:
-            log.warning("%s: altered, or of another version; the index leaves it out", path)
-    return pages
-
-
 log = logging.getLogger(__name__)
-
-PACKAGE = Path(dess.__file__).parent
-
-
-def page_key(report: notebook.Report, studies: Mapping[str, Path]) -> str:
-    """The key of a page whose notebook has its default parameters.
-
-    Args:
-        report: The report.
-        studies: The results folders that it reads, by the names that the page has for them.
-    """
-    parts = [_hash_software(), nbformat.writes(report.original)]
-    for name, folder in studies.items():
-        files = [path.relative_to(folder).as_posix() for path in paths_in(folder, "**/*.parquet")]
-        parts += [
-            name,
-            _hash_file(folder / MANIFEST),
-            *files,
-        ]  # the names of files have their hashes
-    return sha256(repr(parts).encode()).hexdigest()
-
-
-def has_key(page: Path, key: str) -> bool:
-    """Whether a file is a page with this key that has not been altered."""
-    try:
-        existing = Page.read(page)
-        return bool(key) and existing.card.key == key and existing.is_sealed
-    except (OSError, InputError):
-        return False
-
-
-@lru_cache
-def _hash_software() -> str:
-    """A hash of the files of this package and of the versions of all libraries."""
-    # In a checkout, folders of the package lie beside it, and ``**`` does not follow links to them.
-    folders = [PACKAGE]
-    for name in FLOORS:
-        if (PACKAGE / name).is_symlink() or not (PACKAGE / name).is_dir():
-            folders.append(PACKAGE.parent / name)
-    files = sorted(
-        (path.relative_to(folder).as_posix(), _hash_file(path))
-        for folder in folders
-        for path in paths_in(folder, "**/*.*")
-        if path.is_file() and path.parent.name != "__pycache__"
-    )
-    versions = sorted(f"{library.name} {library.version}" for library in metadata.distributions())
-    return repr([sys.version, versions, files])
-
-
-def _hash_file(path: Path) -> str:
-    return sha256(read_bytes(path, LIMIT)).hexdigest()
-
 
 PATIENCE = 60.0  # for which the page of another process is waited for [s]
 # What is said if it takes longer, and what is allowed then.
@@ -229,7 +79,9 @@ def render(
     notebook.check_parameters(reports, values)
     for report in reports:
         report.formats = (*formats,)
-        _find_finished_page(report, results, out, values)
+        report.find_results(results)
+        if not values:
+            find_finished_page(report, results, out)
     lacking = {r.name: {} if r.is_current else _list_lacking(r, results) for r in reports}
     commands = {c: error for errors in lacking.values() for c, error in errors.items()}
     if asked and len(commands) > 1 and all(isinstance(e, Missing) for e in commands.values()):
@@ -286,7 +138,9 @@ def render_study(
     notebook.check_parameters([report], values)
     report.set_parameters({"results": str(folder.absolute()), **values})
     report.formats = (*formats,)
-    _find_finished_page(report, folder, out, values)
+    report.find_results(folder)
+    if not values:
+        find_finished_page(report, folder, out)
     check_pages(out, report.name)
     _write_pages([report], folder, out, progress, values)
     return out / report.page
@@ -302,7 +156,7 @@ def _write_pages(
 ) -> None:
     """Run reports in the folder of their results, and write the pages and the index."""
     changed = [report for report in reports if not report.is_current]
-    read_by = Counter(f for report in changed for f in _find_results(report, results).values())
+    read_by = Counter(f for report in changed for f in report.results.values())
     kernels.run_reports(
         changed, progress, [folder for folder, count in read_by.items() if count > 1]
     )
@@ -327,26 +181,6 @@ def _write_pages(
     if failed := [report for report in reports if report.failure]:
         lines = [f"{r.failure}; partial page: {out / r.page}" for r in failed]
         raise ReportError("; ".join(lines))
-
-
-def _find_finished_page(
-    report: notebook.Report, results: Path, out: Path, values: Mapping[str, Any]
-) -> None:
-    """Find out whether the page of a report is there and of these results, which are sound then."""
-    if values:
-        return
-    # If there are none, ``_list_lacking`` finds out what is wrong.
-    with suppress(InputError):
-        report.key = page_key(report, _find_results(report, results))
-        kept = not report.formats and has_key(out / report.page, report.key)
-        report.is_current = kept and report.is_in(out, results)
-
-
-def _find_results(report: notebook.Report, results: Path) -> dict[str, Path]:
-    """The results folders that a report reads, by name."""
-    optional_files = (paths_in(results, f"{name}/{MANIFEST}") for name in report.optional)
-    others = [path.parent.name for paths in optional_files for path in paths]
-    return {name: results / name for name in (*report.studies, *others)}
 
 
 def _list_lacking(report: notebook.Report, results: Path) -> dict[str, InputError]:

@@ -10,6 +10,7 @@ import stat
 import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from hashlib import sha256
 from importlib import resources
 from itertools import islice
 from os.path import realpath
@@ -65,6 +66,11 @@ def read_bytes(path: Path, limit: int = TEXT_LIMIT, allowed: str = "a file") -> 
     if len(content) > limit:  # it has grown, or it is a file of the system, whose size is unknown
         raise _too_large(path, limit)
     return content
+
+
+def hash_file(path: Path, limit: int) -> str:
+    """The SHA-256 hash of the content of a regular file; errors are those of ``read_text``."""
+    return sha256(read_bytes(path, limit)).hexdigest()
 
 
 def checked(path: Path, limit: int, allowed: str = "a file") -> Path:

@@ -13,9 +13,10 @@ from nbconvert.filters import markdown2html
 from dess.analysis import load_results, numbers
 from dess.analysis.figures import style
 from dess.reports.pages import html
+from dess.reports.pages.index import add_bars, find_pages, make_index
 from dess.reports.pages.notebook import assigned_values, replace_values
 from dess.reports.pages.page import CARD, Page
-from dess.reports.pages.render import add_bars, find_pages, make_index, render_study
+from dess.reports.pages.render import render_study
 from tests.analysis.hostile import hostile_folder
 from tests.reports.here import notebooks_here
 from tests.reports.small import Links

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from dess.analysis import load_results, run_study
-from dess.reports.pages import kernels, render
+from dess.reports.pages import finished, kernels
 from dess.reports.pages.render import render as render_pages
 from dess.reports.pages.render import render_study
 from tests.analysis.small import small_study
@@ -70,29 +70,29 @@ def test_another_notebook_changes_its_page(folder):
 
 @pytest.mark.parametrize("what", ["code", "library"])
 def test_other_code_and_libraries_change_all_pages(folder, tmp_path, monkeypatch, what):
-    render._hash_software.cache_clear()
+    finished._hash_software.cache_clear()
     if what == "library":
-        monkeypatch.setattr(render.metadata, "distributions", list)
+        monkeypatch.setattr(finished.metadata, "distributions", list)
     else:
-        shutil.copytree(render.PACKAGE / "reports", tmp_path / "reports")
+        shutil.copytree(finished.PACKAGE / "reports", tmp_path / "reports")
         (tmp_path / "reports/templates/style.css").write_text("")
         (tmp_path / "dess").mkdir()
         (tmp_path / "dess/reports").symlink_to("../reports")
-        monkeypatch.setattr(render, "PACKAGE", tmp_path / "dess")
+        monkeypatch.setattr(finished, "PACKAGE", tmp_path / "dess")
     assert folder.render() == {"mission", "scorecard"}
-    render._hash_software.cache_clear()
+    finished._hash_software.cache_clear()
 
 
 def test_code_beside_the_package_counts_without_links_to_it(tmp_path, monkeypatch):
     (tmp_path / "dess").mkdir()
-    monkeypatch.setattr(render, "PACKAGE", tmp_path / "dess")
+    monkeypatch.setattr(finished, "PACKAGE", tmp_path / "dess")
     (tmp_path / "dess/policies").write_text("../policies")
     (tmp_path / "policies").mkdir()
     (tmp_path / "policies/planner.py").write_text("before = 1")
-    before = render._hash_software.__wrapped__()
-    assert render._hash_software.__wrapped__() == before
+    before = finished._hash_software.__wrapped__()
+    assert finished._hash_software.__wrapped__() == before
     (tmp_path / "policies/planner.py").write_text("after = 1")
-    assert render._hash_software.__wrapped__() != before
+    assert finished._hash_software.__wrapped__() != before
 
 
 def test_pages_that_are_altered_or_gone_are_rendered_again(folder):

@@ -20,9 +20,9 @@ from dess.policies.registry import TRAINED
 from dess.reports.cli import main
 from dess.reports.pages import html, verify
 from dess.reports.pages.body import make_page
+from dess.reports.pages.index import find_pages, make_index
 from dess.reports.pages.notebook import read_report
 from dess.reports.pages.page import STUDY, Page
-from dess.reports.pages.render import find_pages, make_index
 from dess.reports.pages.verify import verify_page, verify_results
 from tests.analysis.hostile import forged
 from tests.analysis.small import small_study

@@ -1,0 +1,103 @@
+"""The index of the pages in a folder, and the bars with links between them.
+
+The index has tiles, the figure of the scorecard, and a card per page. Anybody may have made a page
+in the folder. So of older pages, the index takes only what cannot run.
+"""
+
+import logging
+import re
+from collections.abc import Container, Iterable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from types import MappingProxyType
+
+from dess import InputError
+from dess.base.files.reading import paths_in
+from dess.reports.pages import INDEX, PREFIX
+from dess.reports.pages.html import fill_page, load_template
+from dess.reports.pages.notebook import GROUPS, SCORECARD
+from dess.reports.pages.page import Page
+
+log = logging.getLogger(__name__)
+
+TILES = {  # pages whose number has a tile, and what it is
+    "performance.html": "Against the paper's policy",
+    "planner.html": "Planning against learning",
+    "own-sea.html": "The cheapest fleet of the example",
+}
+_OF_STUDY = re.compile(rf"{PREFIX}.+(?<!\.partial)\.html")
+
+
+def make_index(
+    pages: Mapping[str, Page], left_out: Mapping[str, Sequence[str]] = MappingProxyType({})
+) -> str:
+    """The index of pages.
+
+    Args:
+        pages: The pages, by file name.
+        left_out: Titles of reports whose results are missing, with the commands that make these.
+    """
+    cards = {name: pages[name].card for name in sort_pages(pages)}
+    scorecard = cards.get(f"{SCORECARD}.html")
+    return fill_page(
+        INDEX,
+        cards=cards,
+        tiles=[
+            (text, page) for page, text in TILES.items() if page in cards and cards[page].number
+        ],
+        picture=scorecard and scorecard.picture,
+        groups=group_pages(pages),
+        left_out=left_out,
+    )
+
+
+def sort_pages(pages: Iterable[str], group: str | None = None) -> list[str]:
+    """File names of pages in the order of the index: those of a group, or all."""
+    present = {*pages}
+    studies = sorted(name for name in present if _OF_STUDY.fullmatch(name))
+    order = []
+    for heading, names in GROUPS.items():
+        if group in (None, heading):
+            if heading == next(iter(GROUPS)):
+                order += studies
+            order += [f"{name}.html" for name in names]
+    return [name for name in order if name in present]
+
+
+def group_pages(pages: Iterable[str]) -> list[tuple[str, list[str]]]:
+    """The headings of the groups that have a page, each with the file names of its pages."""
+    names = {heading: sort_pages(pages, heading) for heading in GROUPS}
+    return [(heading, of_group) for heading, of_group in names.items() if of_group]
+
+
+def add_bars(pages: Mapping[str, Page]) -> dict[str, Page]:
+    """The pages of a folder, with the links to all of them, by group, in their bars."""
+    labels = {}
+    for name in sort_pages(pages):
+        labels[name] = name.removesuffix(".html").replace("-", " ").capitalize()
+        if _OF_STUDY.fullmatch(name):
+            labels[name] = pages[name].card.title
+    shown = {"groups": group_pages(pages), "labels": labels}
+    bar = load_template("bar.html")
+    return {n: page.replace_bar(bar.render(page=n, **shown)) for n, page in pages.items()}
+
+
+def find_pages(out: Path, but: Container[str] = ()) -> dict[str, Page]:
+    """The pages in a folder, by file name; pages that were altered are left out, with a warning.
+
+    Args:
+        out: The folder.
+        but: File names that are left out without a warning.
+    """
+    pages = {}
+    names = sort_pages(path.name for path in paths_in(out, "*.html"))
+    for path in (out / name for name in names if name not in but):
+        is_sound = False
+        with suppress(InputError):
+            page = Page.read(path)
+            is_sound = page.is_sealed and bool(page.card) and page.evidence is not None
+        if is_sound:
+            pages[path.name] = page
+        else:
+            log.warning("%s: altered, or of another version; the index leaves it out", path)
+    return pages
