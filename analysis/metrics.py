@@ -8,6 +8,7 @@ from typing import Any, Literal
 import pandas as pd
 
 from dess.analysis import numbers
+from dess.base.errors import unknown_name
 from dess.model.record import MISSION_RECORD, measures_of
 from dess.scenario.data_sheet import Units
 from dess.scenario.quantities import printed
@@ -362,6 +363,28 @@ def metrics_in(missions: Container[str]) -> list[str]:
 def ranking_metrics(missions: Container[str]) -> list[str]:
     """The metrics by which settings can be ranked: those that missions have, then their cost."""
     return [*metrics_in(missions), *(m.column for m in _OF_PRICES if m.column in missions)]
+
+
+def check_ranking_metric(metric: str, missions: Container[str]) -> None:
+    """Refuse a metric by which these missions cannot be ranked.
+
+    Raises:
+        InputError: If they do not have it.
+    """
+    metrics = ranking_metrics(missions)
+    if metric not in metrics:
+        raise unknown_name("metric", f"{metric!r} is unknown", metric, metrics)
+
+
+def ranking_column(metric: str, missions: Container[str]) -> str:
+    """The column of a metric by which missions are ranked, in the unit of a data sheet if possible.
+
+    Raises:
+        InputError: If the missions do not have it.
+    """
+    column = column_in_sheet_unit(metric, missions)
+    check_ranking_metric(column, missions)
+    return column
 
 
 def metrics_of_scenario(space: ScenarioSpace) -> list[str]:

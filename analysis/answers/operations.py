@@ -14,10 +14,18 @@ from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers.settings.effects import average_over_others
 from dess.analysis.answers.settings.figures import plot_curves
-from dess.analysis.answers.settings.points import check_metric, values_of_points, varied_values
+from dess.analysis.answers.settings.points import values_of_points, varied_values
 from dess.analysis.figures import Drawing
 from dess.analysis.figures.missions import plot_courses
-from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, metric_in_missions, metric_of
+from dess.analysis.metrics import (
+    AGE,
+    PRODUCT,
+    RATIO,
+    SUCCESS,
+    check_ranking_metric,
+    metric_in_missions,
+    metric_of,
+)
 from dess.analysis.names import value_text
 from dess.analysis.results.event_log import mission_length
 from dess.analysis.results.tables import Results
@@ -101,7 +109,7 @@ def changes_from_reference(
     Raises:
         InputError: If there is no such metric, or the field never has the reference value.
     """
-    check_metric(results, metric)
+    check_ranking_metric(metric, results.missions)
     table = values_of_points(results)
     if field not in table or reference not in table[field].to_numpy():
         raise InputError(field, f"is never {reference!r} in the study", "one of its values")

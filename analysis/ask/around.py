@@ -14,17 +14,14 @@ import pandas as pd
 
 from dess import InputError
 from dess.analysis.answers.fleet import cheapest
-from dess.analysis.answers.fleet.costs import (
-    fleets_in_words,
-    priced_settings,
-    setting_cells,
-)
+from dess.analysis.answers.fleet.costs import priced_settings, setting_cells
 from dess.analysis.answers.fleet.requirements import (
     Requirement,
     Verdict,
     least_spare,
     requirements_of,
 )
+from dess.analysis.answers.settings.points import fleets_in_words
 from dess.analysis.ask.question import LONGEST, Question
 from dess.analysis.metrics import metric_of
 from dess.analysis.names import field_named

@@ -13,7 +13,7 @@ from typing import NamedTuple, Self
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.execution.jobs import simulate_missions
-from dess.analysis.results.store import Store, source_folders
+from dess.analysis.results.store import Store, Work
 from dess.analysis.study.study import Study
 from dess.base.files.memory import check_memory
 from dess.policies.registry import Policy, folder_of, load_team
@@ -91,10 +91,12 @@ class Range(NamedTuple):
         return Range(self.low + other.low, self.high + other.high)
 
     def __str__(self) -> str:
-        """The ends in words, such as ``5 seconds to 2 minutes``."""
+        """The ends in words, such as ``5 seconds to 2 minutes``; one if they are the same."""
         low, high = (numbers.format_duration(max(end, 2.0)) for end in self)
         if self.low < 2.0:
             return f"up to {high}"
+        if self.low == self.high:
+            return high
         return f"{low.removesuffix(high[high.index(' ') :])} to {high}"
 
 
@@ -139,24 +141,18 @@ def _decision_time(policy: str) -> tuple[float, float]:
     return _TRAINED if folder_of(policy) else _OTHER
 
 
-def check_time(what: str, seconds: float | Range) -> None:
+def check_time(what: str, time: Range) -> None:
     """Refuse work that takes long, by the lower end of its range.
 
     Args:
         what: The work and its size.
-        seconds: The estimated time [s].
+        time: The estimated time [s].
 
     Raises:
         InputError: If it takes more than ``LONG_RUN``.
     """
-    if isinstance(seconds, Range):
-        least = seconds.low
-        text = str(seconds)
-    else:
-        least = seconds
-        text = numbers.format_duration(seconds)
-    if least > LONG_RUN:
-        raise InputError("", f"{what}, about {text}", CONFIRMED)
+    if time.low > LONG_RUN:
+        raise InputError("", f"{what}, about {time}", CONFIRMED)
 
 
 def check_missions(what: str, spaces: Sequence[ScenarioSpace], earlier: float = 0.0) -> float:
@@ -174,7 +170,7 @@ def check_missions(what: str, spaces: Sequence[ScenarioSpace], earlier: float = 
         InputError: If they may take more than ``LONG_RUN``, or one more memory than is available.
     """
     seconds = earlier + sum(map(_longest_mission_time, spaces))
-    check_time(f"{what}: {len(spaces)} missions to simulate", seconds)
+    check_time(f"{what}: {len(spaces)} missions to simulate", Range(seconds, seconds))
     for space in spaces:
         check_memory(f"{what}: a mission", mission_memory(space), CONFIRMED)
     return seconds
@@ -270,12 +266,11 @@ def plan_study(
         InputError: If the folder contains something else, or ``workers`` is below 1.
     """
     check_workers(workers)
-    store = Store.peek(study, out, accept_code)
-    for source in source_folders(reuse, store.manifest):
-        store.count(source)
-    plan = [_plan_team(study, store, team) for team in range(len(study.policies))]
+    store = Store.peek(study, out, accept_code, reuse)
+    work_of_teams = zip(study.policies, store.work_of_teams(), strict=True)
+    plan = [_plan_team(study, policy, work) for policy, work in work_of_teams]
     if study.bounds:
-        plan.append(_plan_bounds(study, store))
+        plan.append(_plan_bounds(study, store.work_on_bounds()))
     return plan
 
 
@@ -369,30 +364,21 @@ def _failures_left_to_the_run() -> Iterator[None]:
         return
 
 
-def _plan_team(study: Study, store: Store, team: int) -> Planned:
+def _plan_team(study: Study, policy: str, work: Work) -> Planned:
     """What a run would do for a team, as far as it is known now."""
-    manifest = store.manifest
-    spaces = study.scenarios
-    policy = study.policies[team]
-    parts = manifest.parts_of_team(team) + manifest.parts_of_check(team)
-    needed = sum(map(len, parts))
-    missing = sum(map(len, store.missing("missions", parts)))
-    logged = manifest.parts_of_team(team, [study.logged] * study.size)
-    logs = sum(map(len, store.missing("events", logged)))
-    most = needed
-    if study.rule and missing:
-        most = max(needed, study.most_missions)
-    present = needed - missing
-    of_logs = seconds_of(spaces, policy, (logs, logs), "events")
-    seconds = seconds_of(spaces, policy, (missing, most - present), study.engine).plus(of_logs)
-    return Planned(policy, needed, present, logs, most, seconds)
+    most = work.needed
+    if study.rule and work.missing:
+        most = max(work.needed, study.most_missions)
+    present = work.needed - work.missing
+    missions = (work.missing, most - present)
+    time_of_logs = seconds_of(study.scenarios, policy, (work.logs, work.logs), "events")
+    seconds = seconds_of(study.scenarios, policy, missions, study.engine).plus(time_of_logs)
+    return Planned(policy, work.needed, present, work.logs, most, seconds)
 
 
-def _plan_bounds(study: Study, store: Store) -> Planned:
+def _plan_bounds(study: Study, work: Work) -> Planned:
     """What a run would do for the upper bounds."""
-    parts = store.manifest.parts_with_bounds()
-    needed = sum(map(len, parts))
-    missing = sum(map(len, store.missing("bounds", parts)))
-    decisions = missing * sum(map(estimate_decisions, study.scenarios)) / study.size
+    decisions = work.missing * sum(map(estimate_decisions, study.scenarios)) / study.size
     seconds = Range(*(decisions * of_decision for of_decision in BOUND))
-    return Planned("upper bounds", needed, needed - missing, most=needed, seconds=seconds)
+    present = work.needed - work.missing
+    return Planned("upper bounds", work.needed, present, most=work.needed, seconds=seconds)

@@ -16,7 +16,7 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import pandas as pd
@@ -53,6 +53,20 @@ TABLES = {"missions": ("missions", "uavs"), "bounds": ("bounds",), "events": ("e
 
 Place = tuple[int, int]  # a design point and a replication
 Present = defaultdict[str, list[range]]  # replications by the key of their cell
+
+
+class Work(NamedTuple):
+    """What there is to do until a folder is complete.
+
+    Attributes:
+        needed: Number of missions, or of their bounds, that the folder must have.
+        missing: Number of these that it lacks.
+        logs: Number of event logs that it lacks.
+    """
+
+    needed: int
+    missing: int
+    logs: int = 0
 
 
 @dataclass(frozen=True)
@@ -136,14 +150,27 @@ class Store:
         return cls.scan_folder(folder, Manifest.read(folder / chunks.MANIFEST))
 
     @classmethod
-    def peek(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
+    def peek(
+        cls, study: Study, out: str | Path, accept_code: bool = False, reuse: Iterable[Path] = ()
+    ) -> Self:
         """Open a folder only to count which missions are missing; nothing is written or locked.
+
+        Args:
+            study: The study.
+            out: The folder.
+            accept_code: Whether missions that other code has simulated count as present.
+            reuse: Other results folders, whose missions count as if they were here.
 
         Raises:
             InputError: If the folder holds something else, or cannot be written.
         """
         folder = Path(out)
-        return cls.scan_folder(folder, _extended_manifest(folder, Manifest.of(study), accept_code))
+        manifest = _extended_manifest(folder, Manifest.of(study), accept_code)
+        store = cls.scan_folder(folder, manifest)
+        for other in source_folders(reuse, manifest):
+            for key, present in other._present["missions"].items():
+                store._present["missions"][key] += present
+        return store
 
     @classmethod
     def scan_folder(cls, folder: Path, manifest: Manifest) -> Self:
@@ -238,6 +265,25 @@ class Store:
         """
         return _absent_parts(parts, self._present[kind])
 
+    def work_of_teams(self) -> list[Work]:
+        """What there is to do for every team, as far as it is known now."""
+        manifest = self.manifest
+        logged = [manifest.study.logged] * len(manifest.points)
+        work = []
+        for team in range(len(manifest.policies)):
+            parts = manifest.parts_of_team(team) + manifest.parts_of_check(team)
+            logs = self.missing("events", manifest.parts_of_team(team, logged))
+            missing = self.missing("missions", parts)
+            work.append(
+                Work(_count_missions(parts), _count_missions(missing), _count_missions(logs))
+            )
+        return work
+
+    def work_on_bounds(self) -> Work:
+        """What there is to do for the upper bounds."""
+        parts = self.manifest.parts_with_bounds()
+        return Work(_count_missions(parts), _count_missions(self.missing("bounds", parts)))
+
     def keep(self, kind: str, chunk: chunks.Chunk, tables: Sequence[pa.Table]) -> None:
         """Store the tables of a chunk."""
         places = self._places(kind, chunk.team)
@@ -311,11 +357,6 @@ class Store:
         for part in self.missing("missions", parts):
             missing[part.cell.key].append(part.replications)
         return _absent_parts(parts, missing)
-
-    def count(self, other: "Store") -> None:
-        """Count the missions of another folder as if they were here, to plan a run."""
-        for key, present in other._present["missions"].items():
-            self._present["missions"][key] += present
 
     def write_failure(self, chunk: chunks.Chunk, failure: Failure) -> Path:
         """Store why a chunk could not be computed, and return the path of the file."""
@@ -452,6 +493,11 @@ def gaps_between(wanted: range, present: list[range]) -> list[range]:
         if begin >= wanted.stop:
             break
     return [gap for gap in [*missing, range(begin, wanted.stop)] if len(gap)]
+
+
+def _count_missions(parts: Iterable[Part]) -> int:
+    """How many missions some parts have together."""
+    return sum(map(len, parts))
 
 
 def _absent_parts(parts: Iterable[Part], present: Present) -> list[Part]:

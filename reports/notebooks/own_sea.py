@@ -30,11 +30,12 @@ yes = False  # True if the sweep may take more than an hour
 from dess import load_scenario
 from dess.analysis import sweep
 from dess.analysis.answers import summary
-from dess.analysis.answers.fleet import cheapest, verdicts
+from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.fleet import tables as fleet_tables
-from dess.analysis.answers.fleet.costs import cost_parts_table, fleets_in_words
+from dess.analysis.answers.fleet.costs import cost_parts_table
 from dess.analysis.answers.fleet.figures import draw_cheapest
 from dess.analysis.answers.missions import map_caption
+from dess.analysis.answers.settings.points import fleets_in_words, has_conditions
 from dess.analysis.ask import around
 from dess.analysis.ask.assumptions import assumption_sentences
 from dess.analysis.figures.missions import mission_figure, sea_figure
@@ -101,7 +102,7 @@ html.show_parts(no_check if found.checks.empty else fleet_tables.check_table(fou
 # ## Tables
 
 # %%
-if verdicts.has_conditions(found):
+if has_conditions(found):
     html.show_parts(fleet_tables.condition_table(found))
 html.show_parts(cost_parts_table(found))
 

@@ -10,11 +10,11 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers import summary
-from dess.analysis.answers.fleet import cheapest, verdicts
+from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.fleet.costs import prices_in_words
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.settings.baseline import check_baseline
-from dess.analysis.answers.settings.points import metrics_of_page, varied_values
+from dess.analysis.answers.settings.points import has_conditions, metrics_of_page, varied_values
 from dess.analysis.answers.settings.ranking import ranking_metric
 from dess.analysis.ask import around
 from dess.analysis.names import field_named, value_text
@@ -207,16 +207,16 @@ def make_study_report(results: Results, values: Mapping[str, Any] = MappingProxy
     study = results.study
     original = notebook.parse_notebook(NOTEBOOK)
     varied = [*varied_values(results)]
-    kept = find_shown_parts(results, varied)
-    original.cells = [
-        cell for cell in original.cells if all(kept.get(tag, True) for tag in cell_tags(cell))
-    ]
     points = len(results.store.manifest.points)
     where = f"the scenario {study.scenario}"
     if points > 1:
         where = f"{points:,} design points"
     description = study.description or f"{numbers.join_words(results.policies)} at {where}."
     title = page_title(results, varied)
+    kept = find_shown_parts(results, varied)
+    original.cells = [
+        cell for cell in original.cells if all(kept.get(tag, True) for tag in cell_tags(cell))
+    ]
     original.cells[0].source = f"# {html.escape_text(title)}\n\n{html.escape_text(description)}"
     report = notebook.make_report(f"{PREFIX}{study.name}", original)
     return replace(report, title=title, description=" ".join(description.split()))
@@ -265,7 +265,7 @@ def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]
         # Tables of the study.
         "if-selection": isinstance(study.selection, Selection),
         "if-cheapest": is_search,
-        "if-conditions": is_search and verdicts.has_conditions(results),
+        "if-conditions": is_search and has_conditions(results),
         "if-precision": study.precision is not None,
         "if-costs": study.costs is not None and not is_search,
         "if-priced-search": is_search and results.prices.pays_for_missions,

@@ -18,9 +18,7 @@ from pandas.api.types import is_numeric_dtype
 
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.costs import (
-    conditions_in_words,
     cost_parts_in_words,
-    fleets_in_words,
     mean_cost_parts,
     prices_in_words,
 )
@@ -44,7 +42,13 @@ from dess.analysis.answers.settings.home import (
     stranded_sentence,
     way_home_sentence,
 )
-from dess.analysis.answers.settings.points import ends_of_point, ends_sentence, values_of_points
+from dess.analysis.answers.settings.points import (
+    conditions_in_words,
+    ends_of_point,
+    ends_sentence,
+    fleets_in_words,
+    values_of_points,
+)
 from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
 from dess.analysis.metrics import COST, HOME, SUCCESS, metric_of
 from dess.analysis.names import DECISIONS

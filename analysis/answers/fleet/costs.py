@@ -4,10 +4,8 @@
     prices_in_words(results)  # what is paid for
     cost_front(results, "success")  # cost and success, with the probability of being on the front
 
-A setting is a policy at a design point. The fields that an operator decides on, such as the numbers
-of UAVs and pads, make up the fleet. All other fields that the design varies are conditions under
-which the fleet has to work. Fleets are compared under one condition at a time. The cheapest fleet
-that meets requirements is found by ``cheapest``.
+A setting is a policy at a design point, which is a fleet under a condition. Fleets are compared
+under one condition at a time. The cheapest fleet that meets requirements is found by ``cheapest``.
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,22 +16,19 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.settings.points import (
+    conditions_in_words,
+    fleets_in_words,
     intervals_in_words,
-    rows_in_words,
-    values_of_points,
 )
 from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of
-from dess.analysis.names import DECISIONS, field_named, single_value
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.verdict import front_membership, on_front
 from dess.analysis.study.prices import PARTS, PURCHASE, stranded_uavs
 from dess.analysis.tables import MOST_ROWS, Table
 from dess.base.errors import unknown_name
-from dess.scenario.fields import ZONE_PADS
 
 CERTAIN = 0.01  # settings with a lower probability of being on a front are not in the table
-COUNTED = ("uavs", "pads", ZONE_PADS)  # the numbers of what has a price
 # What the parts of a cost are called, and the price that makes each.
 _PART_NAMES = {"charging": "charging", "hours": "hours", "losses": "lost UAVs"}
 _PRICE_OF_PART = {"charging": "charge", "hours": "hour", "losses": "lost_uav"}
@@ -191,38 +186,6 @@ def _mission_values(results: Results, rows: pd.DataFrame, name: str) -> np.ndarr
     wide = missions.pivot(index="replication", columns=["policy", "point"], values=name)
     keys = pd.MultiIndex.from_frame(rows[["policy", "point"]])
     return wide.reindex(columns=keys).to_numpy(float).T
-
-
-@compute_once
-def fleets_in_words(results: Results) -> list[str]:
-    """The fleet of every design point in words: all that has a price or varies."""
-    prices = results.prices
-    table = values_of_points(results)
-    fleets = []
-    for point, others in enumerate(_fields_in_words(results, True)):
-        space = results.scenario(point)
-        words = []
-        if prices.uav or prices.lost_uav or "uavs" in table:
-            words.append(field_named("uavs").words(single_value([*space.uavs])))
-        if prices.pad or {"pads", ZONE_PADS} & {*table}:
-            for zone, pads in enumerate(space.zone_pads, 1):
-                number = field_named("pads").words(pads)
-                words.append(number if zone == 1 else f"{number} in zone {zone}")
-        fleets.append(numbers.join_words([*words, *others]) or "the fleet of the scenario")
-    return fleets
-
-
-@compute_once
-def conditions_in_words(results: Results) -> list[str]:
-    """The condition of every design point in words."""
-    return [", ".join(row) for row in _fields_in_words(results, False)]
-
-
-def _fields_in_words(results: Results, decisions: bool) -> list[list[str]]:
-    """The fields of every design point that are decided on, or the rest; none of ``COUNTED``."""
-    table = values_of_points(results)
-    shown = [f for f in table if (f in DECISIONS) == decisions and f not in COUNTED]
-    return rows_in_words(table[shown])
 
 
 def cost_fronts(results: Results) -> dict[str, pd.DataFrame]:

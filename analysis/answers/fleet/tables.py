@@ -10,12 +10,11 @@ from dess.analysis.answers.fleet.requirements import requirements_in_words, requ
 from dess.analysis.answers.fleet.verdicts import (
     VERDICTS_EXPLAINED,
     checked_settings,
-    has_conditions,
     judge_fleets_everywhere,
     judge_settings,
     reported_metrics,
 )
-from dess.analysis.answers.settings.points import intervals_in_words
+from dess.analysis.answers.settings.points import has_conditions, intervals_in_words
 from dess.analysis.metrics import COST, SUCCESS, metric_of
 from dess.analysis.results.tables import Results
 from dess.analysis.tables import INTERVALS, MOST_PRINTED, MOST_ROWS, Table, format_counts

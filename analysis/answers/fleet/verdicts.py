@@ -9,7 +9,7 @@ from dataclasses import replace
 import pandas as pd
 
 from dess import InputError
-from dess.analysis.answers.fleet.costs import conditions_in_words, priced_settings
+from dess.analysis.answers.fleet.costs import priced_settings
 from dess.analysis.answers.fleet.requirements import Verdict, requirements_of
 from dess.analysis.answers.settings.home import with_way_home
 from dess.analysis.metrics import COST, SUCCESS, metric_of
@@ -125,11 +125,6 @@ def quoted_settings(results: Results) -> pd.DataFrame:
     checked = checked_settings(results).set_index(setting)
     rows.loc[checked.index, checked.columns] = checked
     return rows.reset_index()[[*table]]
-
-
-def has_conditions(results: Results) -> bool:
-    """Whether fleets have to work under several conditions."""
-    return len({*conditions_in_words(results)}) > 1
 
 
 def cheapest_choice(results: Results, policy: str) -> CheapestChoice:

@@ -1,6 +1,8 @@
 """The design points of a study, and the settings made of them, in values and in words.
 
-A setting is a policy at a design point.
+A setting is a policy at a design point. The fields that an operator decides on, such as the numbers
+of UAVs and pads, make up the fleet. All other fields that the design varies are conditions under
+which the fleet has to work.
 """
 
 from collections.abc import Mapping
@@ -10,13 +12,13 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from dess.analysis import numbers
-from dess.analysis.metrics import METRICS, ranking_metrics
-from dess.analysis.names import field_named
+from dess.analysis.metrics import METRICS, check_ranking_metric
+from dess.analysis.names import DECISIONS, field_named, single_value
 from dess.analysis.results.tables import Results, compute_once
-from dess.analysis.tables import (
-    INTERVALS,
-)
-from dess.base.errors import unknown_name
+from dess.analysis.tables import INTERVALS
+from dess.scenario.fields import ZONE_PADS
+
+_COUNTED = ("uavs", "pads", ZONE_PADS)  # the numbers of what has a price
 
 
 def varied_values(results: Results) -> dict[str, list[Any]]:
@@ -67,6 +69,43 @@ def setting_in_words(results: Results, policy: str, point: int) -> str:
     if words:
         return f"{policy} with {words}"
     return policy
+
+
+@compute_once
+def fleets_in_words(results: Results) -> list[str]:
+    """The fleet of every design point in words: all that has a price or varies."""
+    prices = results.prices
+    table = values_of_points(results)
+    fleets = []
+    for point, others in enumerate(_fields_in_words(results, True)):
+        space = results.scenario(point)
+        words = []
+        if prices.uav or prices.lost_uav or "uavs" in table:
+            words.append(field_named("uavs").words(single_value([*space.uavs])))
+        if prices.pad or {"pads", ZONE_PADS} & {*table}:
+            for zone, pads in enumerate(space.zone_pads, 1):
+                number = field_named("pads").words(pads)
+                words.append(number if zone == 1 else f"{number} in zone {zone}")
+        fleets.append(numbers.join_words([*words, *others]) or "the fleet of the scenario")
+    return fleets
+
+
+@compute_once
+def conditions_in_words(results: Results) -> list[str]:
+    """The condition of every design point in words."""
+    return [", ".join(row) for row in _fields_in_words(results, False)]
+
+
+def _fields_in_words(results: Results, decisions: bool) -> list[list[str]]:
+    """The fields of every design point that are decided on, or the rest; none of ``_COUNTED``."""
+    table = values_of_points(results)
+    shown = [f for f in table if (f in DECISIONS) == decisions and f not in _COUNTED]
+    return rows_in_words(table[shown])
+
+
+def has_conditions(results: Results) -> bool:
+    """Whether fleets have to work under several conditions."""
+    return len({*conditions_in_words(results)}) > 1
 
 
 def ordered_values(values: pd.Series) -> list[Any]:
@@ -127,20 +166,13 @@ def intervals_in_words(results: Results) -> str:
     return INTERVALS
 
 
-def check_metric(results: Results, metric: str) -> None:
-    """Raise ``InputError`` if the missions do not have the metric."""
-    metrics = ranking_metrics(results.missions)
-    if metric not in metrics:
-        raise unknown_name("metric", f"{metric!r} is unknown", metric, metrics)
-
-
 def missions_with_metric(results: Results, metric: str, policy: str | None) -> pd.DataFrame:
     """The missions of a policy, or of all, if they have the metric.
 
     Raises:
         InputError: If there is no such metric or policy.
     """
-    check_metric(results, metric)
+    check_ranking_metric(metric, results.missions)
     if policy is None:
         return results.missions
     results.check_policy(policy)

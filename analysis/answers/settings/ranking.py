@@ -15,7 +15,6 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.answers.settings.home import way_home_sentence_of, with_way_home
 from dess.analysis.answers.settings.points import (
-    check_metric,
     ends_of_point,
     ends_sentence,
     intervals_in_words,
@@ -31,11 +30,11 @@ from dess.analysis.metrics import (
     COST,
     PRODUCT,
     SUCCESS,
-    column_in_sheet_unit,
     format_length,
     metric_in_missions,
     metric_of,
     metrics_in,
+    ranking_column,
 )
 from dess.analysis.names import field_named
 from dess.analysis.results.tables import Results, compute_once
@@ -66,9 +65,7 @@ def ranking_metric(results: Results, metric: str | None = None) -> str:
     """
     if metric is None:
         metric = getattr(results.study.selection, "metric", PRODUCT)
-    metric = column_in_sheet_unit(metric, results.missions)
-    check_metric(results, metric)
-    return metric
+    return ranking_column(metric, results.missions)
 
 
 def best_settings_sentence(results: Results, table: pd.DataFrame, metric: str) -> str:
