@@ -11,7 +11,7 @@ import pandas as pd
 from dess import InputError
 from dess.analysis.answers.fleet import cheapest, verdicts
 from dess.analysis.answers.fleet import tables as fleet_tables
-from dess.analysis.answers.fleet.costs import priced_settings, prices_in_words
+from dess.analysis.answers.fleet.costs import priced_settings
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import (
     best_settings_sentences,
@@ -133,7 +133,7 @@ class Answer:
         ranked = rank_settings(self.results, ranking)
         lines = best_settings_sentences(self.results, ranked, ranking)
         if self.question.study.costs:
-            lines.append(prices_in_words(self.results))
+            lines.append(self.results.prices.in_words)
         return lines
 
     def tables(self, metric: str | None = None) -> dict[str, pd.DataFrame]:

@@ -13,7 +13,7 @@ from typing import NamedTuple, Self
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.execution.jobs import simulate_missions
-from dess.analysis.results.store import Store, Work
+from dess.analysis.results.store import Count, Store
 from dess.analysis.study.study import Study
 from dess.base.files.memory import check_memory
 from dess.policies.registry import Policy, folder_of, load_team
@@ -266,11 +266,11 @@ def plan_study(
         InputError: If the folder contains something else, or ``workers`` is below 1.
     """
     check_workers(workers)
-    store = Store.peek(study, out, accept_code, reuse)
-    work_of_teams = zip(study.policies, store.work_of_teams(), strict=True)
-    plan = [_plan_team(study, policy, work) for policy, work in work_of_teams]
+    work = Store.peek(study, out, accept_code, reuse).work()
+    teams = zip(study.policies, work.missions, work.logs, strict=True)
+    plan = [_plan_team(study, *team) for team in teams]
     if study.bounds:
-        plan.append(_plan_bounds(study, store.work_on_bounds()))
+        plan.append(_plan_bounds(study, work.bounds))
     return plan
 
 
@@ -364,21 +364,21 @@ def _failures_left_to_the_run() -> Iterator[None]:
         return
 
 
-def _plan_team(study: Study, policy: str, work: Work) -> Planned:
+def _plan_team(study: Study, policy: str, missions: Count, logs: Count) -> Planned:
     """What a run would do for a team, as far as it is known now."""
-    most = work.needed
-    if study.rule and work.missing:
-        most = max(work.needed, study.most_missions)
-    present = work.needed - work.missing
-    missions = (work.missing, most - present)
-    time_of_logs = seconds_of(study.scenarios, policy, (work.logs, work.logs), "events")
-    seconds = seconds_of(study.scenarios, policy, missions, study.engine).plus(time_of_logs)
-    return Planned(policy, work.needed, present, work.logs, most, seconds)
+    most = missions.needed
+    if study.rule and missions.missing:
+        most = max(missions.needed, study.most_missions)
+    present = missions.needed - missions.missing
+    to_simulate = (missions.missing, most - present)
+    time_of_logs = seconds_of(study.scenarios, policy, (logs.missing, logs.missing), "events")
+    seconds = seconds_of(study.scenarios, policy, to_simulate, study.engine).plus(time_of_logs)
+    return Planned(policy, missions.needed, present, logs.missing, most, seconds)
 
 
-def _plan_bounds(study: Study, work: Work) -> Planned:
+def _plan_bounds(study: Study, bounds: Count) -> Planned:
     """What a run would do for the upper bounds."""
-    decisions = work.missing * sum(map(estimate_decisions, study.scenarios)) / study.size
+    decisions = bounds.missing * sum(map(estimate_decisions, study.scenarios)) / study.size
     seconds = Range(*(decisions * of_decision for of_decision in BOUND))
-    present = work.needed - work.missing
-    return Planned("upper bounds", work.needed, present, most=work.needed, seconds=seconds)
+    present = bounds.needed - bounds.missing
+    return Planned("upper bounds", bounds.needed, present, most=bounds.needed, seconds=seconds)

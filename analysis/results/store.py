@@ -55,18 +55,26 @@ Place = tuple[int, int]  # a design point and a replication
 Present = defaultdict[str, list[range]]  # replications by the key of their cell
 
 
-class Work(NamedTuple):
-    """What there is to do until a folder is complete.
-
-    Attributes:
-        needed: Number of missions, or of their bounds, that the folder must have.
-        missing: Number of these that it lacks.
-        logs: Number of event logs that it lacks.
-    """
+class Count(NamedTuple):
+    """How much of something a folder must have, and how much of it it lacks."""
 
     needed: int
     missing: int
-    logs: int = 0
+
+
+@dataclass(frozen=True)
+class Work:
+    """What there is to do until a folder is complete, as far as it is known now.
+
+    Attributes:
+        missions: Of every team, the number of missions.
+        logs: Of every team, the number of event logs.
+        bounds: The number of upper bounds.
+    """
+
+    missions: list[Count]
+    logs: list[Count]
+    bounds: Count
 
 
 @dataclass(frozen=True)
@@ -265,24 +273,22 @@ class Store:
         """
         return _absent_parts(parts, self._present[kind])
 
-    def work_of_teams(self) -> list[Work]:
-        """What there is to do for every team, as far as it is known now."""
+    def work(self) -> Work:
+        """What there is to do."""
         manifest = self.manifest
+        teams = range(len(manifest.policies))
         logged = [manifest.study.logged] * len(manifest.points)
-        work = []
-        for team in range(len(manifest.policies)):
-            parts = manifest.parts_of_team(team) + manifest.parts_of_check(team)
-            logs = self.missing("events", manifest.parts_of_team(team, logged))
-            missing = self.missing("missions", parts)
-            work.append(
-                Work(_count_missions(parts), _count_missions(missing), _count_missions(logs))
-            )
-        return work
+        missions = [manifest.parts_of_team(t) + manifest.parts_of_check(t) for t in teams]
+        logs = [manifest.parts_of_team(team, logged) for team in teams]
+        return Work(
+            missions=[self._count("missions", parts) for parts in missions],
+            logs=[self._count("events", parts) for parts in logs],
+            bounds=self._count("bounds", manifest.parts_with_bounds()),
+        )
 
-    def work_on_bounds(self) -> Work:
-        """What there is to do for the upper bounds."""
-        parts = self.manifest.parts_with_bounds()
-        return Work(_count_missions(parts), _count_missions(self.missing("bounds", parts)))
+    def _count(self, kind: str, parts: Sequence[Part]) -> Count:
+        """How many missions some parts have, and how many of them are missing."""
+        return Count(sum(map(len, parts)), sum(map(len, self.missing(kind, parts))))
 
     def keep(self, kind: str, chunk: chunks.Chunk, tables: Sequence[pa.Table]) -> None:
         """Store the tables of a chunk."""
@@ -493,11 +499,6 @@ def gaps_between(wanted: range, present: list[range]) -> list[range]:
         if begin >= wanted.stop:
             break
     return [gap for gap in [*missing, range(begin, wanted.stop)] if len(gap)]
-
-
-def _count_missions(parts: Iterable[Part]) -> int:
-    """How many missions some parts have together."""
-    return sum(map(len, parts))
 
 
 def _absent_parts(parts: Iterable[Part], present: Present) -> list[Part]:

@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from dess import InputError
+from dess.analysis import numbers
 from dess.analysis.study.stopping import MOST, Line, StrictTable
 from dess.physics.section import Integer, Number
 from dess.scenario.scenario import ScenarioSpace
@@ -16,6 +17,14 @@ Price = Annotated[float, Field(ge=0, le=10**12, allow_inf_nan=False)]
 
 PURCHASE = "purchase"
 PARTS = (PURCHASE, "charging", "hours", "losses")
+
+_PAID_FOR = {
+    "uav": "a UAV",
+    "pad": "a charging pad",
+    "charge": "charging a battery from 0 to 100 %",
+    "hour": "an hour of a mission",
+    "lost_uav": "a lost UAV",
+}
 
 
 class Costs(StrictTable):
@@ -64,6 +73,24 @@ class Costs(StrictTable):
     def pays_for_missions(self) -> bool:
         """Whether missions have a price, not the purchase alone."""
         return any((self.charge, self.hour, self.lost_uav))
+
+    @property
+    def in_words(self) -> str:
+        """The prices, the missions that are paid for, and what has no price."""
+        paid = []
+        free = []
+        for price, thing in _PAID_FOR.items():
+            value = getattr(self, price)
+            if value:
+                paid.append(f"{numbers.format_money(value, self.currency)} for {thing}")
+            else:
+                free.append(thing)
+        text = f"Prices: {numbers.join_words(paid)}."
+        if self.pays_for_missions:
+            text += f" The fleet is to make {numbers.format_count(self.missions, 'mission')}."
+        if free:
+            text += f" Nothing is paid for {numbers.join_words(free, 'or')}."
+        return text
 
     def of_lost(self, uavs: Any) -> Any:
         """What it costs if every mission loses this number of UAVs, in the currency."""

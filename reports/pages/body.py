@@ -20,7 +20,7 @@ from pygments.formatters import HtmlFormatter
 import dess
 from dess.reports.pages.html import JINJA, PART, set_indices
 from dess.reports.pages.notebook import SCORECARD, Report
-from dess.reports.pages.page import CARD, Card, Page, Picture, hidden_element
+from dess.reports.pages.page import Card, Page, Picture
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 FOLDED = "How this page was made"  # the heading of the section with method and provenance
@@ -100,7 +100,7 @@ def make_page(report: Report) -> Page:
         "scripts": report.scripts,
         "version": dess.__version__,
         "answer": card.finding,
-        "card": hidden_element(CARD, card.model_dump_json()),
+        "card": card.hidden,
         "code_style": Markup(HtmlFormatter().get_style_defs(".highlight")),
         "code": Markup(writer.block_code("\n\n\n".join(report.code), "python")),
         "folded": FOLDED,

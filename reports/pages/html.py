@@ -35,7 +35,7 @@ from dess.analysis.study.study import budget_of
 from dess.analysis.tables import Table
 from dess.base.errors import printable
 from dess.reports.pages import ASKED
-from dess.reports.pages.page import FILES, STUDY, Learned, Page, hidden_element
+from dess.reports.pages.page import STUDY, Learned, Page, hidden_element
 
 STUDIES_BESIDE = 6  # studies with a column in one table of what they were made with
 FEW_WORDS = 18  # characters of a cell that is not broken
@@ -248,7 +248,7 @@ def weights_table(folder: Path) -> HTML:
     files = learned_files(folder)
     rows = [(name, digest[:SHORT]) for name, digest in files.items()]
     shown = make_table(pd.DataFrame(rows, columns=["File", "SHA-256"]), "The learned policies")
-    return HTML(f"{shown.data}{hidden_element(FILES, Learned(files=files).model_dump_json())}")
+    return HTML(f"{shown.data}{Learned(files=files).hidden}")
 
 
 def _name_weights(evidence: Evidence) -> Iterator[str]:

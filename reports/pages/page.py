@@ -34,6 +34,11 @@ class Learned(Document):
 
     files: dict[str, str]
 
+    @property
+    def hidden(self) -> Markup:
+        """What a page contains of them, and does not show."""
+        return hidden_element(FILES, self.model_dump_json())
+
 
 class Card(Document):
     """What a page tells others: its question and, in one sentence, what it found.
@@ -51,6 +56,11 @@ class Card(Document):
     number: str = ""
     picture: Picture | None = None
     key: str = ""
+
+    @property
+    def hidden(self) -> Markup:
+        """What a page contains of the card, and does not show."""
+        return hidden_element(CARD, self.model_dump_json())
 
 
 def hidden_element(kind: str, text: str) -> Markup:

@@ -167,9 +167,9 @@ def _write_pages(
 
         new_pages = {report.page: make_page(report) for report in changed}
         for report in (report for report in changed if not report.failure):
-            files[f"{report.name}.ipynb"] = report.for_jupyter(results, out, values)
             pictures = figure_files(report)
             files |= {f"{report.folder}/{name}": picture for name, picture in pictures}
+            files[f"{report.name}.ipynb"] = report.for_jupyter(results, out, values)
     with locked(out / LOCK, *_BUSY, PATIENCE):
         others = find_pages(out, but=new_pages)
         pages = add_bars(others | new_pages)

@@ -11,7 +11,6 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.answers.fleet import cheapest
-from dess.analysis.answers.fleet.costs import prices_in_words
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.settings.baseline import check_baseline
 from dess.analysis.answers.settings.points import has_conditions, metrics_of_page, varied_values
@@ -151,9 +150,7 @@ def list_commands(results: Results, missions: pd.DataFrame) -> html.Marked:
 
 def list_reasons(results: Results) -> html.Marked:
     """The prices, how sure the answer of a search is, the other answers, and the guarantee."""
-    lines = [
-        f"- {text}" for text in (prices_in_words(results), *cheapest.reason_sentences(results))
-    ]
+    lines = [f"- {text}" for text in (results.prices.in_words, *cheapest.reason_sentences(results))]
     sure = "\n\n".join(
         f"Guarantee: {text}." for text in sorted(cheapest.guarantee_sentences(results))
     )

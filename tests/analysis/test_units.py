@@ -61,12 +61,12 @@ def test_the_price_of_an_hour_takes_the_slot_of_the_sheet(searched):
 def test_ages_of_missions_of_different_lengths_are_not_compared_without_saying_so(studied):
     results = studied(set={"age.measured": True})
     means = results.missions.groupby("policy")["slots"].mean().round()
-    text = unequal_lengths_sentence(results, ["age"])
+    text = unequal_lengths_sentence(results, [metric_of("age")])
     assert f"after {means.min():.0f} mission slots to {means.max():.0f} mission slots" in text
     assert "compared by age of information over missions of different lengths" in text
-    assert unequal_lengths_sentence(results, ["collection_ratio"]) == ""
+    assert unequal_lengths_sentence(results, [metric_of("collection_ratio")]) == ""
     alike = replace(results, missions=results.missions.assign(slots=480))
-    assert unequal_lengths_sentence(alike, ["age"]) == ""
+    assert unequal_lengths_sentence(alike, [metric_of("age")]) == ""
 
 
 def test_without_a_sheet_nothing_is_told_in_units(studied):

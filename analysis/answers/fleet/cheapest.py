@@ -20,7 +20,6 @@ from dess.analysis import numbers
 from dess.analysis.answers.fleet.costs import (
     cost_parts_in_words,
     mean_cost_parts,
-    prices_in_words,
 )
 from dess.analysis.answers.fleet.requirements import (
     Requirement,
@@ -50,7 +49,7 @@ from dess.analysis.answers.settings.points import (
     values_of_points,
 )
 from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
-from dess.analysis.metrics import COST, HOME, SUCCESS, metric_of
+from dess.analysis.metrics import COST, HOME, SUCCESS, Metric, metric_of
 from dess.analysis.names import DECISIONS
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.study.cheapest import Answer, Cheapest, CheapestChoice
@@ -134,6 +133,14 @@ class FleetAnswer:
     def _required(self) -> list[Requirement]:
         return requirements_of(self.results)
 
+    @property
+    def length_dependent_metrics(self) -> list[Metric]:
+        """The metrics by which fleets are compared that may depend on the length of a mission."""
+        asked = [requirement.metric for requirement in self._required]
+        if self.results.prices.hour:
+            return [*asked, metric_of(COST)]
+        return asked
+
     def estimates(self, column: str) -> pd.Series:
         """The mean of a metric of the fleet with its interval, under its worst condition.
 
@@ -156,6 +163,11 @@ class FleetAnswer:
     # --- sentences ---
 
     @property
+    def cost_in_words(self) -> str:
+        """The mean cost of the fleet over the conditions, in the currency of the prices."""
+        return numbers.format_money(self.cost, self.results.prices.currency)
+
+    @property
     def _where(self) -> str:
         """The policy and the condition, as the beginning of a sentence."""
         where = f"With the policy `{self.policy}`"
@@ -167,10 +179,10 @@ class FleetAnswer:
         """Which fleet is the cheapest that meets the requirements, and what it costs."""
         if not self.points:
             return f"{self._where}, no fleet is known to meet the requirements."
-        amount = numbers.format_money(self.cost, self.results.prices.currency)
+        parts = cost_parts_in_words(self.results, self.policy, self.points)
         return (
             f"{self._where}, the cheapest fleet that meets the requirements is **{self.fleet}** "
-            f"for {amount}{cost_parts_in_words(self.results, self.policy, self.points)}."
+            f"for {self.cost_in_words}{parts}."
         )
 
     def estimates_sentence(self) -> str:
@@ -376,9 +388,9 @@ def other_policies_sentences(results: Results) -> list[str]:
             if best.points:
                 sentences.append(f"With the policy `{other.policy}`, it is the same fleet.")
         elif other.points:
-            amount = numbers.format_money(other.cost, results.prices.currency)
             sentences.append(
-                f"With the policy `{other.policy}`, it would be **{other.fleet}** for {amount}."
+                f"With the policy `{other.policy}`, it would be **{other.fleet}** for "
+                f"{other.cost_in_words}."
             )
         else:
             sentences.append(
@@ -392,7 +404,7 @@ def reason_sentences(results: Results) -> list[str]:
     best = cheapest_answer(results)
     lines = [
         best.reasons(len(results.policies)),
-        unequal_lengths_sentence(results, _length_dependent_metrics(results)),
+        unequal_lengths_sentence(results, best.length_dependent_metrics),
     ]
     lines += [
         f"{other.headline()} {other.reasons()}".strip()
@@ -402,17 +414,9 @@ def reason_sentences(results: Results) -> list[str]:
     return [line for line in lines if line]
 
 
-def _length_dependent_metrics(results: Results) -> list[str]:
-    """The metrics by which fleets are compared that may depend on the length of a mission."""
-    asked = [requirement.column for requirement in requirements_of(results)]
-    if results.prices.hour:
-        return [*asked, COST]
-    return asked
-
-
 def cheapest_sentences(results: Results) -> list[str]:
     """In words: the answer, what is paid for, how sure it is, and the other answers."""
-    return [cheapest_sentence(results), prices_in_words(results), *reason_sentences(results)]
+    return [cheapest_sentence(results), results.prices.in_words, *reason_sentences(results)]
 
 
 def guarantee_sentences(results: Results) -> list[str]:

@@ -1,7 +1,7 @@
 """What fleets cost: their purchase, their missions, and the Pareto front of cost and a metric.
 
     results = load_results("results/fleets")  # of a study with a table [costs]
-    prices_in_words(results)  # what is paid for
+    results.prices.in_words  # what is paid for
     cost_front(results, "success")  # cost and success, with the probability of being on the front
 
 A setting is a policy at a design point, which is a fleet under a condition. Fleets are compared
@@ -32,13 +32,6 @@ CERTAIN = 0.01  # settings with a lower probability of being on a front are not 
 # What the parts of a cost are called, and the price that makes each.
 _PART_NAMES = {"charging": "charging", "hours": "hours", "losses": "lost UAVs"}
 _PRICE_OF_PART = {"charging": "charge", "hours": "hour", "losses": "lost_uav"}
-_PAID_FOR = {
-    "uav": "a UAV",
-    "pad": "a charging pad",
-    "charge": "charging a battery from 0 to 100 %",
-    "hour": "an hour of a mission",
-    "lost_uav": "a lost UAV",
-}
 
 
 @compute_once
@@ -160,24 +153,6 @@ def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> 
         f": {money(means[PURCHASE])} for the purchase and {total} for "
         f"{numbers.format_count(prices.missions, 'mission')} ({numbers.join_words(running)})"
     )
-
-
-def prices_in_words(results: Results) -> str:
-    """The prices of a study, the missions that are paid for, and what has no price."""
-    prices = results.prices
-    paid, free = [], []
-    for price, thing in _PAID_FOR.items():
-        value = getattr(prices, price)
-        if value:
-            paid.append(f"{numbers.format_money(value, prices.currency)} for {thing}")
-        else:
-            free.append(thing)
-    text = f"Prices: {numbers.join_words(paid)}."
-    if results.prices.pays_for_missions:
-        text += f" The fleet is to make {numbers.format_count(prices.missions, 'mission')}."
-    if free:
-        text += f" Nothing is paid for {numbers.join_words(free, 'or')}."
-    return text
 
 
 def _mission_values(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:

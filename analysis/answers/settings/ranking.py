@@ -30,6 +30,7 @@ from dess.analysis.metrics import (
     COST,
     PRODUCT,
     SUCCESS,
+    Metric,
     format_length,
     metric_in_missions,
     metric_of,
@@ -136,12 +137,12 @@ def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) ->
         rest,
         ends_sentence(results, best["point"], ends_of_point(results, best["point"])).strip(),
         way_home_sentence_of(results, best, metric),
-        unequal_lengths_sentence(results, [metric]),
+        unequal_lengths_sentence(results, [measure]),
     ]
     return " ".join(filter(None, parts))
 
 
-def unequal_lengths_sentence(results: Results, metrics: Iterable[str]) -> str:
+def unequal_lengths_sentence(results: Results, metrics: Iterable[Metric]) -> str:
     """That missions of different lengths are compared by what depends on it; empty if not so.
 
     Ages grow while a mission lasts, and hours are paid for. A cost is only to be among the metrics
@@ -151,7 +152,7 @@ def unequal_lengths_sentence(results: Results, metrics: Iterable[str]) -> str:
         results: The study.
         metrics: The metrics that are compared.
     """
-    compared = [metric_of(metric).within for metric in metrics if metric_of(metric).grows]
+    compared = [metric.within for metric in metrics if metric.grows]
     missions = results.missions
     has_quota = any(space.quota for space in results.store.manifest.scenarios)
     if not compared or not has_quota or missions["slots"].nunique() == 1:

@@ -7,7 +7,7 @@ from dess.analysis import numbers, run_study
 from dess.analysis.answers import summary
 from dess.analysis.answers.fleet import cheapest, verdicts
 from dess.analysis.answers.fleet import tables as fleet_tables
-from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings, prices_in_words
+from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings
 from dess.analysis.answers.settings.baseline import compare_with_baseline
 from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.intervals import level_after, share_interval
@@ -129,7 +129,7 @@ def test_the_price_is_told_in_its_parts(searched):
     assert f": {purchase:,.0f} EUR for the purchase and " in text
     assert f"hours {numbers.format_money(hours, 'EUR')}" in text
     assert best.cost == pytest.approx(rows["cost"].mean())
-    prices = prices_in_words(searched)
+    prices = searched.prices.in_words
     assert "1,000 EUR for a UAV, 100 EUR for a charging pad" in prices
     assert "The fleet is to make 5 missions." in prices
 

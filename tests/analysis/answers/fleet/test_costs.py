@@ -8,7 +8,6 @@ from dess.analysis.answers.fleet.costs import (
     cost_front,
     mean_cost_parts,
     priced_settings,
-    prices_in_words,
 )
 from dess.analysis.stats.verdict import on_front
 
@@ -40,7 +39,7 @@ def test_bad_questions_get_one_line(fixed, studied):
         priced_settings,
         mean_cost_parts,
         cost_front,
-        prices_in_words,
+        lambda results: results.prices.in_words,
         verdicts.judge_settings,
     ):
         with pytest.raises(InputError, match=r"no prices"):
