@@ -119,7 +119,7 @@ def add_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
             looks = np.array([results.looks(policy)[point] for policy in rows["policy"]])
             measure = metric_in_missions(results.missions, str(metric))
             may_be = may_be_best(wide[rows["policy"]].to_numpy(float), measure, looks)
-            may_be &= within_reach(rows["low"], rows["high"], str(metric)).to_numpy()
+            may_be &= within_reach(rows["low"], rows["high"], measure).to_numpy()
             if may_be.sum() > 1:
                 best = TIED
             else:

@@ -266,7 +266,8 @@ def plan_study(
         InputError: If the folder contains something else, or ``workers`` is below 1.
     """
     check_workers(workers)
-    work = Store.peek(study, out, accept_code, reuse).work()
+    store = Store.peek(study, out, accept_code, reuse)
+    work = store.work()
     teams = zip(study.policies, work.missions, work.logs, strict=True)
     plan = [_plan_team(study, *team) for team in teams]
     if study.bounds:

@@ -178,8 +178,8 @@ def difference_test(
         level: Confidence level.
     """
     differences = differences_of(a, b)
-    rare = intervals.rare_differences(metric, a.mean(), b.mean())
     measure = metric_of(metric)
+    rare = intervals.rare_differences(measure, a.mean(), b.mean())
     if rare is None or (differences.size == 1 and not measure.is_bounded):
         return t_test(differences, level)
     smooth, p = t_test(add_rare_pairs(differences, rare), level)
@@ -228,7 +228,7 @@ def column_tests(
     ends = {"low": mean - half, "high": mean + half}
     table = pd.DataFrame({"difference": mean, **ends, "n": n, "student": half})
     means = values.where(present).mean()
-    rare = intervals.rare_differences(metric, means, means - mean)
+    rare = intervals.rare_differences(measure, means, means - mean)
     if rare is None:
         t = (mean / differences.sem()).abs()
         table["p"] = 2 * stdtr(np.maximum(n - 1, 1), -t)

@@ -119,7 +119,7 @@ def skewness_of(squares: Any, cubes: Any, n: Any) -> Any:
     return np.where(is_known & np.isfinite(skewness), skewness, 0.0)
 
 
-def rare_differences(metric: str | Metric, a: Any, b: Any) -> tuple[Any, Any] | None:
+def rare_differences(metric: Metric, a: Any, b: Any) -> tuple[Any, Any] | None:
     """The differences A - B of missions in which only one of two policies does well.
 
     For outcomes, they are 1 and -1. Of a metric with a known range, one value goes to an end of
@@ -135,14 +135,13 @@ def rare_differences(metric: str | Metric, a: Any, b: Any) -> tuple[Any, Any] | 
     Returns:
         The (...) highest and the (...) lowest differences; None if they are not known.
     """
-    measure = metric_of(metric)
-    if measure.is_outcome:
+    if metric.is_outcome:
         return 0 * (a - b) + 1, 0 * (a - b) - 1
-    if measure.has_range:
-        least, most = measure.range
+    if metric.has_range:
+        least, most = metric.range
         return np.maximum(a - least, most - b), -np.maximum(b - least, most - a)
-    if measure.failure:
-        return a - b + measure.failure, a - b - measure.failure
+    if metric.failure:
+        return a - b + metric.failure, a - b - metric.failure
     return None
 
 
@@ -337,16 +336,17 @@ def stratified_interval(values: np.ndarray, metric: str | Metric, level: float =
         metric: The metric.
         level: Confidence level.
     """
+    measure = metric_of(metric)
     present = ~np.isnan(values)
     n = present.sum(axis=0)
     points = values.shape[1]
     if points == 1:
-        return interval_of(metric, values[present], level)
+        return interval_of(measure, values[present], level)
     means = np.nansum(values, axis=0) / n
     residuals = np.where(present, values - means, 0.0)
     mean = float(means.mean())
     common = float(((residuals / n).sum(axis=1) ** 2).sum()) / points**2  # variance of the mean
-    if metric_of(metric).is_bounded:
+    if measure.is_bounded:
         alone = float(((residuals**2).sum(axis=0) / n**2).sum()) / points**2
         missions = points**2 / float((1 / n).sum())
         if alone:
@@ -362,7 +362,7 @@ def stratified_interval(values: np.ndarray, metric: str | Metric, level: float =
     cubes = float(((residuals / n).sum(axis=1) ** 3).sum()) / points**3
     skewness = skewness_of(common, cubes, replications)
     ends = skewed_ends(mean, error, skewness, replications, level)
-    return Interval(mean, *np.clip(ends, *metric_of(metric).range).tolist())
+    return Interval(mean, *np.clip(ends, *measure.range).tolist())
 
 
 def summary(
@@ -410,19 +410,20 @@ def column_intervals(
     Returns:
         (K, 4): ``mean``, ``low``, ``high``, ``n``, with the columns as index; nan without values.
     """
+    measure = metric_of(metric)
     n = values.count()
     mean = values.mean()
     level = pd.Series(levels, index=values.columns)
     deviations = values - mean
     skewness = skewness_of((deviations**2).sum(), (deviations**3).sum(), n)
     ends = skewed_ends(mean, values.sem(), skewness, np.maximum(n, 1), level)
-    low, high = (end.clip(*metric_of(metric).range) for end in ends)
+    low, high = (end.clip(*measure.range) for end in ends)
     table = pd.DataFrame({"mean": mean, "low": low, "high": high, "n": n})
-    if metric_of(metric).is_bounded:
+    if measure.is_bounded:
         some = n > 0
         ends = bounded_ends(mean[some], values.var(ddof=0)[some], n[some], level[some])
         table.loc[some, ["low", "high"]] = np.transpose(ends)
-    if metric_of(metric).is_outcome:
+    if measure.is_outcome:
         rows = ((values.isin((0, 1)) | values.isna()).all() & (n > 0)).to_numpy()
         successes = (mean * n)[rows].round().astype(int)
         samples = [*zip(successes, n[rows], level[rows], strict=True)]

@@ -155,7 +155,7 @@ def front_membership(
     return count / draws
 
 
-def within_reach(low: pd.Series, high: pd.Series, metric: str | Metric) -> pd.Series:
+def within_reach(low: pd.Series, high: pd.Series, metric: Metric) -> pd.Series:
     """The settings whose interval does not lie wholly on the worse side of another one.
 
     Paired tests alone cannot tell a setting of few missions from one of many: they see only the
@@ -166,7 +166,7 @@ def within_reach(low: pd.Series, high: pd.Series, metric: str | Metric) -> pd.Se
         high: (K,) upper ends.
         metric: The metric.
     """
-    if metric_of(metric).less_is_better:
+    if metric.less_is_better:
         return ~(low > high.min())
     return ~(high < low.max())
 
@@ -200,9 +200,10 @@ def may_be_best(
         (K,) of bool. A setting that has fewer than two replications in common with every other one
         is not ruled out.
     """
+    measure = metric_of(metric)
     present = np.isfinite(values)
     means = np.nansum(values, axis=0) / np.maximum(present.sum(axis=0), 1)
-    if metric_of(metric).less_is_better:
+    if measure.less_is_better:
         values = -values
     # What a replication adds to all settings cancels in their differences.
     centre = np.nanmean(np.where(present.any(1, keepdims=True), values, 0.0), axis=1, keepdims=True)
@@ -212,7 +213,7 @@ def may_be_best(
         looks = np.zeros(values.shape[1], int)
     error_of_policy = (1 - LEVEL) / max(values.shape[1] - 1, 1)
     blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
-    rare = [_rare_leads(metric, means, means[block, None]) for block in blocks]
+    rare = [_rare_leads(measure, means, means[block, None]) for block in blocks]
     # The missions that a pair shares end with those of the setting that has fewer.
     shared = [np.minimum(looks[block, None], looks) for block in blocks]
     alphas = [1 - level_after(of_pairs, 1 - error_of_policy) for of_pairs in shared]
@@ -226,11 +227,11 @@ def may_be_best(
 
 
 def _rare_leads(
-    metric: str | Metric, others: np.ndarray, own: np.ndarray
+    metric: Metric, others: np.ndarray, own: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """The rare differences by which others are ahead of a setting, and behind it."""
     rare = rare_differences(metric, others, own)
-    if rare is None or not metric_of(metric).less_is_better:
+    if rare is None or not metric.less_is_better:
         return rare
     return -rare[1], -rare[0]
 

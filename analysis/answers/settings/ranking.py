@@ -217,15 +217,16 @@ def rank_settings(
     seen = np.array([looks[row.policy][row.point] for row in table.itertuples()])
     others = [name for name in metrics_in(missions) if name != metric]
     for name in (*others, metric):
+        measure = metric_in_missions(missions, name)
         wide = by_replication(missions, name, cell)
         wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[cell]))
-        ends = column_intervals(wide, metric_in_missions(missions, name), level_after(seen))
+        ends = column_intervals(wide, measure, level_after(seen))
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
-    # By the ranking metric, which was computed last.
-    table["tied"] = may_be_best(wide.to_numpy(float), metric_in_missions(missions, metric), seen)
-    table["tied"] &= within_reach(table[f"{metric}_low"], table[f"{metric}_high"], metric)
-    less = metric_of(metric).less_is_better
-    table = table.sort_values(metric, ascending=less, kind="stable", ignore_index=True)
+    # By the ranking metric, which was the last one.
+    table["tied"] = may_be_best(wide.to_numpy(float), measure, seen)
+    table["tied"] &= within_reach(table[f"{metric}_low"], table[f"{metric}_high"], measure)
+    ascending = measure.less_is_better
+    table = table.sort_values(metric, ascending=ascending, kind="stable", ignore_index=True)
     table.insert(0, "rank", np.arange(1, len(table) + 1))
     return table
 
