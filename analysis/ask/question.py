@@ -25,7 +25,7 @@ from dess.analysis.execution.effort import BASELINE as ANY_POLICY
 from dess.analysis.execution.effort import Planned, check_run, plan_study, policies_for
 from dess.analysis.execution.jobs import Progress
 from dess.analysis.execution.runner import Round, run_study
-from dess.analysis.metrics import AGE, ALIASES, METRICS
+from dess.analysis.metrics import AGE, ALIASES, METRICS, column_in_sheet_unit
 from dess.analysis.names import SWEEP, SWEEPS, field_in_words, value_of_field
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.provenance import engine_code, team_of
@@ -34,7 +34,7 @@ from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.design import MAX_SIZE, GridDesign, TableDesign
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.study import Study, study_from
-from dess.base.errors import to_input_error, unknown_name
+from dess.base.errors import shown, to_input_error, unknown_name
 from dess.base.files.reading import paths_in
 from dess.base.files.writing import toml_value, write_file
 from dess.policies.registry import list_teams
@@ -85,6 +85,23 @@ class Question:
         """The results folders of the other questions, whose missions are copied."""
         manifests = paths_in(self.out.parent, f"*/{MANIFEST}")
         return [path.parent for path in manifests if path.parent != self.out]
+
+    def measured_column(self, metric: str, where: str = "metric") -> str:
+        """The column of a metric of its missions, in the unit of a data sheet if possible.
+
+        Args:
+            metric: The metric, which may have a short name.
+            where: What names it, for messages.
+
+        Raises:
+            InputError: If the missions do not measure it.
+        """
+        measured = self.study.metrics
+        column = column_in_sheet_unit(ALIASES.get(metric, metric), measured)
+        if column not in measured:
+            problem = f"{shown(metric)} is not measured"
+            raise unknown_name(where, problem, metric, [*ALIASES, *measured])
+        return column
 
     def plan(self, workers: int = 1) -> list[Planned]:
         """What ``ask`` would do, as ``plan_study`` says it; nothing is written."""

@@ -134,6 +134,7 @@ def world_of(scenario: ScenarioSpace) -> World:
 def _world_of(scenario: ScenarioSpace, thread: int) -> World:
     m, (columns, rows) = scenario.communication_slots, scenario.size
     places = m * fleet.places_per_slot(scenario.fleet)
+    steps = 5 * columns * rows * fleet.legs(scenario.fleet)
     longest = max(columns, rows)
     fine = np.arange(places * (longest - 1) + 1)
     diagonal = np.sqrt(2) * np.sqrt((columns * columns + rows * rows) / 2) * scenario.cell_size
@@ -149,7 +150,6 @@ def _world_of(scenario: ScenarioSpace, thread: int) -> World:
         loss = 10 * scenario.path_loss_exponent * log10(distance / edge)
         mean_snr[row] = np.where(distance <= reach, scenario.edge_snr - loss, -math.inf)
     nodes = np.array(scenario.nodes, np.int64)
-    steps = 5 * columns * rows * fleet.legs(scenario.fleet)
     return World.of(nodes, mean_snr, scenario.chart, steps, m)
 
 

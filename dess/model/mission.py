@@ -145,8 +145,9 @@ class Mission:
         self.policies = policies
         self.world = world_of(scenario)
         self.shown_world = self.world.shown()  # what policies may see of it
+        starts = starts_of([scenario], seed)
         self.state = state_of([scenario], 1)
-        rules.launch(self.state, 0, starts_of([scenario], seed), 0, replication)
+        rules.launch(self.state, 0, starts, 0, replication)
         self.mission = self.state.missions[0]
         self.uavs = self.state.uavs[0]
         self.residual = self.state.residual[0]

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dess.base.errors import shown, unknown_name
 from dess.base.libraries import missing
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption, run_or_exit
@@ -93,7 +92,7 @@ def sweep(
     )
     parameters = {}
     if metric:
-        parameters["metric"] = _measured_metric(question, metric)
+        parameters["metric"] = question.measured_column(metric, "--metric")
     answer = _answer_question(
         question, f"{PREFIX}{question.study.name}", out, workers, dry_run, yes
     )
@@ -169,18 +168,6 @@ def what_if(
         return out / f"{WHAT_IF}.html"
 
     _print_answer(answer, None, render, as_json, "what-if question")
-
-
-def _measured_metric(question: "Question", metric: str) -> str:
-    """The column of the metric that ranks the settings of a sweep."""
-    from dess.analysis.metrics import ALIASES, column_in_sheet_unit
-
-    measured = question.study.metrics
-    column = column_in_sheet_unit(ALIASES.get(metric, metric), measured)
-    if column not in measured:
-        names = [*ALIASES, *measured]
-        raise unknown_name("--metric", f"{shown(metric)} is not measured", metric, names)
-    return column
 
 
 def _answer_question(
