@@ -101,7 +101,7 @@ class Metric:
     @property
     def is_in_sheet_unit(self) -> bool:
         """Whether it is in a unit of a data sheet, which is written behind every value."""
-        return self.unit in _SIZES
+        return self.unit in _UNITS
 
     @property
     def is_outcome(self) -> bool:
@@ -165,7 +165,10 @@ AGE, COST = "age", "cost"  # a cost have the missions of a study with prices
 BOUND, GAP = "upper_bound", "optimality_gap"
 
 _SLOTS, _DATA = "mission slots", "data units"
-_SIZES = {"min": 60.0, "h": 3600.0, "MB": 8e6, "km": 1000.0}  # [s], [bit], [m]
+# What a unit of a data sheet measures, and how large it is [s], [bit], [m].
+_UNITS = {"min": ("slot", 60.0), "h": ("slot", 3600.0), "MB": ("data", 8e6), "km": ("cell", 1e3)}
+# The units of maps, of curves over time and of the player, where there is a data sheet.
+DRAWN_UNITS = {"length": "km", "time": "h", "data": "MB"}
 # A metric is declared once, in the list of the missions that have it: wherever metrics are chosen,
 # they come from these lists. Every mission has the paper's metrics, in its order (Section VI-A). It
 # calls them successful communication, collection ratio, and collection ratio and communication; the
@@ -256,8 +259,9 @@ MEASURES = {metric.column: metric for metric in _MEASURED}
 EITHER = MEASURES | {metric.in_units.column: metric.in_units for metric in _MEASURED}
 ALWAYS = tuple(metric.column for metric in _OF_MISSIONS)  # the metrics of every mission
 BESIDE = {metric.column: metric.name for metric in _BESIDE}  # also of every mission, with names
+_MEASURED_ALWAYS = tuple(name for name in MISSION_RECORD.names or () if name in MEASURES)
 # All of every mission, in the order in which means are listed.
-RECORDED = tuple(dict.fromkeys((SUCCESS, *BESIDE, *ALWAYS)))
+RECORDED = tuple(dict.fromkeys((SUCCESS, *BESIDE, *ALWAYS, *_MEASURED_ALWAYS)))
 # Short names of metrics on the command line.
 ALIASES = {"ratio": RATIO, "product": PRODUCT}
 
@@ -304,7 +308,7 @@ def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
         return metric
     units = 1.0
     if metric.is_in_sheet_unit:
-        units = _SIZES[longest.unit] / _SIZES[metric.unit]
+        units = _UNITS[longest.unit][1] / _UNITS[metric.unit][1]
     return metric.lasting(float(missions[longest.column].max()) * units)
 
 
@@ -334,8 +338,8 @@ def columns_in_units(missions: Mapping[str, Any], units: Units) -> dict[str, Any
 
 def size_of(unit: str, units: Units) -> float:
     """A slot, a data unit or a cell in a unit of time, data or length."""
-    size = {"MB": units.data, "km": units.cell}.get(unit, units.slot)
-    return size / _SIZES[unit]
+    quantity, size = _UNITS[unit]
+    return getattr(units, quantity) / size
 
 
 def format_length(slots: int, units: Units | None) -> str:
@@ -389,5 +393,4 @@ def ranking_column(metric: str, missions: Container[str]) -> str:
 
 def metrics_of_scenario(space: ScenarioSpace) -> list[str]:
     """The metrics of the missions of a scenario, as they are measured."""
-    recorded = [name for name in MISSION_RECORD.names or () if name in MEASURES]
-    return metrics_in([*BESIDE, *recorded, *measures_of(space)])
+    return metrics_in([*BESIDE, *_MEASURED_ALWAYS, *measures_of(space)])

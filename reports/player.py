@@ -31,7 +31,7 @@ from PIL import Image
 from dess import InputError
 from dess.analysis.figures import missions, style
 from dess.analysis.figures.style import node_colours, uav_colours
-from dess.analysis.metrics import format_length, size_of
+from dess.analysis.metrics import DRAWN_UNITS, format_length, size_of
 from dess.analysis.numbers import format_count
 from dess.analysis.results import event_log
 from dess.reports.pages.html import Part, load_template, make_figures
@@ -124,7 +124,7 @@ class Playback:
         if units:
             now = format_length(slot, units)
             end = format_length(self.end, units)
-            data = size_of("MB", units)
+            data = size_of(DRAWN_UNITS["data"], units)
             return f"{now} of {end} · {left * data:,.3g} MB left · {used}"
         return f"slot {slot} of {self.end} · {left:.1f} data units left · {used}"
 
@@ -215,8 +215,7 @@ def choose_units(scenario: Scenario) -> dict[str, tuple[str, float]]:
     """The units in which a player tells lengths, times and data, and what 1 of the model is."""
     if not (units := scenario.units):
         return {"length": ("cells", 1), "time": ("mission slots", 1), "data": ("data units", 1)}
-    metric_units = {"length": "km", "time": "h", "data": "MB"}
-    return {what: (unit, size_of(unit, units)) for what, unit in metric_units.items()}
+    return {what: (unit, size_of(unit, units)) for what, unit in DRAWN_UNITS.items()}
 
 
 def _check_log(log: pd.DataFrame, scenario: Scenario) -> None:

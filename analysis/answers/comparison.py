@@ -177,7 +177,7 @@ def _plot_distribution(values: np.ndarray, pair: Pair) -> Figure:
         for start, end, outcome in ((x[0], 0, BEHIND), (0, x[-1], AHEAD)):
             ax.axvspan(start, end, color=COLOURS[outcome], alpha=0.11, linewidth=0, zorder=0)
         band = np.clip([y - half, y + half], 0, 1)
-        ax.fill_between(x, *band, step="post", color=style.INK, **style.BAND, gid="band")
+        ax.fill_between(x, *band, step="post", **style.band(style.INK), gid="band")
         ax.step(x, y, where="post", color=style.INK, linewidth=1.8, gid="shares")
         shares = {BEHIND: (values < 0).mean(), AHEAD: (values > 0).mean()}
         for place, (outcome, share) in enumerate(shares.items()):

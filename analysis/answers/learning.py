@@ -309,7 +309,7 @@ _SIDES = ("with transfer", "without")
 # Weight of the newest evaluation in the exponential moving average.
 ALPHA = 0.5
 # Level of the intervals of the paper's Fig. 3.
-BAND = 0.99
+BAND_LEVEL = 0.99
 
 
 # What holds for all figures of trainings.
@@ -468,9 +468,9 @@ def compare_transfer(averages: pd.DataFrame, using: str, without: str, shortest:
     since = None
     if first < len(steps):
         since = int(steps[first])
-    last = difference_of_trainings(a.loc[steps[-1]].to_numpy(), b.loc[steps[-1]].to_numpy(), BAND)[
-        0
-    ]
+    last = difference_of_trainings(
+        a.loc[steps[-1]].to_numpy(), b.loc[steps[-1]].to_numpy(), BAND_LEVEL
+    )[0]
     length = int(steps[-1])
     if length >= shortest:
         verdict = judge_parts(verdict_above(last))

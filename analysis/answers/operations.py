@@ -38,7 +38,7 @@ from dess.analysis.tables import WIDER, allowance_sentence
 # model of the same kind (Mathematics 13(21) 3564).
 PUBLISHED = {2: -0.46, 10: -0.79}
 RATE, REPAIR = "failures.uav_rate", "failures.uav_repair"
-BAND = (0.1, 0.9)  # the quantiles between which most queues are
+QUANTILES = (0.1, 0.9)  # the quantiles between which most queues are
 # The events that begin and end the wait of a UAV for a pad.
 _WAITS = (
     *("charge_request", "charge_start", "charge_withdrawal", "uav_failure", "quota_filled"),
@@ -348,7 +348,7 @@ def queues_over_time(results: Results, policy: str, points: Iterable[int]) -> pd
 
     Returns:
         A row per design point and slot: ``point``, the varied fields, ``slot``, the ``mean`` number
-        of UAVs that wait, ``low`` and ``high`` (the quantiles ``BAND`` over missions), and ``n``
+        of UAVs that wait, ``low`` and ``high`` (their ``QUANTILES`` over missions), and ``n``
         missions.
 
     Raises:
@@ -362,7 +362,9 @@ def queues_over_time(results: Results, policy: str, points: Iterable[int]) -> pd
             pd.Series(count_waiting_uavs(results.events(policy, point, n))) for n in logged
         ]
         counts = pd.concat(of_missions, axis=1).fillna(0)
-        ends = dict(zip(("low", "high"), counts.quantile(BAND, axis=1).to_numpy(), strict=True))
+        ends = dict(
+            zip(("low", "high"), counts.quantile(QUANTILES, axis=1).to_numpy(), strict=True)
+        )
         rows = pd.DataFrame({"slot": counts.index, "mean": counts.mean(axis=1), **ends})
         fields = values_of_points(results).loc[[point] * len(rows)].rename_axis("point")
         rows = pd.concat([fields.reset_index(), rows], axis=1)
@@ -375,7 +377,7 @@ def draw_queues(results: Results, margin: float) -> Drawing:
     rows = queues_over_time(results, results.policies[0], short_of_pads(results, margin))
     titles = {uavs: f"UAVs that wait for a pad: {uavs} UAVs" for uavs in rows["uavs"].unique()}
     panels = rows.assign(panel=rows["uavs"])
-    low, high = map(numbers.format_level, BAND)
+    low, high = map(numbers.format_level, QUANTILES)
     return Drawing(
         plot_courses(panels, "pads", "", titles, "Number of charging pads"),
         "The number of UAVs that wait for a pad over the slots of the mission",

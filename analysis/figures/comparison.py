@@ -103,7 +103,7 @@ def plot_gaps(table: pd.DataFrame) -> Figure:
     with style.new_panels(height, len(fleets), "x", sharex=True, squeeze=False) as (figure, axes):
         for ax, (uavs, rows) in zip(axes.flat, fleets, strict=True):
             bound, low, high = rows[[BOUND, f"{BOUND}_low", f"{BOUND}_high"]].iloc[0]
-            ax.axvspan(low, high, color=style.MUTED, **style.BAND)
+            ax.axvspan(low, high, **style.band(style.MUTED))
             ax.axvline(bound, color=style.INK, linewidth=1.3, label="upper bound")
             style.plot_in_rows(rows, ax, PRODUCT, f"{PRODUCT}_low", f"{PRODUCT}_high")
             ax.set(title=f"{format_count(uavs, 'UAV')}: bound {bound:.1%}", xlim=(-0.02, 1.02))

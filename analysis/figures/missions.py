@@ -18,7 +18,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from dess.analysis.figures import style
-from dess.analysis.metrics import size_of
+from dess.analysis.metrics import DRAWN_UNITS, size_of
 from dess.analysis.names import value_text
 from dess.analysis.results import event_log
 from dess.scenario.scenario import Scenario, ScenarioSpace
@@ -92,9 +92,9 @@ def plot_chart(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
     ax.set(aspect="equal", xlim=(-0.5, columns - 0.5), ylim=(rows - 0.5, -0.5))
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(MaxNLocator(integer=True, nbins=8))
-    ax.set_ylabel(f"y, south [{_unit_of_axis(ax.yaxis, 'km', 'cells', scenario)}]")
+    ax.set_ylabel(f"y, south [{_unit_of_axis(ax.yaxis, 'length', 'cells', scenario)}]")
     cells = f"cells of {scenario.cell_size:g} m"
-    ax.set_xlabel(f"x, east [{_unit_of_axis(ax.xaxis, 'km', cells, scenario)}]")
+    ax.set_xlabel(f"x, east [{_unit_of_axis(ax.xaxis, 'length', cells, scenario)}]")
 
 
 def plot_battery(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
@@ -127,10 +127,10 @@ def plot_residual(events: event_log.Events, scenario: Scenario, ax: Axes) -> Non
     ax.plot(total.index, total, color=style.INK, linewidth=1.6, label="all nodes")
     size = 1.0
     if scenario.units:
-        size = size_of("MB", scenario.units)
+        size = size_of(DRAWN_UNITS["data"], scenario.units)
     _margin_note(f"{total.iloc[-1] * size:.0f} left", total.iloc[-1], ax)
     ax.set(title="Residual data, a band per node", ylim=(0, None))
-    ax.set_ylabel(_unit_of_axis(ax.yaxis, "MB", "data units", scenario, 5))
+    ax.set_ylabel(_unit_of_axis(ax.yaxis, "data", "data units", scenario, 5))
     _time_axis(events, scenario, ax)
 
 
@@ -139,7 +139,7 @@ def plot_age(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     curve = event_log.mean_age(events)
     ax.plot(curve["time"], curve["age"], color=style.INK, linewidth=1.2, gid="age")
     ax.set(title="Mean age of the nodes", ylim=(0, None))
-    ax.set_ylabel(_unit_of_axis(ax.yaxis, "h", "slots", scenario, 5))
+    ax.set_ylabel(_unit_of_axis(ax.yaxis, "time", "slots", scenario, 5))
     _time_axis(events, scenario, ax)
 
 
@@ -231,7 +231,7 @@ def plot_courses(
             for value, course in rows[rows["panel"] == panel].groupby(line, sort=False):
                 colour = looks[value_text(value)][0]
                 ax.fill_between(course["slot"], course["low"], course["high"], step="post",
-                                color=colour, **style.BAND)  # fmt: skip
+                                **style.band(colour))  # fmt: skip
                 ax.plot(course["slot"], course["mean"], color=colour, label=value_text(value))
             ax.set(title=title, ylim=(0, None), xlim=(0, rows["slot"].max()))
             style.set_axis_unit(ax.yaxis, unit, 4)
@@ -357,15 +357,16 @@ def _margin_note(text: str, level: float, ax: Axes) -> None:
 def _time_axis(events: event_log.Events, scenario: Scenario, ax: Axes) -> None:
     ax.set(xlim=(0, event_log.mission_length(events)))
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=8))
-    ax.set_xlabel(f"time [{_unit_of_axis(ax.xaxis, 'h', 'mission slots', scenario)}]")
+    ax.set_xlabel(f"time [{_unit_of_axis(ax.xaxis, 'time', 'mission slots', scenario)}]")
     style.grid_of("y", ax)
 
 
 def _unit_of_axis(
-    axis: Axis, unit: str, of_model: str, scenario: Scenario | ScenarioSpace, nbins: int = 8
+    axis: Axis, quantity: str, of_model: str, scenario: Scenario | ScenarioSpace, nbins: int = 8
 ) -> str:
-    """The unit of an axis; with a data sheet, its ticks are in that unit."""
+    """The unit of an axis of lengths, times or data; with a data sheet, its ticks are in it."""
     if not scenario.units:
         return of_model
+    unit = DRAWN_UNITS[quantity]
     style.set_axis_size(axis, size_of(unit, scenario.units), nbins)
     return unit

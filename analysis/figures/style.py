@@ -44,7 +44,6 @@ LINES = ("-", "--", ":", "-.")
 MARKERS = "os^vPX*"
 WIDTH, DPI = 5.2, 150  # inches, dots per inch
 OUTLINED: dict = {"path_effects": [withStroke(linewidth=2.5, foreground="white")]}  # of texts
-BAND: dict = {"alpha": 0.25, "linewidth": 0}  # of confidence bands, in the colour of their line
 # In all figures, blue means better, orange worse, and grey inconclusive.
 BETTER, WORSE = "#0173b2", "#c05000"
 ZERO: dict = {"color": INK, "linewidth": 1, "zorder": 1}  # the line of no difference
@@ -217,6 +216,11 @@ def dot_style(look: Look) -> dict:
     """The style of means with that colour and marker, as arguments of ``Axes.errorbar``."""
     colour, marker = look
     return {"color": colour, "marker": marker, "markersize": 4.5, "capsize": 4, "elinewidth": 1.8}
+
+
+def band(colour: str) -> dict:
+    """The keywords of a band, of confidence or of quantiles, around a line of this colour."""
+    return {"color": colour, "alpha": 0.25, "linewidth": 0}
 
 
 def error_bar_arms(

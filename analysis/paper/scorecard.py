@@ -13,7 +13,7 @@ import pandas as pd
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers import summary
-from dess.analysis.answers.learning import BAND
+from dess.analysis.answers.learning import BAND_LEVEL
 from dess.analysis.paper import measures, rules, values
 from dess.analysis.paper.rules import MARGIN, NEAR
 from dess.analysis.results.learners import trained_policies_by_learner
@@ -29,7 +29,7 @@ _FILE = Path(__file__).with_name("claims.toml")
 _NAMED = {
     "near": numbers.format_margin(NEAR),
     "near_share": f"{100 * NEAR:g} %",
-    "band": f"{100 * BAND:g} %",
+    "band": f"{100 * BAND_LEVEL:g} %",
     "level": numbers.format_margin(MARGIN),
     "crossing": f"{values.CROSSING:,}",
 }
