@@ -75,7 +75,7 @@ def new_sequence(least: float, most: float, error: float = 0.05) -> np.ndarray:
 
 
 @kernel
-def start_sequence(sequence, least, most, error):  # type: ignore[no-untyped-def]
+def start_sequence(sequence, least, most, error):
     """Make a sequence one without values, see ``new_sequence``."""
     s = sequence[0]
     s.error = error
@@ -94,7 +94,7 @@ def start_sequence(sequence, least, most, error):  # type: ignore[no-untyped-def
 
 
 @kernel
-def add_values(sequence, values):  # type: ignore[no-untyped-def]
+def add_values(sequence, values):
     """Add values in their order. The interval depends on this order, and not on when it is read.
 
     Args:
@@ -115,7 +115,7 @@ def add_values(sequence, values):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _bet(s, value):  # type: ignore[no-untyped-def]
+def _bet(s, value):
     """Settle the bets on a value from 0 to 1, and rule out the means against which they have won.
 
     The stakes follow from the values before. Half of the capital is bet on either side, so that a
@@ -148,7 +148,7 @@ def _bet(s, value):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def sequence_ends(sequence):  # type: ignore[no-untyped-def]
+def sequence_ends(sequence):
     """The lower and the upper end of the interval of the mean, so far.
 
     Args:
