@@ -20,7 +20,7 @@ from numba import config, njit
 from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import Compiler, Flags
 from numba.core.types import unliteral
 from numba.extending import overload
 
@@ -40,10 +40,40 @@ class _Code(JITCodeLibrary):
         ll_module.data_layout = self._codegen._data_layout
 
 
+class _Flags(Flags):
+    """The options of a compilation; numba compares them at every call that it compiles.
+
+    It compares the values of all options, which takes a tenth of the time. Those that have been set
+    are enough.
+    """
+
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        return len(self._values)
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, _Flags):
+            return bool(self._values == other._values)
+        return bool(super().__eq__(other))
+
+
 class _Compiler(Compiler):
     """Numba's compiler without garbage collections, which would free little and take a tenth."""
 
     library: type[JITCodeLibrary] = _Code
+
+    def __init__(
+        self,
+        typing: Any,
+        target: Any,
+        library: Any,
+        args: Any,
+        result: Any,
+        flags: Flags,
+        names: Any,
+    ):
+        super().__init__(typing, target, library, args, result, _Flags(flags), names)
 
     def _compile_core(self) -> Any:
         state, was_enabled = self.state, gc.isenabled()

@@ -11,13 +11,13 @@ not found this way and does not count.
 """
 
 import ast
-import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache, lru_cache
 from hashlib import sha256
 from importlib.machinery import PathFinder
 from pathlib import Path
+from typing import Any, TypeAlias
 
 # Imports of other distributions are not followed: their versions identify their code.
 OURS = {"dess"}
@@ -61,41 +61,61 @@ def read(path: Path, module: str) -> tuple[str, tuple[str, ...]]:
     package = module
     if path.name != "__init__.py":
         package = module.rpartition(".")[0]
-    imports = tuple(dict.fromkeys(_imports(tree, package)))
-    return sha256(_outline(tree).encode()).hexdigest(), imports
+    statements: list[_Import] = []
+    outline = _outline(tree, statements)
+    imports = tuple(dict.fromkeys(_imports(statements, package)))
+    return sha256(outline.encode()).hexdigest(), imports
 
 
-def _imports(tree: ast.Module, package: str) -> Iterator[str]:
+_Import: TypeAlias = ast.Import | ast.ImportFrom
+_IMPORTS = {ast.Import, ast.ImportFrom}
+_DOCUMENTED = {ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef}
+
+
+def _outline(part: Any, imports: list[_Import]) -> str:
+    """A part of a syntax tree as text, without positions, docstrings, contexts and empty fields.
+
+    Empty fields differ between versions of Python. The context of a name (whether it is read or
+    written) follows from its place in the tree.
+
+    Args:
+        part: A node, a list of nodes, or a value in a node.
+        imports: Takes the imports of the part. Every process that simulates reads the sources, so
+            they are gone through once.
+    """
+    if isinstance(part, list):
+        return f"[{', '.join([_outline(node, imports) for node in part])}]"
+    if not isinstance(part, ast.AST):
+        return repr(part)
+    node: Any = part
+    kind = type(node)
+    if kind in _IMPORTS:
+        imports.append(node)
+    elif kind in _DOCUMENTED and ast.get_docstring(node, clean=False) is not None:
+        del node.body[0]
+    fields = []
+    for name in kind._fields:
+        value = getattr(node, name, None)
+        if value is not None and value != [] and name != "ctx":
+            fields.append(f"{name}={_outline(value, imports)}")
+    return f"{kind.__name__}({', '.join(fields)})"
+
+
+def _imports(statements: Iterable[_Import], package: str) -> Iterator[str]:
     """The modules that a source may import; for ``from a import b``, both ``a.b`` and ``a``."""
-    for node in ast.walk(tree):
+    for node in statements:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            parents = package.split(".")
-            above = []
-            if node.level:
-                above = parents[: len(parents) - node.level + 1]
-            base = ".".join([*above, *([node.module] if node.module else [])])
-            members = [f"{base}.{alias.name}" for alias in node.names]
-            yield from (name for name in members if path_of(name))
-            if not all(map(path_of, members)):
-                yield base
-
-
-# What `ast.dump` says of empty fields, which differ between versions of Python, and of the context
-# of a name (whether it is read or written), which follows from its place in the tree.
-_EMPTY = re.compile(r"(, )?\b\w+=(None\b|\[\]|(Load|Store|Del)\(\))")
-
-
-def _outline(tree: ast.Module) -> str:
-    """A syntax tree as text, without positions, docstrings, contexts and empty fields."""
-    for node in ast.walk(tree):
-        if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
-            del node.body[0]
-    return _EMPTY.sub("", ast.dump(tree))
-
-
-_DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+            continue
+        parents = package.split(".")
+        above = []
+        if node.level:
+            above = parents[: len(parents) - node.level + 1]
+        base = ".".join([*above, *([node.module] if node.module else [])])
+        members = [f"{base}.{alias.name}" for alias in node.names]
+        yield from (name for name in members if path_of(name))
+        if not all(map(path_of, members)):
+            yield base
 
 
 @cache
