@@ -35,7 +35,7 @@ ALLOWED = {
     "dess.analysis.execution.runner": {"open"},
     # Sources of our own code, and what numba keeps of it.
     "dess.base.kernels": {"read_bytes"},
-    "dess.base.sources": {"read_bytes", "walk"},
+    "dess.base.sources": {"read_bytes"},
     # A library that opens a file which the door has checked, or a temporary one of the door.
     "dess.policies.learner.trained": {"safe_open", "save_file"},
     "dess.policies.learner.session": {"SummaryWriter"},
