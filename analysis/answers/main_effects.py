@@ -99,7 +99,7 @@ def compare_values(
         replications.
     """
     positions = table[table["field"] == field].groupby("point")["position"].first()
-    missions = results.missions[results.missions["policy"] == policy]
+    missions = results.missions_of(policy)
     missions = missions[missions["point"].isin(positions.index)]
     missions = missions[missions["uavs"] >= fewest_uavs]
     values = by_replication(missions, metric, "point").dropna().rename(columns=positions)

@@ -166,7 +166,7 @@ def estimate_metric(
     Returns:
         A row of ``dess.analysis.summary``.
     """
-    missions = results.missions[results.missions["policy"] == policy]
+    missions = results.missions_of(policy)
     if point is not None:
         missions = missions[missions["point"] == point]
     return summary(missions, by=["policy"]).query("metric == @metric").iloc[0]

@@ -220,7 +220,7 @@ def return_table(results: Results, policies: Sequence[str]) -> pd.DataFrame:
 
 def first_logged_mission(results: Results, policy: str) -> Mission:
     """The first mission of the smallest fleet whose event log is kept."""
-    missions = results.missions[results.missions["policy"] == policy].set_index("replication")
+    missions = results.missions_of(policy).set_index("replication")
     replication = int(missions.loc[[*_logged_replications(results, policy)], "uavs"].idxmin())
     return Mission.of(results, policy, 0, replication)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.settings.points import ends_of_point, ends_sentence, points_in_words
 from dess.analysis.figures import Drawing
 from dess.analysis.metrics import (
@@ -568,10 +568,10 @@ def selected_settings(results: Results) -> pd.DataFrame:
         A row per policy: ``policy``, ``point``, ``setting`` in words, number of ``missions``,
         ``left`` (number of points not ruled out), ``guaranteed``, and ``guarantee`` in words, with
         the ends of the values at which the point lies. Empty if the study selects nothing. For a
-        study that selects the cheapest setting, the rows of ``cheapest.selected_fleets``.
+        study that selects the cheapest setting, the rows of ``FleetSearch.selected_fleets``.
     """
     if isinstance(results.study.selection, Cheapest):
-        return cheapest.selected_fleets(results)
+        return search_of(results).selected_fleets()
     words = points_in_words(results)
     rows = []
     for policy in results.policies:

@@ -204,7 +204,7 @@ def missions_needed(answer: Any) -> float:
 
 def product_differences(results: Results, policy: str) -> pd.Series:
     """Variation - baseline in product of a policy, by replication."""
-    missions = results.missions[results.missions["policy"] == policy]
+    missions = results.missions_of(policy)
     sides = missions.pivot(index="replication", columns="point", values=PRODUCT)
     return sides[VARIATION] - sides[BASELINE]
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from dess import InputError
-from dess.analysis.answers.fleet import cheapest, verdicts
 from dess.analysis.answers.fleet import tables as fleet_tables
+from dess.analysis.answers.fleet import verdicts
+from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import priced_settings
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import (
@@ -128,7 +129,8 @@ class Answer:
         if self.question.is_comparison:
             return [*map(strip_markdown, self.variation.sentences())]
         if self.question.study.selection:
-            return [*map(strip_markdown, cheapest.cheapest_sentences(self.results))]
+            search = search_of(self.results)
+            return [*map(strip_markdown, search.sentences())]
         ranking = metric or PRODUCT
         ranked = rank_settings(self.results, ranking)
         lines = best_settings_sentences(self.results, ranked, ranking)
@@ -171,7 +173,7 @@ class Answer:
     @property
     def guarantee(self) -> str:
         """With requirements: what is guaranteed about the selected settings, in words."""
-        return "; ".join(cheapest.guarantee_sentences(self.results))
+        return "; ".join(search_of(self.results).guarantee_sentences())
 
     def plot(self, x: str | None = None, hue: str | None = None, metric: str = PRODUCT) -> "Figure":
         """Curves of a metric over a swept field, with 95 % intervals, for every policy.

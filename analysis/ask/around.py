@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from dess import InputError
-from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import priced_settings, setting_cells
 from dess.analysis.answers.fleet.requirements import (
     Requirement,
@@ -52,10 +52,10 @@ def question_around(results: Results, scenario: str, missions: int = 100) -> Que
         The question, a design point for the fleet and one for every change of it. None without a
         data sheet, or if no fleet is known to meet the requirements, or its policy is a file.
     """
-    policy = cheapest.policy_of_cheapest_fleet(results)
+    best = search_of(results).best
     manifest = results.store.manifest
-    points = cheapest.cheapest_answer(results).points
-    if not points or not results.scenario(points[-1]).units or is_path(policy):
+    points = best.points
+    if not points or not results.scenario(points[-1]).units or is_path(best.policy):
         return None
     fixed = manifest.study.set
     values = manifest.points[points[-1]].values
@@ -75,7 +75,7 @@ def question_around(results: Results, scenario: str, missions: int = 100) -> Que
         "description": "a fleet, and what changes if it or its conditions change a little",
         "set": {field: value for field, value in fixed.items() if field not in varied},
         "design": {"kind": "table", "rows": [start, *(start | change for change in changes)]},
-        "policies": [policy],
+        "policies": [best.policy],
         "missions": missions,
     }
     return Question(study_from(data, "question"), _place_of_question(results))
@@ -88,7 +88,7 @@ def is_known(results: Results) -> bool:
 
 def _place_of_question(results: Results) -> Path:
     """The results folder of the question, beside that of the study."""
-    about = f"{results.store.manifest.key} {cheapest.policy_of_cheapest_fleet(results)}"
+    about = f"{results.store.manifest.key} {search_of(results).best.policy}"
     name = f"{results.store.manifest.study.name[:LONGEST]}-around-{short_hash(about.encode())}"
     return results.store.folder.parent / name
 

@@ -1,7 +1,7 @@
 """What an answer assumes, in ten lines for the one who pays."""
 
 from dess.analysis import numbers
-from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.metrics import PRODUCT
@@ -72,5 +72,5 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
 def _policy_of(results: Results, metric: str) -> str:
     """The policy of the answer: of the cheapest fleet, or of the best setting."""
     if requirements_of(results):
-        return cheapest.policy_of_cheapest_fleet(results)
+        return search_of(results).best.policy
     return str(rank_settings(results, metric)["policy"].iloc[0])

@@ -245,6 +245,17 @@ class Results:
             return np.zeros(len(self.store.manifest.points), int)
         return np.array(selected.looks)
 
+    def missions_of(self, policy: str | None) -> pd.DataFrame:
+        """The missions of a policy; without one, those of all.
+
+        Raises:
+            InputError: If it is not in the study.
+        """
+        if policy is None:
+            return self.missions
+        self.check_policy(policy)
+        return self.missions[self.missions["policy"] == policy]
+
     def check_policy(self, policy: str) -> None:
         """Refuse a policy that is not in the study.
 

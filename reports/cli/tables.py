@@ -7,7 +7,7 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers import diff, optimality, summary
-from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import setting_cells
 from dess.analysis.answers.settings.points import points_in_words, setting_in_words
 from dess.analysis.answers.settings.sobol import index_table
@@ -45,7 +45,7 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         _print_selections(selected)
         is_search = "condition" in selected
         if is_search and study.costs:
-            for text in cheapest.cheapest_sentences(results):
+            for text in search_of(results).sentences():
                 console.print_text(f" {text.translate(str.maketrans('', '', '*`'))}")
         if len(results.checks):
             means = summary.means_of_check(results)

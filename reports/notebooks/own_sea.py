@@ -30,8 +30,8 @@ yes = False  # True if the sweep may take more than an hour
 from dess import load_scenario
 from dess.analysis import sweep
 from dess.analysis.answers import summary
-from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.fleet import tables as fleet_tables
+from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import cost_parts_table
 from dess.analysis.answers.fleet.figures import draw_cheapest
 from dess.analysis.answers.missions import map_caption
@@ -51,7 +51,8 @@ answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **
 
 # %%
 found = answer.results
-html.make_answer(cheapest.cheapest_sentence(found), cheapest.cheapest_fleet(found))
+search = search_of(found)
+html.make_answer(search.sentence(), search.best.fleet)
 
 # %%
 html.lead_figure(*draw_cheapest(found))
@@ -69,9 +70,8 @@ html.show_parts(
 )
 
 # %%
-policy = cheapest.policy_of_cheapest_fleet(found)
-point = cheapest.shown_point(found)
-mission = resimulate(found, policy, point, 0)
+point = search.shown_point
+mission = resimulate(found, search.best.policy, point, 0)
 map_of_mission = mission_figure(mission.events, mission.scenario)
 about_mission = map_caption(mission, fleets_in_words(found)[point])
 
@@ -108,7 +108,9 @@ html.show_parts(cost_parts_table(found))
 
 # %%
 html.show_parts(
-    summary.worst_missions_table(found, summary.worst_missions(found, policy, point=point))
+    summary.worst_missions_table(
+        found, summary.worst_missions(found, search.best.policy, point=point)
+    )
 )
 
 # %% [markdown]

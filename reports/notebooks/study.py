@@ -25,8 +25,8 @@ import numpy as np
 
 from dess.analysis import distribution, load_results, tables
 from dess.analysis.answers import summary
-from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.fleet import tables as fleet_tables
+from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import cost_front_table, cost_parts_table
 from dess.analysis.answers.fleet.figures import draw_cost_fronts
 from dess.analysis.answers.main_effects import draw_one_at_a_time
@@ -69,7 +69,8 @@ metrics = page.shown_metrics(study, by)
 called = metric_of(by).within
 
 # %% tags=["if-cheapest"]
-html.make_answer(cheapest.cheapest_sentence(study))
+search = search_of(study)
+html.make_answer(search.sentence())
 
 # %% tags=["if-answer"]
 ranked = rank_settings(study, by)
@@ -257,11 +258,9 @@ whose = f"every policy at its best setting by {called}"
 worst = summary.worst_missions(study, best["policy"], point=best["point"])
 
 # %% tags=["if-cheapest"]
-missions = cheapest.shown_missions(study)
+missions = search.shown_missions
 whose = "the fleet of the answer"
-worst = summary.worst_missions(
-    study, cheapest.policy_of_cheapest_fleet(study), point=cheapest.shown_point(study)
-)
+worst = summary.worst_missions(study, search.best.policy, point=search.shown_point)
 
 # %% tags=["if-ranked"]
 spread = distribution(missions, by, np.random.default_rng(study.store.manifest.seed))

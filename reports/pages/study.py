@@ -10,7 +10,7 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers import summary
-from dess.analysis.answers.fleet import cheapest
+from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.settings.baseline import check_baseline
 from dess.analysis.answers.settings.points import has_conditions, metrics_of_page, varied_values
@@ -106,7 +106,7 @@ def leading_metric(results: Results, metric: str | None) -> str:
         InputError: If there is no such metric.
     """
     if metric is None and requirements_of(results):
-        return cheapest.tightest_requirement(results)[0].column
+        return search_of(results).tightest_requirement()[0].column
     return ranking_metric(results, metric)
 
 
@@ -150,10 +150,9 @@ def list_commands(results: Results, missions: pd.DataFrame) -> html.Marked:
 
 def list_reasons(results: Results) -> html.Marked:
     """The prices, how sure the answer of a search is, the other answers, and the guarantee."""
-    lines = [f"- {text}" for text in (results.prices.in_words, *cheapest.reason_sentences(results))]
-    sure = "\n\n".join(
-        f"Guarantee: {text}." for text in sorted(cheapest.guarantee_sentences(results))
-    )
+    search = search_of(results)
+    lines = [f"- {text}" for text in (results.prices.in_words, *search.reason_sentences())]
+    sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(search.guarantee_sentences()))
     return html.escape_sentences("\n".join(lines) + f"\n\n{sure}")
 
 

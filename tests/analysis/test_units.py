@@ -8,8 +8,8 @@ import pytest
 
 from dess import InputError
 from dess.analysis import tables
-from dess.analysis.answers.fleet import cheapest
 from dess.analysis.answers.fleet import tables as fleet_tables
+from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import mean_cost_parts
 from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
 from dess.analysis.ask import around
@@ -103,7 +103,7 @@ def test_an_age_is_required_to_be_at_most(column, age, verdict):
 
 
 def test_the_answer_has_every_requirement_in_its_unit(searched):
-    text = " ".join(cheapest.cheapest_sentences(searched))
+    text = " ".join(search_of(searched).sentences())
     assert " h (at most 0.8333 h required)" in text
     # Half a percent of two hours more.
     assert "its age of information is at most 0.8433 h" in text

@@ -1,7 +1,8 @@
 """The answer of a search for the cheapest fleet that meets requirements.
 
     results = load_results("results/fleets")  # of a study that searches for the cheapest fleet
-    cheapest_sentence(results)  # in words
+    search = search_of(results)
+    search.sentence()  # in words
     tables.fleet_table(results)  # the fleets by cost, with the answer marked
 
 A fleet is searched for every policy and under every condition and, if there are several conditions,
@@ -316,143 +317,172 @@ class FleetAnswer:
         return " ".join(filter(None, parts))
 
 
-@compute_once
-def fleet_answers(results: Results) -> list[FleetAnswer]:
-    """The answers of every policy: one for each condition, then one for all of them together."""
-    conditions = [*dict.fromkeys(conditions_in_words(results))]
-    if len(conditions) > 1:
-        conditions.append(ALL_CONDITIONS)
-    return [
-        FleetAnswer(results, policy, condition, number)
-        for policy in results.policies
-        for number, condition in enumerate(conditions)
-    ]
+@dataclass(frozen=True, eq=False)
+class FleetSearch:
+    """What a study that searches for the cheapest fleet has found, of all policies.
 
-
-@compute_once
-def cheapest_answer(results: Results) -> FleetAnswer:
-    """The cheapest fleet of any policy under all conditions; that of the first policy if none."""
-    return min(_last_answers(results), key=lambda answer: answer.cost)
-
-
-def _last_answers(results: Results) -> list[FleetAnswer]:
-    """The answer of every policy for all conditions."""
-    of_policies = {answer.policy: answer for answer in fleet_answers(results)}
-    return [*of_policies.values()]
-
-
-def policy_of_cheapest_fleet(results: Results) -> str:
-    """The policy whose fleet is the cheapest that meets the requirements under every condition."""
-    return cheapest_answer(results).policy
-
-
-def cheapest_fleet(results: Results) -> str:
-    """The cheapest fleet of all policies that meets the requirements under every condition."""
-    return cheapest_answer(results).fleet
-
-
-def shown_point(results: Results) -> int:
-    """The design point of the answer that pages show missions of; of the closest fleet if none.
-
-    Of a fleet for several conditions, it is that of the last condition.
+    Attributes:
+        results: The study.
     """
-    answer = cheapest_answer(results)
-    if answer.points:
-        return answer.points[-1]
-    rows = judge_settings(results)
-    rows = rows[rows["policy"] == answer.policy]
-    return int(rows.loc[least_spare(rows, requirements_of(results)).idxmax(), "point"])
 
+    results: Results
 
-def shown_missions(results: Results) -> pd.DataFrame:
-    """The missions of the answer that pages show, those of ``shown_point``."""
-    missions = results.missions
-    policy = policy_of_cheapest_fleet(results)
-    is_shown = (missions["policy"] == policy) & (missions["point"] == shown_point(results))
-    return missions[is_shown]
+    @cached_property
+    def fleet_answers(self) -> list[FleetAnswer]:
+        """The answers of every policy: one for each condition, then one for all of them."""
+        conditions = [*dict.fromkeys(conditions_in_words(self.results))]
+        if len(conditions) > 1:
+            conditions.append(ALL_CONDITIONS)
+        return [
+            FleetAnswer(self.results, policy, condition, number)
+            for policy in self.results.policies
+            for number, condition in enumerate(conditions)
+        ]
 
+    @property
+    def answers_for_all_conditions(self) -> list[FleetAnswer]:
+        """The answer of every policy for all conditions."""
+        of_policies = {answer.policy: answer for answer in self.fleet_answers}
+        return [*of_policies.values()]
 
-def cheapest_sentence(results: Results) -> str:
-    """In words: the cheapest fleet of all policies, and which the others would have named."""
-    return " ".join([cheapest_answer(results).headline(), *other_policies_sentences(results)])
+    @cached_property
+    def best(self) -> FleetAnswer:
+        """The cheapest fleet of any policy under all conditions; that of the first one if none."""
+        return min(self.answers_for_all_conditions, key=lambda answer: answer.cost)
 
+    @property
+    def shown_point(self) -> int:
+        """The design point of the answer that pages show missions of; of the closest fleet if none.
 
-def other_policies_sentences(results: Results) -> list[str]:
-    """A sentence for each other policy: what its cheapest fleet is, so how much depends on it."""
-    best = cheapest_answer(results)
-    sentences = []
-    for other in _last_answers(results):
-        if other.policy == best.policy:
-            continue
-        if other.fleet == best.fleet:
-            if best.points:
-                sentences.append(f"With the policy `{other.policy}`, it is the same fleet.")
-        elif other.points:
-            sentences.append(
-                f"With the policy `{other.policy}`, it would be **{other.fleet}** for "
-                f"{other.cost_in_words}."
+        Of a fleet for several conditions, it is that of the last condition.
+        """
+        if self.best.points:
+            return self.best.points[-1]
+        rows = judge_settings(self.results)
+        rows = rows[rows["policy"] == self.best.policy]
+        return int(rows.loc[least_spare(rows, requirements_of(self.results)).idxmax(), "point"])
+
+    @property
+    def shown_missions(self) -> pd.DataFrame:
+        """The missions of the answer that pages show, those of ``shown_point``."""
+        missions = self.results.missions
+        is_policy = missions["policy"] == self.best.policy
+        return missions[is_policy & (missions["point"] == self.shown_point)]
+
+    # --- sentences ---
+
+    def sentence(self) -> str:
+        """The cheapest fleet of all policies, and which the others would have named."""
+        return " ".join([self.best.headline(), *self.other_policies_sentences()])
+
+    def other_policies_sentences(self) -> list[str]:
+        """For each other policy, what its cheapest fleet is, so how much depends on the policy."""
+        sentences = []
+        for other in self.answers_for_all_conditions:
+            if other.policy == self.best.policy:
+                continue
+            if other.fleet == self.best.fleet:
+                if self.best.points:
+                    sentences.append(f"With the policy `{other.policy}`, it is the same fleet.")
+            elif other.points:
+                sentences.append(
+                    f"With the policy `{other.policy}`, it would be **{other.fleet}** for "
+                    f"{other.cost_in_words}."
+                )
+            else:
+                sentences.append(
+                    f"With the policy `{other.policy}`, no fleet is known to meet the requirements."
+                )
+        return sentences
+
+    def reason_sentences(self) -> list[str]:
+        """How sure the answer is; then the answers of the other policies and conditions."""
+        lines = [
+            self.best.reasons(len(self.results.policies)),
+            unequal_lengths_sentence(self.results, self.best.length_dependent_metrics),
+        ]
+        lines += [
+            f"{other.headline()} {other.reasons()}".strip()
+            for other in self.fleet_answers
+            if other is not self.best
+        ]
+        return [line for line in lines if line]
+
+    def sentences(self) -> list[str]:
+        """The answer, what is paid for, how sure it is, and the other answers."""
+        return [self.sentence(), self.results.prices.in_words, *self.reason_sentences()]
+
+    def guarantee_sentences(self) -> list[str]:
+        """What is guaranteed about the selected fleets of every policy; none without a search."""
+        choices = [self.results.cheapest(policy) for policy in self.results.policies]
+        return [*dict.fromkeys(choice.guarantee for choice in choices if choice)]
+
+    # --- the numbers behind them ---
+
+    def selected_fleets(self) -> pd.DataFrame:
+        """What was selected for every policy and condition.
+
+        Returns:
+            A row per policy and condition and, if there are several conditions, one for all of
+            them: ``policy``, ``condition`` in words, ``point`` (None if no setting is selected, or
+            for all conditions), ``setting`` (the fleet in words), ``missions`` of the policy,
+            ``left`` (number of settings that may be as good), ``guaranteed`` and ``guarantee``.
+        """
+        rows = []
+        for fleet_answer in self.fleet_answers:
+            choice = cheapest_choice(self.results, fleet_answer.policy)
+            of_one = choice.answers[fleet_answer.number]
+            is_point = of_one.points and of_one.condition is not None
+            rows.append(
+                {
+                    "policy": fleet_answer.policy,
+                    "condition": fleet_answer.condition,
+                    "point": of_one.points[0] if is_point else None,
+                    "setting": fleet_answer.fleet,
+                    "missions": choice.missions,
+                    "left": len(of_one.left),
+                    "guaranteed": of_one.settled,
+                    "guarantee": choice.guarantee,
+                }
             )
-        else:
-            sentences.append(
-                f"With the policy `{other.policy}`, no fleet is known to meet the requirements."
-            )
-    return sentences
+        return pd.DataFrame(rows).astype({"point": "Int64"})
 
+    def tightest_requirement(self) -> tuple[Requirement, str]:
+        """The requirement that the answer is chosen by, and the condition under which it is.
 
-def reason_sentences(results: Results) -> list[str]:
-    """How sure the answer is; then the answers of the other policies and conditions."""
-    best = cheapest_answer(results)
-    lines = [
-        best.reasons(len(results.policies)),
-        unequal_lengths_sentence(results, best.length_dependent_metrics),
-    ]
-    lines += [
-        f"{other.headline()} {other.reasons()}".strip()
-        for other in fleet_answers(results)
-        if other is not best
-    ]
-    return [line for line in lines if line]
+        It is the one that alone asks for the most expensive fleet, with the policy of the answer;
+        of several of these, the one that the answer keeps with the least to spare.
+        """
+        rows = judge_settings(self.results)
+        rows = rows[rows["policy"] == self.best.policy]
 
+        def tightness(requirement: Requirement, part: pd.DataFrame) -> tuple[float, float]:
+            keeps = requirement.margin(part[requirement.column]) >= 0
+            cheapest_cost = np.inf
+            if keeps.any():
+                cheapest_cost = part[COST][keeps].min()
+            room = relative_spare(part, requirement)
+            selected = part["point"].isin(self.best.points)
+            if selected.any():
+                least_room = float(room[selected].iloc[0])
+            else:
+                least_room = float(room.max())
+            return cheapest_cost, -least_room
 
-def cheapest_sentences(results: Results) -> list[str]:
-    """In words: the answer, what is paid for, how sure it is, and the other answers."""
-    return [cheapest_sentence(results), results.prices.in_words, *reason_sentences(results)]
-
-
-def guarantee_sentences(results: Results) -> list[str]:
-    """What is guaranteed about the selected fleets of every policy; none without a search."""
-    choices = [results.cheapest(policy) for policy in results.policies]
-    return [*dict.fromkeys(choice.guarantee for choice in choices if choice)]
+        parts: Sequence[tuple[str, pd.DataFrame]] = [*rows.groupby("condition", sort=False)]
+        asked = [
+            (asked_requirement, str(name), part)
+            for asked_requirement in requirements_of(self.results)
+            for name, part in parts
+        ]
+        requirement, condition, _ = max(asked, key=lambda found: tightness(found[0], found[2]))
+        return requirement, condition
 
 
 @compute_once
-def selected_fleets(results: Results) -> pd.DataFrame:
-    """What was selected by a study that searches for the cheapest fleets.
-
-    Returns:
-        A row per policy and condition and, if there are several conditions, one for all of them:
-        ``policy``, ``condition`` in words, ``point`` (None if no setting is selected, or for all
-        conditions), ``setting`` (the fleet in words), ``missions`` of the policy, ``left`` (number
-        of settings that may be as good), ``guaranteed`` and ``guarantee``.
-    """
-    rows = []
-    for fleet_answer in fleet_answers(results):
-        choice = cheapest_choice(results, fleet_answer.policy)
-        of_one = choice.answers[fleet_answer.number]
-        is_point = of_one.points and of_one.condition is not None
-        rows.append(
-            {
-                "policy": fleet_answer.policy,
-                "condition": fleet_answer.condition,
-                "point": of_one.points[0] if is_point else None,
-                "setting": fleet_answer.fleet,
-                "missions": choice.missions,
-                "left": len(of_one.left),
-                "guaranteed": of_one.settled,
-                "guarantee": choice.guarantee,
-            }
-        )
-    return pd.DataFrame(rows).astype({"point": "Int64"})
+def search_of(results: Results) -> FleetSearch:
+    """What a study that searches for the cheapest fleet has found."""
+    return FleetSearch(results)
 
 
 def _ends_of_values(results: Results, point: int) -> dict[str, str]:
@@ -481,36 +511,3 @@ def _ends_of_values(results: Results, point: int) -> dict[str, str]:
         for field, end in ends_of_point(results, point).items()
         if field in DECISIONS and may_be_cheaper(field, end)
     }
-
-
-def tightest_requirement(results: Results) -> tuple[Requirement, str]:
-    """The requirement that the answer is chosen by, and the condition under which it is.
-
-    It is the one that alone asks for the most expensive fleet, with the policy of the answer; of
-    several of these, the one that the answer keeps with the least to spare.
-    """
-    best = cheapest_answer(results)
-    rows = judge_settings(results)
-    rows = rows[rows["policy"] == best.policy]
-
-    def tightness(requirement: Requirement, part: pd.DataFrame) -> tuple[float, float]:
-        keeps = requirement.margin(part[requirement.column]) >= 0
-        cheapest_cost = np.inf
-        if keeps.any():
-            cheapest_cost = part[COST][keeps].min()
-        room = relative_spare(part, requirement)
-        selected = part["point"].isin(best.points)
-        if selected.any():
-            least_room = float(room[selected].iloc[0])
-        else:
-            least_room = float(room.max())
-        return cheapest_cost, -least_room
-
-    parts: Sequence[tuple[str, pd.DataFrame]] = [*rows.groupby("condition", sort=False)]
-    asked = [
-        (asked_requirement, str(name), part)
-        for asked_requirement in requirements_of(results)
-        for name, part in parts
-    ]
-    requirement, condition, _ = max(asked, key=lambda found: tightness(found[0], found[2]))
-    return requirement, condition

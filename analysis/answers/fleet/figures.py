@@ -7,7 +7,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from dess.analysis.answers.fleet import cheapest, verdicts
+from dess.analysis.answers.fleet import verdicts
+from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import cost_fronts
 from dess.analysis.answers.fleet.requirements import Verdict, requirements_in_words, requirements_of
 from dess.analysis.answers.settings.figures import counted_missions
@@ -103,15 +104,15 @@ def draw_cost_fronts(results: Results) -> Iterator[Drawing]:
 
 def draw_cheapest(results: Results) -> Drawing:
     """The cost against the metric of the tightest requirement of a search, with the answer."""
-    answer = cheapest.cheapest_answer(results)
-    requirement, condition = cheapest.tightest_requirement(results)
+    search = search_of(results)
+    requirement, condition = search.tightest_requirement()
     rows = verdicts.judge_settings(results)
-    rows = rows[(rows["policy"] == answer.policy) & (rows["condition"] == condition)]
-    is_answer = rows["point"].isin(answer.points)
+    rows = rows[(rows["policy"] == search.best.policy) & (rows["condition"] == condition)]
+    is_answer = rows["point"].isin(search.best.points)
     is_met = rows["verdict"] == Verdict.MET
     rows = rows.assign(on_front=is_answer, probability=np.where(is_met, 1.0, 0.4))
     marks = (
-        f"With the policy {answer.policy}. Large, dark marks meet all requirements "
+        f"With the policy {search.best.policy}. Large, dark marks meet all requirements "
         f"({requirements_in_words(requirements_of(results))}); "
         "small, faint ones miss them or are open. "
     )

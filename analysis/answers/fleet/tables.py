@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.answers.fleet.cheapest import cheapest_answer
+from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import format_amount, purchase_prices, setting_cells
 from dess.analysis.answers.fleet.requirements import requirements_in_words, requirements_of
 from dess.analysis.answers.fleet.verdicts import (
@@ -34,7 +34,7 @@ def fleet_rows(results: Results) -> pd.DataFrame:
     else:
         rows = judge_settings(results)
     rows = rows.sort_values(COST, kind="stable", ignore_index=True)
-    best = cheapest_answer(results)
+    best = search_of(results).best
     is_answer = rows["selected"] & (rows["policy"] == best.policy)
     marks = np.where(is_answer, "answer", np.where(rows["selected"], "selected", ""))
     purchase = purchase_prices(results)

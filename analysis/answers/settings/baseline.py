@@ -9,13 +9,13 @@ from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers.settings.points import (
     metrics_of_page,
-    missions_with_metric,
     named_cells,
     points_in_words,
     values_of_points,
 )
 from dess.analysis.metrics import (
     METRICS,
+    check_ranking_metric,
     metric_in_missions,
     metric_of,
 )
@@ -74,10 +74,9 @@ def compare_with_baseline(
     check_baseline(results, point)
     tables = []
     for metric in metrics:
+        check_ranking_metric(metric, results.missions)
         parts = []
-        for policy, missions in missions_with_metric(results, metric, None).groupby(
-            "policy", sort=False
-        ):
+        for policy, missions in results.missions.groupby("policy", sort=False):
             wide = by_replication(missions, metric, "point")
             measure = metric_in_missions(results.missions, metric)
             others = wide.drop(columns=point)

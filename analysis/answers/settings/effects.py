@@ -10,11 +10,16 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from dess.analysis.answers.settings.points import (
-    missions_with_metric,
     ordered_values,
     values_of_points,
 )
-from dess.analysis.metrics import PRODUCT, Metric, metric_in_missions, metric_of
+from dess.analysis.metrics import (
+    PRODUCT,
+    Metric,
+    check_ranking_metric,
+    metric_in_missions,
+    metric_of,
+)
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.intervals import (
@@ -110,7 +115,8 @@ def _average_labelled(
     cell_of = groups.ngroup().to_numpy()
     cells = labels.drop_duplicates(ignore_index=True)
     sizes = np.bincount(cell_of)
-    missions = missions_with_metric(results, metric, policy)
+    check_ranking_metric(metric, results.missions)
+    missions = results.missions_of(policy)
     measure = metric_in_missions(results.missions, metric)
     design = results.manifest["study"]["design"] or {}
     if sampled := design.get("kind") == "saltelli":  # only its samples A and B are independent

@@ -12,7 +12,7 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from dess.analysis import numbers
-from dess.analysis.metrics import METRICS, check_ranking_metric
+from dess.analysis.metrics import METRICS
 from dess.analysis.names import DECISIONS, field_named, single_value
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.tables import INTERVALS
@@ -164,19 +164,6 @@ def intervals_in_words(results: Results) -> str:
     if is_search:
         return f"{INTERVALS} that allow for the search"
     return INTERVALS
-
-
-def missions_with_metric(results: Results, metric: str, policy: str | None) -> pd.DataFrame:
-    """The missions of a policy, or of all, if they have the metric.
-
-    Raises:
-        InputError: If there is no such metric or policy.
-    """
-    check_ranking_metric(metric, results.missions)
-    if policy is None:
-        return results.missions
-    results.check_policy(policy)
-    return results.missions[results.missions["policy"] == policy]
 
 
 def metrics_of_page(metric: str) -> list[str]:

@@ -19,7 +19,6 @@ from dess.analysis.answers.settings.points import (
     ends_sentence,
     intervals_in_words,
     metrics_of_page,
-    missions_with_metric,
     named_cells,
     points_in_words,
     setting_in_words,
@@ -31,6 +30,7 @@ from dess.analysis.metrics import (
     PRODUCT,
     SUCCESS,
     Metric,
+    check_ranking_metric,
     format_length,
     metric_in_missions,
     metric_of,
@@ -209,11 +209,12 @@ def rank_settings(
     Raises:
         InputError: If there is no such metric or policy.
     """
-    missions = missions_with_metric(results, metric, policy)
+    check_ranking_metric(metric, results.missions)
+    missions = results.missions_of(policy)
+    looks = {name: results.looks(name) for name in missions["policy"].unique()}
     cell = ["policy", "point"]
     table = missions.groupby(cell, sort=False).size().rename("n").reset_index()
     table = table.join(values_of_points(results), on="point")
-    looks = {policy: results.looks(policy) for policy in missions["policy"].unique()}
     seen = np.array([looks[row.policy][row.point] for row in table.itertuples()])
     others = [name for name in metrics_in(missions) if name != metric]
     for name in (*others, metric):
@@ -252,7 +253,7 @@ def allowance_for_setting(results: Results, rows: pd.DataFrame, metric: str) -> 
     """
     first = rows.iloc[0]
     measure = metric_of(metric)
-    missions = missions_with_metric(results, metric, first["policy"])
+    missions = results.missions_of(first["policy"])
     values = missions.loc[missions["point"] == first["point"], metric].to_numpy(float)
     plain = mean_interval(values[~np.isnan(values)])
     half = (plain.high - plain.low) / 2

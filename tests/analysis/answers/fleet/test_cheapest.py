@@ -5,8 +5,9 @@ import pytest
 
 from dess.analysis import numbers, run_study
 from dess.analysis.answers import summary
-from dess.analysis.answers.fleet import cheapest, verdicts
 from dess.analysis.answers.fleet import tables as fleet_tables
+from dess.analysis.answers.fleet import verdicts
+from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings
 from dess.analysis.answers.settings.baseline import compare_with_baseline
 from dess.analysis.stats.differences import compare_pairs
@@ -52,11 +53,11 @@ def test_a_search_is_kept_told_and_checked(searched):
     assert manifest.selected[0]  # or this test says little
     assert len(verdicts.checked_settings(searched)) == len(searched.checks) / 6
     assert searched.choice("greedy") is None
-    texts = "\n".join(cheapest.cheapest_sentences(searched))
+    texts = "\n".join(search_of(searched).sentences())
     assert "With the policy `greedy` and under all conditions, the cheapest fleet" in texts
     assert "shown at" not in texts
     saving = "costs at most 50.00 EUR more than any"
-    assert all(saving in guarantee for guarantee in cheapest.guarantee_sentences(searched))
+    assert all(saving in guarantee for guarantee in search_of(searched).guarantee_sentences())
 
 
 def test_an_answer_quotes_the_check_and_a_table_allows_for_the_search(searched):
@@ -65,7 +66,7 @@ def test_an_answer_quotes_the_check_and_a_table_allows_for_the_search(searched):
     assert quoted.loc[checks.index, checks.columns].equals(checks)
     assert quoted.loc[others].equals(found.loc[others])
     assert "intervals that allow for the search" in fleet_tables.fleet_table(searched).caption
-    assert "In 6 missions that check it" in " ".join(cheapest.cheapest_sentences(searched))
+    assert "In 6 missions that check it" in " ".join(search_of(searched).sentences())
     for (policy, point), row in found.iterrows():
         missions = searched.missions.query("policy == @policy and point == @point")
         level = float(level_after(searched.looks(policy)[point]))
@@ -101,7 +102,7 @@ def test_the_table_has_the_fleets_by_cost_with_verdicts_and_the_answer_marked(se
     cells, caption, _ = fleet_tables.fleet_table(searched)
     assert [text.split(":")[0] for text in cells["Requirements"]] == [*rows["verdict"]]
     marked = cells[cells["Requirements"] == "met: the answer"]
-    best = cheapest.cheapest_answer(searched)
+    best = search_of(searched).best
     assert marked[["Fleet", "Policy"]].to_numpy().tolist() == [[best.fleet, best.policy]]
     assert "success of at least 80 %" in caption
     # Missions of the paper may end in the air; the required metric, the way home and n are there.
@@ -122,10 +123,10 @@ def test_a_long_table_shows_the_rows_about_the_answer():
 
 
 def test_the_price_is_told_in_its_parts(searched):
-    best, table = cheapest.cheapest_answer(searched), mean_cost_parts(searched)
+    best, table = search_of(searched).best, mean_cost_parts(searched)
     rows = table[(table["policy"] == best.policy) & table["point"].isin(best.points)]
     purchase, hours = rows["purchase"].mean(), rows["hours"].mean()
-    text = cheapest.cheapest_sentence(searched)
+    text = search_of(searched).sentence()
     assert f": {purchase:,.0f} EUR for the purchase and " in text
     assert f"hours {numbers.format_money(hours, 'EUR')}" in text
     assert best.cost == pytest.approx(rows["cost"].mean())
@@ -135,25 +136,24 @@ def test_the_price_is_told_in_its_parts(searched):
 
 
 def test_what_is_shown_of_missions_is_of_the_answer(searched):
-    best, shown = cheapest.cheapest_answer(searched), cheapest.shown_missions(searched)
+    search = search_of(searched)
+    best, shown = search.best, search.shown_missions
     assert {*shown["policy"]} == {best.policy}
     assert {*shown["point"]} == {best.points[-1]}
 
 
 def test_an_answer_says_whether_uavs_can_fly_home(searched):
-    best = cheapest.cheapest_answer(searched)
+    best = search_of(searched).best
     means = (
         searched.checks[searched.checks["policy"] == best.policy].groupby("point")["home"].mean()
     )
     worst = means[[*best.points]].min()
-    assert f"At the end of {numbers.format_percent(worst)} [" in cheapest.cheapest_sentence(
-        searched
-    )
+    assert f"At the end of {numbers.format_percent(worst)} [" in search_of(searched).sentence()
     parts = mean_cost_parts(searched)
     rows = parts[(parts["policy"] == best.policy) & parts["point"].isin(best.points)]
     number = numbers.format_quantity(round(rows["stranded"].mean(), 2))
-    assert f"On average {number} UAVs of a mission are left without" in cheapest.cheapest_sentence(
-        searched
+    assert (
+        f"On average {number} UAVs of a mission are left without" in search_of(searched).sentence()
     )
 
 
@@ -174,10 +174,10 @@ def searched_sea(folder, policies, requirements, values, **rule):
 def test_an_answer_says_what_is_guaranteed_names_all_that_is_paid_and_its_ends(tmp_path):
     values = {"uavs": [2, 3], "pads": [1, 2], "zones.pads": [1, 3]}
     found = searched_sea(tmp_path, ["greedy", "random"], {"success": 0.6}, values)
-    text = cheapest.cheapest_sentence(found)
+    text = search_of(found).sentence()
     assert "**2 UAVs, 1 pad and 1 pad in zone 2** for 2,200 EUR" in text
     # Of two policies.
-    first, other = cheapest.reason_sentences(found)
+    first, other = search_of(found).reason_sentences()
     assert "With a probability of at least 95 %, its success is at least 50 %." in first
     assert "With a probability of at least 97.5 %, its success is at least 50 %." in other
     assert "Of the values asked for, 2 UAVs is the least; a cheaper one may lie beyond." in first
@@ -193,22 +193,22 @@ def test_the_answer_is_the_cheapest_fleet_of_any_policy(first, tmp_path):
     policies, values = ["greedy", "nearest"], {"uavs": [1, 3], "pads": [1], "quota": [30]}
     asked = {"collection_ratio": 0.365}
     found = searched_sea(tmp_path, policies[:: 1 - 2 * first], asked, values, tolerance=0.03)
-    fleets = cheapest.selected_fleets(found).set_index("policy")["setting"].to_dict()
+    search = search_of(found)
+    fleets = search.selected_fleets().set_index("policy")["setting"].to_dict()
     one, three = (f"{uavs}, 1 pad and 1 pad in zone 2" for uavs in ("1 UAV", "3 UAVs"))
     # Or this test says little.
     assert fleets == {"greedy": one, "nearest": three}
-    assert cheapest.cheapest_sentence(found).startswith(
-        "With the policy `greedy`, the cheapest fleet"
-    )
+    text = search.sentence()
+    assert text.startswith("With the policy `greedy`, the cheapest fleet")
     other = f"With the policy `nearest`, it would be **{three}** for 3,200 EUR."
-    assert cheapest.cheapest_sentence(found).endswith(other)
+    assert text.endswith(other)
     # Success was not required, and is told.
-    assert "its success is " in cheapest.cheapest_sentence(found)
-    assert "(none is required)" in cheapest.cheapest_sentence(found)
-    assert cheapest.cheapest_sentences(found)[0] == cheapest.cheapest_sentence(found)
-    assert cheapest.cheapest_fleet(found) == one
+    assert "its success is " in text
+    assert "(none is required)" in text
+    assert search.sentences()[0] == text
+    assert search.best.fleet == one
     # One UAV is the least of all.
-    assert "Of the values" not in cheapest.reason_sentences(found)[0]
+    assert "Of the values" not in search.reason_sentences()[0]
 
 
 def test_an_answer_says_what_would_have_settled_it(studied, tmp_path):
@@ -217,7 +217,7 @@ def test_an_answer_says_what_would_have_settled_it(studied, tmp_path):
     values = {"uavs": [[1, 3]], "pads": [1]}
     short = {"tolerance": 0.02, "budget": 40}
     found = searched_sea(tmp_path, ["random"], {"collection_ratio": near}, values, **short)
-    (text,) = cheapest.reason_sentences(found)
+    (text,) = search_of(found).reason_sentences()
     enough = found.cheapest("random").enough
     assert 40 < enough < 40 * 64
     assert "The budget of 40 missions ended before this was decided; about" in text
