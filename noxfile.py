@@ -1,4 +1,4 @@
-"""The sessions: tests, lowest, lint, docs, reports, bench, verify, fuzz, integrations."""
+"""The sessions: tests, lowest, lint, docs, wasm, reports, bench, verify, fuzz, integrations."""
 
 import re
 import shutil
@@ -133,6 +133,16 @@ def docs(session: nox.Session) -> None:
     install(session, "[docs]")
     session.run("mkdocs", "build", "--strict", env={"NO_MKDOCS_2_WARNING": "1"})
     session.log(f"The site is at {Path('build/site/index.html').resolve().as_uri()}")
+
+
+@nox.session
+def wasm(session: nox.Session) -> None:
+    """Build the WebAssembly module; ``-- --check`` compares it with what would be built."""
+    install(session)
+    if session.virtualenv.venv_backend != "none":
+        session.install("ziglang", "-c", "constraints.txt")
+    fixed = {"PYTHONHASHSEED": "0"}
+    session.run("python", "tools/wasm/build_module.py", *session.posargs, env=fixed)
 
 
 @nox.session

@@ -11,10 +11,10 @@ import numpy as np
 
 from dess.base.kernels import inlined, kernel
 from dess.model.guard.battery import margin, must_charge, slots_left, slots_needed
-from dess.model.guard.moves import contest, contests, guard, safe_moves
+from dess.model.guard.moves import contest, contests, safe_moves
 from dess.model.guard.parking import parking_cell, parking_memory, stays
 from dess.model.guard.ways import path_length, round_trip
-from dess.model.rules import data_left
+from dess.model.rules import data_left, legal_moves
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
 from dess.physics import streams
@@ -22,7 +22,8 @@ from dess.physics.chart import Chart, distance, spread
 from dess.physics.landing import flies
 from dess.physics.wind import reach_of
 
-_NEAREST, _GREEDY, _TOUR, _AGE = range(4)
+# The numbers of the policies in compiled code.
+RANDOM, UNGUARDED, NEAREST, GREEDY, TOUR, AGE = range(6)
 
 # A node is worth a visit if it has at least this share of the mean initial data. Without such a
 # threshold, UAVs would fly to and fro for single new data units.
@@ -37,18 +38,6 @@ _FINE = 2.0**24  # parts of a slot of age per slot of distance
 _CONTEST_COST = np.array([0.0, 0.5, 2.5, 50.0])
 
 
-class Random:
-    """Choose a safe action at random, from a random stream that only policies use."""
-
-    name = "random"
-
-    def act(self, view: View) -> np.ndarray:
-        """Choose the (R,) actions for the rows of the view."""
-        return _choose_at_random(
-            view.state.missions, view.state.uavs, guard(view), view.mission, view.uav
-        )
-
-
 class RandomUnguarded:
     """Choose as ``random`` does, but without the return guard: it shows what the guard is worth."""
 
@@ -56,13 +45,14 @@ class RandomUnguarded:
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
-        return _choose_at_random(
-            view.state.missions, view.state.uavs, view.legal, view.mission, view.uav
+        chart = view.world.chart
+        return _choose_legal_actions(
+            view.state.missions, view.state.uavs, *chart, view.mission, view.uav
         )
 
 
 class _Heuristic:
-    """A policy whose rule for the goal is part of a compiled function."""
+    """A policy whose rule is part of a compiled function."""
 
     name: str
     _kind: int
@@ -73,19 +63,26 @@ class _Heuristic:
         nodes = view.world.nodes
         chart = view.world.chart
         circuit = _NO_CIRCUIT
-        if self._kind == _TOUR:
-            circuit = _plan_circuit(nodes.tobytes(), chart.zones.tobytes(), chart.zones.shape)
+        if self._kind == TOUR:
+            circuit = plan_circuit(nodes, chart)
         return _choose_actions(
             self._kind, state.missions, state.uavs, state.residual, state.sensors, nodes, circuit,
             *chart, reach_of(state.missions, chart), view.mission, view.uav,
         )  # fmt: skip
 
 
+class Random(_Heuristic):
+    """Choose a safe action at random, from a random stream that only policies use."""
+
+    name = "random"
+    _kind = RANDOM
+
+
 class Nearest(_Heuristic):
     """Fly to the nearest node that is worth a visit."""
 
     name = "nearest"
-    _kind = _NEAREST
+    _kind = NEAREST
 
 
 class Greedy(_Heuristic):
@@ -95,14 +92,14 @@ class Greedy(_Heuristic):
     """
 
     name = "greedy"
-    _kind = _GREEDY
+    _kind = GREEDY
 
 
 class Tour(_Heuristic):
     """Follow a fixed circuit through the nodes, split into equal parts, one for each UAV."""
 
     name = "tour"
-    _kind = _TOUR
+    _kind = TOUR
 
 
 class Age(_Heuristic):
@@ -114,34 +111,51 @@ class Age(_Heuristic):
     """
 
     name = "age"
-    _kind = _AGE
+    _kind = AGE
+
+
+# The numbers of the policies by their names.
+KINDS = {"random-unguarded": UNGUARDED} | {
+    policy.name: policy._kind for policy in (Random, Nearest, Greedy, Tour, Age)
+}
 
 
 @kernel
-def _choose_at_random(missions, uavs, allowed, rows_mission, rows_uav):
-    """Random allowed moves into uncontested cells; Hover where there is none."""
+def _choose_legal_actions(
+    missions, uavs, zones, parking, sizes, nearest, ways, rows, rows_mission, rows_uav
+):  # fmt: skip
+    chart = Chart(zones, parking, sizes, nearest, ways, rows)
     actions = np.empty(len(rows_mission), np.int64)
     for row in range(len(rows_mission)):
         i = rows_uav[row]
-        mission = missions[rows_mission[row]]
-        team = uavs[rows_mission[row]]
-        levels = contests(mission, team, i)
-        moves = count = 0
-        for action in range(4):
-            if allowed[row, action] and contest(levels, action) == 0:
-                moves |= 1 << action
-                count += 1
-        actions[row] = HOVER
-        if count > 0:
-            place = (streams.POLICY, 0, mission.slot, i)
-            words = streams.block(mission.seed, mission.replication, *place)
-            pick = streams.integer(words[0], 0, count - 1)
-            for action in range(4):
-                if moves >> action & 1:
-                    if pick == 0:
-                        actions[row] = action
-                    pick -= 1
+        mission, team = missions[rows_mission[row]], uavs[rows_mission[row]]
+        actions[row] = choose_at_random(mission, team, i, legal_moves(chart, team[i]))
     return actions
+
+
+@inlined
+def choose_at_random(mission, team, i, allowed):
+    """A random one of the allowed moves into uncontested cells; Hover where there is none.
+
+    ``allowed`` has a bit for each action.
+    """
+    levels = contests(mission, team, i)
+    moves = count = 0
+    for action in range(4):
+        if allowed >> action & 1 and contest(levels, action) == 0:
+            moves |= 1 << action
+            count += 1
+    if count == 0:
+        return HOVER
+    place = (streams.POLICY, 0, mission.slot, i)
+    words = streams.block(mission.seed, mission.replication, *place)
+    pick = streams.integer(words[0], 0, count - 1)
+    for action in range(4):
+        if moves >> action & 1:
+            if pick == 0:
+                return action
+            pick -= 1
+    return HOVER
 
 
 @kernel
@@ -160,7 +174,7 @@ def _choose_actions(
         if b != last:
             last = b
             left = data_left(missions[b], residual[b])
-        actions[row] = _choose_action(
+        actions[row] = choose_action(
             kind, missions[b], uavs[b], i, residual[b], left, sensors[b], nodes, circuit, chart,
             reach, memory,
         )  # fmt: skip
@@ -168,7 +182,7 @@ def _choose_actions(
 
 
 @inlined
-def _choose_action(
+def choose_action(
     kind, mission, team, i, data, left, sensors, nodes, circuit, chart, reach, memory
 ):
     """The action of UAV ``i``; ``left`` are all data, ``memory`` is that of its parking cell."""
@@ -178,6 +192,8 @@ def _choose_action(
     if charge:
         home = parking_cell(mission, team, i, left, chart, memory, reach)
     safe = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
+    if kind == RANDOM:
+        return choose_at_random(mission, team, i, safe)
     goal_x, goal_y = home.x, home.y
     node = _choose_goal(
         kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach
@@ -230,19 +246,19 @@ def _choose_goal(
             spent = round_trip(mission, u, chart, x, y, home, reach)
         if spent > spare:
             continue
-        if kind == _NEAREST:
+        if kind == NEAREST:
             score = 1.0 / (slots + _SLOTS_AT_NODE)
-        elif kind == _GREEDY:
+        elif kind == GREEDY:
             score = data[k] / (slots + _SLOTS_AT_NODE)
-        elif kind == _AGE:
+        elif kind == AGE:
             score = _score_by_age(mission, data, sensors, nodes, chart, k, slots)
         else:
             score = 1.0 / (1.0 + _circuit_position(mission, i, circuit[k]))
         if score <= best:  # the weights below are at most 1
             continue
-        if kind in (_GREEDY, _AGE) and _teammate_is_nearer(mission, team, i, chart, x, y, slots):
+        if kind in (GREEDY, AGE) and _teammate_is_nearer(mission, team, i, chart, x, y, slots):
             score *= _SHARED
-        if kind != _AGE and data[k] < worth:
+        if kind != AGE and data[k] < worth:
             score *= 1e-3
         if score > best:
             best = score
@@ -296,9 +312,13 @@ def _circuit_position(mission, i, position):
 _NO_CIRCUIT = np.zeros(0, np.int64)
 
 
+def plan_circuit(nodes: np.ndarray, chart: Chart) -> np.ndarray:
+    """The (K,) position of each node on a short round trip (nearest neighbour, then 2-opt)."""
+    return _plan_circuit(nodes.tobytes(), chart.zones.tobytes(), chart.zones.shape)
+
+
 @lru_cache(maxsize=64)
 def _plan_circuit(nodes: bytes, zones: bytes, shape: tuple[int, int]) -> np.ndarray:
-    """The (K,) position of each node on a short round trip (nearest neighbour, then 2-opt)."""
     cells = np.frombuffer(nodes, np.int64).reshape(-1, 2)
     chart = np.frombuffer(zones, np.int8)
     places = cells @ [1, shape[1]]

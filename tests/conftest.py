@@ -31,6 +31,7 @@ QUICK = (
     *("dess/base/test_errors.py", "dess/base/test_files.py"),
     *("dess/model/test_missions.py", "dess/model/test_rules.py"),
     *("policies/test_registry.py", "analysis/stats", "test_doors.py"),
+    "analysis/wasm/test_code.py",
 )
 # Files that compile most, each what those before it do not: two workers begin with them, so that
 # seldom both compile the same.

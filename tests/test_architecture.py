@@ -30,7 +30,7 @@ ROOMS = {
         "registry",
     ),
     "analysis": (
-        *("numbers", "names", "metrics", "stats", "tables", "bound", "study", "results"),
+        *("numbers", "names", "metrics", "stats", "tables", "bound", "study", "wasm", "results"),
         *("execution", "figures", "answers.settings", "answers.fleet", "answers", "paper"),
         "ask",
     ),

@@ -95,26 +95,42 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
-def kernel(function: Callable) -> Any:
+def kernel(function: Callable, **options: Any) -> Any:
     """Compile a function with numba to code that does not hold Python's global lock.
+
+    An inlined function that calls it takes its code in, too: numba hands the option on.
 
     The compiled function is cached on disk. If its module has no source file, or no folder for the
     cache can be written, it is compiled again in every process.
 
+    Args:
+        function: The function.
+        **options: Options of numba beside those of all kernels.
+
     Raises:
         InputError: If the environment does not let numba compile.
     """
+    options = _OPTIONS | options
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         raise InputError("NUMBA_DISABLE_JIT", "the simulator runs only compiled", "unset it")
     stamp = _code_behind(function.__module__, inspect.getfile(function))
     try:
-        compiled = njit(cache=bool(stamp), **_OPTIONS)(function)
+        compiled = njit(cache=bool(stamp), **options)(function)
     except RuntimeError:  # numba has found no folder for its cache ("no locator available")
-        return njit(**_OPTIONS)(function)
+        return njit(**options)(function)
     compiled.get_call_template = partial(_without_literals, compiled.get_call_template)
     if stamp:
         compiled._cache._cache_file = _cache_file(compiled._cache, stamp)
     return compiled
+
+
+def large_kernel(function: Callable) -> Any:
+    """Compile a function like ``kernel``; functions that call it do not take its code in.
+
+    With the code of the return guard in each place that calls it, a first run would take half as
+    long again.
+    """
+    return kernel(function, forceinline=False)
 
 
 def _without_literals(template: Callable, args: Any, kws: Any) -> Any:

@@ -62,7 +62,7 @@ def read(path: Path, module: str) -> tuple[str, tuple[str, ...]]:
     if path.name != "__init__.py":
         package = module.rpartition(".")[0]
     statements: list[_Import] = []
-    outline = _outline(tree, statements)
+    outline = outline_of(tree, statements)
     imports = tuple(dict.fromkeys(_imports(statements, package)))
     return sha256(outline.encode()).hexdigest(), imports
 
@@ -72,7 +72,7 @@ _IMPORTS = {ast.Import, ast.ImportFrom}
 _DOCUMENTED = {ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef}
 
 
-def _outline(part: Any, imports: list[_Import]) -> str:
+def outline_of(part: Any, imports: list[_Import]) -> str:
     """A part of a syntax tree as text, without positions, docstrings, contexts and empty fields.
 
     Empty fields differ between versions of Python. The context of a name (whether it is read or
@@ -84,7 +84,7 @@ def _outline(part: Any, imports: list[_Import]) -> str:
             they are gone through once.
     """
     if isinstance(part, list):
-        return f"[{', '.join([_outline(node, imports) for node in part])}]"
+        return f"[{', '.join([outline_of(node, imports) for node in part])}]"
     if not isinstance(part, ast.AST):
         return repr(part)
     node: Any = part
@@ -97,7 +97,7 @@ def _outline(part: Any, imports: list[_Import]) -> str:
     for name in kind._fields:
         value = getattr(node, name, None)
         if value is not None and value != [] and name != "ctx":
-            fields.append(f"{name}={_outline(value, imports)}")
+            fields.append(f"{name}={outline_of(value, imports)}")
     return f"{kind.__name__}({', '.join(fields)})"
 
 

@@ -205,13 +205,10 @@ def _advance(job_of, queue, source, state, world, scratch, ways, records):
         if job_of[b] < 0:
             continue
         mission, team, data = missions[b], uavs[b], residual[b]
-        if not rules.advance_without_uavs(
-            mission, team, data, sensors[b], arrivals, batches, search
-        ):
-            rules.advance(
-                mission, team, data, sensors[b], teeth[b], arrivals,
-                nodes, mean_snr, order, means, chart, batches, search,
-            )  # fmt: skip
+        rules.run_slot(
+            mission, team, data, sensors[b], teeth[b], arrivals,
+            nodes, mean_snr, order, means, chart, batches, search,
+        )  # fmt: skip
         if is_over(mission):
             job = job_of[b]
             write_record(mission, team, data, sensors[b], teeth[b], ways, records, job)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dess.base.elementary import exp, hypot, log1p, log10
-from dess.base.kernels import inlined, kernel
+from dess.base.kernels import inlined, kernel, large_kernel
 from dess.model.state import STEP_X, STEP_Y
 from dess.physics import fleet, streams
 from dess.physics.chart import Chart, read_only
@@ -153,7 +153,7 @@ def _world_of(scenario: ScenarioSpace, thread: int) -> World:
     return World.of(nodes, mean_snr, scenario.chart, steps, m)
 
 
-@kernel
+@large_kernel
 def _fill_row(u, row, nodes, mean_snr, order, means):
     """Fill the row of a step: the nodes by descending mean SNR (ties: lower index), and the SNR.
 

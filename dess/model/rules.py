@@ -18,7 +18,7 @@ three go on (see ``advance_without_uavs``).
 """
 
 from dess.base.elementary import exp
-from dess.base.kernels import inlined, kernel
+from dess.base.kernels import inlined, kernel, large_kernel
 from dess.model import channel
 from dess.model.state import (
     ACTIVE,
@@ -452,6 +452,19 @@ def advance(
     strike_if_on(mission, uavs, residual, sensors, LOST)
 
 
+@inlined
+def run_slot(
+    mission, uavs, residual, sensors, teeth, arrivals,
+    nodes, mean_snr, order, means, chart, batches, search,
+):  # fmt: skip
+    """Run one mission slot with the actions in ``uavs``, or without any UAV after the last one."""
+    if not advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, search):
+        advance(
+            mission, uavs, residual, sensors, teeth, arrivals,
+            nodes, mean_snr, order, means, chart, batches, search,
+        )  # fmt: skip
+
+
 @for_sections
 def advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, search):
     """Run a slot of a mission that waits for its horizon; return whether it does (``is_over``)."""
@@ -461,7 +474,7 @@ def advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, se
     return True
 
 
-@kernel
+@large_kernel
 def _advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, search):
     """New data arrive, and pads and nodes fail and are repaired; nothing else happens."""
     mission.slot_collected = 0.0

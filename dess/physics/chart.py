@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dess.base.kernels import inlined, kernel
+from dess.base.kernels import inlined, kernel, large_kernel
 
 Cell = tuple[int, int]
 Rectangle = tuple[int, int, int, int]  # x, y, width and height
@@ -113,7 +113,7 @@ def chart_at(
         rows[[y * width + x for x, y in places]] = np.arange(len(places))
     ways = np.full((len(places), cells.size), FAR, np.int16)
     numbers = np.array([y * width + x for x, y in places])
-    _fill_ways(cells.reshape(-1), _neighbours(cells), numbers, ways)
+    fill_ways(cells.reshape(-1), neighbours_of(cells), numbers, ways)
     return _chart_of(cells, parking, sizes, nearest, ways, rows)
 
 
@@ -148,11 +148,11 @@ def spread(zones: np.ndarray, sources: np.ndarray) -> tuple[np.ndarray, np.ndarr
     cells = sources[:, 1] * zones.shape[1] + sources[:, 0]
     is_open = zones.reshape(-1)[cells] != NO_FLY
     nearest[cells[is_open]] = np.flatnonzero(is_open)
-    _spread(_neighbours(zones), cells[is_open], lengths, nearest)
+    _spread(neighbours_of(zones), cells[is_open], lengths, nearest)
     return lengths, nearest
 
 
-def _neighbours(zones: np.ndarray) -> np.ndarray:
+def neighbours_of(zones: np.ndarray) -> np.ndarray:
     """(H * W, 4) the numbers of the cells north, east, south and west of a cell; -1 where none."""
     cells = np.full(np.add(zones.shape, 2), -1, np.int32)
     cells[1:-1, 1:-1] = np.where(zones == NO_FLY, -1, np.arange(zones.size).reshape(zones.shape))
@@ -165,9 +165,9 @@ def _spread(neighbours, sources, lengths, nearest):
     queue = np.empty(len(lengths), np.int32)
     first = 0
     last = len(sources)
-    queue[:last] = sources
-    for cell in sources:
-        lengths[cell] = 0
+    for number in range(last):
+        queue[number] = sources[number]
+        lengths[sources[number]] = 0
     while first < last:
         cell = queue[first]
         first += 1
@@ -181,7 +181,7 @@ def _spread(neighbours, sources, lengths, nearest):
 
 
 @kernel
-def _fill_ways(zones, neighbours, places, ways):
+def fill_ways(zones, neighbours, places, ways):
     """Write the ways from these cells to all others, where ``FAR`` stands before, row by row."""
     nearest = np.zeros(len(zones), np.int32)
     for number in range(len(places)):
@@ -189,7 +189,7 @@ def _fill_ways(zones, neighbours, places, ways):
             _spread(neighbours, places[number : number + 1], ways[number], nearest)
 
 
-@kernel
+@large_kernel
 def length_around(zones, ways, rows, closed, x, y, to_x, to_y):
     """The cells on the shortest way between two cells that avoids closed cells, or ``FAR``.
 
@@ -281,7 +281,7 @@ def _distance(ways, rows, zones, x, y, to_x, to_y):
     return _distance_on_large_grid(ways, rows, zones, cell, to)
 
 
-@kernel
+@large_kernel
 def _distance_on_large_grid(ways, rows, zones, cell, to):
     if rows[to] >= 0:
         return np.int64(ways[rows[to], cell])

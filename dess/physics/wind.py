@@ -147,13 +147,14 @@ def surcharges(
     columns, rows = size
     table = np.zeros((4, rows, columns), np.int64)
     if north or east or south or west or gusts:
-        _fill(north, east, south, west, gusts, seed, table)
+        fill_surcharges(north, east, south, west, gusts, seed, table)
     table.flags.writeable = False
     return table
 
 
 @kernel
-def _fill(north, east, south, west, gusts, seed, table):
+def fill_surcharges(north, east, south, west, gusts, seed, table):
+    """Write the (4, H, W) surcharges of ``surcharges`` into a table."""
     rows, columns = table.shape[1:]
     for action, (step_x, step_y) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
         for y in range(rows):
@@ -233,12 +234,12 @@ def _filled(
     for group, homes in enumerate(np.frombuffer(parking, np.int64).reshape(groups, -1, 2)):
         table[group, :, homes[:, 1], homes[:, 0]] = 0
         for s in range(slowest):
-            _relax(cells, extras, s + 1, table[group, s])
+            relax(cells, extras, s + 1, table[group, s])
     return read_only(table)
 
 
 @kernel
-def _relax(zones, extras, slots, costs):
+def relax(zones, extras, slots, costs):
     """Lower the costs of all cells to those of the cheapest ways to the cell that costs nothing."""
     rows, columns = zones.shape
     changed, forth = True, True

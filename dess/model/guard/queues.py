@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.base.kernels import inlined, kernel
+from dess.base.kernels import inlined, kernel, large_kernel
 from dess.model.guard.battery import must_charge
 from dess.model.guard.ways import battery_of_way
 from dess.model.state import HOVER
@@ -125,7 +125,7 @@ def _needs_pad(mission, u, data):
     return u.active and not u.grounded and (u.pad_request >= 0 or must_charge(mission, u, data))
 
 
-@kernel
+@large_kernel
 def plan_pads(mission, uavs, i, data, chart, plan, reach):
     """Plan where and when all UAVs charge that must; see the text of the module.
 

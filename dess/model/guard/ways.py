@@ -4,7 +4,7 @@ import heapq
 
 import numpy as np
 
-from dess.base.kernels import inlined, kernel
+from dess.base.kernels import inlined, kernel, large_kernel
 from dess.model.guard.battery import ends_soon, lasts, slots_left
 from dess.model.state import STEP_X, STEP_Y
 from dess.physics.charging import slots_to_charge
@@ -70,7 +70,7 @@ def _closed(mission, uavs, i, j, chart, planned):
     return -1, -1
 
 
-@kernel
+@large_kernel
 def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     """The way around all cells that teammates close.
 
@@ -121,7 +121,7 @@ def battery_home(mission, uavs, i, chart, planned, x, y, home, reach):
     return battery_of_way(mission, uavs[i], chart, x, y, home.x, home.y, cells, reach)
 
 
-@kernel
+@large_kernel
 def is_late(mission, uavs, i, chart, planned, home, kept, reach):
     """Whether the battery of UAV ``i`` is too low for its way home and the slots that it keeps.
 
@@ -134,7 +134,7 @@ def is_late(mission, uavs, i, chart, planned, home, kept, reach):
     return spent + 1 + kept > slots_left(mission, u)
 
 
-@kernel
+@large_kernel
 def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
     """The battery [%] that UAV ``i`` needs to its parking cell, as it is and not as it may be most.
 

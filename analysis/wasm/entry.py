@@ -1,0 +1,395 @@
+"""The entry points of the WebAssembly module: compiled functions over a table of arrays.
+
+The module flies missions with the functions of the batch engine (``rules.launch``,
+``heuristics.choose_action``, ``rules.run_slot``, ``record.write_record``); the loop around them is
+here. Its arrays lie where its caller has put them: ``table`` has five int64 for each of ``ARRAYS``,
+an address and up to four sizes. ``dess.analysis.wasm.image`` makes the arrays of a scenario.
+"""
+
+from collections import namedtuple
+from typing import Any
+
+import numpy as np
+from numba import carray, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from dess.analysis.stats.sequences import SEQUENCE, add_values, sequence_ends, start_sequence
+from dess.base.kernels import kernel
+from dess.model import rules
+from dess.model.channel import BATCH, World
+from dess.model.guard.parking import parking_memory
+from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records, write_record
+from dess.model.state import MISSION, SENSOR, UAV, Starts, State
+from dess.physics.chart import FAR, Chart, fill_ways
+from dess.physics.landing import is_over
+from dess.physics.wind import fill_surcharges, relax
+from dess.policies.heuristics import UNGUARDED, choose_action, choose_at_random
+
+_F8, _I8, _I4, _I2, _I1 = np.float64, np.int64, np.int32, np.int16, np.int8
+# The metrics of missions, in the order of the columns of ``values``: those of each mission, what
+# extended scenarios measure (nan where one does not), and the cost (nan without prices).
+METRICS = (
+    *("success", "home", "collection_ratio", "collection_ratio_and_communication", "reward"),
+    *(OPERATIONS.names or ()),
+    "cost",
+)
+_MEASURED, _COST = 5, len(METRICS) - 1
+# What ``prices`` has: prices and missions of ``study.prices.Costs``, and the seconds of a slot.
+PRICES = ("uav", "pad", "charge", "hour", "lost_uav", "missions", "seconds")
+# The sums of ``totals``, for each metric over the missions that have it.
+TOTALS = ("count", "sum", "squares", "least", "most")
+
+# The arrays by name: the type of their entries and the number of their axes. B is the number of
+# missions of a call, I that of UAVs, K that of nodes; there is the state of one mission. MISSION is
+# right for scenarios without sections, too: they give the same records with it.
+ARRAYS: dict[str, tuple[Any, int]] = {
+    "missions": (MISSION, 1),
+    "uavs": (UAV, 2),
+    "residual": (_F8, 2),
+    "sensors": (SENSOR, 2),
+    "teeth": (_I4, 2),
+    "constants": (MISSION, 1),  # from here on those of ``Starts``
+    "ranges": (_I8, 3),
+    "types": (UAV, 2),
+    "data": (_F8, 3),
+    "rates": (_F8, 2),
+    "nodes": (_I8, 2),  # of ``World``
+    "mean_snr": (_F8, 2),
+    "order": (_I2, 2),
+    "means": (_F8, 3),
+    "zones": (_I1, 2),  # of ``Chart``
+    "parking": (_I8, 2),
+    "sizes": (_I8, 1),
+    "nearest": (_I4, 2),
+    "ways": (_I2, 2),
+    "neighbours": (_I4, 2),
+    "batches": (BATCH, 2),  # of ``Scratch``
+    "search": (_I8, 2),
+    "arrivals": (_I8, 1),
+    "reach": (_I2, 4),  # the tables of ``wind.reach_of`` and ``wind.ways_home``
+    "ways_home": (_I2, 3),
+    "circuit": (_I8, 1),  # of ``tour``
+    "policies": (_I8, 1),  # (I,) the policy of each UAV
+    "actions": (_I8, 1),  # (I,) what a UAV has decided in this slot, -1 if it was not asked
+    "mission_records": (MISSION_RECORD, 1),  # of ``Records``
+    "uav_records": (UAV_RECORD, 2),
+    "operations": (OPERATIONS, 1),
+    "prices": (_F8, 1),
+    "factors": (_F8, 1),  # of the metrics, where their unit is that of a data sheet
+    "values": (_F8, 2),  # (B, METRICS)
+    "baseline": (_F8, 2),  # (B, METRICS) values of other missions with the same replications
+    "totals": (_F8, 2),  # (METRICS, TOTALS)
+    "bounds": (_F8, 2),  # (METRICS, 3) the least and the largest value, and the error of the ends
+    "sequences": (SEQUENCE, 1),  # (METRICS,) the confidence sequences of the means
+    "ends": (_F8, 2),  # (METRICS, 2) the ends of the intervals of the means
+}
+WORDS = 5  # of the table for each array
+_AT = namedtuple("_At", ARRAYS)(*range(0, WORDS * len(ARRAYS), WORDS))
+_NO_UAV = np.zeros(1, UAV_RECORD)  # the record of one that a mission does not have
+# Compiled functions take names, not attributes, as types.
+_BATCH, _MISSION, _SENSOR, _UAV = BATCH, MISSION, SENSOR, UAV
+_MISSION_RECORD, _UAV_RECORD, _OPERATIONS = MISSION_RECORD, UAV_RECORD, OPERATIONS
+_SEQUENCE = SEQUENCE
+
+
+@intrinsic
+def _pointer(typingctx: Any, address: Any) -> Any:
+    """The pointer to an address."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], cgutils.voidptr_t)
+
+    return types.voidptr(types.int64), generate
+
+
+@kernel
+def _array1(table, at, dtype):
+    return carray(_pointer(table[at]), (table[at + 1],), dtype)
+
+
+@kernel
+def _array2(table, at, dtype):
+    return carray(_pointer(table[at]), (table[at + 1], table[at + 2]), dtype)
+
+
+@kernel
+def _array3(table, at, dtype):
+    shape = (table[at + 1], table[at + 2], table[at + 3])
+    return carray(_pointer(table[at]), shape, dtype)
+
+
+@kernel
+def _array4(table, at, dtype):
+    shape = (table[at + 1], table[at + 2], table[at + 3], table[at + 4])
+    return carray(_pointer(table[at]), shape, dtype)
+
+
+@kernel
+def _state(table):
+    return State(
+        _array1(table, _AT.missions, _MISSION),
+        _array2(table, _AT.uavs, _UAV),
+        _array2(table, _AT.residual, _F8),
+        _array2(table, _AT.sensors, _SENSOR),
+        _array2(table, _AT.teeth, _I4),
+    )
+
+
+@kernel
+def _starts(table):
+    return Starts(
+        _array1(table, _AT.constants, _MISSION),
+        _array3(table, _AT.ranges, _I8),
+        _array2(table, _AT.types, _UAV),
+        _array3(table, _AT.data, _F8),
+        _array2(table, _AT.rates, _F8),
+    )
+
+
+@kernel
+def _chart(table):
+    return Chart(
+        _array2(table, _AT.zones, _I1),
+        _array2(table, _AT.parking, _I8),
+        _array1(table, _AT.sizes, _I8),
+        _array2(table, _AT.nearest, _I4),
+        _array2(table, _AT.ways, _I2),
+        None,  # grids on which not all cells have a row of ways need more memory than a page has
+    )
+
+
+@kernel
+def _world(table):
+    return World(
+        _array2(table, _AT.nodes, _I8),
+        _array2(table, _AT.mean_snr, _F8),
+        _array2(table, _AT.order, _I2),
+        _array3(table, _AT.means, _F8),
+        _chart(table),
+    )
+
+
+@kernel
+def _records(table):
+    return Records(
+        _array1(table, _AT.mission_records, _MISSION_RECORD),
+        _array2(table, _AT.uav_records, _UAV_RECORD),
+        _array1(table, _AT.operations, _OPERATIONS),
+    )
+
+
+@kernel
+def prepare(table):
+    """Fill the tables that follow from the sea: the ways between cells, and the battery home."""
+    chart = _chart(table)
+    zones = chart.zones
+    ways = chart.ways
+    if len(ways) > 0:
+        row_by_row = carray(_pointer(table[_AT.zones]), (zones.size,), _I1)
+        ways[:] = FAR
+        neighbours = _array2(table, _AT.neighbours, _I4)
+        fill_ways(row_by_row, neighbours, np.arange(zones.size), ways)
+    mission = _array1(table, _AT.constants, _MISSION)[0]
+    extras = np.zeros((4, *zones.shape), np.int64)
+    if mission.wind_most > 0:
+        fill_surcharges(
+            mission.wind_north, mission.wind_east, mission.wind_south, mission.wind_west,
+            mission.wind_gusts, mission.wind_seed, extras,
+        )  # fmt: skip
+    reach = _array4(table, _AT.reach, _I2)
+    home = _array3(table, _AT.ways_home, _I2)
+    reach[:] = FAR
+    home[:] = FAR
+    for slots in range(1, len(home) + 1):
+        for number in range(len(chart.parking)):
+            x = chart.parking[number, 0]
+            y = chart.parking[number, 1]
+            home[slots - 1, y, x] = 0
+            if number < len(reach) and slots <= reach.shape[1]:
+                reach[number, slots - 1, y, x] = 0
+                relax(zones, extras, slots, reach[number, slots - 1])
+        relax(zones, extras, slots, home[slots - 1])
+
+
+@kernel
+def play(table, first, count, launches, slots):
+    """Fly missions, and write the record of each that is over.
+
+    Args:
+        table: The table of arrays.
+        first: The replication of the first mission, whose record is in row 0.
+        count: The number of missions, one after the other.
+        launches: Whether they begin; otherwise the mission of the state goes on.
+        slots: The most slots that each flies now.
+
+    Returns:
+        How many missions are over.
+    """
+    state = _state(table)
+    starts = _starts(table)
+    world = _world(table)
+    records = _records(table)
+    nodes, mean_snr, order, means, chart = world
+    reach = _array4(table, _AT.reach, _I2)
+    ways = _array3(table, _AT.ways_home, _I2)
+    batches = _array2(table, _AT.batches, _BATCH)
+    search = _array2(table, _AT.search, _I8)
+    arrivals = _array1(table, _AT.arrivals, _I8)
+    circuit = _array1(table, _AT.circuit, _I8)
+    policies = _array1(table, _AT.policies, _I8)
+    actions = _array1(table, _AT.actions, _I8)
+    memory = parking_memory(chart, len(actions))
+    mission = state.missions[0]
+    team = state.uavs[0]
+    data = state.residual[0]
+    sensors = state.sensors[0]
+    teeth = state.teeth[0]
+    over = 0
+    for row in range(count):
+        if launches:
+            rules.launch(state, 0, starts, 0, first + row)
+        left = slots
+        while left > 0 and not is_over(mission):
+            left -= 1
+            data_left = rules.data_left(mission, data)
+            for i in range(mission.uavs):
+                actions[i] = -1
+                if not rules.may_act(team[i]):
+                    continue
+                if policies[i] == UNGUARDED:
+                    legal = rules.legal_moves(chart, team[i])
+                    actions[i] = choose_at_random(mission, team, i, legal)
+                else:
+                    actions[i] = choose_action(
+                        policies[i], mission, team, i, data, data_left, sensors, nodes, circuit,
+                        chart, reach, memory,
+                    )  # fmt: skip
+            for i in range(mission.uavs):  # all have decided before any action is written
+                if actions[i] >= 0:
+                    team[i].action = actions[i]
+            rules.run_slot(
+                mission, team, data, sensors, teeth, arrivals,
+                nodes, mean_snr, order, means, chart, batches, search,
+            )  # fmt: skip
+        if is_over(mission):
+            over += 1
+            for i in range(mission.uavs, len(team)):
+                records.uavs[row, i] = _NO_UAV[0]
+            write_record(mission, team, data, sensors, teeth, ways, records, row)
+    return over
+
+
+@kernel
+def measure(table, count):
+    """Write the metrics of the first ``count`` records into ``values``."""
+    missions, uavs, _ = _records(table)
+    shape = (len(missions), _COST - _MEASURED)
+    operations = carray(_pointer(table[_AT.operations]), shape, _F8)
+    mission = _array1(table, _AT.constants, _MISSION)[0]
+    values = _array2(table, _AT.values, _F8)
+    factors = _array1(table, _AT.factors, _F8)
+    prices = _array1(table, _AT.prices, _F8)
+    for row in range(count):
+        record = missions[row]
+        values[row, 0] = record.success
+        values[row, 1] = record.home
+        values[row, 2] = record.collection_ratio
+        values[row, 3] = record.collection_ratio_and_communication
+        values[row, 4] = record.reward
+        for column in range(_MEASURED, _COST):
+            values[row, column] = operations[row, column - _MEASURED]
+        values[row, _COST] = np.nan
+        if len(prices) > 0:
+            values[row, _COST] = _cost(prices, mission.pads, record, uavs[row])
+        for column in range(values.shape[1]):
+            values[row, column] *= factors[column]
+
+
+@kernel
+def _cost(prices, pads, record, uavs):
+    """The cost of a mission, summed up from the parts of ``dess.analysis.study.prices``."""
+    uav = prices[0]
+    pad = prices[1]
+    charge = prices[2]
+    hour = prices[3]
+    lost_uav = prices[4]
+    missions = prices[5]
+    seconds = prices[6]
+    charged = lost = 0
+    for i in range(record.uavs):
+        charged += uavs[i].charged
+        lost += uavs[i].down
+    purchase = uav * record.uavs + pad * pads
+    charging = missions * charge * charged / 100
+    hours = missions * hour * (record.slots * seconds / 3600)
+    return purchase + charging + hours + missions * lost_uav * lost
+
+
+@kernel
+def subtract(table, count):
+    """Take ``baseline`` from the first ``count`` rows of ``values``."""
+    values = _array2(table, _AT.values, _F8)
+    baseline = _array2(table, _AT.baseline, _F8)
+    for row in range(count):
+        for column in range(values.shape[1]):
+            values[row, column] -= baseline[row, column]
+
+
+@kernel
+def begin(table, is_difference):
+    """Begin the totals and the confidence sequences, of metrics or of their differences."""
+    totals = _array2(table, _AT.totals, _F8)
+    bounds = _array2(table, _AT.bounds, _F8)
+    sequences = _array1(table, _AT.sequences, _SEQUENCE)
+    for column in range(len(bounds)):
+        for number in range(totals.shape[1]):
+            totals[column, number] = 0.0
+        least = bounds[column, 0]
+        most = bounds[column, 1]
+        if is_difference:
+            most = most - least
+            least = -most
+        start_sequence(sequences[column : column + 1], least, most, bounds[column, 2])
+
+
+@kernel
+def add(table, count):
+    """Add the first ``count`` rows of ``values``, in their order.
+
+    They count in ``totals`` and in the confidence sequences, whose intervals are written to
+    ``ends``.
+    """
+    values = _array2(table, _AT.values, _F8)
+    totals = _array2(table, _AT.totals, _F8)
+    ends = _array2(table, _AT.ends, _F8)
+    sequences = _array1(table, _AT.sequences, _SEQUENCE)
+    for column in range(values.shape[1]):
+        sequence = sequences[column : column + 1]
+        add_values(sequence, values[:count, column])
+        ends[column, 0], ends[column, 1] = sequence_ends(sequence)
+    for row in range(count):
+        for column in range(values.shape[1]):
+            value = values[row, column]
+            if np.isnan(value):
+                continue
+            total = totals[column]
+            if total[0] == 0 or value < total[3]:
+                total[3] = value
+            if total[0] == 0 or value > total[4]:
+                total[4] = value
+            total[0] += 1
+            total[1] += value
+            total[2] += value * value
+
+
+_TABLE = types.CPointer(types.int64)
+# What the module has, by name: the compiled function and the types of its arguments.
+ENTRIES = {
+    "prepare": (prepare, (_TABLE,)),
+    "play": (play, (_TABLE, types.int64, types.int64, types.boolean, types.int64)),
+    "measure": (measure, (_TABLE, types.int64)),
+    "subtract": (subtract, (_TABLE, types.int64)),
+    "begin": (begin, (_TABLE, types.boolean)),
+    "add": (add, (_TABLE, types.int64)),
+}

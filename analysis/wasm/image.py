@@ -1,0 +1,434 @@
+"""The arrays of a scenario for the WebAssembly module, and what settings change in them.
+
+An image has all arrays of ``entry.ARRAYS``: the bytes of those that Python computes, and the shapes
+of the others. A setting that a page offers is a ``Slider``. If its value stands in some words of
+the arrays, the slider has a recipe, which says where; otherwise it has, for each of its values, the
+bytes that differ. Either way, the arrays are those that Python makes of the changed scenario.
+
+    image = make_image(load_scenario("paper"), ["greedy"], seed=7, missions=25,
+                       settings={"uavs": range(1, 7)})
+    image.document()  # as JSON
+"""
+
+from base64 import b64encode
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dess.analysis.metrics import metric_for_length, metric_of, size_of
+from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.sequences import SEQUENCE
+from dess.analysis.study.prices import Costs
+from dess.analysis.wasm.entry import ARRAYS, METRICS, PRICES, TOTALS
+from dess.base.errors import InputError
+from dess.model.channel import empty_scratch, world_of
+from dess.model.record import empty_records
+from dess.model.state import (
+    MISSION,
+    starts_of,
+    state_of,
+    teeth_lengths,
+    types_of,
+)
+from dess.physics.chart import neighbours_of
+from dess.physics.wind import reach_of, ways_home
+from dess.policies.heuristics import KINDS, plan_circuit
+from dess.scenario.scenario import ScenarioSpace
+
+# The arrays of which only the shape is in an image: what missions write, and what ``prepare``
+# fills. They begin with zeros, the records of ``operations`` with nan.
+EMPTY = {
+    *("missions", "uavs", "residual", "sensors", "teeth", "order", "means", "ways", "batches"),
+    *("arrivals", "reach", "ways_home", "actions", "mission_records", "uav_records"),
+    *("operations", "values", "baseline", "totals", "sequences", "ends"),
+}
+MOST_MEMORY = 2**29  # of an image [bytes]; each worker of a page has its own
+
+_LEAST_NORMAL = np.finfo(np.float64).tiny
+
+Patch = dict[str, list[tuple[int, bytes]]]  # by array, the bytes from an offset on
+
+
+class Word(NamedTuple):
+    """A word of eight bytes that has the value of a setting, times a factor.
+
+    Attributes:
+        array: The name of its array.
+        offset: Where it begins [bytes].
+        kind: ``i8`` for an integer, ``f8`` for a float; both little-endian.
+        factor: The factor.
+    """
+
+    array: str
+    offset: int
+    kind: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class Slider:
+    """A setting that a page may change.
+
+    Attributes:
+        setting: The field of the scenario.
+        values: The values that it may have.
+        recipe: The words that have its value; empty if the slider has ``patches``.
+        patches: What differs from the image at each value.
+    """
+
+    setting: str
+    values: tuple[Any, ...]
+    recipe: tuple[Word, ...] = ()
+    patches: tuple[Patch, ...] = ()
+
+    def apply(self, arrays: dict[str, np.ndarray], value: Any) -> None:
+        """Change the arrays as a page does for a value."""
+        for array, offset, kind, factor in self.recipe:
+            word = np.array([value * factor], f"<{kind}")
+            _bytes_of(arrays[array])[offset : offset + 8] = word.view(np.uint8)
+        if self.patches:
+            for array, parts in self.patches[self.values.index(value)].items():
+                for offset, part in parts:
+                    end = offset + len(part)
+                    _bytes_of(arrays[array])[offset:end] = np.frombuffer(part, np.uint8)
+
+
+@dataclass(frozen=True)
+class Image:
+    """The arrays of missions of a scenario, and the settings that may change.
+
+    Attributes:
+        arrays: The arrays by name, in the order of ``entry.ARRAYS``.
+        sliders: The settings.
+    """
+
+    arrays: dict[str, np.ndarray]
+    sliders: tuple[Slider, ...] = ()
+
+    @property
+    def memory(self) -> int:
+        """The memory that the arrays need [bytes]."""
+        return sum(array.nbytes for array in self.arrays.values())
+
+    def document(self) -> dict[str, Any]:
+        """The image for JSON; bytes are in base64."""
+        return {
+            "arrays": [*map(_describe_array, self.arrays, self.arrays.values())],
+            "fields": {
+                name: fields_of(array.dtype)
+                for name, array in self.arrays.items()
+                if array.dtype.names
+            },
+            "metrics": [*METRICS],
+            "totals": [*TOTALS],
+            "policies": KINDS,
+            "sliders": [*map(_describe_slider, self.sliders)],
+        }
+
+
+def explain_refusal(space: ScenarioSpace, team: Sequence[str]) -> str:
+    """One sentence that says why the module cannot fly missions; empty if it can."""
+    for name in team:
+        if name not in KINDS:
+            return f"The policy {name} decides in Python."
+    if space.needs_events:
+        return "Packets that arrive in continuous time need the event engine, which is in Python."
+    if space.chart.rows is not None:
+        return "With no-fly cells, a grid of more than 10,000 cells needs more memory than a page."
+    return ""
+
+
+def make_image(
+    space: ScenarioSpace,
+    team: Sequence[str],
+    seed: int = 0,
+    missions: int = 25,
+    settings: Mapping[str, Sequence[Any]] | None = None,
+    costs: Costs | None = None,
+) -> Image:
+    """The image of missions of a scenario.
+
+    Args:
+        space: The scenario.
+        team: The names of the policies; UAV i follows the policy ``team[i % len(team)]``.
+        seed: Seed of the missions.
+        missions: The most missions of a call, each of which has a row of records.
+        settings: By the fields of the scenario that may change, the values that they may have.
+        costs: The prices, if missions have costs.
+
+    Raises:
+        InputError: If the module cannot fly these missions (``explain_refusal``), or a setting
+            changes the shape of an array.
+    """
+    settings = settings or {}
+    if why := explain_refusal(space, team):
+        raise InputError("the WebAssembly module", why, "heuristics in the slotted model")
+    varied = {
+        (setting, position): ScenarioSpace.of(space, **{setting: value})
+        for setting, values in settings.items()
+        for position, value in enumerate(values)
+    }
+    everywhere = [space, *varied.values()]
+    fleet = max(variant.uavs[1] for variant in everywhere)
+    teeth = teeth_lengths(everywhere)
+
+    def arrays_at(scenario: ScenarioSpace) -> dict[str, np.ndarray]:
+        return _arrays_of(scenario, team, seed, missions, fleet, teeth, costs)
+
+    arrays = arrays_at(space)
+    sliders = []
+    for setting, values in settings.items():
+        others = [arrays_at(varied[setting, position]) for position in range(len(values))]
+        sliders.append(_make_slider(setting, values, arrays, others))
+    _check_independence(sliders)
+    image = Image(arrays, tuple(sliders))
+    if image.memory > MOST_MEMORY:
+        size = f"{image.memory >> 20} MiB of memory"
+        raise InputError("the WebAssembly module", size, f"{MOST_MEMORY >> 20} MiB at most")
+    return image
+
+
+def _arrays_of(
+    space: ScenarioSpace,
+    team: Sequence[str],
+    seed: int,
+    missions: int,
+    fleet: int,
+    teeth: int,
+    costs: Costs | None,
+) -> dict[str, np.ndarray]:
+    """All arrays by name, for fleets of at most that many UAVs."""
+    state = state_of([space], 1)
+    starts = starts_of([space], seed)
+    world = world_of(space)
+    chart = world.chart
+    scratch = empty_scratch(fleet, len(space.nodes))
+    records = empty_records(missions, fleet, is_extended=True)
+    reach = reach_of(starts.constants, chart)
+    if reach is None:
+        reach = np.zeros((0, 0, 0, 0), np.int16)
+    neighbours = np.zeros((0, 4), np.int32)
+    if chart.ways.size:
+        neighbours = neighbours_of(chart.zones)
+    kinds = [KINDS[team[i % len(team)]] for i in range(fleet)]
+    arrays = {
+        "missions": state.missions,
+        "uavs": types_of(space, fleet)[None],
+        "residual": state.residual,
+        "sensors": state.sensors,
+        "teeth": np.zeros((1, teeth), np.int32),
+        "constants": starts.constants.view(MISSION),
+        "ranges": starts.ranges,
+        "types": types_of(space, fleet)[None],
+        "data": starts.data,
+        "rates": starts.rates,
+        **{name: getattr(world, name) for name in ("nodes", "mean_snr", "order", "means")},
+        **{name: getattr(chart, name) for name in ("zones", "parking", "sizes", "nearest")},
+        "ways": chart.ways,
+        "neighbours": neighbours,
+        "batches": scratch.batches,
+        "search": scratch.search,
+        "arrivals": np.zeros(len(space.nodes), np.int64),
+        "reach": reach,
+        "ways_home": ways_home(starts.constants, chart),
+        "circuit": plan_circuit(world.nodes, chart),
+        "policies": np.array(kinds, np.int64),
+        "actions": np.zeros(fleet, np.int64),
+        "mission_records": records.missions,
+        "uav_records": records.uavs,
+        "operations": records.operations,
+        "prices": _prices_of(space, costs),
+        "factors": _factors_of(space),
+        "values": np.zeros((missions, len(METRICS))),
+        "baseline": np.zeros((missions, len(METRICS))),
+        "totals": np.zeros((len(METRICS), len(TOTALS))),
+        "bounds": _bounds_of(space),
+        "sequences": np.zeros(len(METRICS), SEQUENCE),
+        "ends": np.zeros((len(METRICS), 2)),
+    }
+    return {name: _without_gaps(arrays[name]) for name in ARRAYS}
+
+
+def copy_inputs(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Copies of the arrays that Python computes, with the bytes between the fields of records."""
+    return {
+        name: np.frombuffer(bytearray(array.tobytes()), array.dtype).reshape(array.shape)
+        for name, array in arrays.items()
+        if name not in EMPTY
+    }
+
+
+def _without_gaps(array: np.ndarray) -> np.ndarray:
+    """The array in one piece, with zeros between the fields of its records."""
+    if not array.dtype.names:
+        return np.ascontiguousarray(array)
+    copy = np.zeros(array.shape, array.dtype)
+    for name in array.dtype.names:
+        copy[name] = array[name]
+    return copy
+
+
+def _prices_of(space: ScenarioSpace, costs: Costs | None) -> np.ndarray:
+    """The prices in the order of ``PRICES``; none without costs."""
+    if costs is None:
+        return np.zeros(0)
+    seconds = costs.slot_seconds or 0.0
+    if space.units:
+        seconds = space.units.slot
+    values = costs.model_dump() | {"seconds": seconds}
+    return np.array([values[name] for name in PRICES], np.float64)
+
+
+def _factors_of(space: ScenarioSpace) -> np.ndarray:
+    """What turns the metrics into the units of the data sheet, 1 without one."""
+    factors = np.ones(len(METRICS))
+    if units := space.units:
+        for column, name in enumerate(METRICS):
+            if unit := metric_of(name).sheet_unit:
+                factors[column] = size_of(unit, units)
+    return factors
+
+
+def _bounds_of(space: ScenarioSpace) -> np.ndarray:
+    """(METRICS, 3) the least and the largest value of each metric, and the error of intervals."""
+    bounds = np.empty((len(METRICS), 3))
+    for column, name in enumerate(METRICS):
+        unit = metric_of(name).in_units.column if space.units else name
+        least, most = metric_for_length(unit, space.max_slots, space.units).range
+        bounds[column] = least, most, 1 - LEVEL
+    return bounds
+
+
+def _make_slider(
+    setting: str,
+    values: Sequence[Any],
+    arrays: Mapping[str, np.ndarray],
+    others: Sequence[Mapping[str, np.ndarray]],
+) -> Slider:
+    """The slider of a setting, from the arrays that Python makes of each of its values."""
+    for name, array in arrays.items():
+        if any(other[name].shape != array.shape for other in others):
+            raise InputError(setting, f"changes the shape of {name}", "settings of the same sea")
+    patches = tuple(_difference(arrays, other) for other in others)
+    recipe = _find_recipe(values, arrays, others)
+    with_recipe = Slider(setting, tuple(values), recipe)
+    for value, other in zip(values, others, strict=True):
+        changed = copy_inputs(arrays)
+        with_recipe.apply(changed, value)
+        if any(changed[name].tobytes() != other[name].tobytes() for name in changed):
+            return Slider(setting, tuple(values), patches=patches)
+    return with_recipe
+
+
+def _find_recipe(
+    values: Sequence[Any],
+    arrays: Mapping[str, np.ndarray],
+    others: Sequence[Mapping[str, np.ndarray]],
+) -> tuple[Word, ...]:
+    """The words that change with a setting, as if each had its value times a factor."""
+    if not all(isinstance(value, int | float) for value in values):
+        return ()
+    place, largest = max(enumerate(values), key=lambda pair: abs(pair[1]))
+    words = []
+    for name in arrays:
+        if name in EMPTY:
+            continue
+        versions = [_words_of(other[name]) for other in (arrays, *others)]
+        changing = np.any([version != versions[0] for version in versions], axis=0)
+        for number in np.flatnonzero(changing):
+            word = versions[place + 1][number : number + 1]
+            kind = "i8"
+            if word[0] != int(largest):
+                kind = "f8"
+            content = word.view(f"<{kind}")[0]
+            if 0 < abs(content) < _LEAST_NORMAL:  # the bits of another integer
+                return ()
+            words.append(Word(name, int(8 * number), kind, float(content / (largest or 1))))
+    return tuple(words)
+
+
+def _difference(arrays: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> Patch:
+    """The words that differ, those beside each other in one part."""
+    patch: Patch = {}
+    for name in arrays:
+        if name in EMPTY:
+            continue
+        differs = np.flatnonzero(_words_of(arrays[name]) != _words_of(other[name]))
+        runs = np.split(differs, np.flatnonzero(np.diff(differs) > 1) + 1)
+        content = other[name].tobytes()
+        parts = [
+            (int(8 * run[0]), content[8 * run[0] : 8 * run[-1] + 8]) for run in runs if len(run)
+        ]
+        if parts:
+            patch[name] = parts
+    return patch
+
+
+def _check_independence(sliders: Sequence[Slider]) -> None:
+    """Refuse two settings that change the same words: together they would change others.
+
+    Raises:
+        InputError: If there are such.
+    """
+    owners: dict[tuple[str, int], str] = {}
+    for slider in sliders:
+        for place in {*_places_of(slider)}:
+            other = owners.setdefault(place, slider.setting)
+            if other != slider.setting:
+                problem = f"change the same words of {place[0]}"
+                raise InputError(f"{other} and {slider.setting}", problem, "one of them")
+
+
+def _places_of(slider: Slider) -> Iterator[tuple[str, int]]:
+    """The array and the offset of each word that a slider changes."""
+    yield from ((word.array, word.offset) for word in slider.recipe)
+    for patch in slider.patches:
+        for name, parts in patch.items():
+            for offset, part in parts:
+                yield from ((name, at) for at in range(offset, offset + len(part), 8))
+
+
+def _bytes_of(array: np.ndarray) -> np.ndarray:
+    return array.reshape(-1).view(np.uint8)
+
+
+def _words_of(array: np.ndarray) -> np.ndarray:
+    """The array as integers of eight bytes; zeros fill the last."""
+    content = array.tobytes()
+    return np.frombuffer(content + bytes(-len(content) % 8), "<i8")
+
+
+def fields_of(kind: np.dtype) -> dict[str, tuple[int, str, int]]:
+    """The fields of a record by name: offset [bytes], type and number of entries."""
+    fields = {}
+    for name in kind.names or ():
+        assert kind.fields
+        field, offset = kind.fields[name][:2]
+        fields[name] = (offset, field.base.str[1:], int(np.prod(field.shape)))
+    return fields
+
+
+def _describe_array(name: str, array: np.ndarray) -> dict[str, Any]:
+    described: dict[str, Any] = {"name": name, "item": array.itemsize, "shape": [*array.shape]}
+    if name == "operations":
+        described["fill"] = "nan"
+    if name not in EMPTY and array.size:
+        described["bytes"] = b64encode(array.tobytes()).decode()
+    return described
+
+
+def _describe_slider(slider: Slider) -> dict[str, Any]:
+    described: dict[str, Any] = {"setting": slider.setting, "values": [*slider.values]}
+    if slider.recipe:
+        described["recipe"] = [[*word] for word in slider.recipe]
+    if slider.patches:
+        described["patches"] = [
+            {
+                name: [[offset, b64encode(part).decode()] for offset, part in parts]
+                for name, parts in patch.items()
+            }
+            for patch in slider.patches
+        ]
+    return described
