@@ -32,6 +32,7 @@ from dess.model.state import (
     teeth_lengths,
     types_of,
 )
+from dess.model.view import check_team
 from dess.physics.chart import neighbours_of
 from dess.physics.wind import reach_of, ways_home
 from dess.policies.heuristics import KINDS, plan_circuit
@@ -159,12 +160,14 @@ def make_image(
         costs: The prices, if missions have costs.
 
     Raises:
-        InputError: If the module cannot fly these missions (``explain_refusal``), or a setting
-            changes the shape of an array.
+        InputError: If the module cannot fly these missions (``explain_refusal``), the team has more
+            policies than the largest fleet has UAVs, a setting changes the shape of an array, or
+            two change the same words.
     """
     settings = settings or {}
     if why := explain_refusal(space, team):
         raise InputError("the WebAssembly module", why, "heuristics in the slotted model")
+    check_team(len(team), [space])
     varied = {
         (setting, position): ScenarioSpace.of(space, **{setting: value})
         for setting, values in settings.items()
