@@ -127,8 +127,8 @@ def kernel(function: Callable, **options: Any) -> Any:
 def large_kernel(function: Callable) -> Any:
     """Compile a function like ``kernel``; functions that call it do not take its code in.
 
-    With the code of the return guard in each place that calls it, a first run would take half as
-    long again.
+    With the code of the return guard in each place that calls it, a first run would take a fifth
+    longer.
     """
     return kernel(function, forceinline=False)
 
