@@ -342,6 +342,13 @@ def size_of(unit: str, units: Units) -> float:
     return getattr(units, quantity) / size
 
 
+def choose_units(units: Units | None) -> dict[str, tuple[str, float]]:
+    """The units in which a player tells lengths, times and data, and what 1 of the model is."""
+    if not units:
+        return {"length": ("cells", 1), "time": ("mission slots", 1), "data": ("data units", 1)}
+    return {what: (unit, size_of(unit, units)) for what, unit in DRAWN_UNITS.items()}
+
+
 def format_length(slots: int, units: Units | None) -> str:
     """The length of a mission, as ``215 mission slots`` or ``1.25 h``."""
     if units:

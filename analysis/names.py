@@ -125,6 +125,7 @@ _OTHERS = (  # that studies vary
     Field(ZONE_PADS, "Pads of each further zone", "Further pads"),
     Field("nodes", "Sensor nodes", "Nodes"),
     Field("quota", "Communication quota", "Quota", "communication slots"),
+    Field("max_slots", "Longest duration of a mission", "Duration", "mission slots"),
     Field("arrival_rate", "Arrival rate", "Arrivals", "data units per node and slot"),
     Field("arrivals.buffer", "Buffer of a node", "Buffer", "packets"),
     Field("charging.order", "Order of the queue for pads", "Order"),

@@ -31,13 +31,12 @@ from PIL import Image
 from dess import InputError
 from dess.analysis.figures import missions, style
 from dess.analysis.figures.style import node_colours, uav_colours
-from dess.analysis.metrics import DRAWN_UNITS, format_length, size_of
+from dess.analysis.metrics import DRAWN_UNITS, choose_units, format_length, size_of
 from dess.analysis.numbers import format_count
 from dess.analysis.results import event_log
 from dess.reports.pages.html import Part, load_template, make_figures
 from dess.scenario.scenario import Scenario
 
-TRAIL = 12  # number of last moves that are drawn behind a UAV
 # The events that a player jumps to, in words; of a pad, the text has no number.
 JUMPS = {
     "charge_start": "UAV {} starts to charge",
@@ -187,8 +186,8 @@ class Playback:
             "thresholds": {"C_S": scenario.charge_start, "C_C": scenario.charge_complete},
             "colours": {"uavs": self.uav_colours, "nodes": self.node_colours},
             "pads": scenario.charging_pads,
-            "trail": TRAIL,
-            "units": choose_units(scenario),
+            "trail": style.TRAIL,
+            "units": choose_units(scenario.units),
             "filled": np.isin(range(scenario.uavs), filled).tolist(),
             "fleet": {name: (1 * values).tolist() for name, values in self.fleet.items()},
             "residual": self.residual.round(2).tolist(),
@@ -209,13 +208,6 @@ def _find_corners(x: np.ndarray, y: np.ndarray) -> list[tuple[int, int]]:
     if len(moves):
         turns = np.r_[True, (moves[1:] != moves[:-1]).any(axis=1), True]
     return [(int(x), int(y)) for x, y in cells[turns]]
-
-
-def choose_units(scenario: Scenario) -> dict[str, tuple[str, float]]:
-    """The units in which a player tells lengths, times and data, and what 1 of the model is."""
-    if not (units := scenario.units):
-        return {"length": ("cells", 1), "time": ("mission slots", 1), "data": ("data units", 1)}
-    return {what: (unit, size_of(unit, units)) for what, unit in DRAWN_UNITS.items()}
 
 
 def _check_log(log: pd.DataFrame, scenario: Scenario) -> None:
@@ -427,7 +419,7 @@ class Film:
         fleet = self.playback.fleet
         cells = np.stack([fleet["x"], fleet["y"]], 2)
         for uav, colour in enumerate(playback.uav_colours):
-            way = cells[max(slot - TRAIL, 0) : slot + 1, uav].T
+            way = cells[max(slot - style.TRAIL, 0) : slot + 1, uav].T
             yield from self.sea.plot(way[0], way[1], color=colour, alpha=0.35, linewidth=3)
             if (node := fleet["node"][slot, uav]) >= 0:
                 link = np.array([cells[slot, uav], playback.scenario.nodes[node]]).T

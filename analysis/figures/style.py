@@ -42,6 +42,7 @@ UAVS = ("#1b1b1b", "#b3123f", "#1f5fbf", "#00734d", "#8a4b00", "#7b2fa0", "#007a
 
 LINES = ("-", "--", ":", "-.")
 MARKERS = "os^vPX*"
+TRAIL = 12  # number of last moves that are drawn behind a UAV
 WIDTH, DPI = 5.2, 150  # inches, dots per inch
 OUTLINED: dict = {"path_effects": [withStroke(linewidth=2.5, foreground="white")]}  # of texts
 # In all figures, blue means better, orange worse, and grey inconclusive.

@@ -18,6 +18,9 @@ from dess.scenario.fields import MOST_DATA, Fields
 # bytes each, and less than a second of compiled code to draw them all.
 MOST_PACKETS = 2_000_000
 
+# Shortest distance at which the SNR is known [m]; ratios of distances to it are finite.
+NEAREST = 0.001
+
 # Largest number of entries in the table of dess.model.channel: 8 GiB if all of it were filled.
 MOST_ENTRIES = 2**30
 
@@ -144,6 +147,8 @@ def _unfit(c: Fields) -> Iterator[InputError]:
             if np.max(c.value(name)) > full:
                 problem = f"{c.value(name)} is more than the reserve leaves"
                 yield InputError(name, problem, str(full))
+    if 0 < c.radio.anchor < NEAREST:
+        yield InputError("radio.anchor", f"{c.radio.anchor:g} m is too near", "0, or 0.001..1e6")
     if c.quota == 0 and not c.landing:
         yield InputError("quota", "0 needs landing", "1..1000000, or landing = true")
     for name in ("names", "arrivals.rates", "arrivals.initial", "arrivals.merged"):

@@ -2,6 +2,7 @@
 # jupyter:
 #   dess:
 #     studies: []
+#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py
@@ -42,6 +43,7 @@ from dess.analysis.figures.missions import mission_figure, sea_figure
 from dess.analysis.names import node_placing_sentence
 from dess.analysis.results.resimulate import resimulate
 from dess.reports.pages import html, study
+from dess.reports.pages.panel import make_panel
 
 # %%
 sea = load_scenario(scenario)
@@ -58,6 +60,10 @@ html.make_answer(search.sentence(), search.best.fleet)
 html.lead_figure(*draw_cheapest(found))
 
 # %%
+point = search.shown_point
+make_panel(found.scenario(point), found.scenario(point), scenario, [search.best.policy], seed)
+
+# %%
 html.render_part("assumptions.html", lines=assumption_sentences(found)) if sea.units else None
 
 # %% [markdown]
@@ -70,7 +76,6 @@ html.show_parts(
 )
 
 # %%
-point = search.shown_point
 mission = resimulate(found, search.best.policy, point, 0)
 map_of_mission = mission_figure(mission.events, mission.scenario)
 about_mission = map_caption(mission, fleets_in_words(found)[point])

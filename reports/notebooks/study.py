@@ -2,6 +2,7 @@
 # jupyter:
 #   dess:
 #     studies: [.]
+#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py
@@ -84,6 +85,9 @@ html.make_answer(variance_sentence(study, by))
 
 # %%
 html.lead_figure(*draw_main_figure(study, by))
+
+# %%
+page.make_panel_of(study, by)
 
 # %% tags=["if-sheet"]
 from dess.analysis.ask.assumptions import assumption_sentences

@@ -2,6 +2,7 @@
 # jupyter:
 #   dess:
 #     studies: []
+#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py
@@ -34,6 +35,7 @@ from dess.analysis.answers.variation import measured_columns
 from dess.analysis.metrics import metric_of
 from dess.reports.pages import html
 from dess.reports.pages import study as page
+from dess.reports.pages.panel import make_panel
 
 # %%
 asked = what_if(
@@ -50,6 +52,9 @@ pairs = f"n = {missions:,} pairs per policy"
 html.lead_figure(
     variation.plot(), "Paired differences of the metrics", f"{pairs}; bars are 95 % intervals."
 )
+
+# %%
+make_panel(found.scenario(0), found.scenario(1), scenario, found.policies, seed)
 
 # %% [markdown]
 # ## Why

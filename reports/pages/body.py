@@ -18,7 +18,7 @@ from nbformat import NotebookNode
 from pygments.formatters import HtmlFormatter
 
 import dess
-from dess.reports.pages.html import JINJA, PART, set_indices
+from dess.reports.pages.html import JINJA, PART, panel_hash, set_indices
 from dess.reports.pages.notebook import SCORECARD, Report
 from dess.reports.pages.page import Card, Page, Picture
 
@@ -98,6 +98,8 @@ def make_page(report: Report) -> Page:
     exporter.environment.globals |= {
         "report": report,
         "scripts": report.scripts,
+        "simulates": report.simulates,
+        "panel_hash": panel_hash,
         "version": dess.__version__,
         "answer": card.finding,
         "card": card.hidden,

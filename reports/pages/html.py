@@ -15,6 +15,7 @@ import re
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
+from hashlib import sha256
 from html import escape
 from numbers import Number
 from pathlib import Path
@@ -105,8 +106,22 @@ def load_template(name: str, **filters: Callable[..., str]) -> Template:
         finalize = _escape_unless_marked
     loader = PackageLoader("dess.reports", "templates")
     environment = Environment(loader=loader, finalize=finalize, trim_blocks=True, **JINJA)
+    environment.globals["panel_hash"] = panel_hash
     environment.filters |= {"indexed": set_indices, "explained": Markup.escape, **filters}
     return environment.get_template(name)
+
+
+@cache
+def panel_script() -> str:
+    """The script of a panel."""
+    from dess.analysis.figures import style  # for the pages that have one
+
+    return load_template("panel_script.js").render(style=style)
+
+
+def panel_hash() -> str:
+    """The hash by which a page lets a browser run the script of a panel, and no other."""
+    return b64encode(sha256(panel_script().encode()).digest()).decode()
 
 
 def render_part(name: str, **values: Any) -> HTML:
@@ -114,12 +129,14 @@ def render_part(name: str, **values: Any) -> HTML:
     return HTML(load_template(name).render(**values))
 
 
-def fill_page(name: str, scripts: bool = False, **values: Any) -> str:
+def fill_page(name: str, scripts: bool = False, simulates: bool = False, **values: Any) -> str:
     """Fill a template with values, and seal the page.
 
-    A browser makes no request for the page, and runs a script only if ``scripts`` is set.
+    A browser makes no request for the page, and runs scripts only if ``scripts`` is set. If
+    ``simulates`` is set, it runs the script of a panel, and its WebAssembly module.
     """
-    page = load_template(name).render(scripts=scripts, version=dess.__version__, **values)
+    permitted = {"scripts": scripts, "simulates": simulates}
+    page = load_template(name).render(version=dess.__version__, **permitted, **values)
     return Page(page).sealed.text
 
 

@@ -12,7 +12,8 @@ from dess.analysis.results.resimulate import Evidence
 from dess.base.files.documents import Document
 from dess.base.files.reading import read_text
 
-STUDY, FILES, CARD = "dess-study", "dess-files", "dess-card"  # what is hidden in a page
+# What is hidden in a page.
+STUDY, FILES, CARD, PANEL = "dess-study", "dess-files", "dess-card", "dess-panel"
 LARGEST = 512 * 2**20  # bytes of a page that is shown in an index
 LIMIT = 64 * 2**20  # bytes of a page that is verified
 ALLOWED = "a page of dess report"

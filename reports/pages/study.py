@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
+from IPython.display import HTML, Markdown
 
 from dess.analysis import numbers
 from dess.analysis.answers import summary
@@ -14,7 +15,7 @@ from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.settings.baseline import check_baseline
 from dess.analysis.answers.settings.points import has_conditions, metrics_of_page, varied_values
-from dess.analysis.answers.settings.ranking import ranking_metric
+from dess.analysis.answers.settings.ranking import rank_settings, ranking_metric
 from dess.analysis.ask import around
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
@@ -23,6 +24,8 @@ from dess.analysis.study.selection import Selection
 from dess.policies.registry import list_departures
 from dess.reports.pages import PREFIX, html, notebook
 from dess.reports.pages.notebook import Report, cell_tags
+from dess.reports.pages.panel import make_panel
+from dess.scenario.scenario import SEA
 
 _MOST_FIELDS = 3  # the largest number of fields that a title names
 _MOST_VALUES = 12  # the largest number of values of a field in a list
@@ -216,6 +219,25 @@ def make_study_report(results: Results, values: Mapping[str, Any] = MappingProxy
     original.cells[0].source = f"# {html.escape_text(title)}\n\n{html.escape_text(description)}"
     report = notebook.make_report(f"{PREFIX}{study.name}", original)
     return replace(report, title=title, description=" ".join(description.split()))
+
+
+def make_panel_of(results: Results, metric: str) -> HTML | Markdown:
+    """The panel of the page of a study, which begins with its best setting.
+
+    Args:
+        results: The study.
+        metric: The metric that ranks the settings.
+    """
+    point, policy = 0, results.policies[0]
+    if isinstance(results.study.selection, Cheapest):
+        search = search_of(results)
+        point, policy = search.shown_point, search.best.policy
+    elif results.design != "saltelli":
+        best = rank_settings(results, metric).iloc[0]
+        point, policy = int(best.point), best.policy
+    space, manifest = results.scenario(point), results.store.manifest
+    name = manifest.points[point].values.get(SEA, results.study.scenario)
+    return make_panel(space, space, name, [policy], manifest.seed)
 
 
 def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]:

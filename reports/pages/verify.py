@@ -33,7 +33,8 @@ from dess.analysis.results.tables import Results, results_of
 from dess.base.files.reading import paths_in
 from dess.model.events import PARAMETER_EVENTS
 from dess.policies.registry import Policy, is_confirmed, load_team
-from dess.reports.pages.page import ALLOWED, LIMIT, Page
+from dess.reports.pages.page import ALLOWED, LIMIT, PANEL, Page
+from dess.reports.pages.panel import CHECKED, Panel, check_panel, is_of_another_version
 from dess.scenario.scenario import ScenarioSpace
 
 BOUNDS_CHECKED = 3  # upper bounds that are computed again at most, since each takes seconds
@@ -127,7 +128,8 @@ def verify_page(
         _draw_missions(evidence, sampling) for evidence in studies
     ]  # all, before any is simulated
     records = [_compare_missions(*pair, named) for pair in zip(studies, drawn, strict=True)]
-    return [Check("page", 1, altered, notes), *files, *records]
+    panels = [_check_panel(text, page, sampling) for text in page.find_hidden(PANEL)]
+    return [Check("page", 1, altered, notes), *files, *panels, *records]
 
 
 def verify_results(
@@ -250,6 +252,16 @@ def _match_stored_columns(log: pd.DataFrame, stored: pa.Table) -> pd.DataFrame:
         return log
     events = log[~log["event"].isin(PARAMETER_EVENTS)]
     return events[stored.column_names].reset_index(drop=True)
+
+
+def _check_panel(text: str, page: Page, sampling: _Sampling) -> Check:
+    """Make a panel again, with the missions that it is compared with."""
+    panel = Panel.parse(text, page.where, page.allowed)
+    sampling.refuse_long_checks("panel", [*panel.spaces])
+    notes = []
+    if is_of_another_version(panel):
+        notes = ["made with another version of the engine, so only its missions are checked"]
+    return Check("panel", CHECKED, check_panel(panel, page.text), notes)
 
 
 def _check_files(files: Mapping[str, str]) -> Check:

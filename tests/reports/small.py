@@ -124,7 +124,7 @@ def words_of(html: str) -> str:
 
 def words(html: str) -> str:
     """The words of a piece of a page, be it of HTML or Markdown."""
-    bare = re.sub(r"<script.*?</script>|<[^>]+>", " ", html, flags=re.S)
+    bare = re.sub(r"<(script|style).*?</\1>|<[^>]+>", " ", html, flags=re.S)
     return unescape(re.sub(r"\s+", " ", bare)).replace("**", "")
 
 

@@ -172,6 +172,15 @@ def test_values_at_the_limits_are_allowed_and_those_beyond_are_not():
                 ScenarioSpace.of(space, **{field: kind(refused)})
 
 
+def test_the_snr_is_known_at_no_distance_near_zero():
+    """The ratio of a distance to it would overflow."""
+    assert load_scenario("paper", **{"radio.anchor": 0.001}).radio.anchor == 0.001
+    with pytest.raises(
+        InputError, match="radio.anchor: 1e-308 m is too near; allowed: 0, or 0.001"
+    ):
+        load_scenario("paper", **{"radio.anchor": 1e-308})
+
+
 def test_no_number_of_a_scenario_is_minus_zero():
     """Compiled code divides by rates, and by -0.0 with another result than by 0.0."""
     space = load_scenario("paper")

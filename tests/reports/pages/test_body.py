@@ -26,7 +26,9 @@ def page(*cells: str | DisplayObject) -> Page:
         else:
             notebook.cells.append(new_markdown_cell(cell))
     nbformat.validate(notebook)
-    return make_page(Report("test", "A title", "About it.", [], [], False, notebook, notebook))
+    return make_page(
+        Report("test", "A title", "About it.", [], [], False, False, notebook, notebook)
+    )
 
 
 def main_of(*cells: str | DisplayObject) -> str:

@@ -1,0 +1,365 @@
+"""The panel of a page: its reader changes settings, and the page simulates missions of them.
+
+    display(make_panel(baseline, variation, "paper", ["greedy"], seed=0))
+
+The page carries the WebAssembly module and an image of the scenario (``dess.analysis.wasm``), so it
+needs no network and no Python. Without JavaScript or WebAssembly, and on paper, there is no panel.
+"""
+
+import gzip
+import json
+import re
+import zlib
+from base64 import b64decode, b64encode
+from collections.abc import Iterator, Sequence
+from hashlib import sha256
+from typing import Any
+
+from IPython.display import HTML, Markdown
+from markupsafe import Markup
+
+from dess import InputError, simulate_batch
+from dess.analysis.execution.effort import seconds_of
+from dess.analysis.figures import style
+from dess.analysis.metrics import PRODUCT, choose_units, metric_of
+from dess.analysis.names import field_named, value_text
+from dess.analysis.wasm.entry import METRICS
+from dess.analysis.wasm.image import explain_refusal, make_image
+from dess.analysis.wasm.module import read_module
+from dess.base.files.documents import Document
+from dess.base.files.writing import toml_value
+from dess.model.record import Records, empty_records
+from dess.policies.heuristics import KINDS
+from dess.policies.registry import load
+from dess.reports.pages.html import panel_script, render_part, write_markdown
+from dess.reports.pages.page import PANEL, hidden_element
+from dess.scenario.fields import dotted
+from dess.scenario.scenario import ScenarioSpace, is_scenario_name
+
+PAPER = "paper"  # the scenario that commands begin with where there is no other name
+PORTION = 25  # the most missions of a call of the module
+MISSIONS = 1000  # of a run, unless the reader asks for others
+CHECKED = 100  # of the baseline, which are compared with those of Python
+MOST_SECONDS = 120.0  # that these missions may take in Python
+SIDES = {"a": "A: the baseline", "b": "B: the variation"}
+_HASH = r'"([0-9a-f]{64})"'
+_PACKED = re.compile('(?<=type="text/plain">)([A-Za-z0-9+/=]+)(?=</script>)')
+_ENCODED = re.compile("[A-Za-z0-9+/=]*")
+
+# What a reader may change wherever the scenario lets him, and by which values.
+_COUNTS = {"uavs": (1, 2, 3, 4, 5, 6, 8), "pads": (1, 2, 3, 4, 6, 8, 16)}
+_SCALED = {
+    "arrival_rate": (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0),
+    "max_slots": (0.5, 0.75, 1.0, 1.5, 2.0),
+}
+_PERCENT = {
+    "charge_start": (10, 20, 30, 40, 50),
+    "charge_complete": (60, 70, 80, 90, 100),
+}
+_RATES = {"failures.uav_rate": (0.0, 0.0005, 0.001, 0.002, 0.005)}
+
+
+class Panel(Document):
+    """What a panel is made of, which its page keeps, so that the panel can be made again.
+
+    Attributes:
+        scenario: The name of the scenario on the command line.
+        named: The values of this scenario, which commands need not name.
+        baseline: The values of the scenario that A begins with.
+        variation: Those that B begins with.
+        policy: The policy of both.
+        seed: The seed of the missions.
+        module: The SHA-256 hash of the WebAssembly module.
+    """
+
+    scenario: str
+    named: dict[str, Any]
+    baseline: dict[str, Any]
+    variation: dict[str, Any]
+    policy: str
+    seed: int
+    module: str
+
+    @property
+    def spaces(self) -> tuple[ScenarioSpace, ScenarioSpace]:
+        """The scenarios of A and of B.
+
+        Raises:
+            InputError: If one is not valid.
+        """
+        return ScenarioSpace.of(**self.baseline), ScenarioSpace.of(**self.variation)
+
+    def render(self) -> str:
+        """The panel as HTML.
+
+        Raises:
+            InputError: If the module cannot simulate these missions.
+        """
+        baseline, variation = self.spaces
+        if why := explain_refusal(baseline, [self.policy]):
+            raise InputError("panel", why, "a heuristic in the slotted model")
+        time = seconds_of([baseline], self.policy, (CHECKED, CHECKED))
+        if time.high > MOST_SECONDS:
+            problem = f"{CHECKED} missions would take {time}"
+            raise InputError("panel", problem, f"{MOST_SECONDS:.0f} seconds at most")
+        settings = dict(_settings_of(baseline, variation))
+        image = make_image(baseline, [self.policy], self.seed, PORTION, settings)
+        starts = {
+            side: [values.index(_value_of(space, key)) for key, values in settings.items()]
+            for side, space in zip(SIDES, (baseline, variation), strict=True)
+        }
+        named = ScenarioSpace.of(**self.named)
+        ours, theirs = (dotted(space.model_dump(mode="json")) for space in (baseline, named))
+        fixed = [key for key in ours if key not in settings and ours[key] != theirs.get(key)]
+        fleet = len(image.arrays["uavs"][0])
+        data = {
+            "settings": [
+                _describe_setting(key, values, _value_of(named, key))
+                for key, values in settings.items()
+            ],
+            # What commands have to set beside these settings.
+            "fixed": [f"{key}={toml_value(ours[key])}" for key in fixed],
+            "policies": [name for name in KINDS if name != "random-unguarded"],
+            "metrics": [*_describe_metrics(baseline)],
+            "sea": _describe_sea(baseline, fleet),
+            "product": METRICS.index(PRODUCT),
+            "scenario": self.scenario,
+            "seed": self.seed,
+            "check": {
+                "policy": self.policy,
+                "positions": starts["a"],
+                "hashes": hash_missions(baseline, self.policy, self.seed, fleet),
+            },
+        }
+        return str(
+            render_part(
+                "panel.html",
+                data=data,
+                module=_pack(read_module()),
+                image=_pack(json.dumps(image.document()).encode()),
+                sides=SIDES,
+                script=panel_script(),
+                start={side: {"policy": self.policy, "positions": starts[side]} for side in SIDES},
+                missions=MISSIONS,
+            ).data
+        )
+
+
+def make_panel(
+    baseline: ScenarioSpace,
+    variation: ScenarioSpace,
+    scenario: str,
+    policies: Sequence[str],
+    seed: int,
+) -> HTML | Markdown:
+    """The panel of a baseline and a variation; a sentence instead where it is not possible.
+
+    Args:
+        baseline: The scenario that A begins with.
+        variation: The one that B begins with.
+        scenario: The name of the scenario, or its file, which a reader may not have: commands then
+            set all fields.
+        policies: The policies of the page; the first that the module knows is the one to begin
+            with, otherwise ``greedy``.
+        seed: The seed of the missions.
+    """
+    named = scenario if is_scenario_name(scenario) else PAPER
+    panel = Panel(
+        scenario=named,
+        named=ScenarioSpace.of(named).model_dump(mode="json"),
+        baseline=baseline.model_dump(mode="json"),
+        variation=variation.model_dump(mode="json"),
+        policy=next((name for name in policies if name in KINDS), "greedy"),
+        seed=seed,
+        module=sha256(read_module()).hexdigest(),
+    )
+    try:
+        rendered = panel.render()
+    except InputError as error:
+        return write_markdown("This page cannot simulate by itself: {why}", why=str(error))
+    return HTML(hidden_element(PANEL, panel.model_dump_json()) + Markup(rendered))
+
+
+def check_panel(panel: Panel, page: str) -> list[str]:
+    """What is wrong with the panel of a page, a line for each; nothing of what it has shown counts.
+
+    The panel is made again, with its module, its arrays and the hashes of its missions, and must
+    have the same bytes. A panel of another version of the module has only its missions checked.
+
+    Args:
+        panel: What the page says that its panel is made of.
+        page: The text of the page.
+    """
+    if is_of_another_version(panel):
+        own = re.findall(_HASH, panel.render())
+        return [
+            f"mission {number} of its baseline differs"
+            for number, digest in enumerate(own)
+            if digest not in page
+        ]
+    if _is_in(panel.render(), page):
+        return []
+    return ["differs from the panel that the same settings give: its module, arrays or missions"]
+
+
+def _is_in(rendered: str, page: str) -> bool:
+    """Whether a page has a panel; what is packed may have been compressed in another way."""
+    *parts, end = _PACKED.split(rendered)
+    place = page.find(parts[0])
+    if place < 0:
+        return False
+    for text, packed in zip(parts[::2], parts[1::2], strict=True):
+        if not page.startswith(text, place):
+            return False
+        place += len(text)
+        theirs = _ENCODED.match(page, place)
+        if theirs is None or not _is_packed_as(theirs.group(), packed):
+            return False
+        place = theirs.end()
+    return page.startswith(end, place)
+
+
+def _is_packed_as(theirs: str, packed: str) -> bool:
+    """Whether a packed text has the content of another; no more of it is unpacked than this has."""
+    content = gzip.decompress(b64decode(packed))
+    unpack = zlib.decompressobj(wbits=31)
+    try:
+        return unpack.decompress(b64decode(theirs), len(content) + 1) == content
+    except (ValueError, zlib.error):
+        return False
+
+
+def is_of_another_version(panel: Panel) -> bool:
+    """Whether a panel has another module than the one that is installed."""
+    return panel.module != sha256(read_module()).hexdigest()
+
+
+def hash_missions(space: ScenarioSpace, policy: str, seed: int, fleet: int) -> list[str]:
+    """The SHA-256 hashes of the records of the first missions, as the module writes them.
+
+    Args:
+        space: The scenario.
+        policy: The policy of all UAVs.
+        seed: The seed of the missions.
+        fleet: The number of UAVs for which a record has room.
+    """
+    records = simulate_batch(space, [load(policy)], seed, CHECKED)
+    padded = _with_room(records, fleet)
+    return [
+        sha256(b"".join(kind[row].tobytes() for kind in padded)).hexdigest()
+        for row in range(CHECKED)
+    ]
+
+
+def _with_room(records: Records, fleet: int) -> Records:
+    """Records with room for a fleet, and for what extended scenarios measure."""
+    padded = empty_records(len(records.missions), fleet, is_extended=True)
+    padded.missions[:] = records.missions
+    padded.uavs[:, : records.uavs.shape[1]] = records.uavs
+    if len(records.operations):
+        padded.operations[:] = records.operations
+    return padded
+
+
+def _settings_of(
+    baseline: ScenarioSpace, variation: ScenarioSpace
+) -> Iterator[tuple[str, list[Any]]]:
+    """The settings of the panel: by field, the values that the scenario allows, in their order."""
+    for key, values in _candidates_of(baseline):
+        allowed = [value for value in values if _is_allowed(baseline, key, value)]
+        present = [_value_of(space, key) for space in (baseline, variation)]
+        ordered = _in_order([*allowed, *present])
+        if len(ordered) > 1:
+            yield key, ordered
+    offered = {key for key, _ in _candidates_of(baseline)}
+    ours, theirs = (dotted(space.model_dump(mode="json")) for space in (baseline, variation))
+    for key in ours | theirs:
+        if key not in offered and ours.get(key) != theirs.get(key):
+            yield key, [ours.get(key), theirs.get(key)]
+
+
+def _candidates_of(space: ScenarioSpace) -> Iterator[tuple[str, Sequence[Any]]]:
+    yield from _COUNTS.items()
+    for key, factors in _SCALED.items():
+        value = getattr(space, key)
+        whole = isinstance(value, int)
+        scaled = [float(f"{factor * value:.6g}") for factor in factors]
+        yield key, [*map(round, scaled)] if whole else scaled
+    yield from _PERCENT.items()
+    yield from _RATES.items()
+
+
+def _is_allowed(space: ScenarioSpace, key: str, value: Any) -> bool:
+    try:
+        ScenarioSpace.of(space, **{key: value})
+    except InputError:
+        return False
+    return True
+
+
+def _value_of(space: ScenarioSpace, key: str) -> Any:
+    """The value of a field as a reader knows it: of a range with equal ends, one number."""
+    if key == "pads":
+        return space.charging_pads
+    value: Any = space
+    for part in key.split("."):
+        value = getattr(value, part)
+    if isinstance(value, tuple):
+        return value[0] if len({*value}) == 1 else [*value]
+    return value
+
+
+def _in_order(values: Sequence[Any]) -> list[Any]:
+    """Each value once: ranges, which differ between missions, before numbers."""
+    different = [value for n, value in enumerate(values) if value not in values[:n]]
+    numbers = sorted(value for value in different if not isinstance(value, list))
+    return [value for value in different if isinstance(value, list)] + numbers
+
+
+def _describe_sea(space: ScenarioSpace, fleet: int) -> dict[str, Any]:
+    """What a player draws of the scenario."""
+    colours = {"uavs": style.uav_colours(fleet), "nodes": style.node_colours(len(space.nodes))}
+    return {
+        "size": space.size,
+        "zones": space.rectangles,
+        "nodes": space.nodes,
+        "names": space.names,
+        "noFly": space.no_fly,
+        "units": choose_units(space.units),
+        "trail": style.TRAIL,
+        "colours": colours,
+    }
+
+
+def _describe_setting(key: str, values: Sequence[Any], default: Any) -> dict[str, Any]:
+    """A setting for the page; a command need not name the default, which the scenario has."""
+    field = field_named(key)
+    return {
+        "default": values.index(default) if default in values else None,
+        "key": key,
+        "name": field.name,
+        "unit": field.unit,
+        "values": values,
+        "texts": [value_text(value) for value in values],
+        "options": [f"{key}={toml_value(value)}" for value in values],
+    }
+
+
+def _describe_metrics(space: ScenarioSpace) -> Iterator[dict[str, Any]]:
+    """What the panel writes of each metric, by its column in the values of missions."""
+    for column, name in enumerate(METRICS):
+        metric = metric_of(name)
+        if space.units:
+            metric = metric.in_units
+        yield {
+            "column": column,
+            "name": metric.name,
+            "percent": metric.in_percent,
+            "unit": metric.unit,
+            "less": metric.less_is_better,
+        }
+
+
+def _pack(content: bytes) -> str:
+    """Compressed bytes as text; equal bytes give equal text."""
+    return b64encode(gzip.compress(content, 9, mtime=0)).decode()

@@ -1,0 +1,85 @@
+// The engine of dess in a page: the WebAssembly module, with the arrays of a scenario.
+// See docs/reference/webassembly.md. Used by the page and by its workers.
+
+const WORDS = 5; // of the table of arrays, for each array: its address and up to four sizes
+
+function bytesOfBase64(text) {
+    return Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+}
+
+class Engine {
+    // Lay out the arrays of an image; `setting` has the positions of some sliders, by their names.
+    // A bare image has no scenario, and only adds up values.
+    constructor(module, image, setting = {}) {
+        this.exports = new WebAssembly.Instance(module, {}).exports;
+        this.image = image;
+        this.places = {};
+        const rows = image.arrays.map((array) => {
+            const size = array.shape.reduce((product, length) => product * length, array.item);
+            this.places[array.name] = this.exports.reserve(size);
+            return [this.places[array.name], ...array.shape];
+        });
+        const table = this.view(BigInt64Array, this.exports.arrays(), WORDS * rows.length);
+        rows.forEach((words, row) => words.forEach((word, n) => { table[WORDS * row + n] = BigInt(word); }));
+        for (const array of image.arrays) {
+            if (array.bytes) this.write(array.name, 0, array.bytes);
+            if (array.fill === "nan") this.floats(array.name).fill(NaN);
+        }
+        for (const slider of image.sliders)
+            if (slider.setting in setting) this.move(slider, setting[slider.setting]);
+        if (!image.isBare) this.exports.prepare();
+    }
+
+    // Memory may have grown, so that views have to be made again after each call of the module.
+    view(kind, place, length) {
+        return new kind(this.exports.memory.buffer, place, length);
+    }
+
+    write(name, offset, bytes) {
+        this.view(Uint8Array, this.places[name] + offset, bytes.length).set(bytes);
+    }
+
+    bytes(name) {
+        const {item, shape} = this.image.arrays.find((array) => array.name === name);
+        return this.view(Uint8Array, this.places[name], shape.reduce((product, length) => product * length, item));
+    }
+
+    floats(name) {
+        const bytes = this.bytes(name);
+        return this.view(Float64Array, bytes.byteOffset, bytes.length / 8);
+    }
+
+    integers(name) {
+        const bytes = this.bytes(name);
+        return this.view(BigInt64Array, bytes.byteOffset, bytes.length / 8);
+    }
+
+    // A field of all records of an array.
+    field(array, name) {
+        const [offset, kind] = this.image.fields[array][name], bytes = this.bytes(array);
+        const {item} = this.image.arrays.find((other) => other.name === array);
+        const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.length);
+        const read = {
+            i8: (place) => Number(view.getBigInt64(place, true)),
+            f8: (place) => view.getFloat64(place, true),
+            b1: (place) => view.getUint8(place) > 0,
+        }[kind];
+        return Array.from({length: bytes.length / item}, (_, row) => read(row * item + offset));
+    }
+
+    // Change what a slider changes, for the value at a position.
+    move(slider, position) {
+        for (const [array, offset, kind, factor] of slider.recipe ?? []) {
+            const content = slider.values[position] * factor;
+            const word = kind === "i8" ? BigInt64Array.of(BigInt(content)) : Float64Array.of(content);
+            this.write(array, offset, new Uint8Array(word.buffer));
+        }
+        for (const [array, parts] of Object.entries(slider.patches?.[position] ?? {}))
+            for (const [offset, part] of parts) this.write(array, offset, bytesOfBase64(part));
+    }
+
+    // All UAVs follow the policy of this number.
+    follow(policy) {
+        this.integers("policies").fill(BigInt(policy));
+    }
+}

@@ -1,0 +1,220 @@
+"""A panel simulates in a page what Python simulates; ``dess verify`` finds what was changed."""
+
+import gzip
+import json
+import re
+from base64 import b64decode, b64encode
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page as Tab
+
+from dess import load_scenario, policies, simulate_batch
+from dess.analysis.metrics import HOME, METRICS, metric_of
+from dess.analysis.wasm.image import make_image
+from dess.reports.pages.html import fill_page
+from dess.reports.pages.page import PANEL, Page
+from dess.reports.pages.panel import CHECKED, PORTION, hash_missions, make_panel
+from dess.reports.pages.verify import verify_page
+from tests.flown import Engine
+
+SEED = 7
+MISSIONS = 120  # of a run
+PATIENCE = 60_000  # ms
+
+
+@pytest.fixture(scope="module")
+def panel() -> str:
+    baseline, variation = (load_scenario("paper", uavs=uavs) for uavs in (1, 2))
+    return str(make_panel(baseline, variation, "paper", ["planner", "greedy"], SEED).data)
+
+
+@pytest.fixture(scope="module")
+def document(panel, tmp_path_factory) -> Path:
+    """A page that contains the panel alone."""
+    shown = {"title": "A panel", "outcome": "", "library": "", "player": panel}
+    path = tmp_path_factory.mktemp("panel") / "page.html"
+    path.write_text(fill_page("mission.html", simulates=True, **shown), "utf-8")
+    return path
+
+
+def test_the_hashes_are_those_of_the_records_of_the_module():
+    """Each is of the bytes of the mission, of its UAVs, and of what extended scenarios measure."""
+    space = load_scenario("paper", uavs=[1, 3], age={"measured": True})
+    engine = Engine(make_image(space, ["greedy"], SEED, PORTION))
+    engine.call("play", 0.0, PORTION)
+    kinds = [*engine.records()]
+    hashes = [
+        sha256(b"".join(kind[row].tobytes() for kind in kinds)).hexdigest()
+        for row in range(PORTION)
+    ]
+    assert hash_missions(space, "greedy", SEED, kinds[1].shape[1])[:PORTION] == hashes
+
+
+def test_what_cannot_be_simulated_in_a_page_is_a_sentence():
+    space = load_scenario("paper", arrivals={"process": "continuous"})
+    assert "continuous time" in make_panel(space, space, "paper", ["greedy"], SEED).data
+
+
+def test_a_panel_that_nobody_changed_is_found_sound(document):
+    checks = {check.what: check for check in verify_page(document, 1, 0)}
+    assert checks["panel"].compared == CHECKED
+    assert not any(check.differing for check in checks.values())
+
+
+@pytest.mark.parametrize("part", ["module", "image", "data"])
+def test_a_changed_bit_of_module_arrays_or_hashes_is_found(document, tmp_path, part):
+    """Though the checksum of the page was made anew."""
+    text = document.read_text("utf-8")
+    begin = text.index(">", text.index(f'id="panel-{part}"')) + 1
+    at = text.index("hashes", begin) + 20 if part == "data" else begin + 400
+    changed = text[:at] + ("0" if text[at] != "0" else "1") + text[at + 1 :]
+    path = tmp_path / "page.html"
+    path.write_text(Page(changed).sealed.text, "utf-8")
+    checks = {check.what: check.differing for check in verify_page(path, 1, 0)}
+    assert checks["page"] == []
+    assert len(checks["panel"]) == 1
+
+
+def test_a_panel_may_be_compressed_in_another_way(document, tmp_path):
+    """Other versions of zlib find other bytes for the same content."""
+    text = document.read_text("utf-8")
+    packed = re.search('id="panel-module" type="text/plain">([^<]*)<', text)[1]
+    fast = b64encode(gzip.compress(gzip.decompress(b64decode(packed)), 1)).decode()
+    assert fast != packed
+    path = tmp_path / "page.html"
+    path.write_text(Page(text.replace(packed, fast)).sealed.text, "utf-8")
+    assert not any(check.differing for check in verify_page(path, 1, 0))
+
+
+def test_the_missions_of_a_panel_of_another_version_are_checked(document, tmp_path):
+    text = document.read_text("utf-8")
+    hidden = re.search(f'class="{PANEL}"[^>]*>(.*?)</script>', text, re.S)
+    about = json.loads(hidden[1]) | {"module": "0" * 64}
+    text = text.replace(hidden[1], json.dumps(about))
+    digest = re.search('"hashes": ."([0-9a-f]{64})', text)[1]
+    for content, count in ((text, 0), (text.replace(digest, digest[::-1]), 1)):
+        path = tmp_path / "page.html"
+        path.write_text(Page(content).sealed.text, "utf-8")
+        (check,) = (check for check in verify_page(path, 1, 0) if check.what == "panel")
+        assert len(check.notes) == 1
+        assert len(check.differing) == count
+
+
+def run(tab: Tab, missions: int = MISSIONS) -> str:
+    """Run the missions, and return what the panel says of them."""
+    tab.locator("[name=missions]").fill(str(missions))
+    tab.get_by_role("button", name="Run").click()
+    status = tab.locator("[data-panel=status]")
+    status.get_by_text(re.compile(r"in [\d.]+ s\.")).wait_for(timeout=PATIENCE)
+    return str(status.text_content())
+
+
+def cells_of(tab: Tab, name: str) -> list[str]:
+    """What the panel shows of a metric: A, B, their difference, and whether it is decided."""
+    row = tab.locator("#panel tbody tr").filter(
+        has=tab.get_by_role("rowheader", name=name, exact=True)
+    )
+    return [str(text) for text in row.locator("td").all_text_contents()]
+
+
+def means_of(uavs: int, policy: str = "greedy") -> dict[str, float]:
+    records = simulate_batch(
+        load_scenario("paper", uavs=uavs), policies.load(policy), SEED, MISSIONS
+    )
+    return {metric: float(np.mean(records.missions[metric])) for metric in (*METRICS, HOME)}
+
+
+def test_the_page_simulates_what_python_does(visit, document):
+    """Its means are those of Python to the last digit, and its records to the last bit."""
+    opened = visit(document, 1280)
+    said = run(opened.page)
+    assert f"{MISSIONS} of {MISSIONS} missions of A and of B" in said
+    assert f"first {CHECKED} missions of A are the same as those of Python, bit for bit" in said
+    for metric in (*METRICS, HOME):
+        shown = cells_of(opened.page, metric_of(metric).name)
+        for cell, uavs in zip(shown, (1, 2), strict=False):
+            assert cell.startswith(f"{100 * means_of(uavs)[metric]:.1f} % [")
+    product = cells_of(opened.page, metric_of("collection_ratio_and_communication").name)
+    assert product[2].startswith("+") and product[3].startswith("decided: B is higher")
+    command = opened.page.locator("[data-panel=command]").text_content()
+    assert command == (
+        "dess what-if --policy greedy --baseline uavs=1 --set uavs=2 --scenario paper "
+        f"--seed {SEED} --missions {MISSIONS}"
+    )
+    assert opened.complaints == []
+    assert [url for url in opened.requests if not url.startswith("blob:")] == [document.as_uri()]
+
+
+def test_a_reader_changes_settings_with_the_keyboard(visit, document):
+    tab = visit(document, 390).page
+    tab.locator("[name=b-policy]").select_option("nearest")
+    tab.locator("[name=b-uavs]").press("Home")
+    run(tab)
+    shown = cells_of(tab, metric_of("collection_ratio").name)
+    assert shown[1].startswith(f"{100 * means_of(1, 'nearest')['collection_ratio']:.1f} % [")
+    command = tab.locator("[data-panel=command]").text_content()
+    assert "--policy greedy --policy nearest --set uavs=1" in command
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_a_mission_is_played_on_both_sides(visit, document):
+    """It ends after as many slots as in Python, with as much data left."""
+    tab = visit(document, 390).page
+    run(tab)
+    tab.get_by_role("button", name="worst of B").click()
+    (number,) = re.findall(
+        r"Mission (\d+):", str(tab.locator("[data-panel=mission-text]").text_content())
+    )
+    for side, uavs in (("a", 1), ("b", 2)):
+        record = simulate_batch(
+            load_scenario("paper", uavs=uavs), policies.load("greedy"), SEED, [int(number)]
+        ).missions[0]
+        player = tab.locator(f"#panel-player-{side}")
+        player.locator("canvas").press("End")
+        told = str(player.locator("output").text_content())
+        assert told.startswith(f"slot {record['slots']} of {record['slots']} · ")
+        left = float(re.search(r"· ([\d.,]+) data units left", told)[1].replace(",", ""))
+        assert left == pytest.approx(record["residual"], rel=0.01)
+    command = str(tab.locator("[data-panel=mission-command]").text_content())
+    assert f"--set uavs=1 --seed {SEED} --replication {number}" in command
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_a_mission_that_differs_is_named(visit, document, tmp_path):
+    """As if the module simulated something else than Python did."""
+    text = document.read_text("utf-8")
+    digests = re.search(r'"hashes": \[([^\]]*)\]', text)[1].split(", ")
+    swapped = ", ".join([digests[0], digests[2], digests[1], *digests[3:]])
+    path = tmp_path / "page.html"
+    path.write_text(text.replace(", ".join(digests), swapped), "utf-8")
+    assert "Mission 1 of A differs" in run(visit(path, 1280).page)
+
+
+def test_missions_are_stopped(visit, document):
+    tab = visit(document, 1280).page
+    tab.locator("[name=missions]").fill("100000")
+    tab.get_by_role("button", name="Run").click()
+    tab.locator("[data-panel=status]").get_by_text("running").wait_for(timeout=PATIENCE)
+    tab.get_by_role("button", name="Stop").click()
+    assert "stopped" in str(tab.locator("[data-panel=status]").text_content())
+    assert tab.get_by_role("button", name="Run").is_enabled()
+
+
+def test_the_address_is_text_of_strangers(visit, document, tmp_path):
+    """Known names and positions within their limits count, and nothing else."""
+    address = "a-uavs=3&b-policy=tour&missions=77&b-uavs=99&a-policy=<img src=x>&c-uavs=1&a-pads=-1"
+    opened = visit(document, 1280)
+    tab = opened.page
+    tab.goto(f"{document.as_uri()}#{address}")
+    tab.reload()
+    tab.locator("#panel[data-ready=yes]").wait_for(timeout=PATIENCE)
+    assert tab.locator("[name=a-uavs]").input_value() == "3"
+    assert tab.locator("[name=b-uavs]").input_value() == "1"
+    assert tab.locator("[name=b-policy]").input_value() == "tour"
+    assert tab.locator("[name=a-policy]").input_value() == "greedy"
+    assert tab.locator("[name=missions]").input_value() == "77"
+    assert tab.locator("[data-panel=results]").is_hidden()  # it starts nothing
+    assert opened.complaints == []
