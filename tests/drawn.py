@@ -177,7 +177,10 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
             "gusts": draw(st.just(0.0) | _numbers(0.0, 10.0)),
             "seed": draw(st.integers(0, 2**32 - 1)),
         },
-        "charge_rate": draw(st.integers(1, 25) | _numbers(0.2, 20.0)),
+        # With at most eleven decimals, a rate is exact (``charge_fraction``).
+        "charge_rate": draw(
+            st.integers(1, 25) | _numbers(0.2, 20.0).map(lambda rate: round(rate, 11))
+        ),
         "radio": {
             "anchor": draw(st.just(0.0) | _numbers(10.0, 3000.0)),
             "range": draw(st.just(0.0) | _numbers(201.0, 3000.0)),

@@ -96,11 +96,13 @@ def _homes(sea: Sea) -> list[tuple[int, ...]]:
 def _decides_alike(plain: Sea, turned: Sea, turn: Turn) -> bool:
     """Whether all UAVs charge at the same cells of a turned sea: no tie was decided otherwise.
 
-    The UAV with the lowest battery chooses first, so its way is the same whatever it chooses.
+    Where no UAV has to wait for a pad, the one with the lowest battery chooses first, so its way is
+    the same whatever it chooses. Otherwise the one that can ask soonest does.
     """
     homes, others = _homes(plain), _homes(turned)
-    first = int(np.argmin([plain.state.uavs[0][i]["battery"] for i in plain.view.uav]))
-    assert plain.space.zones or homes[first][2] == others[first][2]
+    if not plain.space.zones and plain.space.charging_pads >= plain.space.uavs[1]:
+        first = int(np.argmin([plain.state.uavs[0][i]["battery"] for i in plain.view.uav]))
+        assert homes[first][2] == others[first][2]
     return [(*turn.cell(x, y), *rest) for x, y, *rest in homes] == others
 
 
