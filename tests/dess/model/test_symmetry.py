@@ -14,7 +14,7 @@ from dess.model.rules import launch
 from dess.model.state import HOVER, State, starts_of, state_of
 from dess.model.view import View
 from dess.physics.wind import reach_of
-from dess.policies.heuristics import _AGE, _GREEDY, _NEAREST
+from dess.policies.heuristics import AGE, GREEDY, NEAREST
 from dess.scenario.scenario import ScenarioSpace
 from tests import compiled
 from tests.dess.model.turns import Turn
@@ -148,7 +148,7 @@ def test_a_sea_mirrored_or_turned_is_the_same(case):
                 assert one[name] == other[name]
 
 
-HEURISTICS = {"nearest": _NEAREST, "greedy": _GREEDY, "age": _AGE}
+HEURISTICS = {"nearest": NEAREST, "greedy": GREEDY, "age": AGE}
 
 
 def _decisions(sea: Sea, name: str) -> list[tuple[int, int, int, int]]:
