@@ -61,7 +61,8 @@ html.lead_figure(*draw_cheapest(found))
 
 # %%
 point = search.shown_point
-make_panel(found.scenario(point), found.scenario(point), scenario, [search.best.policy], seed)
+shown = found.scenario(point)
+make_panel(shown, shown, scenario, [search.best.policy], seed, found.study.costs)
 
 # %%
 html.render_part("assumptions.html", lines=assumption_sentences(found)) if sea.units else None

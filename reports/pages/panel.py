@@ -12,6 +12,7 @@ import re
 import zlib
 from base64 import b64decode, b64encode
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from hashlib import sha256
 from typing import Any
 
@@ -23,7 +24,8 @@ from dess.analysis.execution.effort import seconds_of
 from dess.analysis.figures import style
 from dess.analysis.metrics import PRODUCT, choose_units, metric_of
 from dess.analysis.names import field_named, value_text
-from dess.analysis.wasm.entry import METRICS
+from dess.analysis.study.prices import Costs
+from dess.analysis.wasm.entry import METRICS, PRICES
 from dess.analysis.wasm.image import explain_refusal, make_image
 from dess.analysis.wasm.module import read_module
 from dess.base.files.documents import Document
@@ -41,7 +43,15 @@ PORTION = 25  # the most missions of a call of the module
 MISSIONS = 1000  # of a run, unless the reader asks for others
 CHECKED = 100  # of the baseline, which are compared with those of Python
 MOST_SECONDS = 120.0  # that these missions may take in Python
-SIDES = {"a": "A: the baseline", "b": "B: the variation"}
+SIDES = {"a": "A: the baseline", "b": "B: the variation"}  # What is paid for, in words.
+_PRICED = {
+    "uav": "A UAV",
+    "pad": "A charging pad",
+    "charge": "A full charge",
+    "hour": "An hour of a mission",
+    "lost_uav": "A lost UAV",
+    "missions": "Missions planned for the fleet",
+}
 _HASH = r'"([0-9a-f]{64})"'
 _PACKED = re.compile('(?<=type="text/plain">)([A-Za-z0-9+/=]+)(?=</script>)')
 _ENCODED = re.compile("[A-Za-z0-9+/=]*")
@@ -70,6 +80,7 @@ class Panel(Document):
         policy: The policy of both.
         seed: The seed of the missions.
         module: The SHA-256 hash of the WebAssembly module.
+        costs: The prices, if the missions have costs.
     """
 
     scenario: str
@@ -79,6 +90,7 @@ class Panel(Document):
     policy: str
     seed: int
     module: str
+    costs: Costs | None = None
 
     @property
     def spaces(self) -> tuple[ScenarioSpace, ScenarioSpace]:
@@ -103,7 +115,7 @@ class Panel(Document):
             problem = f"{CHECKED} missions would take {time}"
             raise InputError("panel", problem, f"{MOST_SECONDS:.0f} seconds at most")
         settings = dict(_settings_of(baseline, variation))
-        image = make_image(baseline, [self.policy], self.seed, PORTION, settings)
+        image = make_image(baseline, [self.policy], self.seed, PORTION, settings, self.costs)
         starts = {
             side: [values.index(_value_of(space, key)) for key, values in settings.items()]
             for side, space in zip(SIDES, (baseline, variation), strict=True)
@@ -120,7 +132,8 @@ class Panel(Document):
             # What commands have to set beside these settings.
             "fixed": [f"{key}={toml_value(ours[key])}" for key in fixed],
             "policies": [name for name in KINDS if name != "random-unguarded"],
-            "metrics": [*_describe_metrics(baseline)],
+            "metrics": [*_describe_metrics(baseline, self.costs)],
+            "prices": [*_describe_prices(self.costs)],
             "sea": _describe_sea(baseline, fleet),
             "product": METRICS.index(PRODUCT),
             "scenario": self.scenario,
@@ -139,6 +152,7 @@ class Panel(Document):
                 image=_pack(json.dumps(image.document()).encode()),
                 sides=SIDES,
                 script=panel_script(),
+                currency=self.costs.currency if self.costs else "",
                 start={side: {"policy": self.policy, "positions": starts[side]} for side in SIDES},
                 missions=MISSIONS,
             ).data
@@ -151,6 +165,7 @@ def make_panel(
     scenario: str,
     policies: Sequence[str],
     seed: int,
+    costs: Costs | None = None,
 ) -> HTML | Markdown:
     """The panel of a baseline and a variation; a sentence instead where it is not possible.
 
@@ -162,6 +177,7 @@ def make_panel(
         policies: The policies of the page; the first that the module knows is the one to begin
             with, otherwise ``greedy``.
         seed: The seed of the missions.
+        costs: The prices, if the missions have costs.
     """
     named = scenario if is_scenario_name(scenario) else PAPER
     panel = Panel(
@@ -172,6 +188,7 @@ def make_panel(
         policy=next((name for name in policies if name in KINDS), "greedy"),
         seed=seed,
         module=sha256(read_module()).hexdigest(),
+        costs=costs,
     )
     try:
         rendered = panel.render()
@@ -345,10 +362,19 @@ def _describe_setting(key: str, values: Sequence[Any], default: Any) -> dict[str
     }
 
 
-def _describe_metrics(space: ScenarioSpace) -> Iterator[dict[str, Any]]:
+def _describe_prices(costs: Costs | None) -> Iterator[dict[str, Any]]:
+    """The prices that a reader may change, in the order in which the module has them."""
+    if costs is not None:
+        for name in PRICES[: PRICES.index("seconds")]:
+            yield {"name": name, "label": _PRICED[name], "value": getattr(costs, name)}
+
+
+def _describe_metrics(space: ScenarioSpace, costs: Costs | None) -> Iterator[dict[str, Any]]:
     """What the panel writes of each metric, by its column in the values of missions."""
     for column, name in enumerate(METRICS):
         metric = metric_of(name)
+        if metric.kind == "cost" and costs is not None:
+            metric = replace(metric, unit=costs.currency)
         if space.units:
             metric = metric.in_units
         yield {

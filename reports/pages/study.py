@@ -237,7 +237,7 @@ def make_panel_of(results: Results, metric: str) -> HTML | Markdown:
         point, policy = int(best.point), best.policy
     space, manifest = results.scenario(point), results.store.manifest
     name = manifest.points[point].values.get(SEA, results.study.scenario)
-    return make_panel(space, space, name, [policy], manifest.seed)
+    return make_panel(space, space, name, [policy], manifest.seed, results.study.costs)
 
 
 def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]:

@@ -15,6 +15,8 @@ const inputs = Object.fromEntries(SIDES.map((side) => [side, {
     policy: root.querySelector(`[name="${side}-policy"]`),
 }]));
 const missions = root.querySelector("[name=missions]");
+const priceInputs = data.prices.map(({name}) => root.querySelector(`[name="price-${name}"]`));
+const prices = () => priceInputs.map((input) => Math.min(Math.max(Number(input.value) || 0, 0), 1e12));
 
 // Numbers, written as everywhere on the page.
 const minus = (text) => (Number(text.replaceAll(",", "")) ? text.replace("-", "−") : text.replace("-", ""));
@@ -121,6 +123,7 @@ function start() {
         number: (run?.number ?? 0) + 1,
         sides,
         target: asked(),
+        prices: prices(),
         isOver: false,
         choices: Object.fromEntries(sides.map((side) => [side, choice(side)])),
         asked: Object.fromEntries(sides.map((side) => [side, 0])),
@@ -174,8 +177,8 @@ function give(member) {
     run.asked[side] += count;
     member.busy = true;
     member.worker.postMessage({
-        side, first, count, run: run.number, key: keyOf(chosen), setting: settingOf(chosen),
-        policy: image.policies[chosen.policy],
+        side, first, count, run: run.number, key: `${keyOf(chosen)} ${run.prices}`, setting: settingOf(chosen),
+        policy: image.policies[chosen.policy], prices: run.prices,
         wantsRecords: isChecked(chosen) && first < data.check.hashes.length,
     });
 }

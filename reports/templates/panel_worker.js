@@ -8,10 +8,11 @@ onmessage = ({data}) => {
         ({module, image} = data);
         return;
     }
-    const {side, key, setting, policy, first, count, run, wantsRecords} = data;
+    const {side, key, setting, policy, prices, first, count, run, wantsRecords} = data;
     if (sides[side]?.key !== key) {
         sides[side] = {key, engine: new Engine(module, image, setting)};
         sides[side].engine.follow(policy);
+        sides[side].engine.floats("prices").set(prices);
     }
     const {engine} = sides[side], began = performance.now();
     engine.exports.play(first, count);

@@ -13,6 +13,7 @@ from playwright.sync_api import Page as Tab
 
 from dess import load_scenario, policies, simulate_batch
 from dess.analysis.metrics import HOME, METRICS, metric_of
+from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.image import make_image
 from dess.reports.pages.html import fill_page
 from dess.reports.pages.page import PANEL, Page
@@ -28,7 +29,8 @@ PATIENCE = 60_000  # ms
 @pytest.fixture(scope="module")
 def panel() -> str:
     baseline, variation = (load_scenario("paper", uavs=uavs) for uavs in (1, 2))
-    return str(make_panel(baseline, variation, "paper", ["planner", "greedy"], SEED).data)
+    costs = Costs(uav=1000, pad=300, charge=40)
+    return str(make_panel(baseline, variation, "paper", ["planner", "greedy"], SEED, costs).data)
 
 
 @pytest.fixture(scope="module")
@@ -191,6 +193,18 @@ def test_a_mission_that_differs_is_named(visit, document, tmp_path):
     path = tmp_path / "page.html"
     path.write_text(text.replace(", ".join(digests), swapped), "utf-8")
     assert "Mission 1 of A differs" in run(visit(path, 1280).page)
+
+
+def test_prices_are_changed(visit, document):
+    tab = visit(document, 1280).page
+    tab.get_by_text("Prices [EUR]").click()
+    tab.get_by_label("A UAV", exact=True).fill("2500")
+    run(tab)
+    for cell, uavs in zip(cells_of(tab, "Cost"), (1, 2), strict=False):
+        space = load_scenario("paper", uavs=uavs)
+        records = simulate_batch(space, policies.load("greedy"), SEED, MISSIONS)
+        charging = 40 * records.uavs["charged"].sum(axis=1).mean() / 100
+        assert cell.startswith(f"{2500 * uavs + 300 * 16 + charging:,.0f} EUR [")
 
 
 def test_missions_are_stopped(visit, document):
