@@ -38,10 +38,12 @@ PAGES = (
     *("index", "mission", "performance", "learning", "parameters"),
     *("comparison", "what-if", "own-sea", "explorer"),
 )
+PANEL, ASKED = "panel", "what-if"  # the picture of a panel, and its page
 # What the first screen of every page is made with.
 LOOK = (
     *("layout.html", "report.html", "bar.html", "index.html", "part.html", "picture.html"),
     *("player.html", "player.js", "explorer.html", "explorer.js", "style.css"),
+    *("panel.html", "panel.js"),
 )
 FINDING, LOOKED = "Finding", "Look"  # what a picture keeps, as texts of a PNG file
 
@@ -59,7 +61,7 @@ def outdated(pages: Path) -> list[str]:
         pages: The folder of the pages. Of pages that are missing, or whose questions are not the
             shipped ones, only the look is compared.
     """
-    return [name for name in PAGES if not is_current(name, pages)]
+    return [name for name in (*PAGES, PANEL) if not is_current(name, pages)]
 
 
 def is_current(name: str, pages: Path) -> bool:
@@ -69,7 +71,7 @@ def is_current(name: str, pages: Path) -> bool:
         return False
     with Image.open(file) as picture:
         kept = picture.info
-    said = finding_of(pages / f"{name}.html")
+    said = finding_of(pages / f"{ASKED if name == PANEL else name}.html")
     return kept.get(LOOKED) == look() and said in ("", kept.get(FINDING))
 
 
@@ -102,12 +104,22 @@ def draw_gallery(pages: Path) -> None:
             path = pages / f"{name}.html"
             window.goto(path.resolve().as_uri())
             window.wait_for_timeout(500)  # until curves and players are drawn
-            picture = Image.open(io.BytesIO(window.screenshot())).convert("RGB")
-            kept = PngInfo()
-            kept.add_text(FINDING, finding_of(path))
-            kept.add_text(LOOKED, look())
-            file = GALLERY / f"{name}.png"
-            picture.quantize(64).save(file, optimize=True, pnginfo=kept)
+            _keep_picture(name, window.screenshot(), path)
+        path = pages / f"{ASKED}.html"
+        window.goto(path.resolve().as_uri())
+        window.get_by_role("button", name="Run").click()
+        window.get_by_text("bit for bit").wait_for()
+        window.get_by_role("button", name="Run", disabled=False).wait_for()
+        _keep_picture(PANEL, window.locator("#panel").screenshot(), path)
+
+
+def _keep_picture(name: str, screenshot: bytes, page: Path) -> None:
+    """Write a picture of a page, with what it says and how pages look."""
+    kept = PngInfo()
+    kept.add_text(FINDING, finding_of(page))
+    kept.add_text(LOOKED, look())
+    picture = Image.open(io.BytesIO(screenshot)).convert("RGB")
+    picture.quantize(64).save(GALLERY / f"{name}.png", optimize=True, pnginfo=kept)
 
 
 # --- the model ---

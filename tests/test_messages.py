@@ -17,12 +17,14 @@ from dess.analysis.answers.comparison import Times
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.results.resimulate import Evidence
 from dess.analysis.study.study import Study
+from dess.analysis.wasm.module import About
 from dess.base.files.documents import Document
 from dess.model.record import MISSION_RECORD
 from dess.policies.learner.checkpoint import Header
 from dess.policies.learner.config import Description, TrainingConfig, load_config
 from dess.policies.registry import TRAINED
 from dess.reports.pages.page import Card, Learned
+from dess.reports.pages.panel import Panel
 from dess.scenario.no_fly import NoFlyFile
 from dess.scenario.nodes import NodesFile
 from dess.scenario.own_sea import ZonePlace
@@ -86,6 +88,9 @@ def documents() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     yield Features, {"features": [{"geometry": point, "properties": {"Name": "A"}}]}
     yield Card, {"title": "", "finding": "", "picture": {"alt": "", "source": "", "narrow": ""}}
     yield Learned, {"files": {"a": ""}}
+    scenario = {"scenario": "paper", "named": {}, "baseline": {}, "variation": {}}
+    yield Panel, scenario | {"policy": "greedy", "seed": 0, "module": "", "costs": {"uav": 1.0}}
+    yield About, {"module": "", "code": "", "built_with": {"numba": "1"}}
     geometries = {"type": "GeometryCollection", "geometries": [point]}
     yield Features, {"features": [{"geometry": geometries}]}
 

@@ -23,7 +23,7 @@ from dess.analysis.stats.sequences import SEQUENCE
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import ARRAYS, METRICS, PRICES, TOTALS
 from dess.base.errors import InputError
-from dess.model.channel import empty_scratch, world_of
+from dess.model.channel import empty_scratch, make_world
 from dess.model.record import empty_records
 from dess.model.state import (
     MISSION,
@@ -34,6 +34,7 @@ from dess.model.state import (
 )
 from dess.model.view import check_team
 from dess.physics.chart import neighbours_of
+from dess.physics.fleet import legs
 from dess.physics.wind import reach_of, ways_home
 from dess.policies.heuristics import KINDS, plan_circuit
 from dess.scenario.scenario import ScenarioSpace
@@ -45,7 +46,8 @@ EMPTY = {
     *("arrivals", "reach", "ways_home", "actions", "mission_records", "uav_records"),
     *("operations", "values", "baseline", "totals", "sequences", "ends"),
 }
-MOST_MEMORY = 2**29  # of an image [bytes]; each worker of a page has its own
+SHAPES = EMPTY - {"operations"}  # which begin with nan
+MOST_MEMORY = 2**27  # of an image [bytes]; each worker of a page has its own
 
 _LEAST_NORMAL = np.finfo(np.float64).tiny
 
@@ -138,7 +140,16 @@ def explain_refusal(space: ScenarioSpace, team: Sequence[str]) -> str:
         return "Packets that arrive in continuous time need the event engine, which is in Python."
     if space.chart.rows is not None:
         return "With no-fly cells, a grid of more than 10,000 cells needs more memory than a page."
+    if (needed := _memory_of_radio(space)) > MOST_MEMORY:
+        return f"The tables of its radio need {needed >> 20} MiB, more memory than a page."
     return ""
+
+
+def _memory_of_radio(space: ScenarioSpace) -> int:
+    """The bytes of the tables ``order`` and ``means`` of ``World``, before they are made."""
+    columns, rows = space.size
+    steps = 5 * columns * rows * legs(space.fleet)
+    return steps * len(space.nodes) * (2 + 8 * space.communication_slots)
 
 
 def make_image(
@@ -205,7 +216,7 @@ def _arrays_of(
     """All arrays by name, for fleets of at most that many UAVs."""
     state = state_of([space], 1)
     starts = starts_of([space], seed)
-    world = world_of(space)
+    world = make_world(space)
     chart = world.chart
     scratch = empty_scratch(fleet, len(space.nodes))
     records = empty_records(missions, fleet, is_extended=True)
@@ -251,7 +262,15 @@ def _arrays_of(
         "sequences": np.zeros(len(METRICS), SEQUENCE),
         "ends": np.zeros((len(METRICS), 2)),
     }
-    return {name: _without_gaps(arrays[name]) for name in ARRAYS}
+    return {
+        name: _without_content(arrays[name]) if name in SHAPES else _without_gaps(arrays[name])
+        for name in ARRAYS
+    }
+
+
+def _without_content(array: np.ndarray) -> np.ndarray:
+    """Zeros of the same shape, which take no memory: there are as many as values of settings."""
+    return np.broadcast_to(np.zeros((), array.dtype), array.shape)
 
 
 def copy_inputs(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -132,6 +132,11 @@ def world_of(scenario: ScenarioSpace) -> World:
 
 @lru_cache(maxsize=8)
 def _world_of(scenario: ScenarioSpace, thread: int) -> World:
+    return make_world(scenario)
+
+
+def make_world(scenario: ScenarioSpace) -> World:
+    """As ``world_of``, but new; it is not kept for the next mission of the scenario."""
     m, (columns, rows) = scenario.communication_slots, scenario.size
     places = m * fleet.places_per_slot(scenario.fleet)
     steps = 5 * columns * rows * fleet.legs(scenario.fleet)

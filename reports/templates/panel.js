@@ -118,6 +118,10 @@ class Series {
 
 function start() {
     stop();
+    missions.value = asked();
+    priceInputs.forEach((input, n) => { input.value = prices()[n]; });
+    find("mission").hidden = true;
+    find("results").classList.remove("stale");
     const sides = isSame() ? ["a"] : SIDES;
     run = {
         number: (run?.number ?? 0) + 1,
@@ -262,6 +266,7 @@ function showChoice(side) {
         const input = inputs[side].sliders[n], text = `${texts[positions[n]]} ${unit}`.trim();
         input.setAttribute("aria-valuetext", text);
         input.parentElement.querySelector("output").textContent = text;
+        input.parentElement.classList.toggle("differs", positions[n] !== choice("a").positions[n]);
     });
 }
 
@@ -276,10 +281,10 @@ function stateInWords(isRunning) {
 function checkInWords() {
     const {compared, differing, hashes} = data.check;
     if (differing !== null && differing !== undefined)
-        return `Mission ${differing} of A differs from the one that Python simulates.`;
+        return `Mission ${differing} of the page's baseline differs from the one that Python simulates.`;
     if (!compared) return "";
     if (compared < Math.min(hashes.length, run.target)) return "";
-    return `The first ${compared} missions of A are the same as those of Python, bit for bit.`;
+    return `The first ${compared} missions of the page's baseline are the same as those of Python, bit for bit.`;
 }
 
 function showMetric(metric) {
@@ -289,7 +294,8 @@ function showMetric(metric) {
     row.hidden = !estimates.some(({count}) => count);
     estimates.forEach((estimate, n) => { cells[n].textContent = estimate.count ? interval(metric, estimate) : ""; });
     if (!run.difference) {
-        cells[1].textContent = cells[2].textContent = cells[3].textContent = "";
+        cells[1].textContent = "the same as A";
+        cells[2].textContent = cells[3].textContent = "";
         return;
     }
     const gap = run.difference.estimate(metric);
@@ -302,10 +308,11 @@ function verdict(metric, {mean, low, high, count}) {
         const isBetter = metric.less ? high < 0 : low > 0;
         return `decided: B is ${low > 0 ? "higher" : "lower"}, which is ${isBetter ? "better" : "worse"}`;
     }
-    if (!mean || !Number.isFinite(high - low)) return "not decided";
+    if (!Number.isFinite(high - low)) return "not decided";
+    if (!mean) return `no difference seen; at most ${difference(metric, {mean: high, low, high}).split(" ")[0].slice(1)}`;
     // An interval becomes narrower with about the root of the number of missions.
     const needed = count * ((high - low) / 2 / Math.abs(mean)) ** 2 - count;
-    return `not decided${needed > 0 && needed < 1e6 ? `, about ${quantity(Number(needed.toPrecision(1)))} more` : ""}`;
+    return `not decided${needed > 0 && needed < 1e6 ? `, about ${quantity(Number(needed.toPrecision(1)))} more missions` : ""}`;
 }
 
 // The least and the largest product of both sides, in steps of 5 %.
@@ -429,6 +436,7 @@ function addressOf() {
         data.settings.forEach(({key}, n) => state.set(`${side}-${key}`, positions[n]));
         state.set(`${side}-policy`, policy);
     }
+    data.prices.forEach(({name}, n) => state.set(`price-${name}`, prices()[n]));
     state.set("missions", asked());
     return `${location.href.split("#")[0]}#${state}`;
 }
@@ -443,6 +451,10 @@ function readAddress() {
         const policy = state.get(`${side}-policy`);
         if (data.policies.includes(policy)) inputs[side].policy.value = policy;
     }
+    data.prices.forEach(({name}, n) => {
+        const price = state.get(`price-${name}`);
+        if (/^\d{1,12}(\.\d{1,6})?$/.test(price ?? "")) priceInputs[n].value = Number(price);
+    });
     if (/^\d{1,6}$/.test(state.get("missions") ?? "")) missions.value = Math.min(Number(state.get("missions")), MOST_MISSIONS);
 }
 
@@ -464,6 +476,15 @@ async function unpack(name) {
     return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
+// What is shown is of the settings before, until the reader runs the missions of the new ones.
+function change() {
+    const isRunning = Boolean(run) && !run.isOver;
+    if (isRunning) stop();
+    else show();
+    find("results").classList.toggle("stale", Boolean(run));
+    if (run) find("status").textContent = "These numbers are of the settings before: press Run.";
+}
+
 async function open() {
     if (!window.WebAssembly || !window.DecompressionStream || !window.Worker) return;
     module = await WebAssembly.compile(await unpack("panel-module"));
@@ -473,7 +494,7 @@ async function open() {
     root.hidden = false;
     document.querySelectorAll("[data-replaced-by=panel]").forEach((element) => element.classList.add("replaced"));
     root.querySelectorAll("fieldset").forEach((fieldset) => { fieldset.disabled = false; });
-    root.addEventListener("input", () => { if (run && !run.isOver) stop(); show(); });
+    root.addEventListener("input", change);
     find("run").addEventListener("click", start);
     find("stop").addEventListener("click", () => stop());
     find("link").addEventListener("click", (event) => copy(event.target, addressOf()));

@@ -134,7 +134,9 @@ def test_the_page_simulates_what_python_does(visit, document):
     opened = visit(document, 1280)
     said = run(opened.page)
     assert f"{MISSIONS} of {MISSIONS} missions of A and of B" in said
-    assert f"first {CHECKED} missions of A are the same as those of Python, bit for bit" in said
+    assert (
+        f"first {CHECKED} missions of the page's baseline are the same as those of Python" in said
+    )
     for metric in (*METRICS, HOME):
         shown = cells_of(opened.page, metric_of(metric).name)
         for cell, uavs in zip(shown, (1, 2), strict=False):
@@ -192,7 +194,7 @@ def test_a_mission_that_differs_is_named(visit, document, tmp_path):
     swapped = ", ".join([digests[0], digests[2], digests[1], *digests[3:]])
     path = tmp_path / "page.html"
     path.write_text(text.replace(", ".join(digests), swapped), "utf-8")
-    assert "Mission 1 of A differs" in run(visit(path, 1280).page)
+    assert "Mission 1 of the page's baseline differs" in run(visit(path, 1280).page)
 
 
 def test_prices_are_changed(visit, document):
@@ -205,6 +207,16 @@ def test_prices_are_changed(visit, document):
         records = simulate_batch(space, policies.load("greedy"), SEED, MISSIONS)
         charging = 40 * records.uavs["charged"].sum(axis=1).mean() / 100
         assert cell.startswith(f"{2500 * uavs + 300 * 16 + charging:,.0f} EUR [")
+
+
+def test_numbers_of_other_settings_are_said_to_be_so(visit, document):
+    tab = visit(document, 1280).page
+    run(tab)
+    tab.get_by_role("button", name="worst of B").click()
+    tab.locator("[name=a-uavs]").press("End")
+    assert "of the settings before" in str(tab.locator("[data-panel=status]").text_content())
+    run(tab)
+    assert tab.locator("[data-panel=mission]").is_hidden()
 
 
 def test_missions_are_stopped(visit, document):
