@@ -316,8 +316,9 @@ def _is_allowed(space: ScenarioSpace, key: str, value: Any) -> bool:
 
 def _value_of(space: ScenarioSpace, key: str) -> Any:
     """The value of a field as a reader knows it: of a range with equal ends, one number."""
-    if key == "pads":
-        return space.charging_pads
+    if key == "pads" and space.pads is None:
+        *_, width, height = space.zone
+        return width * height
     value: Any = space
     for part in key.split("."):
         value = getattr(value, part)

@@ -309,6 +309,7 @@ function verdict(metric, {mean, low, high, count}) {
         return `decided: B is ${low > 0 ? "higher" : "lower"}, which is ${isBetter ? "better" : "worse"}`;
     }
     if (!Number.isFinite(high - low)) return "not decided";
+    if (low === high) return "no difference seen";
     if (!mean) return `no difference seen; at most ${difference(metric, {mean: high, low, high}).split(" ")[0].slice(1)}`;
     // An interval becomes narrower with about the root of the number of missions.
     const needed = count * ((high - low) / 2 / Math.abs(mean)) ** 2 - count;

@@ -14,7 +14,8 @@ from playwright.sync_api import Page as Tab
 from dess import load_scenario, policies, simulate_batch
 from dess.analysis.metrics import HOME, METRICS, metric_of
 from dess.analysis.study.prices import Costs
-from dess.analysis.wasm.image import make_image
+from dess.analysis.wasm.image import copy_inputs, make_image
+from dess.reports.pages import panel as panels
 from dess.reports.pages.html import fill_page
 from dess.reports.pages.page import PANEL, Page
 from dess.reports.pages.panel import CHECKED, PORTION, hash_missions, make_panel
@@ -53,6 +54,20 @@ def test_the_hashes_are_those_of_the_records_of_the_module():
         for row in range(PORTION)
     ]
     assert hash_missions(space, "greedy", SEED, kinds[1].shape[1])[:PORTION] == hashes
+
+
+@pytest.mark.parametrize("name", ["paper", "bay", "jade-bight"])
+def test_the_settings_begin_with_those_of_the_scenario(name):
+    """Where they stand at first, they change no byte of the arrays."""
+    space = load_scenario(name)
+    settings = dict(panels._settings_of(space, space))
+    assert len(settings) >= 3
+    image = make_image(space, ["greedy"], SEED, PORTION, settings)
+    for slider in image.sliders:
+        changed = copy_inputs(image.arrays)
+        slider.apply(changed, panels._value_of(space, slider.setting))
+        for array, content in changed.items():
+            assert content.tobytes() == image.arrays[array].tobytes(), (slider.setting, array)
 
 
 def test_what_cannot_be_simulated_in_a_page_is_a_sentence():
