@@ -28,7 +28,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from dess.base.errors import InputError, shown, unknown_name
+from dess.base.errors import InputError, listed, shown, unknown_name
 from dess.base.files.reading import Missing, paths_in, read_text
 from dess.base.sources import path_of
 from dess.model.view import View
@@ -370,7 +370,7 @@ def list_departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) ->
                 if field in present and not low <= present[field][0] <= present[field][1] <= high
             ]
             if beyond:
-                lines.append(f"{name} acts outside of its training: {', '.join(beyond)}")
+                lines.append(f"{name} acts outside of its training: {listed(beyond)}")
     return lines
 
 
