@@ -18,12 +18,13 @@ from typing import Any
 
 from IPython.display import HTML, Markdown
 from markupsafe import Markup
+from pydantic import TypeAdapter
 
 from dess import InputError, simulate_batch
 from dess.analysis.execution.effort import seconds_of
 from dess.analysis.figures import style
 from dess.analysis.metrics import PRODUCT, choose_units, metric_of
-from dess.analysis.names import field_named, value_text
+from dess.analysis.names import RANGES, field_named, value_text
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS, PRICES
 from dess.analysis.wasm.image import explain_refusal, make_image
@@ -43,7 +44,8 @@ PORTION = 25  # the most missions of a call of the module
 MISSIONS = 1000  # of a run, unless the reader asks for others
 CHECKED = 100  # of the baseline, which are compared with those of Python
 MOST_SECONDS = 120.0  # that these missions may take in Python
-SIDES = {"a": "A: the baseline", "b": "B: the variation"}  # What is paid for, in words.
+SIDES = {"a": "A: the baseline", "b": "B: the variation"}
+# What is paid for, in words.
 _PRICED = {
     "uav": "A UAV",
     "pad": "A charging pad",
@@ -292,7 +294,7 @@ def _settings_of(
     ours, theirs = (dotted(space.model_dump(mode="json")) for space in (baseline, variation))
     for key in ours | theirs:
         if key not in offered and ours.get(key) != theirs.get(key):
-            yield key, [ours.get(key), theirs.get(key)]
+            yield key, [_value_of(space, key) for space in (baseline, variation)]
 
 
 def _candidates_of(space: ScenarioSpace) -> Iterator[tuple[str, Sequence[Any]]]:
@@ -322,8 +324,9 @@ def _value_of(space: ScenarioSpace, key: str) -> Any:
     value: Any = space
     for part in key.split("."):
         value = getattr(value, part)
-    if isinstance(value, tuple):
-        return value[0] if len({*value}) == 1 else [*value]
+    value = TypeAdapter(Any).dump_python(value, mode="json")
+    if key in RANGES and value[0] == value[1]:
+        return value[0]
     return value
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page as Tab
 
-from dess import load_scenario, policies, simulate_batch
+from dess import InputError, load_scenario, policies, simulate_batch
 from dess.analysis.metrics import HOME, METRICS, metric_of
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.image import copy_inputs, make_image
@@ -68,6 +68,27 @@ def test_the_settings_begin_with_those_of_the_scenario(name):
         slider.apply(changed, panels._value_of(space, slider.setting))
         for array, content in changed.items():
             assert content.tobytes() == image.arrays[array].tobytes(), (slider.setting, array)
+
+
+@pytest.mark.parametrize(
+    "baseline, variation",
+    [
+        ({"initial_data": 5}, {"initial_data": [5, 20]}),
+        ({"wind.strength": 0.0}, {"wind.strength": 1.0}),
+        ({"zone": [26, 2, 4, 4]}, {"zone": [2, 2, 4, 4]}),
+        ({"nodes": [[3, 3], [9, 9]]}, {"nodes": [[3, 3]]}),
+        ({"landing": False}, {"landing": True, "quota": 0}),
+        ({"fleet": []}, {"fleet": [{"rate": 2.0}]}),
+        ({}, {"data_sheet": {"slot": "20 s", "endurance": "30 min", "data_rate": "1 MB/h"}}),
+    ],
+)
+def test_any_variation_has_a_panel_or_a_sentence(baseline, variation):
+    try:
+        sides = [load_scenario("paper", **values) for values in (baseline, variation)]
+    except InputError:  # of the data sheet, whose fields are another subject
+        return
+    made = make_panel(*sides, "paper", ["greedy"], SEED).data
+    assert 'id="panel"' in made or "cannot simulate by itself" in made
 
 
 def test_what_cannot_be_simulated_in_a_page_is_a_sentence():
