@@ -78,7 +78,9 @@ def page_of(folder, **parameters):
     """The texts of the page and of its drawings, without rendering it."""
     report = make_study_report(load_results(folder))
     texts = [cell.source for cell in report.notebook.cells if cell.cell_type == "markdown"]
-    shown = re.sub("<script.*?</script>", "", shown_by(report, results=str(folder), **parameters))
+    shown = shown_by(report, results=str(folder), **parameters)
+    shown = re.sub('<section id="panel".*?</section>', "", shown, flags=re.S)  # on every page
+    shown = re.sub("<script.*?</script>", "", shown)
     bare = re.sub(r"[`*]|<[^>]*>", "", " ".join([*texts, shown]))
     return " ".join(unescape(bare).split())
 
