@@ -161,6 +161,7 @@ FAILURE_COST = _FIELDS["reward_quota"].default - _FIELDS["reward_depleted"].defa
 SUCCESS, RATIO, HOME = "success", "collection_ratio", "home"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
 AGE, COST = "age", "cost"  # a cost have the missions of a study with prices
+COLLECTED = "collected"
 # Of a study with bounds: the bound, and the bound minus the product.
 BOUND, GAP = "upper_bound", "optimality_gap"
 
@@ -242,7 +243,7 @@ _RECORDED = (
     _time_metric("slots", "Length of the mission"),
     _time_metric(MOST_SLOTS, "Longest that the mission may last"),
     _time_metric("uav_slots", "UAV-hours", horizons=0.0),
-    _amount_metric("collected", "Data collected", _DATA, "MB"),
+    _amount_metric(COLLECTED, "Data collected", _DATA, "MB"),
     _amount_metric("collected_per_uav", "Data collected per UAV", _DATA, "MB"),
     _amount_metric("residual", "Data left", _DATA, "MB", less=True),
     _time_metric("charging_per_uav", "Charging per UAV", "min"),

@@ -151,7 +151,7 @@ def format_count(number: int, what: str) -> str:
     return f"{number:,} {inflect(what, number)}"
 
 
-def inflect(what: str, number: int) -> str:
+def inflect(what: str, number: float) -> str:
     """The name of a thing, or of several, as ``policy`` or ``policies``."""
     if number == 1:
         return what

@@ -56,7 +56,7 @@ RULES: list[dict[str, Any]] = [
             "requirements": {"success": 0.9},
             "indifference": 1.0,
         },
-        "costs": {"currency": "EUR", "uav": 1.0},
+        "costs": {"currency": "EUR", "uav": 1.0, "years": 5.0, "days": 200},
     },
 ]
 ROW = {

@@ -12,7 +12,7 @@ from dess import InputError
 from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet import verdicts
 from dess.analysis.answers.fleet.cheapest import search_of
-from dess.analysis.answers.fleet.costs import priced_settings
+from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import (
     best_settings_sentences,
@@ -75,10 +75,11 @@ class Answer:
             A row per setting with ``rank``, ``policy``, ``point``, ``n`` missions, the swept
             fields, every metric with the ends of its 95 % interval (``success``, ``success_low``,
             ``success_high``), and ``tied``: whether the setting may be as good as the best one.
-            With prices also ``cost`` with its interval. With requirements also the ``verdict``
-            (``met``, ``missed`` or ``open``), and ``selected``: whether the setting is the selected
-            one of its policy under its condition. Of a what-if question, a row per policy and
-            metric, as ``answers.variation.compare_sides`` returns it.
+            With prices also ``cost`` with its interval, and its parts where costs are those of a
+            year. With requirements also the ``verdict`` (``met``, ``missed`` or ``open``), and
+            ``selected``: whether the setting is the selected one of its policy under its condition.
+            Of a what-if question, a row per policy and metric, as
+            ``answers.variation.compare_sides`` returns it.
         """
         if self.question.is_comparison:
             return self.variation.table()
@@ -87,12 +88,16 @@ class Answer:
         if study.costs is None:
             return table
         if study.selection:
-            priced = verdicts.judge_settings(self.results)
+            priced = [verdicts.judge_settings(self.results)]
         else:
-            priced = priced_settings(self.results)
+            priced = [priced_settings(self.results)]
+        if study.costs.years is not None:
+            priced.append(mean_cost_parts(self.results).drop(columns="stranded"))
         key = ["policy", "point"]
-        more = [name for name in priced if name in key or name not in table]
-        return table.merge(priced[more], on=key, how="left")
+        for columns in priced:
+            more = [name for name in columns if name in key or name not in table]
+            table = table.merge(columns[more], on=key, how="left")
+        return table
 
     def fleets(self) -> pd.DataFrame:
         """With requirements: the fleets that the answer was chosen from, the cheapest first.

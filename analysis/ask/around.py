@@ -132,7 +132,7 @@ def table_around(results: Results) -> Table:
     columns = [requirement.column for requirement in requirements]
     cells = setting_cells(data.assign(condition="", fleet=data["change"]), columns)
     cells = cells.drop(columns="Policy").rename(columns={"Fleet": "What if"})
-    cells = cells.rename(columns={"Cost": f"Cost [{results.prices.currency}]"})
+    cells = cells.rename(columns={"Cost": f"Cost [{results.prices.unit}]"})
     differences = compare(changed_results.missions, 0, columns, correction=None, of="point")
     differences = differences.set_index(["metric", "point"])[["difference", "low", "high"]]
     for metric in map(metric_of, columns):

@@ -286,9 +286,11 @@ def _cheapest_rule(
             raise unknown_name("requirements", f"{metric!r} is unknown", metric, names)
         least[full] = share
     spaces = study.scenarios
-    fleet = prices.uav * max(space.uavs[1] for space in spaces)
-    fleet += prices.pad * max(space.charging_pads for space in spaces)
-    running = prices.missions * (prices.charge + prices.hour + prices.lost_uav)
+    most_uavs = max(space.uavs[1] for space in spaces)
+    most_pads = max(space.charging_pads for space in spaces)
+    fleet = prices.purchase_of(most_uavs, most_pads)
+    worn = prices.pack / prices.pack_cycles
+    running = prices.paid_missions * (prices.charge + prices.hour + prices.lost_uav + worn)
     if not fleet and not running:
         raise InputError("prices", "all are 0", "one or more above 0")
     rule = {

@@ -225,7 +225,7 @@ class Setting(NamedTuple):
         values: The fields that the design sets.
         loss: The cost over all missions if every mission lost all UAVs, in the currency.
         horizon: The largest age that data can have [h with a data sheet, otherwise slots].
-        currency: The currency of the costs.
+        currency: What costs are in: a currency, or a currency a year.
     """
 
     values: Mapping[str, Any]
@@ -237,7 +237,7 @@ class Setting(NamedTuple):
     def of(cls, values: Mapping[str, Any], space: ScenarioSpace, costs: Costs) -> Self:
         """The setting of a design point."""
         loss = costs.of_lost(space.uavs[1])
-        return cls(values, loss, horizon_of(space), costs.currency)
+        return cls(values, loss, horizon_of(space), costs.unit)
 
 
 def horizon_of(space: ScenarioSpace) -> float:

@@ -1,22 +1,25 @@
-"""What a fleet costs: the prices of a study, and the cost of a mission by what is paid for."""
+"""What a fleet costs: the prices of a study, and the cost of its missions by what is paid for."""
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.study.stopping import MOST, Line, StrictTable
+from dess.model.state import types_of
 from dess.physics.section import Integer, Number
 from dess.scenario.scenario import ScenarioSpace
 
 # A price; the sums of all missions that may be planned are still finite.
 Price = Annotated[float, Field(ge=0, le=10**12, allow_inf_nan=False)]
 
-PURCHASE = "purchase"
+PURCHASE, PACKS = "purchase", "packs"
 PARTS = (PURCHASE, "charging", "hours", "losses")
+PARTS_OF_A_YEAR = (PURCHASE, PACKS, "charging", "hours", "losses")
 
 _PAID_FOR = {
     "uav": "a UAV",
@@ -24,7 +27,10 @@ _PAID_FOR = {
     "charge": "charging a battery from 0 to 100 %",
     "hour": "an hour of a mission",
     "lost_uav": "a lost UAV",
+    "pack": "a battery pack",
 }
+# What only the costs of a year have.
+_OF_A_YEAR = ("interest", "days", "pack", "pack_cycles")
 
 
 class Costs(StrictTable):
@@ -33,8 +39,12 @@ class Costs(StrictTable):
     UAVs and pads are bought once. Charging, hours and lost UAVs are paid for in each of the
     ``missions`` planned for the fleet.
 
+    With ``years``, costs are those of a year with ``days`` missions: UAVs and pads are paid off by
+    equal amounts, and worn battery packs are replaced.
+
     Raises:
-        pydantic.ValidationError: If a price is below 0.
+        pydantic.ValidationError: If a price is below 0, or fields of a year and of a number of
+            missions are mixed.
     """
 
     currency: Line = Field("EUR", min_length=1, max_length=16, description="name of the currency")
@@ -55,6 +65,44 @@ class Costs(StrictTable):
         description="length of a mission slot [s]; needed for the price of an hour, unless there "
         "is a data sheet",
     )
+    years: Number | None = Field(
+        None,
+        ge=0.1,
+        le=100,
+        description="years over which UAVs and pads are paid off; costs are then those of a year",
+    )
+    interest: Number = Field(
+        0.0, ge=0, le=1, description="interest a year, as a share: 0.04 for 4 %; with years"
+    )
+    days: Integer | None = Field(
+        None, ge=1, le=365, description="days of a year with a mission; needed with years"
+    )
+    pack: Price = Field(
+        0.0,
+        description="price of a battery pack that replaces a worn one, with years; uav includes "
+        "the first one",
+    )
+    pack_cycles: Number = Field(
+        300.0,
+        ge=1,
+        le=1_000_000,
+        description="how often a battery pack can be emptied before it is worn, with years",
+    )
+
+    @model_validator(mode="after")
+    def _is_of_a_year_or_of_missions(self) -> Self:
+        if self.years is None:
+            for field in _OF_A_YEAR:
+                self._refuse_if_given(field, "is given without years", "with years")
+        else:
+            self._refuse_if_given("missions", "is given beside years", "days instead")
+            if self.days is None:
+                raise InputError("days", "is missing", "with years, the missions of a year: 1..365")
+        return self
+
+    def _refuse_if_given(self, field: str, problem: str, allowed: str) -> None:
+        if getattr(self, field) != type(self).model_fields[field].default:
+            raise InputError(field, problem, allowed)
 
     def check(self, spaces: Sequence[ScenarioSpace]) -> None:
         """Check that the length of a slot is known where hours have a price.
@@ -72,7 +120,26 @@ class Costs(StrictTable):
     @property
     def pays_for_missions(self) -> bool:
         """Whether missions have a price, not the purchase alone."""
-        return any((self.charge, self.hour, self.lost_uav))
+        return any((self.charge, self.hour, self.lost_uav, self.pack))
+
+    @property
+    def unit(self) -> str:
+        """What costs are in: the currency, or the currency a year."""
+        if self.years is None:
+            return self.currency
+        return f"{self.currency} a year"
+
+    @property
+    def part_names(self) -> tuple[str, ...]:
+        """What costs consist of."""
+        if self.years is None:
+            return PARTS
+        return PARTS_OF_A_YEAR
+
+    @property
+    def paid_missions(self) -> int:
+        """The number of missions that are paid for: those that are planned, or those of a year."""
+        return self.days or self.missions
 
     @property
     def in_words(self) -> str:
@@ -81,20 +148,48 @@ class Costs(StrictTable):
         free = []
         for price, thing in _PAID_FOR.items():
             value = getattr(self, price)
+            is_of_a_year = price in _OF_A_YEAR
             if value:
                 paid.append(f"{numbers.format_money(value, self.currency)} for {thing}")
-            else:
+            elif self.years is not None or not is_of_a_year:
                 free.append(thing)
         text = f"Prices: {numbers.join_words(paid)}."
-        if self.pays_for_missions:
+        if self.years is not None:
+            text += f" {self._year_in_words}"
+        elif self.pays_for_missions:
             text += f" The fleet is to make {numbers.format_count(self.missions, 'mission')}."
         if free:
             text += f" Nothing is paid for {numbers.join_words(free, 'or')}."
         return text
 
+    @property
+    def _year_in_words(self) -> str:
+        """How UAVs, pads and packs are paid for in a year, and its missions."""
+        years = self.years or 0.0
+        text = (
+            f"UAVs and pads are paid off over {years:g} {numbers.inflect('year', years)} at "
+            f"{100 * self.interest:g} % interest; "
+            f"the fleet makes {numbers.format_count(self.paid_missions, 'mission')} a year."
+        )
+        if self.pack:
+            text += f" A pack is worn after {self.pack_cycles:g} full charges."
+        return text
+
+    def purchase_of(self, uavs: Any, pads: Any) -> Any:
+        """What UAVs and pads cost: once, or in each of the years over which they are paid off.
+
+        The amount of a year is an annuity, ``P r (1 + r)^n / ((1 + r)^n - 1)``.
+        """
+        price = self.uav * uavs + self.pad * pads
+        if self.years is None:
+            return price
+        if self.interest == 0:
+            return price / self.years
+        return price * self.interest / -math.expm1(-self.years * math.log1p(self.interest))
+
     def of_lost(self, uavs: Any) -> Any:
         """What it costs if every mission loses this number of UAVs, in the currency."""
-        return self.missions * self.lost_uav * uavs
+        return self.paid_missions * self.lost_uav * uavs
 
     def parts(
         self, spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any], uavs: Mapping[str, Any]
@@ -104,29 +199,35 @@ class Costs(StrictTable):
         Args:
             spaces: The scenario of every design point.
             missions: (n,) columns of the missions: ``point`` and the fields of ``MISSION_RECORD``.
-            uavs: Columns of the UAVs of these missions, in the same order: ``charged`` and ``down``
-                of ``UAV_RECORD``.
+            uavs: Columns of the UAVs of these missions, in the same order: ``charged``, ``down``
+                and ``battery`` of ``UAV_RECORD``.
 
         Returns:
-            The (n,) amounts of each of ``PARTS``.
+            The (n,) amounts of each of ``part_names``.
 
         Raises:
-            InputError: If charging or lost UAVs have a price, and results of before lack what was
-                charged and lost.
+            InputError: If charging, packs or lost UAVs have a price, and results of before lack
+                what was charged and lost.
         """
         fleet = np.asarray(missions["uavs"])
         points = np.asarray(missions["point"])
         mission = np.repeat(np.arange(len(fleet)), fleet)
         pads = np.array([space.charging_pads for space in spaces])
-        charged = self._sum_of(uavs, "charged", mission, len(fleet), self.charge)
+        price_of_battery = self.charge or self.pack
+        charged = self._sum_of(uavs, "charged", mission, len(fleet), price_of_battery)
         lost = self._sum_of(uavs, "down", mission, len(fleet), self.lost_uav)
         seconds = [space.units.slot if space.units else self.slot_seconds or 0 for space in spaces]
         hours = np.asarray(missions["slots"]) * np.array(seconds)[points] / 3600
-        return {
-            PURCHASE: self.uav * fleet + self.pad * pads[points],
-            "charging": self.missions * self.charge * charged / 100,
-            "hours": self.missions * self.hour * hours,
-            "losses": self.missions * self.lost_uav * lost,
+        amounts = {PURCHASE: self.purchase_of(fleet, pads[points])}
+        if self.years is not None:
+            if price_of_battery:  # the recharge after the mission is paid for, too
+                charged = charged + _battery_lost(spaces, missions, uavs, mission)
+            packs = charged / 100 / self.pack_cycles
+            amounts[PACKS] = self.paid_missions * self.pack * packs
+        return amounts | {
+            "charging": self.paid_missions * self.charge * charged / 100,
+            "hours": self.paid_missions * self.hour * hours,
+            "losses": self.paid_missions * self.lost_uav * lost,
         }
 
     @staticmethod
@@ -143,6 +244,32 @@ class Costs(StrictTable):
                 "results of this version, in another results folder",
             )
         return np.bincount(mission, np.asarray(uavs[field]), missions)
+
+
+def _battery_lost(
+    spaces: Sequence[ScenarioSpace],
+    missions: Mapping[str, Any],
+    uavs: Mapping[str, Any],
+    mission: np.ndarray,
+) -> np.ndarray:
+    """(n,) how much less battery the UAVs of a mission have at its end than at its start [%].
+
+    With what was charged in the mission, it is what they have spent in the air.
+
+    Args:
+        spaces: The scenario of every design point.
+        missions: As in ``Costs.parts``.
+        uavs: As in ``Costs.parts``.
+        mission: (u,) the mission of every UAV.
+    """
+    fleet = np.asarray(missions["uavs"])
+    points = np.asarray(missions["point"])
+    number = np.arange(len(mission)) - np.repeat(np.cumsum(fleet) - fleet, fleet)
+    most = max(space.uavs[1] for space in spaces)
+    of_types = np.stack([types_of(space, most)["battery"] for space in spaces])
+    start = of_types[points[mission], number]
+    start = np.where(start > 0, start, np.asarray(missions["flying_time"])[mission])
+    return np.bincount(mission, start - np.asarray(uavs["battery"]), len(fleet))
 
 
 def stranded_uavs(uavs: Mapping[str, Any]) -> np.ndarray:

@@ -63,7 +63,9 @@ def sweep(
         missions: Missions per setting; with --require, additional missions that check each
             selected setting.
         price: A price: uav, pad, charge, hour or lost_uav; also currency, missions (planned for
-            the fleet) and slot_seconds; repeatable.
+            the fleet) and slot_seconds. With years (over which the fleet is paid off) and days
+            (with a mission in a year), costs are those of a year; then also interest, pack (a
+            battery) and pack_cycles. Repeatable.
         require: Search for the cheapest setting whose mean of a metric (success, ratio,
             product) is at least this, or of age at most: "6 h" with a data sheet, otherwise
             mission slots; repeatable. It may be half a point below; the answer says what is

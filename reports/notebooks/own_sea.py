@@ -47,7 +47,9 @@ from dess.reports.pages.panel import make_panel
 
 # %%
 sea = load_scenario(scenario)
-priced = {**prices, "currency": currency, "missions": planned}
+priced = {**prices, "currency": currency}
+if "years" not in prices:
+    priced["missions"] = planned
 costs = {"prices": priced, "requirements": requirements}
 answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **costs, **fields)
 
@@ -154,7 +156,7 @@ html.write_markdown(
     size=sea.cell_size,
     settings=len(answer.table()),
     n=len(found.missions),
-    planned=planned,
+    planned=found.prices.paid_missions,
 )
 
 # %%

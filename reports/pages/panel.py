@@ -54,6 +54,7 @@ _PRICED = {
     "lost_uav": "A lost UAV",
     "missions": "Missions planned for the fleet",
 }
+_NO_COSTS = Markup("<p>The panel of this page has no costs, since they are those of a year.</p>\n")
 _HASH = r'"([0-9a-f]{64})"'
 _PACKED = re.compile('(?<=type="text/plain">)([A-Za-z0-9+/=]+)(?=</script>)')
 _ENCODED = re.compile("[A-Za-z0-9+/=]*")
@@ -179,8 +180,12 @@ def make_panel(
         policies: The policies of the page; the first that the module knows is the one to begin
             with, otherwise ``greedy``.
         seed: The seed of the missions.
-        costs: The prices, if the missions have costs.
+        costs: The prices, if the missions have costs. The panel has no costs of a year.
     """
+    note = Markup("")
+    if costs is not None and costs.years is not None:
+        costs = None
+        note = _NO_COSTS
     named = scenario if is_scenario_name(scenario) else PAPER
     panel = Panel(
         scenario=named,
@@ -196,7 +201,7 @@ def make_panel(
         rendered = panel.render()
     except InputError as error:
         return write_markdown("This page cannot simulate by itself: {why}", why=str(error))
-    return HTML(hidden_element(PANEL, panel.model_dump_json()) + Markup(rendered))
+    return HTML(hidden_element(PANEL, panel.model_dump_json()) + note + Markup(rendered))
 
 
 def check_panel(panel: Panel, page: str) -> list[str]:

@@ -58,6 +58,48 @@ def test_the_price_of_an_hour_takes_the_slot_of_the_sheet(searched):
     np.testing.assert_allclose(hours, 36 * means.to_numpy() * SLOT / 3600)
 
 
+def test_a_search_answers_in_costs_of_a_year_and_of_a_gb(searched):
+    year = {"years": 2, "days": 200, "pack": 900, "pack_cycles": 100}
+    again = sweep_question(
+        {"uavs": (1, 2), "pads": (1, 2)},
+        searched.store.folder.parents[1] / "small.toml",
+        ["greedy"],
+        20,
+        prices=PRICES | year,
+        requirements={"success": 0.6, "ratio": 0.3, "age": "50 min"},
+        folder=searched.store.folder.parents[1],
+    )
+    results = again.ask()
+    answer = Answer(again, results)
+    best = search_of(results).best
+    missions = results.missions[results.missions["point"] == best.points[0]]
+    uavs = results.uavs[results.uavs["point"] == best.points[0]]
+    spent = (80 + uavs["charged"] - uavs["battery"]).sum() / len(missions)
+    space = results.scenario(best.points[0])
+    parts = {
+        "purchase": (space.uavs[1] * 20_000 + space.charging_pads * 5_000) / 2,
+        "packs": 200 * 900 * spent / 100 / 100,
+        "hours": 200 * 36 * missions["slots"].mean() * SLOT / 3600,
+    }
+    assert best.cost == pytest.approx(sum(parts.values()))
+    gb = 200 * missions["collected"].mean() * UNIT / 8e9
+    for table in answer.tables().values():
+        (row,) = table[table["selected"]].to_dict("records")
+        assert {name: row[name] for name in parts} == pytest.approx(parts)
+        assert row["gb"] == pytest.approx(gb)
+        assert row["cost_per_gb"] == pytest.approx(best.cost / gb)
+    text = search_of(results).sentence()
+    assert f"for {best.cost:,.0f} EUR a year: {parts['purchase']:,.0f} EUR for the purchase" in text
+    assert f"(battery packs {parts['packs']:,.0f} EUR and hours {parts['hours']:,.0f} EUR)" in text
+    assert "for 200 missions (" in text
+    assert f"{best.cost / gb:,.0f} EUR per GB collected" in text
+    assert "paid off over 2 years at 0 % interest; the fleet makes 200 missions a year" in (
+        " ".join(answer.answers())
+    )
+    assert "Cost [EUR a year]" in answer.brief_tables()[0].cells
+    assert "--price years=2" in again.command
+
+
 def test_ages_of_missions_of_different_lengths_are_not_compared_without_saying_so(studied):
     results = studied(set={"age.measured": True})
     means = results.missions.groupby("policy")["slots"].mean().round()

@@ -166,7 +166,7 @@ class FleetAnswer:
     @property
     def cost_in_words(self) -> str:
         """The mean cost of the fleet over the conditions, in the currency of the prices."""
-        return numbers.format_money(self.cost, self.results.prices.currency)
+        return numbers.format_money(self.cost, self.results.prices.unit)
 
     @property
     def _where(self) -> str:
@@ -287,7 +287,7 @@ class FleetAnswer:
         if other.empty:
             return ""
         row = other.iloc[0]
-        amount = numbers.format_money(row[COST], self.results.prices.currency)
+        amount = numbers.format_money(row[COST], self.results.prices.unit)
         measured = [
             f"{r.metric.within} {r.metric.written(*row[interval_columns(r.column)])}"
             for r in self._required

@@ -21,17 +21,32 @@ from dess.analysis.answers.settings.points import (
     intervals_in_words,
 )
 from dess.analysis.answers.settings.ranking import rank_settings
-from dess.analysis.metrics import COST, METRICS, PRODUCT, SUCCESS, metric_of
+from dess.analysis.metrics import (
+    COLLECTED,
+    COST,
+    METRICS,
+    PRODUCT,
+    SUCCESS,
+    column_in_sheet_unit,
+    metric_of,
+)
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.verdict import front_membership, on_front
-from dess.analysis.study.prices import PARTS, PURCHASE, stranded_uavs
+from dess.analysis.study.prices import PURCHASE, stranded_uavs
 from dess.analysis.tables import MOST_ROWS, Table
 from dess.base.errors import unknown_name
 
 CERTAIN = 0.01  # settings with a lower probability of being on a front are not in the table
 # What the parts of a cost are called, and the price that makes each.
-_PART_NAMES = {"charging": "charging", "hours": "hours", "losses": "lost UAVs"}
-_PRICE_OF_PART = {"charging": "charge", "hours": "hour", "losses": "lost_uav"}
+_PART_NAMES = {
+    "packs": "battery packs",
+    "charging": "charging",
+    "hours": "hours",
+    "losses": "lost UAVs",
+}
+_PRICE_OF_PART = {"packs": "pack", "charging": "charge", "hours": "hour", "losses": "lost_uav"}
+_PER_GB = "cost_per_gb"  # of a year, with a data sheet
+_MB_PER_GB = 1000
 
 
 @compute_once
@@ -62,7 +77,9 @@ def mean_cost_parts(results: Results) -> pd.DataFrame:
     Returns:
         A row per policy and design point: ``policy``, ``point``, ``purchase``, ``charging``,
         ``hours``, ``losses``, and ``cost``, their sum; ``stranded``, the mean number of UAVs of a
-        mission that cannot fly home, beyond those that ``losses`` pays for.
+        mission that cannot fly home, beyond those that ``losses`` pays for. Where costs are those
+        of a year, also ``packs`` and, with a data sheet, ``gb``, the data collected in the year
+        [GB], and ``cost_per_gb``.
 
     Raises:
         InputError: If the study has no prices.
@@ -71,8 +88,14 @@ def mean_cost_parts(results: Results) -> pd.DataFrame:
     missions = results.missions
     uavs = results.uavs
     amounts = prices.parts(results.store.manifest.scenarios, missions, uavs)
+    columns = [*prices.part_names, COST]
     table = missions[["policy", "point", COST]].assign(**amounts)
-    means = table.groupby(["policy", "point"], sort=False, as_index=False)[[*PARTS, COST]].mean()
+    collected = column_in_sheet_unit(COLLECTED, missions)
+    if prices.years is not None and collected != COLLECTED:
+        columns.append("gb")
+        table["gb"] = prices.paid_missions * missions[collected] / _MB_PER_GB
+    means = table.groupby(["policy", "point"], sort=False, as_index=False)[columns].mean()
+    means = _with_cost_per_gb(means)
     is_recorded = "down" in uavs and uavs["down"].notna().all()  # results of before are not
     number = uavs[["policy", "point"]].assign(stranded=np.nan)
     if is_recorded:
@@ -80,6 +103,31 @@ def mean_cost_parts(results: Results) -> pd.DataFrame:
     sums = number.groupby(["policy", "point"], sort=False)["stranded"].sum(min_count=1)
     per_setting = missions.groupby(["policy", "point"], sort=False).size()
     return means.join((sums / per_setting).rename("stranded"), on=["policy", "point"])
+
+
+def _with_cost_per_gb(parts: pd.DataFrame) -> pd.DataFrame:
+    """Rows of ``mean_cost_parts`` with the cost of a GB, where the data are known."""
+    if "gb" not in parts:
+        return parts
+    return parts.assign(**{_PER_GB: parts[COST] / parts["gb"].where(parts["gb"] > 0)})
+
+
+@compute_once
+def yearly_parts(results: Results) -> pd.DataFrame:
+    """The parts of the cost of every fleet in a year, means over the conditions.
+
+    Args:
+        results: A study whose costs are those of a year.
+
+    Returns:
+        A row per policy and fleet: ``policy``, ``fleet`` in words, ``packs``, ``charging``,
+        ``hours``, ``losses`` and, with a data sheet, ``gb`` and ``cost_per_gb``.
+    """
+    means = mean_cost_parts(results).drop(columns=["stranded", PURCHASE])
+    words = fleets_in_words(results)
+    means.insert(1, "fleet", [words[point] for point in means["point"]])
+    fleets = means.drop(columns="point").groupby(["policy", "fleet"], sort=False, as_index=False)
+    return _with_cost_per_gb(fleets.mean()).drop(columns=COST)
 
 
 @compute_once
@@ -134,11 +182,12 @@ def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> 
         fleet: Its design points, one for each condition.
     """
     prices = results.prices
-    if not results.prices.pays_for_missions:
-        return ""
     table = mean_cost_parts(results)
     rows = table[(table["policy"] == policy) & table["point"].isin(fleet)]
-    means = rows[[*PARTS]].mean()
+    per_gb = _cost_per_gb_in_words(results, rows)
+    if not prices.pays_for_missions:
+        return per_gb
+    means = rows[[*prices.part_names]].mean()
 
     def money(value: float) -> str:
         return numbers.format_money(value, prices.currency)
@@ -151,8 +200,22 @@ def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> 
     total = money(means.sum() - means[PURCHASE])
     return (
         f": {money(means[PURCHASE])} for the purchase and {total} for "
-        f"{numbers.format_count(prices.missions, 'mission')} ({numbers.join_words(running)})"
+        f"{numbers.format_count(prices.paid_missions, 'mission')} "
+        f"({numbers.join_words(running)}){per_gb}"
     )
+
+
+def _cost_per_gb_in_words(results: Results, rows: pd.DataFrame) -> str:
+    """What a GB costs, to follow the cost of a year; empty where that is not known.
+
+    Args:
+        results: The study.
+        rows: Rows of ``mean_cost_parts`` of a fleet, one for each condition.
+    """
+    if "gb" not in rows or not rows["gb"].sum():
+        return ""
+    per_gb = rows[COST].mean() / rows["gb"].mean()
+    return f", or {numbers.format_money(per_gb, results.prices.currency)} per GB collected"
 
 
 def _mission_values(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:
@@ -191,7 +254,7 @@ def cost_front_table(results: Results) -> Table:
         head = f"On the front of {metric_of(metric).within}"
         shown[head] = shares.loc[top.index, metric].map(numbers.format_percent)
     caption = (
-        f"Settings that may be on a front: mean cost [{results.prices.currency}] and metrics "
+        f"Settings that may be on a front: mean cost [{results.prices.unit}] and metrics "
         f"with {intervals_in_words(results)}, and the probability that they are on it"
     )
     data = first.drop(columns=["on_front", "probability"])
@@ -205,7 +268,7 @@ def cost_parts_table(results: Results) -> Table:
     )
     top = rows.head(MOST_ROWS)
     shown = setting_cells(top, [])
-    for part in PARTS:
+    for part in results.prices.part_names:
         shown[part.capitalize()] = top[part].map("{:,.0f}".format)
-    caption = f"The mean cost of the settings [{results.prices.currency}], and its parts"
+    caption = f"The mean cost of the settings [{results.prices.unit}], and its parts"
     return Table(shown, caption, rows)

@@ -127,7 +127,7 @@ def _draw_costs(results: Results, rows: pd.DataFrame, metric: str, marks: str) -
     condition = rows["condition"].iloc[0]
     bounds = {requirement.column: requirement.bound for requirement in requirements_of(results)}
     least = bounds.get(metric)
-    drawing = plot_costs(rows, metric, results.manifest["study"]["costs"]["currency"], least)
+    drawing = plot_costs(rows, metric, results.prices.unit, least)
     alt = f"Cost against {metric_of(metric).within}"
     if condition:
         alt += f", {condition}"

@@ -5,7 +5,12 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.cheapest import search_of
-from dess.analysis.answers.fleet.costs import format_amount, purchase_prices, setting_cells
+from dess.analysis.answers.fleet.costs import (
+    format_amount,
+    purchase_prices,
+    setting_cells,
+    yearly_parts,
+)
 from dess.analysis.answers.fleet.requirements import requirements_in_words, requirements_of
 from dess.analysis.answers.fleet.verdicts import (
     VERDICTS_EXPLAINED,
@@ -27,7 +32,8 @@ def fleet_rows(results: Results) -> pd.DataFrame:
         Rows of ``judge_settings``, or of ``judge_fleets_everywhere`` if there are several
         conditions, with the parts of the cost (``purchase`` and ``running``) and ``answer``:
         ``answer`` for the answer, ``selected`` for the cheapest fleet of another policy that meets
-        the requirements.
+        the requirements. Where costs are those of a year, the columns of ``costs.yearly_parts``
+        follow.
     """
     if has_conditions(results):
         rows = judge_fleets_everywhere(results)
@@ -39,7 +45,10 @@ def fleet_rows(results: Results) -> pd.DataFrame:
     marks = np.where(is_answer, "answer", np.where(rows["selected"], "selected", ""))
     purchase = purchase_prices(results)
     bought = [purchase[point] for point in rows["point"]]
-    return rows.assign(purchase=bought, running=rows[COST] - bought, answer=marks)
+    rows = rows.assign(purchase=bought, running=rows[COST] - bought, answer=marks)
+    if results.prices.years is None:
+        return rows
+    return rows.merge(yearly_parts(results), on=["policy", "fleet"], how="left")
 
 
 def shown_rows(rows: pd.DataFrame, most: int) -> pd.DataFrame:
@@ -60,7 +69,7 @@ def fleet_cells(results: Results, rows: pd.DataFrame, further: str = SUCCESS) ->
         further: A metric that is shown beside those of the requirements.
     """
     cells = setting_cells(rows.assign(condition=""), [])
-    cells = cells.rename(columns={"Cost": f"Cost [{results.prices.currency}]"})
+    cells = cells.rename(columns={"Cost": f"Cost [{results.prices.unit}]"})
     place = cells.shape[1]
     if results.prices.pays_for_missions:
         cells.insert(place, "Purchase", rows["purchase"].map(format_amount))

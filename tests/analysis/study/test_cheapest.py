@@ -40,6 +40,52 @@ def test_the_cost_of_missions_by_hand():
     assert parts["losses"].tolist() == [0, 7 * 50 * 2]
 
 
+def test_the_cost_of_a_year_by_hand():
+    # As above. The battery of each UAV is 80 % at the start, except for the type of the first one
+    # of point 1, which has 70 %. They spend 70 + 53 - 33 = 90 % and (80 - 20) + 40 + 80 = 180 %.
+    spaces = [space(uavs=2, flying_time=80), space(uavs=1, pads=3, fleet=[{"flying_time": 70}])]
+    missions = {"point": [1, 0], "uavs": [1, 2], "slots": [90, 30], "flying_time": [80, 80]}
+    uavs = {"charged": [53, 40, 0], "down": [0, 1, 1], "battery": [33, 20, 0]}
+    prices = Costs(
+        uav=100, pad=10, charge=2, hour=60, lost_uav=50, slot_seconds=120,
+        years=2, interest=0.1, days=250, pack=30, pack_cycles=200,
+    )  # fmt: skip
+    parts = prices.parts(spaces, missions, uavs)
+    assert [*parts] == [*prices.part_names]
+    # What 1 EUR costs in each of 2 years: 0.1 * 1.21 / 0.21.
+    annuity = 0.1 * 1.1**2 / (1.1**2 - 1)
+    assert annuity == pytest.approx(0.576190476)
+    assert parts["purchase"] == pytest.approx([130 * annuity, 360 * annuity])
+    assert parts["packs"] == pytest.approx([250 * 30 * 0.9 / 200, 250 * 30 * 1.8 / 200])
+    assert parts["charging"] == pytest.approx([250 * 2 * 0.9, 250 * 2 * 1.8])
+    assert parts["hours"] == pytest.approx([250 * 60 * 3, 250 * 60 * 1])
+    assert parts["losses"].tolist() == [0, 250 * 50 * 2]
+    assert prices.of_lost(2) == 250 * 50 * 2
+
+
+def test_without_interest_a_price_is_paid_in_equal_parts():
+    free, cheap = (Costs(uav=300, years=3, days=1, interest=r) for r in (0, 1e-12))
+    assert free.purchase_of(2, 0) == 200
+    assert cheap.purchase_of(2, 0) == pytest.approx(200, rel=1e-11)
+
+
+def test_a_year_and_a_number_of_missions_exclude_each_other():
+    for fields, line in {
+        "years": "days: is missing; allowed: with years, the missions of a year: 1..365",
+        "years days missions": "missions: is given beside years; allowed: days instead",
+        "days": "days: is given without years; allowed: with years",
+        "interest": "interest: is given without years; allowed: with years",
+        "pack": "pack: is given without years; allowed: with years",
+        "pack_cycles": "pack_cycles: is given without years; allowed: with years",
+    }.items():
+        given = {"years": 5, "days": 200, "missions": 7, "interest": 0.1, "pack": 5}
+        given |= {"pack_cycles": 200}
+        costs = {"uav": 1, **{field: given[field] for field in fields.split()}}
+        with pytest.raises(InputError) as error:
+            load_study("table4", costs=costs)
+        assert str(error.value) == f"study table4: costs: {line}"
+
+
 def test_results_of_before_are_priced_if_charging_and_losses_have_no_price():
     missions, uavs = {"point": [0], "uavs": [1], "slots": [90]}, {"battery": [27]}
     assert Costs(uav=100).parts([space(uavs=1)], missions, uavs)["purchase"].tolist() == [100]
