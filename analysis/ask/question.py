@@ -223,11 +223,15 @@ def sweep_question(
     """
     if unknown := [key for key in prices or () if key not in Costs.model_fields]:
         raise unknown_name("prices", f"{unknown[0]!r} is unknown", unknown[0], Costs.model_fields)
-    load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
+    space = load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
     swept = {field: of_field for field, of_field in values.items() if len(of_field) > 1}
     fixed: dict[str, Any] = {field: values[field][0] for field in values if field not in swept}
     if AGE in (requirements or ()):
         fixed["age.measured"] = True
+    if (
+        requirements and space.units and "charging.measured" not in values
+    ):  # for the rule of thumb beside the answer
+        fixed["charging.measured"] = True
     if isinstance(policies, str):
         policies = [policies]
     data: dict[str, Any] = {

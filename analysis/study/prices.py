@@ -221,7 +221,7 @@ class Costs(StrictTable):
         amounts = {PURCHASE: self.purchase_of(fleet, pads[points])}
         if self.years is not None:
             if price_of_battery:  # the recharge after the mission is paid for, too
-                charged = charged + _battery_lost(spaces, missions, uavs, mission)
+                charged = spent_battery(spaces, missions, uavs)
             packs = charged / 100 / self.pack_cycles
             amounts[PACKS] = self.paid_missions * self.pack * packs
         return amounts | {
@@ -246,30 +246,27 @@ class Costs(StrictTable):
         return np.bincount(mission, np.asarray(uavs[field]), missions)
 
 
-def _battery_lost(
-    spaces: Sequence[ScenarioSpace],
-    missions: Mapping[str, Any],
-    uavs: Mapping[str, Any],
-    mission: np.ndarray,
+def spent_battery(
+    spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any], uavs: Mapping[str, Any]
 ) -> np.ndarray:
-    """(n,) how much less battery the UAVs of a mission have at its end than at its start [%].
+    """(n,) the battery that the UAVs of a mission have spent in the air [%].
 
-    With what was charged in the mission, it is what they have spent in the air.
+    It is what they had at the start and what was charged, without what is left at the end.
 
     Args:
         spaces: The scenario of every design point.
         missions: As in ``Costs.parts``.
         uavs: As in ``Costs.parts``.
-        mission: (u,) the mission of every UAV.
     """
     fleet = np.asarray(missions["uavs"])
-    points = np.asarray(missions["point"])
+    mission = np.repeat(np.arange(len(fleet)), fleet)
     number = np.arange(len(mission)) - np.repeat(np.cumsum(fleet) - fleet, fleet)
     most = max(space.uavs[1] for space in spaces)
     of_types = np.stack([types_of(space, most)["battery"] for space in spaces])
-    start = of_types[points[mission], number]
+    start = of_types[np.asarray(missions["point"])[mission], number]
     start = np.where(start > 0, start, np.asarray(missions["flying_time"])[mission])
-    return np.bincount(mission, start - np.asarray(uavs["battery"]), len(fleet))
+    spent = start + np.asarray(uavs["charged"]) - np.asarray(uavs["battery"])
+    return np.bincount(mission, spent, len(fleet))
 
 
 def stranded_uavs(uavs: Mapping[str, Any]) -> np.ndarray:

@@ -11,6 +11,7 @@ from dess.analysis import tables
 from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import mean_cost_parts
+from dess.analysis.answers.fleet.rule_of_thumb import RuleOfThumb, rule_of_thumb
 from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
 from dess.analysis.ask import around
 from dess.analysis.ask.answer import Answer
@@ -98,6 +99,32 @@ def test_a_search_answers_in_costs_of_a_year_and_of_a_gb(searched):
     )
     assert "Cost [EUR a year]" in answer.brief_tables()[0].cells
     assert "--price years=2" in again.command
+
+
+def test_the_rule_of_thumb_takes_its_numbers_from_the_missions_of_the_answer(searched):
+    best = search_of(searched).best
+    missions = searched.missions[searched.missions["point"] == best.points[0]]
+    uavs = searched.uavs[searched.uavs["point"] == best.points[0]]
+    flights = missions["pad_requests"].sum()
+    lacking = (80 + uavs["charged"] - uavs["battery"]).sum() / flights
+    charge = 40 * 60 * lacking / 100
+    wait = uavs["slots_waiting"].sum() / flights * SLOT
+    rule = rule_of_thumb(searched, best.policy, best.points)
+    assert rule.flying == pytest.approx(uavs["slots_flying"].sum() / missions["slots"].sum())
+    assert rule.flight == pytest.approx(uavs["slots_flying"].sum() / flights * SLOT)
+    assert rule.recovery == pytest.approx(charge + wait)
+    assert rule.sentence(searched.scenario(best.points[0]).uavs[1]) in (
+        search_of(searched).sentences()
+    )
+
+
+def test_the_rule_of_thumb_by_hand():
+    rule = RuleOfThumb(flying=1.3, flight=1500, recovery=2200)
+    assert rule.uavs == 2 * (2 + 1)
+    text = "asks for 6 UAVs: 2 (ceil(36.7 min / 25 min) + 1), since 1.3 UAVs are in the air"
+    assert all(text in rule.sentence(uavs) for uavs in (5, 6, 7))
+    for uavs, why in ((5, "It rounds up"), (6, "That is the answer"), (7, "does not count UAVs")):
+        assert why in rule.sentence(uavs)
 
 
 def test_ages_of_missions_of_different_lengths_are_not_compared_without_saying_so(studied):

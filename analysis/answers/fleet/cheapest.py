@@ -29,6 +29,7 @@ from dess.analysis.answers.fleet.requirements import (
     relative_spare,
     requirements_of,
 )
+from dess.analysis.answers.fleet.rule_of_thumb import rule_of_thumb
 from dess.analysis.answers.fleet.verdicts import (
     ALL_CONDITIONS,
     cheapest_choice,
@@ -297,6 +298,15 @@ class FleetAnswer:
             f"{numbers.join_words(measured)}, {_WHY_NOT[row['verdict']]}."
         )
 
+    def rule_of_thumb_sentence(self) -> str:
+        """How many UAVs a rule of thumb asks for; empty without a fleet or a data sheet."""
+        if not self.points:
+            return ""
+        rule = rule_of_thumb(self.results, self.policy, self.points)
+        if rule is None:
+            return ""
+        return rule.sentence(self.results.scenario(self.points[0]).uavs[1])
+
     def headline(self) -> str:
         """The fleet, its cost, what was measured of it, and whether its UAVs could fly home."""
         parts = [self.choice_sentence(), self.estimates_sentence(), self.home_sentence()]
@@ -399,6 +409,7 @@ class FleetSearch:
         """How sure the answer is; then the answers of the other policies and conditions."""
         lines = [
             self.best.reasons(len(self.results.policies)),
+            self.best.rule_of_thumb_sentence(),
             unequal_lengths_sentence(self.results, self.best.length_dependent_metrics),
         ]
         lines += [

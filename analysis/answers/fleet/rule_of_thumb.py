@@ -1,0 +1,114 @@
+"""A rule of thumb for the size of a fleet, beside the one that a search has found.
+
+    rule = rule_of_thumb(results, "greedy", [3])  # of the missions at design point 3
+    rule.uavs
+
+With ``a`` UAVs in the air, each of which flies for a time F and then needs a time R until it can
+fly again, ``a (ceil(R / F) + 1)`` are enough (arXiv 2604.15890). The means of simulated missions
+take the place of what an engineer would estimate.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dess.analysis import numbers
+from dess.analysis.results.tables import Results
+from dess.analysis.study.prices import spent_battery
+from dess.scenario.quantities import printed
+
+
+@dataclass(frozen=True)
+class RuleOfThumb:
+    """The rule, with what it takes from the missions of a fleet.
+
+    Attributes:
+        flying: The mean number of UAVs in the air.
+        flight: The mean time in the air between charges [s].
+        recovery: The time to charge from the mean battery at landing to full, with the mean wait
+            for a pad [s].
+    """
+
+    flying: float
+    flight: float
+    recovery: float
+
+    @property
+    def uavs(self) -> int:
+        """How many UAVs the rule asks for."""
+        return self._kept_flying * (self._spares_of_each + 1)
+
+    @property
+    def _kept_flying(self) -> int:
+        return math.ceil(self.flying)
+
+    @property
+    def _spares_of_each(self) -> int:
+        return math.ceil(self.recovery / self.flight)
+
+    def sentence(self, uavs: int) -> str:
+        """What the rule says, and why a search may say something else.
+
+        Args:
+            uavs: The number of UAVs that the search has found.
+        """
+        flight = _format_time(self.flight)
+        recovery = _format_time(self.recovery)
+        text = (
+            f"The rule of thumb, active (ceil(recovery / active time) + 1), asks for "
+            f"{numbers.format_count(self.uavs, 'UAV')}: {self._kept_flying} (ceil({recovery} / "
+            f"{flight}) + 1), since {self.flying:.1f} UAVs are in the air on average, a flight "
+            f"takes {flight}, and {recovery} go by until the next one. "
+        )
+        if self.uavs == uavs:
+            return f"{text}That is the answer, though the rule knows no requirement and no pads."
+        if self.uavs > uavs:
+            return (
+                f"{text}It rounds up, to keep {numbers.format_count(self._kept_flying, 'UAV')} in "
+                "the air at every moment even if all batteries empty at once. The requirements do "
+                "not ask for that; the rule knows neither them, nor pads, nor failures."
+            )
+        return (
+            f"{text}It does not count UAVs that stand ready or are under repair, and it knows no "
+            "requirement, no pads and no failures."
+        )
+
+
+def _format_time(seconds: float) -> str:
+    """A time of three digits, as ``36.7 min``."""
+    return printed(60 * float(f"{seconds / 60:.3g}"), "s")
+
+
+def rule_of_thumb(results: Results, policy: str, points: Sequence[int]) -> RuleOfThumb | None:
+    """The rule for a fleet, of its missions in a search.
+
+    Args:
+        results: A study whose missions measure the use of the pads.
+        policy: The policy.
+        points: The design points of the fleet, one for each condition.
+
+    Returns:
+        The rule; None without a data sheet, or if no UAV has charged.
+    """
+    missions = results.missions
+    scenarios = results.store.manifest.scenarios
+    if "pad_requests" not in missions or not all(scenarios[point].units for point in points):
+        return None
+    of_fleet = (missions["policy"] == policy) & missions["point"].isin(points)
+    of_its_uavs = (results.uavs["policy"] == policy) & results.uavs["point"].isin(points)
+    missions = missions[of_fleet]
+    uavs = results.uavs[of_its_uavs]
+    flights = missions["pad_requests"].sum()
+    if not flights > 0:
+        return None
+    space = scenarios[points[0]]
+    assert space.units
+    spent = spent_battery(scenarios, missions, uavs).sum() / flights
+    charge = spent / float(space.charge_fraction)
+    wait = uavs["slots_waiting"].sum() / flights
+    flown = uavs["slots_flying"].sum()
+    return RuleOfThumb(
+        flying=float(flown / missions["slots"].sum()),
+        flight=float(flown / flights * space.units.slot),
+        recovery=float((charge + wait) * space.units.slot),
+    )
