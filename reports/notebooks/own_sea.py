@@ -43,7 +43,6 @@ from dess.analysis.figures.missions import mission_figure, sea_figure
 from dess.analysis.names import node_placing_sentence
 from dess.analysis.results.resimulate import resimulate
 from dess.reports.pages import html, study
-from dess.reports.pages.panel import make_panel
 
 # %%
 sea = load_scenario(scenario)
@@ -64,7 +63,7 @@ html.lead_figure(*draw_cheapest(found))
 # %%
 point = search.shown_point
 shown = found.scenario(point)
-make_panel(shown, shown, scenario, [search.best.policy], seed, found.study.costs)
+study.make_panel_of(found)
 
 # %%
 html.render_part("assumptions.html", lines=assumption_sentences(found)) if sea.units else None

@@ -91,7 +91,7 @@ def make_page(report: Report) -> Page:
         template_paths=[str(TEMPLATES)],
         filters=filters
         | {"anchor": section_anchor, "is_beside": is_beside_figure}
-        | {"sections": split_sections, "term_anchor": term_anchor},
+        | {"sections": split_sections, "term_anchor": term_anchor, "has_panel": has_panel},
     )
     for option, value in JINJA.items():
         setattr(exporter.environment, option, value)
@@ -157,6 +157,12 @@ def split_sections(cells: Iterable[NotebookNode]) -> list[tuple[Markup, list[Not
 def section_anchor(heading: Markup) -> str:
     """The anchor of a section."""
     return re.sub(r"\W+", "-", heading.striptags()).strip("-")
+
+
+def has_panel(cells: Iterable[NotebookNode]) -> bool:
+    """Whether a cell shows a panel, to which the page has a link."""
+    outputs = [output.get("data", {}) for cell in cells for output in cell.get("outputs", [])]
+    return any('<section id="panel"' in data.get("text/html", "") for data in outputs)
 
 
 def term_anchor(term: str) -> str:

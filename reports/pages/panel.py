@@ -11,9 +11,10 @@ import json
 import re
 import zlib
 from base64 import b64decode, b64encode
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
+from types import MappingProxyType
 from typing import Any
 
 from IPython.display import HTML, Markdown
@@ -21,6 +22,7 @@ from markupsafe import Markup
 from pydantic import TypeAdapter
 
 from dess import InputError, simulate_batch
+from dess.analysis.answers.fleet.requirements import Requirement
 from dess.analysis.execution.effort import seconds_of
 from dess.analysis.figures import style
 from dess.analysis.metrics import PRODUCT, choose_units, metric_of
@@ -31,12 +33,12 @@ from dess.analysis.wasm.image import explain_refusal, make_image
 from dess.analysis.wasm.module import read_module
 from dess.base.files.documents import Document
 from dess.base.files.writing import toml_value
-from dess.model.record import Records, empty_records
+from dess.model.record import Records, empty_records, measures_of
 from dess.policies.heuristics import KINDS
 from dess.policies.registry import load
 from dess.reports.pages.html import panel_script, render_part, write_markdown
 from dess.reports.pages.page import PANEL, hidden_element
-from dess.scenario.fields import dotted
+from dess.scenario.fields import dotted, is_number
 from dess.scenario.scenario import ScenarioSpace, is_scenario_name
 
 PAPER = "paper"  # the scenario that commands begin with where there is no other name
@@ -60,16 +62,18 @@ _PACKED = re.compile('(?<=type="text/plain">)([A-Za-z0-9+/=]+)(?=</script>)')
 _ENCODED = re.compile("[A-Za-z0-9+/=]*")
 
 # What a reader may change wherever the scenario lets him, and by which values.
-_COUNTS = {"uavs": (1, 2, 3, 4, 5, 6, 8), "pads": (1, 2, 3, 4, 6, 8, 16)}
+_COUNTS = {"uavs": 8, "pads": 16}  # every number up to this one, or to that of the page
+_MOST_POSITIONS = 64  # of a slider
 _SCALED = {
     "arrival_rate": (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0),
     "max_slots": (0.5, 0.75, 1.0, 1.5, 2.0),
 }
-_PERCENT = {
+_LEVELS = {
     "charge_start": (10, 20, 30, 40, 50),
     "charge_complete": (60, 70, 80, 90, 100),
+    "failures.uav_rate": (0.0, 0.0005, 0.001, 0.002, 0.005),
 }
-_RATES = {"failures.uav_rate": (0.0, 0.0005, 0.001, 0.002, 0.005)}
+_OFFERED = (*_COUNTS, *_SCALED, *_LEVELS)
 
 
 class Panel(Document):
@@ -84,6 +88,8 @@ class Panel(Document):
         seed: The seed of the missions.
         module: The SHA-256 hash of the WebAssembly module.
         costs: The prices, if the missions have costs.
+        requirements: The bounds on the means of metrics that the page is about.
+        varied: By setting, the values that the study of the page has.
     """
 
     scenario: str
@@ -94,6 +100,8 @@ class Panel(Document):
     seed: int
     module: str
     costs: Costs | None = None
+    requirements: dict[str, float] = {}
+    varied: dict[str, list[Any]] = {}
 
     @property
     def spaces(self) -> tuple[ScenarioSpace, ScenarioSpace]:
@@ -117,7 +125,7 @@ class Panel(Document):
         if time.high > MOST_SECONDS:
             problem = f"{CHECKED} missions would take {time}"
             raise InputError("panel", problem, f"{MOST_SECONDS:.0f} seconds at most")
-        settings = dict(_settings_of(baseline, variation))
+        settings = dict(_settings_of(baseline, variation, self.varied))
         image = make_image(baseline, [self.policy], self.seed, PORTION, settings, self.costs)
         starts = {
             side: [values.index(_value_of(space, key)) for key, values in settings.items()]
@@ -127,6 +135,7 @@ class Panel(Document):
         ours, theirs = (dotted(space.model_dump(mode="json")) for space in (baseline, named))
         fixed = [key for key in ours if key not in settings and ours[key] != theirs.get(key)]
         fleet = len(image.arrays["uavs"][0])
+        metrics = [*_describe_metrics(baseline, self.costs)]
         data = {
             "settings": [
                 _describe_setting(key, values, _value_of(named, key))
@@ -135,7 +144,7 @@ class Panel(Document):
             # What commands have to set beside these settings.
             "fixed": [f"{key}={toml_value(ours[key])}" for key in fixed],
             "policies": [name for name in KINDS if name != "random-unguarded"],
-            "metrics": [*_describe_metrics(baseline, self.costs)],
+            "metrics": metrics,
             "prices": [*_describe_prices(self.costs)],
             "sea": _describe_sea(baseline, fleet),
             "product": METRICS.index(PRODUCT),
@@ -158,6 +167,7 @@ class Panel(Document):
                 currency=self.costs.currency if self.costs else "",
                 start={side: {"policy": self.policy, "positions": starts[side]} for side in SIDES},
                 missions=MISSIONS,
+                required=[*_describe_requirements(self.requirements, metrics)],
             ).data
         )
 
@@ -169,6 +179,8 @@ def make_panel(
     policies: Sequence[str],
     seed: int,
     costs: Costs | None = None,
+    requirements: Sequence[Requirement] = (),
+    varied: Mapping[str, Sequence[Any]] = MappingProxyType({}),
 ) -> HTML | Markdown:
     """The panel of a baseline and a variation; a sentence instead where it is not possible.
 
@@ -181,6 +193,8 @@ def make_panel(
             with, otherwise ``greedy``.
         seed: The seed of the missions.
         costs: The prices, if the missions have costs. The panel has no costs of a year.
+        requirements: Those that the page is about.
+        varied: By setting, the values that the study of the page has, which the panel has too.
     """
     note = Markup("")
     if costs is not None and costs.years is not None:
@@ -196,6 +210,17 @@ def make_panel(
         seed=seed,
         module=sha256(read_module()).hexdigest(),
         costs=costs,
+        requirements={
+            name: requirement.bound
+            for requirement in requirements
+            for name in METRICS
+            if requirement.column in (name, metric_of(name).in_units.column)
+        },
+        varied={
+            key: [value for value in values if is_number(value)]
+            for key, values in varied.items()
+            if key in _OFFERED
+        },
     )
     try:
         rendered = panel.render()
@@ -286,31 +311,34 @@ def _with_room(records: Records, fleet: int) -> Records:
 
 
 def _settings_of(
-    baseline: ScenarioSpace, variation: ScenarioSpace
+    baseline: ScenarioSpace,
+    variation: ScenarioSpace,
+    varied: Mapping[str, Sequence[Any]] = MappingProxyType({}),
 ) -> Iterator[tuple[str, list[Any]]]:
     """The settings of the panel: by field, the values that the scenario allows, in their order."""
-    for key, values in _candidates_of(baseline):
-        allowed = [value for value in values if _is_allowed(baseline, key, value)]
+    for key in _OFFERED:
         present = [_value_of(space, key) for space in (baseline, variation)]
+        values = [*_candidates_of(baseline, key, present), *varied.get(key, ())]
+        allowed = [value for value in values if _is_allowed(baseline, key, value)]
         ordered = _in_order([*allowed, *present])
         if len(ordered) > 1:
             yield key, ordered
-    offered = {key for key, _ in _candidates_of(baseline)}
     ours, theirs = (dotted(space.model_dump(mode="json")) for space in (baseline, variation))
     for key in ours | theirs:
-        if key not in offered and ours.get(key) != theirs.get(key):
+        if key not in _OFFERED and ours.get(key) != theirs.get(key):
             yield key, [_value_of(space, key) for space in (baseline, variation)]
 
 
-def _candidates_of(space: ScenarioSpace) -> Iterator[tuple[str, Sequence[Any]]]:
-    yield from _COUNTS.items()
-    for key, factors in _SCALED.items():
+def _candidates_of(space: ScenarioSpace, key: str, present: Sequence[Any]) -> Sequence[Any]:
+    """The values of a setting that are offered on any page."""
+    if key in _COUNTS:
+        most = max([_COUNTS[key], *(value for value in present if isinstance(value, int))])
+        return range(1, min(most, _MOST_POSITIONS) + 1)
+    if key in _SCALED:
         value = getattr(space, key)
-        whole = isinstance(value, int)
-        scaled = [float(f"{factor * value:.6g}") for factor in factors]
-        yield key, [*map(round, scaled)] if whole else scaled
-    yield from _PERCENT.items()
-    yield from _RATES.items()
+        scaled = [float(f"{factor * value:.6g}") for factor in _SCALED[key]]
+        return [*map(round, scaled)] if isinstance(value, int) else scaled
+    return _LEVELS[key]
 
 
 def _is_allowed(space: ScenarioSpace, key: str, value: Any) -> bool:
@@ -380,6 +408,9 @@ def _describe_prices(costs: Costs | None) -> Iterator[dict[str, Any]]:
 
 def _describe_metrics(space: ScenarioSpace, costs: Costs | None) -> Iterator[dict[str, Any]]:
     """What the panel writes of each metric, by its column in the values of missions."""
+    offered = {*METRICS[: METRICS.index("reward")], *measures_of(space)}
+    if costs is not None:
+        offered.add("cost")
     for column, name in enumerate(METRICS):
         metric = metric_of(name)
         if metric.kind == "cost" and costs is not None:
@@ -388,11 +419,24 @@ def _describe_metrics(space: ScenarioSpace, costs: Costs | None) -> Iterator[dic
             metric = metric.in_units
         yield {
             "column": column,
+            "key": name,
             "name": metric.name,
             "percent": metric.in_percent,
             "unit": metric.unit,
             "less": metric.less_is_better,
+            "isOffered": name in offered,
         }
+
+
+def _describe_requirements(
+    requirements: Mapping[str, float], metrics: Sequence[Mapping[str, Any]]
+) -> Iterator[tuple[str, str]]:
+    """The metric and the bound of each line of requirements; there is one line at least."""
+    percent = {metric["key"]: metric["percent"] for metric in metrics}
+    for name, bound in requirements.items():
+        yield name, f"{100 * bound if percent[name] else bound:.10g}"
+    if not requirements:
+        yield "", ""
 
 
 def _pack(content: bytes) -> str:

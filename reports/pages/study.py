@@ -221,23 +221,24 @@ def make_study_report(results: Results, values: Mapping[str, Any] = MappingProxy
     return replace(report, title=title, description=" ".join(description.split()))
 
 
-def make_panel_of(results: Results, metric: str) -> HTML | Markdown:
+def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdown:
     """The panel of the page of a study, which begins with its best setting.
 
     Args:
         results: The study.
-        metric: The metric that ranks the settings.
+        metric: The metric that ranks the settings, if it is not that of the study.
     """
     point, policy = 0, results.policies[0]
     if isinstance(results.study.selection, Cheapest):
         search = search_of(results)
         point, policy = search.shown_point, search.best.policy
     elif results.design != "saltelli":
-        best = rank_settings(results, metric).iloc[0]
+        best = rank_settings(results, ranking_metric(results, metric)).iloc[0]
         point, policy = int(best.point), best.policy
     space, manifest = results.scenario(point), results.store.manifest
     name = manifest.points[point].values.get(SEA, results.study.scenario)
-    return make_panel(space, space, name, [policy], manifest.seed, results.study.costs)
+    about = results.study.costs, requirements_of(results), varied_values(results)
+    return make_panel(space, space, name, [policy], manifest.seed, *about)
 
 
 def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]:

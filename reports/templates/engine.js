@@ -3,16 +3,59 @@
 
 const WORDS = 5; // of the table of arrays, for each array: its address and up to four sizes
 
+/**
+ * The arrays of a scenario, and what settings change in them.
+ * @typedef { {name: string, item: number, shape: number[], bytes?: any, fill?: string}} ArrayOfImage
+ * @typedef { {
+ *     setting: string, values: any[], recipe?: [string, number, string, number][],
+ *     patches?: Record<string, [number, string][]>[],
+ * }} Slider
+ * @typedef { {
+ *     arrays: ArrayOfImage[], fields: Record<string, Record<string, [number, string, number]>>,
+ *     metrics: string[], totals: string[], policies: Record<string, number>, sliders: Slider[], isBare?: boolean,
+ * }} Image
+ */
+
+/** @param {string} text */
 function bytesOfBase64(text) {
     return Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+}
+
+/**
+ * A text of the page that is packed: base64 of bytes compressed by gzip.
+ * @param {string} id
+ */
+async function unpack(id) {
+    const packed = bytesOfBase64(document.getElementById(id).textContent.trim());
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/**
+ * The module and the image that a page contains.
+ * @param {string} name - the beginning of the ids of both
+ * @returns {Promise<{module: WebAssembly.Module, image: Image}>}
+ */
+async function unpackEngine(name) {
+    const module = await WebAssembly.compile(await unpack(`${name}-module`));
+    const image = JSON.parse(new TextDecoder().decode(await unpack(`${name}-image`)));
+    for (const array of image.arrays) if (array.bytes) array.bytes = bytesOfBase64(array.bytes);
+    return {module, image};
 }
 
 class Engine {
     // Lay out the arrays of an image; `setting` has the positions of some sliders, by their names.
     // A bare image has no scenario, and only adds up values.
+    /**
+     * @param {WebAssembly.Module} module
+     * @param {Image} image
+     * @param {Record<string, number>} setting
+     */
     constructor(module, image, setting = {}) {
+        /** @type {any} */
         this.exports = new WebAssembly.Instance(module, {}).exports;
         this.image = image;
+        /** @type {Record<string, number>} */
         this.places = {};
         const rows = image.arrays.map((array) => {
             const size = array.shape.reduce((product, length) => product * length, array.item);
@@ -28,6 +71,16 @@ class Engine {
         for (const slider of image.sliders)
             if (slider.setting in setting) this.move(slider, setting[slider.setting]);
         if (!image.isBare) this.exports.prepare();
+    }
+
+    /**
+     * Call the module.
+     * @param {string} name
+     * @param {number[]} numbers
+     * @returns {number}
+     */
+    call(name, ...numbers) {
+        return this.exports[name](...numbers);
     }
 
     // Memory may have grown, so that views have to be made again after each call of the module.

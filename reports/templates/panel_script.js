@@ -6,4 +6,8 @@
 
 {% include "replay.js" %}
 
+{% include "panel_numbers.js" %}
+
+{% include "panel_crew.js" %}
+
 {% include "panel.js" %}

@@ -56,6 +56,15 @@ def test_the_hashes_are_those_of_the_records_of_the_module():
     assert hash_missions(space, "greedy", SEED, kinds[1].shape[1])[:PORTION] == hashes
 
 
+def test_every_whole_number_can_be_chosen():
+    """Of UAVs, up to that of the page if it is larger; of pads, as many as the zone has cells."""
+    for uavs, most in ((3, 8), (11, 11)):
+        space = load_scenario("paper", uavs=uavs)
+        settings = dict(panels._settings_of(space, space))
+        assert settings["uavs"] == [*range(1, most + 1)]
+        assert settings["pads"] == [*range(1, 17)]
+
+
 @pytest.mark.parametrize("name", ["paper", "bay", "jade-bight"])
 def test_the_settings_begin_with_those_of_the_scenario(name):
     """Where they stand at first, they change no byte of the arrays."""
@@ -190,6 +199,7 @@ def test_the_page_simulates_what_python_does(visit, document):
 
 def test_a_reader_changes_settings_with_the_keyboard(visit, document):
     tab = visit(document, 390).page
+    tab.locator("#panel summary").first.press("Enter")  # on a narrow screen, settings are folded
     tab.locator("[name=b-policy]").select_option("nearest")
     tab.locator("[name=b-uavs]").press("Home")
     run(tab)
@@ -255,6 +265,43 @@ def test_numbers_of_other_settings_are_said_to_be_so(visit, document):
     assert tab.locator("[data-panel=mission]").is_hidden()
 
 
+def test_a_requirement_is_judged_by_the_intervals(visit, document):
+    """It may be changed without new missions: an interval is on one side of it, or around it."""
+    tab = visit(document, 390).page
+    run(tab)
+    tab.locator("[name=require-0]").select_option("collection_ratio")
+    ends = [
+        [float(end) for end in re.search(r"\[(.*), (.*)\]", cell).groups()]
+        for cell in cells_of(tab, metric_of("collection_ratio").name)[:2]
+    ]
+    for bound in (ends[0][0] - 1, sum(ends[0]) / 2, ends[0][1] + 1, ends[1][1] + 1):
+        tab.locator("[name=bound-0]").fill(str(bound))
+        words = [
+            "meets" if low > bound else "misses" if high < bound else "open" for low, high in ends
+        ]
+        marks = tab.locator("[data-panel=verdicts] strong").all_text_contents()
+        assert marks == words
+    assert "of the settings before" not in str(tab.locator("[data-panel=status]").text_content())
+
+
+def test_a_becomes_b_and_all_is_as_before(visit, document):
+    tab = visit(document, 1280).page
+    values = {
+        name: tab.locator(f"[name={name}]").input_value()
+        for name in ("a-uavs", "b-uavs", "a-policy", "b-policy", "require-0", "price-uav")
+    }
+    tab.locator("[name=a-uavs]").press("End")
+    tab.locator("[name=a-policy]").select_option("tour")
+    tab.locator("[name=require-0]").select_option("success")
+    tab.get_by_role("button", name="Copy A to B").click()
+    for name in ("uavs", "policy"):
+        sides = [tab.locator(f"[name={side}-{name}]").input_value() for side in "ab"]
+        assert sides[0] == sides[1]
+    tab.get_by_role("button", name="Reset").click()
+    for name, value in values.items():
+        assert tab.locator(f"[name={name}]").input_value() == value
+
+
 def test_missions_are_stopped(visit, document):
     tab = visit(document, 1280).page
     tab.locator("[name=missions]").fill("100000")
@@ -268,6 +315,7 @@ def test_missions_are_stopped(visit, document):
 def test_the_address_is_text_of_strangers(visit, document, tmp_path):
     """Known names and positions within their limits count, and nothing else."""
     address = "a-uavs=3&b-policy=tour&missions=77&b-uavs=99&a-policy=<img src=x>&c-uavs=1&a-pads=-1"
+    address += "&require-0=home&bound-0=1e9"
     opened = visit(document, 1280)
     tab = opened.page
     tab.goto(f"{document.as_uri()}#{address}")
@@ -278,5 +326,7 @@ def test_the_address_is_text_of_strangers(visit, document, tmp_path):
     assert tab.locator("[name=b-policy]").input_value() == "tour"
     assert tab.locator("[name=a-policy]").input_value() == "greedy"
     assert tab.locator("[name=missions]").input_value() == "77"
+    assert tab.locator("[name=require-0]").input_value() == "home"
+    assert tab.locator("[name=bound-0]").input_value() == ""
     assert tab.locator("[data-panel=results]").is_hidden()  # it starts nothing
     assert opened.complaints == []

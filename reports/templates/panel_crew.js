@@ -1,0 +1,233 @@
+// The missions of a panel: Web Workers simulate them in portions, and the module adds them up.
+
+/**
+ * What a worker is asked for: some missions of a setting.
+ * @typedef {object} Order
+ * @property {string} name - of the track
+ * @property {string} key - of the setting: equal keys have equal missions
+ * @property {Record<string, number>} setting - the positions of the sliders
+ * @property {number} policy - the number of the policy
+ * @property {number[]} prices
+ * @property {boolean} wantsRecords
+ * @property {number} first - the replication of the first mission
+ * @property {number} count
+ */
+
+/**
+ * What a worker answers.
+ * @typedef {object} Answer
+ * @property {number} job
+ * @property {string} name
+ * @property {number} first
+ * @property {number} count
+ * @property {Float64Array} values
+ * @property {Uint8Array[] | null} records
+ * @property {number} took - the time [ms]
+ */
+
+/**
+ * What workers do: it gives out orders until there is nothing to do, and takes the answers.
+ * @typedef { {isOver: boolean, next: () => Order | null, take: (answer: Answer) => void}} Job
+ */
+
+/** @typedef { {worker: Worker, isBusy: boolean}} Member */
+
+const PORTION = 120; // the time that a portion of missions should take [ms]
+const MOST_WORKERS = 8;
+const SUMMED = ["values", "baseline", "totals", "sequences", "ends"]; // what a series needs
+const BOUNDS = 3; // numbers of a metric in the array of that name; the last is the error
+const rowsOf = (/** @type {Image} */ image, /** @type {string} */ name) =>
+    image.arrays.find((array) => array.name === name)?.shape[0] ?? 0;
+
+// Sums and intervals of a series of missions, or of the differences of two, computed by the module.
+class Series {
+    /**
+     * @param {WebAssembly.Module} module
+     * @param {Image} image
+     * @param {Record<string, number>} setting
+     * @param {number | null} error - the probability that an interval fails, if not that of the image
+     */
+    constructor(module, image, setting, error = null) {
+        const arrays = image.arrays.map((array) =>
+            array.bytes || SUMMED.includes(array.name) ? array : {...array, shape: array.shape.map(() => 0)});
+        this.module = module;
+        this.image = image;
+        this.engine = new Engine(module, {...image, arrays, isBare: true}, setting);
+        this.count = 0;
+        if (error !== null) {
+            const bounds = this.engine.floats("bounds");
+            for (let place = BOUNDS - 1; place < bounds.length; place += BOUNDS) bounds[place] = error;
+        }
+        this.engine.call("begin", 0);
+    }
+
+    /**
+     * The differences of two series, which have values between the bounds of both.
+     * @param {Series} before
+     * @param {Series} after
+     */
+    static ofDifferences(before, after) {
+        const series = new Series(before.module, before.image, {}), bounds = series.engine.floats("bounds");
+        const [ours, theirs] = [before, after].map(({engine}) => engine.floats("bounds"));
+        for (let metric = 0; metric < bounds.length; metric += BOUNDS) {
+            bounds[metric] = Math.min(ours[metric], theirs[metric]);
+            bounds[metric + 1] = Math.max(ours[metric + 1], theirs[metric + 1]);
+        }
+        series.engine.call("begin", 1);
+        return series;
+    }
+
+    /**
+     * Add the values of missions; less those of the same missions of a baseline, if there is one.
+     * @param {Float64Array} values
+     * @param {Float64Array | null} baseline
+     */
+    add(values, baseline = null) {
+        const width = this.image.metrics.length, most = rowsOf(this.image, "values") * width;
+        for (let begin = 0; begin < values.length; begin += most) {
+            const rows = values.subarray(begin, begin + most), count = rows.length / width;
+            this.engine.floats("values").set(rows);
+            if (baseline) {
+                this.engine.floats("baseline").set(baseline.subarray(begin, begin + most));
+                this.engine.call("subtract", count);
+            }
+            this.engine.call("add", count);
+            this.count += count;
+        }
+    }
+
+    /**
+     * @param {Metric} metric
+     * @returns {Estimate}
+     */
+    estimate({column}) {
+        const [totals, ends] = [this.engine.floats("totals"), this.engine.floats("ends")];
+        const width = totals.length / this.image.metrics.length;
+        const [count, sum] = totals.slice(column * width);
+        return {mean: sum / count, low: ends[2 * column], high: ends[2 * column + 1], count};
+    }
+}
+
+// The missions of a setting, of which only the unbroken beginning counts.
+class Track {
+    /**
+     * @param {Series} series
+     * @param {Omit<Order, "first" | "count" | "wantsRecords">} order
+     */
+    constructor(series, order) {
+        this.series = series;
+        this.order = order;
+        this.asked = 0;
+        this.took = 0; // by a mission [ms]
+        /** @type {Map<number, Float64Array>} */
+        this.waiting = new Map();
+    }
+
+    /**
+     * The order of the next missions, at most so many.
+     * @param {number} most
+     * @returns {Order}
+     */
+    next(most) {
+        const fit = this.took ? Math.floor(PORTION / this.took) : 1;
+        const first = this.asked, count = Math.min(Math.max(fit, 1), rowsOf(this.series.image, "values"), most);
+        this.asked += count;
+        return {...this.order, first, count, wantsRecords: false};
+    }
+
+    /**
+     * Take what a worker answers.
+     * @param {Answer} answer
+     * @returns {Float64Array[]} the values that count from now on
+     */
+    take({first, count, values, took}) {
+        this.took = took / count;
+        this.waiting.set(first, values);
+        const added = [];
+        for (let rows; (rows = this.waiting.get(this.series.count)); added.push(rows)) {
+            this.waiting.delete(this.series.count);
+            this.series.add(rows);
+        }
+        return added;
+    }
+
+    // Forget the missions after the unbroken beginning, so that they are asked for again.
+    rewind() {
+        this.waiting.clear();
+        this.asked = this.series.count;
+    }
+}
+
+// The workers, which do one job at a time.
+class Crew {
+    /**
+     * @param {string} source - the script of a worker
+     * @param { {module: WebAssembly.Module, image: Image}} engine
+     * @param {(why: string) => void} fail - called when a worker dies
+     */
+    constructor(source, engine, fail) {
+        this.source = source;
+        this.engine = engine;
+        this.fail = fail;
+        this.number = 0;
+        /** @type {Member[]} */
+        this.members = [];
+        /** @type {Job | null} */
+        this.job = null;
+    }
+
+    /** @param {Job} job */
+    begin(job) {
+        this.end();
+        this.job = job;
+        this.number += 1;
+        const most = Math.min(Math.max((navigator.hardwareConcurrency || 2) - 1, 1), MOST_WORKERS);
+        while (this.members.length < most) this.members.push(this.hire());
+        this.wake();
+    }
+
+    end() {
+        if (this.job) this.job.isOver = true;
+        this.job = null;
+        this.members.filter(({isBusy}) => isBusy).forEach(({worker}) => worker.terminate());
+        this.members = this.members.filter(({isBusy}) => !isBusy);
+    }
+
+    /** @returns {Member} */
+    hire() {
+        const address = URL.createObjectURL(new Blob([this.source], {type: "text/javascript"}));
+        const member = {worker: new Worker(address), isBusy: false};
+        URL.revokeObjectURL(address);
+        member.worker.onmessage = (event) => this.take(member, event.data);
+        member.worker.onerror = (event) => {
+            event.preventDefault();
+            this.fail(`The browser ended the simulation (${event.message || "a worker died"}); what is shown is of the missions before.`);
+        };
+        member.worker.postMessage(this.engine);
+        return member;
+    }
+
+    // Give orders to those who have none.
+    wake() {
+        this.members.filter(({isBusy}) => !isBusy).forEach((member) => this.give(member));
+    }
+
+    /** @param {Member} member */
+    give(member) {
+        const order = this.job?.next();
+        if (!order) return;
+        member.isBusy = true;
+        member.worker.postMessage({...order, job: this.number});
+    }
+
+    /**
+     * @param {Member} member
+     * @param {Answer} answer
+     */
+    take(member, answer) {
+        member.isBusy = false;
+        if (!this.job || answer.job !== this.number) return;
+        this.job.take(answer);
+        this.give(member);
+    }
+}

@@ -1,0 +1,114 @@
+// How a panel writes numbers: as they are written everywhere on its page.
+
+/**
+ * A metric, as the panel writes it.
+ * @typedef {object} Metric
+ * @property {number} column - its column in the values of missions
+ * @property {string} key
+ * @property {string} name
+ * @property {boolean} percent - whether it is a share, and is written in percent
+ * @property {string} unit
+ * @property {boolean} less - whether less is better
+ * @property {boolean} isOffered - whether a reader may require it
+ */
+
+/**
+ * A mean and the ends of its interval.
+ * @typedef { {mean: number, low: number, high: number, count: number}} Estimate
+ */
+
+/**
+ * A bound on the mean of a metric.
+ * @typedef { {metric: Metric, bound: number}} Requirement
+ */
+
+const minus = (/** @type {string} */ text) => (Number(text.replaceAll(",", "")) ? text.replace("-", "−") : text.replace("-", ""));
+
+/** @param {number} number */
+function grouped(number, digits = 0) {
+    return number.toLocaleString("en-US", {minimumFractionDigits: digits, maximumFractionDigits: digits});
+}
+
+/**
+ * One decimal; a number in the middle of two becomes the even one, as in Python.
+ * @param {number} number
+ */
+function tenths(number) {
+    const isTie = Number.isInteger(number * 4) && !Number.isInteger(number * 2);
+    if (!isTie) return number.toFixed(1);
+    const below = Math.floor(number * 10);
+    return ((below % 2 ? below + 1 : below) / 10).toFixed(1);
+}
+
+/** @param {number} number */
+function quantity(number) {
+    if (Math.abs(number) < 1e-12) return "0";
+    if (Math.abs(number) >= 1000) return minus(grouped(number));
+    return minus(String(Number(number.toPrecision(4))));
+}
+
+/** @type {(metric: Metric, number: number) => string} */
+function written({percent, unit}, number) {
+    if (percent) return `${minus(tenths(100 * number))} %`;
+    return `${quantity(number)} ${unit}`.trim();
+}
+
+/** @type {(metric: Metric, estimate: Estimate) => string} */
+function interval(metric, {mean, low, high}) {
+    const end = (/** @type {number} */ number) => metric.percent ? minus(tenths(100 * number)) : quantity(number);
+    const ends = [low, high].map((number) => Number.isFinite(number) ? end(number) : "?");
+    return `${written(metric, mean)} [${ends.join(", ")}]`;
+}
+
+/**
+ * A difference with its unit; shares differ by percentage points.
+ * @type {(metric: Metric, estimate: Pick<Estimate, "mean" | "low" | "high">) => string}
+ */
+function difference(metric, {mean, low, high}) {
+    const write = (/** @type {number} */ number) => signed(metric, number);
+    return `${write(mean)} [${write(low)}, ${write(high)}] ${unitOfDifference(metric)}`.trim();
+}
+
+/** @type {(metric: Metric) => string} */
+const unitOfDifference = ({percent, unit}) => percent ? "points" : unit;
+
+/** @type {(metric: Metric, number: number) => string} */
+function signed({percent}, number) {
+    if (!Number.isFinite(number)) return "?";
+    const text = percent ? minus(tenths(100 * number)) : quantity(number);
+    return number > 0 && Number(text) !== 0 ? `+${text}` : text;
+}
+
+/**
+ * Whether B is better, or about how many more missions may decide it.
+ * @type {(metric: Metric, estimate: Estimate) => string}
+ */
+function decision(metric, {mean, low, high, count}) {
+    if (low > 0 || high < 0) {
+        const isBetter = metric.less ? high < 0 : low > 0;
+        return `decided: B is ${low > 0 ? "higher" : "lower"}, which is ${isBetter ? "better" : "worse"}`;
+    }
+    if (!Number.isFinite(high - low)) return "not decided";
+    if (low === high) return "no difference seen";
+    if (!mean) return `no difference seen; at most ${signed(metric, high).slice(1)} ${unitOfDifference(metric)}`.trim();
+    // An interval becomes narrower with about the root of the number of missions.
+    const needed = count * ((high - low) / 2 / Math.abs(mean)) ** 2 - count;
+    return `not decided${needed > 0 && needed < 1e6 ? `, about ${quantity(Number(needed.toPrecision(1)))} more missions` : ""}`;
+}
+
+/** @type {(requirement: Requirement) => string} */
+function requirementInWords({metric, bound}) {
+    const amount = metric.percent ? `${quantity(100 * bound)} %` : written(metric, bound);
+    return `${metric.name} of at ${metric.less ? "most" : "least"} ${amount}`;
+}
+
+/**
+ * Whether a whole interval keeps a bound (*meets*), breaks it (*misses*), or neither (*open*).
+ * @type {(requirement: Requirement, estimate: Estimate) => "meets" | "misses" | "open"}
+ */
+function verdict({metric, bound}, {low, high, count}) {
+    if (!count) return "open";
+    const [worst, best] = metric.less ? [bound - high, bound - low] : [low - bound, high - bound];
+    if (worst >= 0) return "meets";
+    return best < 0 ? "misses" : "open";
+}
