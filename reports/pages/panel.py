@@ -73,6 +73,7 @@ _LEVELS = {
     "charge_complete": (60, 70, 80, 90, 100),
     "failures.uav_rate": (0.0, 0.0005, 0.001, 0.002, 0.005),
 }
+_SIDE = 8  # of the grid, the most numbers of UAVs and of pads
 _OFFERED = (*_COUNTS, *_SCALED, *_LEVELS)
 
 
@@ -146,6 +147,7 @@ class Panel(Document):
             "policies": [name for name in KINDS if name != "random-unguarded"],
             "metrics": metrics,
             "prices": [*_describe_prices(self.costs)],
+            "grid": self._grid(settings),
             "sea": _describe_sea(baseline, fleet),
             "product": METRICS.index(PRODUCT),
             "scenario": self.scenario,
@@ -170,6 +172,20 @@ class Panel(Document):
                 required=[*_describe_requirements(self.requirements, metrics)],
             ).data
         )
+
+    def _grid(self, settings: Mapping[str, Sequence[Any]]) -> dict[str, list[int]] | None:
+        """The positions of the fleets of the buyer's grid: those of a search with prices."""
+        if not self.requirements or self.costs is None or not {*_COUNTS} <= {*settings}:
+            return None
+        positions = {}
+        for key in _COUNTS:
+            values = self.varied.get(key) or [_value_of(self.spaces[0], key)]
+            numbers = [value for value in values if value in settings[key] and is_number(value)]
+            if not numbers:
+                return None
+            numbers = [numbers[place * (len(numbers) - 1) // (_SIDE - 1)] for place in range(_SIDE)]
+            positions[key] = sorted({settings[key].index(number) for number in numbers})
+        return positions
 
 
 def make_panel(

@@ -33,6 +33,8 @@ let image;
 let crew;
 /** @type {Comparison | null} */
 let run = null;
+/** @type {Grid | null} */
+let grid = null;
 
 /**
  * What is chosen on a side.
@@ -152,10 +154,14 @@ function check(first, records) {
     });
 }
 
-function start() {
-    stop();
+function tidy() {
     missions.value = asked();
     priceInputs.forEach((input, n) => { input.value = prices()[n]; });
+}
+
+function start() {
+    stop();
+    tidy();
     find("mission").hidden = true;
     find("results").classList.remove("stale");
     data.check.compared = 0;
@@ -180,9 +186,10 @@ function schedule() {
 }
 
 function show(why = "") {
-    const isRunning = Boolean(crew.job && !crew.job.isOver);
+    const isRunning = run !== null && crew.job === run && !run.isOver;
     find("run").disabled = isRunning;
     find("stop").disabled = !isRunning;
+    if (data.grid) showGrid();
     SIDES.forEach(showChoice);
     find("differing").textContent = choicesInWords();
     find("command").textContent = commandOf();
@@ -204,6 +211,67 @@ function showChoice(side) {
         input.parentElement.querySelector("output").textContent = text;
         input.parentElement.classList.toggle("differs", positions[n] !== choice("a").positions[n]);
     });
+}
+
+// The grid: every number of UAVs with every number of pads, with the other settings of A.
+/** @returns {[number, number, Choice][]} */
+function choicesOfGrid() {
+    const [uavs, pads] = ["uavs", "pads"].map((key) => data.settings.findIndex((setting) => setting.key === key));
+    const {positions, policy} = choice("a");
+    return data.grid.uavs.flatMap((uav) => data.grid.pads.map((pad) => {
+        const moved = positions.map((position, n) => n === uavs ? uav : n === pads ? pad : position);
+        return [uav, pad, {positions: moved, policy}];
+    }));
+}
+
+// What the numbers of the grid depend on; not the bounds of the requirements.
+const keyOfGrid = () => [
+    ...choicesOfGrid().map(([, , chosen]) => keyOf(chosen)), prices(), ...requirements().map(({metric}) => metric.key),
+].join(" ");
+
+const askedOfGrid = () => Math.min(Math.max(Math.round(Number(named("grid-missions").value)) || 0, 1), MOST_MISSIONS);
+let gridKey = "";
+
+function fill() {
+    stop();
+    tidy();
+    named("grid-missions").value = askedOfGrid();
+    const required = requirements(), choices = choicesOfGrid();
+    if (!required.length) return;
+    if (keyOfGrid() !== gridKey) {
+        const error = GRID_ERROR / choices.length / required.length;
+        const textOf = (key, position) => data.settings.find((setting) => setting.key === key).texts[position];
+        const cells = choices.map(([uavs, pads, chosen]) => {
+            const counts = [[textOf("uavs", uavs), "UAV"], [textOf("pads", pads), "pad"]];
+            const name = counts.map(([count, noun]) => `${count} ${noun}${count === "1" ? "" : "s"}`).join(", ");
+            return {uavs, pads, name, track: trackOf(`${uavs} ${pads}`, chosen, error)};
+        });
+        grid = new Grid(cells, required, data.metrics.find(({key}) => key === "cost"));
+        gridKey = keyOfGrid();
+    }
+    grid.extend(Math.min(grid.count + askedOfGrid(), MOST_MISSIONS));
+    crew.begin({
+        get isOver() { return grid.isOver; },
+        set isOver(isOver) { grid.isOver = isOver; },
+        next: () => grid.next(),
+        take: (answer) => { grid.take(answer); schedule(); },
+    });
+    show();
+}
+
+function showGrid() {
+    const isRunning = grid !== null && crew.job !== run && !grid.isOver, isNew = keyOfGrid() !== gridKey;
+    find("fill").disabled = isRunning || !requirements().length;
+    find("fill-stop").disabled = !isRunning;
+    find("grid").classList.toggle("stale", grid !== null && isNew);
+    if (!requirements().length) find("grid-status").textContent = "Choose what is required.";
+    else if (grid && isNew) find("grid-status").textContent = "The grid is of the settings before: press Fill the grid.";
+    else if (grid) {
+        grid.requirements = requirements();
+        if (isRunning) crew.wake(); // a bound that has moved may have opened a cell
+        find("grid-status").textContent = `${grid.inWords()} ${grouped(grid.count)} missions${isRunning ? ", running" : ""}.`;
+        grid.show(find("grid"));
+    } else find("grid-status").textContent = "";
 }
 
 // By what A and B differ, for readers of a narrow screen, on which the settings are folded.
@@ -502,6 +570,11 @@ async function open() {
     root.querySelectorAll("fieldset").forEach((fieldset) => { fieldset.disabled = false; });
     root.addEventListener("input", change);
     required.forEach(({line}) => line.addEventListener("input", require));
+    if (data.grid) {
+        find("fill").addEventListener("click", fill);
+        find("fill-stop").addEventListener("click", () => stop());
+        named("grid-missions").addEventListener("input", (event) => event.stopPropagation());
+    }
     find("same").addEventListener("click", copyAToB);
     find("reset").addEventListener("click", reset);
     find("run").addEventListener("click", start);

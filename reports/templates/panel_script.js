@@ -10,4 +10,6 @@
 
 {% include "panel_crew.js" %}
 
+{% include "panel_grid.js" %}
+
 {% include "panel.js" %}

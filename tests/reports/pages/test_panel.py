@@ -12,7 +12,9 @@ import pytest
 from playwright.sync_api import Page as Tab
 
 from dess import InputError, load_scenario, policies, simulate_batch
-from dess.analysis.metrics import HOME, METRICS, metric_of
+from dess.analysis.answers.fleet.requirements import Requirement
+from dess.analysis.metrics import HOME, METRICS, PRODUCT, metric_of
+from dess.analysis.stats.sequences import add_values, new_sequence, sequence_ends
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.image import copy_inputs, make_image
 from dess.reports.pages import panel as panels
@@ -300,6 +302,85 @@ def test_a_becomes_b_and_all_is_as_before(visit, document):
     tab.get_by_role("button", name="Reset").click()
     for name, value in values.items():
         assert tab.locator(f"[name={name}]").input_value() == value
+
+
+@pytest.fixture(scope="module")
+def searched(tmp_path_factory) -> Path:
+    """A page with the panel of a search for the cheapest fleet."""
+    space, required = load_scenario("paper", uavs=2, pads=1), Requirement(metric_of(PRODUCT), 0.7)
+    fleets = {"uavs": [1, 2], "pads": [1, 4]}
+    costs = Costs(uav=1000, pad=300)
+    panel = make_panel(space, space, "paper", ["greedy"], SEED, costs, [required], fleets)
+    shown = {"title": "A panel", "outcome": "", "library": "", "player": panel.data}
+    path = tmp_path_factory.mktemp("panel") / "page.html"
+    path.write_text(fill_page("mission.html", simulates=True, **shown), "utf-8")
+    return path
+
+
+def grid_of(tab: Tab) -> dict[tuple[int, int], tuple[str, str]]:
+    """The look of each cell of the buyer's grid and its text, by UAVs and pads."""
+    rows = tab.locator(".grid tbody tr").all()
+    return {
+        (uavs, pads): (str(cell.get_attribute("class")), cell.inner_text())
+        for pads, row in zip((1, 4), rows, strict=True)
+        for uavs, cell in zip((1, 2), row.locator("td").all(), strict=True)
+    }
+
+
+def test_the_grid_says_what_is_known_of_each_fleet(visit, searched):
+    """Its intervals are those of Python, for all cells together, and hold for other bounds."""
+    opened = visit(searched, 1280)
+    tab = opened.page
+    tab.locator("[name=grid-missions]").fill("400")
+    tab.get_by_role("button", name="Fill the grid").click()
+    status = tab.locator("[data-panel=grid-status]")
+    status.get_by_text(re.compile(r"\d missions\.$")).wait_for(timeout=PATIENCE)
+    grid = grid_of(tab)
+    assert {fleet: look for fleet, (look, _) in grid.items()} == {
+        (1, 1): "misses",
+        (1, 4): "misses",
+        (2, 1): "meets cheapest",
+        (2, 4): "meets",
+    }
+    ends = {}
+    for (uavs, pads), (_, text) in grid.items():
+        count = int(re.search(r"(\d+) missions", text)[1])
+        space = load_scenario("paper", uavs=uavs, pads=pads)
+        records = simulate_batch(space, policies.load("greedy"), SEED, count)
+        sequence = new_sequence(0, 1, 0.05 / len(grid))
+        add_values(sequence, records.missions[PRODUCT])
+        low, high = ends[uavs, pads] = sequence_ends(sequence)
+        assert f"[{100 * low:.1f}, {100 * high:.1f}]" in text
+    before = str(status.text_content())
+    assert "The cheapest is 2 UAVs, 1 pad for 2,300 EUR" in before
+    tab.locator("[name=bound-0]").fill(str(100 * np.mean(ends[1, 1])))  # no one knows
+    assert "The cheapest so far is 2 UAVs, 1 pad for 2,300 EUR; 1 UAV, 1 pad" in str(
+        status.text_content()
+    )
+    looks = {fleet: look for fleet, (look, _) in grid_of(tab).items()}
+    assert (looks[1, 1], looks[2, 1]) == ("open", "meets leading")
+    tab.locator("[name=bound-0]").fill("20")
+    assert "The cheapest is 1 UAV, 1 pad for 1,300 EUR" in str(status.text_content())
+    tab.locator("[name=a-max_slots]").press("Home")
+    assert "of the settings before" in str(status.text_content())
+    assert opened.complaints == []
+
+
+def test_the_grid_is_stopped_and_goes_on(visit, searched):
+    tab = visit(searched, 390).page
+    tab.locator("[name=bound-0]").fill("58.5")  # too near to the mean of one UAV
+    tab.locator("[name=grid-missions]").fill("100000")
+    tab.get_by_role("button", name="Fill the grid").click()
+    status = tab.locator("[data-panel=grid-status]")
+    status.get_by_text(re.compile(r"[1-9]\d* missions, running")).wait_for(timeout=PATIENCE)
+    tab.get_by_role("button", name="Stop").first.click()
+    (stopped,) = re.findall(r"([\d,]+) missions\.", str(status.text_content()))
+    tab.locator("[name=grid-missions]").fill("50")
+    tab.get_by_role("button", name="Fill the grid").click()
+    status.get_by_text(re.compile(r"\d missions\.$")).wait_for(timeout=PATIENCE)
+    (later,) = re.findall(r"([\d,]+) missions\.", str(status.text_content()))
+    assert int(later.replace(",", "")) == int(stopped.replace(",", "")) + 50
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
 
 
 def test_missions_are_stopped(visit, document):

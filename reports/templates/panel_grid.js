@@ -1,0 +1,146 @@
+// The buyer's grid: fleets of UAVs and charging pads, and which of them are known to meet
+// requirements. Its intervals hold together and for any bounds, so that these may be moved.
+
+/**
+ * A fleet, by the positions of both settings, and its missions.
+ * @typedef {object} Cell
+ * @property {number} uavs
+ * @property {number} pads
+ * @property {string} name - in words
+ * @property {Track} track
+ */
+
+/** @typedef {"meets" | "misses" | "open"} Verdict */
+
+const GRID_ERROR = 0.05; // the probability that an interval of any cell fails
+const FEWEST = 30; // missions of a cell, with which its cost has an interval
+
+class Grid {
+    /**
+     * @param {Cell[]} cells
+     * @param {Requirement[]} requirements
+     * @param {Metric} cost
+     */
+    constructor(cells, requirements, cost) {
+        this.cells = cells;
+        this.requirements = requirements;
+        this.cost = cost;
+        this.isOver = true;
+        this.target = 0; // missions in all
+        this.away = 0; // orders that are not answered
+        this.columns = new Set([cost, ...requirements.map(({metric}) => metric)].map(({column}) => column));
+    }
+
+    /**
+     * Go on, up to so many missions in all.
+     * @param {number} missions
+     */
+    extend(missions) {
+        this.cells.forEach(({track}) => track.rewind());
+        this.target = missions;
+        this.away = 0;
+        this.isOver = !this.hasWork();
+    }
+
+    get count() {
+        return this.cells.reduce((sum, {track}) => sum + track.series.count, 0);
+    }
+
+    get asked() {
+        return this.cells.reduce((sum, {track}) => sum + track.asked, 0);
+    }
+
+    hasWork() {
+        return this.asked < this.target && this.cells.some((cell) => this.isUndecided(cell));
+    }
+
+    /** @param {Cell} cell */
+    isUndecided(cell) {
+        return cell.track.series.count < FEWEST || this.verdict(cell) === "open";
+    }
+
+    // The next missions of the cell that has the fewest of those that are not decided.
+    next() {
+        if (!this.hasWork()) return null;
+        const undecided = this.cells.filter((cell) => this.isUndecided(cell));
+        const {track} = undecided.reduce((least, other) => other.track.asked < least.track.asked ? other : least);
+        this.away += 1;
+        return track.next(this.target - this.asked);
+    }
+
+    /** @param {Answer} answer */
+    take(answer) {
+        const {values} = answer, {image} = this.cells[0].track.series, width = image.metrics.length;
+        for (let place = 0; place < values.length; place++) // what nobody asks for needs no interval
+            if (!this.columns.has(place % width)) values[place] = NaN;
+        this.cells.find(({track}) => track.order.name === answer.name)?.track.take(answer);
+        this.away -= 1;
+        this.isOver = this.away === 0 && !this.hasWork();
+    }
+
+    /**
+     * What is known of the requirements together: the most serious of what is known of each.
+     * @param {Cell} cell
+     * @returns {Verdict}
+     */
+    verdict({track}) {
+        const verdicts = this.requirements.map((required) => verdict(required, track.series.estimate(required.metric)));
+        return verdicts.includes("misses") ? "misses" : verdicts.includes("open") ? "open" : "meets";
+    }
+
+    /**
+     * The cell with the least mean cost that meets the requirements, and those that may be cheaper
+     * and do not miss them.
+     * @returns { {cell: Cell, rivals: Cell[]} | null}
+     */
+    cheapest() {
+        const costs = new Map(this.cells.map((cell) => [cell, cell.track.series.estimate(this.cost)]));
+        const good = this.cells.filter((cell) => this.verdict(cell) === "meets" && costs.get(cell).count >= FEWEST);
+        if (!good.length) return null;
+        const cell = good.reduce((least, other) => costs.get(other).mean < costs.get(least).mean ? other : least);
+        const rivals = this.cells.filter((other) =>
+            other !== cell && !(costs.get(other).low >= costs.get(cell).high) && this.verdict(other) !== "misses");
+        return {cell, rivals};
+    }
+
+    // Which cell is the cheapest, in words.
+    inWords() {
+        const answer = this.cheapest();
+        if (answer === null) {
+            const possible = this.cells.some((cell) => this.verdict(cell) === "open");
+            return possible ? "No cell is known to meet the requirements." : "No cell meets the requirements.";
+        }
+        const {cell, rivals} = answer, amount = written(this.cost, cell.track.series.estimate(this.cost).mean);
+        if (!rivals.length) return `The cheapest is ${cell.name} for ${amount}: every cheaper cell misses the requirements.`;
+        return `The cheapest so far is ${cell.name} for ${amount}; ${rivals.map(({name}) => name).join("; ")} may be cheaper.`;
+    }
+
+    /**
+     * Write into the table what is known of each cell, and frame the cheapest.
+     * @param {HTMLElement} table
+     */
+    show(table) {
+        const answer = this.cheapest();
+        for (const cell of this.cells) {
+            const place = /** @type {HTMLElement} */ (table.querySelector(`[data-cell="${cell.uavs} ${cell.pads}"]`));
+            const {series} = cell.track, word = this.verdict(cell), mark = document.createElement("strong");
+            mark.textContent = word;
+            const isFramed = answer?.cell === cell;
+            place.className = `${series.count ? word : ""} ${isFramed ? (answer.rivals.length ? "leading" : "cheapest") : ""}`.trim();
+            if (!series.count) {
+                place.textContent = "";
+                continue;
+            }
+            const details = this.requirements.map(({metric}) => `${metric.name} ${interval(metric, series.estimate(metric))}`);
+            details.push(`${grouped(series.count)} missions`);
+            const lines = [written(this.cost, series.estimate(this.cost).mean), ...details];
+            if (isFramed) lines.unshift(answer.rivals.length ? "cheapest so far" : "cheapest");
+            place.replaceChildren(mark, ...lines.map((line) => {
+                const part = document.createElement("span");
+                part.className = details.includes(line) ? "detail" : "";
+                part.textContent = line;
+                return part;
+            }));
+        }
+    }
+}
