@@ -156,6 +156,20 @@ def failures(draw: st.DrawFn) -> dict[str, Any]:
 
 
 @st.composite
+def radios(draw: st.DrawFn) -> dict[str, Any]:
+    """A radio whose rate grows with the SNR, or has steps."""
+    values: dict[str, Any] = {
+        "anchor": draw(st.just(0.0) | _numbers(10.0, 3000.0)),
+        "range": draw(st.just(0.0) | _numbers(201.0, 3000.0)),
+        "duty_cycle": draw(st.just(1.0) | _numbers(0.01, 1.0)),
+    }
+    if draw(st.booleans()):
+        return values | {"max_rate": draw(st.just(0.0) | _numbers(0.1, 5.0))}
+    levels = draw(st.lists(st.integers(-40, 40), min_size=1, max_size=6, unique=True).map(sorted))
+    return values | {"steps": [(snr, 0.2 * (n + 1)) for n, snr in enumerate(levels)]}
+
+
+@st.composite
 def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
     """Spaces whose sections beyond the paper are on or off, those that both engines have."""
     strengths = st.just(0.0) | _numbers(0.0, 10.0)
@@ -181,11 +195,8 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
         "charge_rate": draw(
             st.integers(1, 25) | _numbers(0.2, 20.0).map(lambda rate: round(rate, 11))
         ),
-        "radio": {
-            "anchor": draw(st.just(0.0) | _numbers(10.0, 3000.0)),
-            "range": draw(st.just(0.0) | _numbers(201.0, 3000.0)),
-            "max_rate": draw(st.just(0.0) | _numbers(0.1, 5.0)),
-        },
+        "radio": draw(radios()),
+        "arrivals": {"message": draw(st.sampled_from([0.0, 0.003, 0.1, 2.5]))},
         "fleet": draw(st.lists(_uav_types, max_size=3)),
         "landing": draw(st.booleans()),
     }
@@ -206,6 +217,7 @@ def continuous_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
     slots = draw(st.lists(st.integers(0, 30), max_size=3, unique=True).map(sorted))
     arrivals = {
         "process": "continuous",
+        "message": draw(st.sampled_from([0.0, 0.05, 2.5])),
         "rates": draw(st.just([]) | st.just([draw(_numbers(0.0, 2.0)) for _ in nodes])),
         "schedule": [[slot, draw(_numbers(0.0, 3.0))] for slot in slots],
         "buffer": draw(st.sampled_from([0, 1, 2, 5])),

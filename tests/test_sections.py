@@ -55,7 +55,7 @@ SECTIONS = {
     "arrivals": Row({"rates": [0.5] * 25}, "arrival_rate", "arrival_rate", REFUSED),
     "age": Row({"measured": True, "reward": -1.0}, WITHOUT_EFFECT, WITHOUT_EFFECT, REFUSED),
     "charging": Row({"power": 7}, "power", LEFT_TO_GUARD, REFUSED),
-    "radio": Row({"range": 1000.0}, "has_range", "has_range", REFUSED),
+    "radio": Row({"range": 1000.0}, "has_limit", "has_limit", REFUSED),
     "failures": Row({"pad_rate": 0.1}, "working_pads", "working_pads", REFUSED),
     "wind": Row({"strength": 0.5}, "wind_most", "wind_most", REFUSED),
     "fleet": Row([{"slots_per_cell": 2}], "slots_per_cell", "slots_per_cell", REFUSED),

@@ -229,7 +229,7 @@ def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
 def _data_by(mission, residual, sensors, slots, batches, search):
     """(T + 1, K) the data that each node has had by the start of slot t = 0..T."""
     data = np.empty((slots + 1, len(residual)))
-    arrivals = np.empty(len(residual), np.int64)
+    arrivals = np.empty(len(residual))
     had = residual.copy()
     for t in range(slots):
         data[t] = had

@@ -178,7 +178,7 @@ def check_missions(what: str, spaces: Sequence[ScenarioSpace], earlier: float = 
 
 def _longest_mission_time(space: ScenarioSpace) -> float:
     """The longest time that the SimPy engine takes for a mission [s]."""
-    arrivals = len(space.nodes) * space.arrival_rate * space.max_slots
+    arrivals = len(space.nodes) * min(space.arrival_rate / space.message, 1) * space.max_slots
     in_slots = space.max_slots * space.uavs[1] * space.communication_slots
     return (in_slots + max(arrivals, space.packets)) * EVENT
 

@@ -66,7 +66,7 @@ ARRAYS: dict[str, tuple[Any, int]] = {
     "neighbours": (_I4, 2),
     "batches": (BATCH, 2),  # of ``Scratch``
     "search": (_I8, 2),
-    "arrivals": (_I8, 1),
+    "arrivals": (_F8, 1),
     "reach": (_I2, 4),  # the tables of ``wind.reach_of`` and ``wind.ways_home``
     "ways_home": (_I2, 3),
     "circuit": (_I8, 1),  # of ``tour``
@@ -235,7 +235,7 @@ def play(table, first, count, launches, slots):
     ways = _array3(table, _AT.ways_home, _I2)
     batches = _array2(table, _AT.batches, _BATCH)
     search = _array2(table, _AT.search, _I8)
-    arrivals = _array1(table, _AT.arrivals, _I8)
+    arrivals = _array1(table, _AT.arrivals, _F8)
     circuit = _array1(table, _AT.circuit, _I8)
     policies = _array1(table, _AT.policies, _I8)
     actions = _array1(table, _AT.actions, _I8)

@@ -244,7 +244,7 @@ def _arrays_of(
         "neighbours": neighbours,
         "batches": scratch.batches,
         "search": scratch.search,
-        "arrivals": np.zeros(len(space.nodes), np.int64),
+        "arrivals": np.zeros(len(space.nodes)),
         "reach": reach,
         "ways_home": ways_home(starts.constants, chart),
         "circuit": plan_circuit(world.nodes, chart),

@@ -178,7 +178,7 @@ def _step(
 ):  # fmt: skip
     """Run one slot of every mission and write the ``OUTCOME`` records."""
     fleet = uavs.shape[1]
-    arrivals = np.empty(len(nodes), np.int64)
+    arrivals = np.empty(len(nodes))
     charged = np.empty(fleet, np.int64)
     collected = np.empty(fleet)
     for b in range(len(missions)):

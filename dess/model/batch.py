@@ -200,7 +200,7 @@ def _advance(job_of, queue, source, state, world, scratch, ways, records):
     nodes, mean_snr, order, means, chart = world
     batches, search = scratch
     missions, uavs, residual, sensors, teeth = state
-    arrivals = np.empty(len(nodes), np.int64)
+    arrivals = np.empty(len(nodes))
     for b in range(len(missions)):
         if job_of[b] < 0:
             continue

@@ -18,7 +18,7 @@ from dess.base.kernels import inlined, kernel, large_kernel
 from dess.model.state import STEP_X, STEP_Y
 from dess.physics import fleet, streams
 from dess.physics.chart import Chart, read_only
-from dess.physics.radio import has_max_rate
+from dess.physics.radio import has_max_rate, has_steps, step_efficiency
 from dess.scenario.scenario import ScenarioSpace
 
 GROUP = 4  # communication slots whose shadowing one Philox block holds
@@ -350,13 +350,15 @@ def _top(node, snr, word, width):
 @inlined
 def rate(mission, snr):
     """Data units per communication slot at an SNR [dB] (eq. 9)."""
-    length = mission.communication_slot_length
-    if has_max_rate(mission):
-        return length * min(efficiency(snr), mission.max_rate)
-    return length * efficiency(snr)
+    return mission.communication_slot_length * efficiency(mission, snr)
 
 
 @inlined
-def efficiency(snr):
-    """``log2(1 + SNR)`` [bit/s/Hz] at an SNR [dB]."""
-    return _PER_LOG_2 * log1p(exp(snr * _DB_TO_LOG))
+def efficiency(mission, snr):
+    """The spectral efficiency [bit/s/Hz] at an SNR [dB]: of a step, or ``log2(1 + SNR)``."""
+    if has_steps(mission):
+        return step_efficiency(mission, snr)
+    shannon = _PER_LOG_2 * log1p(exp(snr * _DB_TO_LOG))
+    if has_max_rate(mission):
+        return min(shannon, mission.max_rate)
+    return shannon

@@ -154,7 +154,7 @@ class Mission:
         self.sensors = self.state.sensors[0]
         self.fleet = range(int(self.mission["uavs"]))
         self.wants_pad_bits = 0  # bit i tells whether UAV i wants a pad in this slot
-        self.arrivals = np.zeros(len(scenario.nodes), np.int64)
+        self.arrivals = np.zeros(len(scenario.nodes))
         self.scratch = empty_scratch(scenario.uavs[1], len(scenario.nodes))
         self.listener = LogWriter(self.state, self.world.nodes) if events else Listener()
         self.packets: Packets | None = None

@@ -47,7 +47,7 @@ class Packet:
 # The same as a record of an array.
 PACKET = np.dtype([(field.name, field.type) for field in fields(Packet)])
 
-# Sums of data units are rounded; a rest below this is no part of a packet.
+# Sums of data units are rounded; a rest below this share of a message is no part of a packet.
 _ROUNDING = 1e-9
 
 
@@ -56,6 +56,7 @@ class Buffers:
 
     Attributes:
         limit: Packets that a buffer can hold; 0 for no limit.
+        rest: What is no part of a packet [data units].
         newest_first: Whether the newest packet is served first. Then a full buffer loses its oldest
             packet when a new one comes; otherwise it refuses the new one.
         queues: For each node, the numbers of the packets in its buffer, the oldest first.
@@ -64,8 +65,11 @@ class Buffers:
         lost: How many packets were lost.
     """
 
-    def __init__(self, nodes: int, limit: int = 0, newest_first: bool = False):
+    def __init__(
+        self, nodes: int, limit: int = 0, newest_first: bool = False, message: float = 1.0
+    ):
         self.limit, self.newest_first = limit, newest_first
+        self.rest = _ROUNDING * message
         self.queues: list[deque[int]] = [deque() for _ in range(nodes)]
         self.delivered: list[int] = []
         self.all: list[Packet] = []
@@ -96,7 +100,7 @@ class Buffers:
         queue = self.queues[k]
         while queue:
             packet = self.all[queue[-1 if self.newest_first else 0]]
-            if packet.remaining > amount + _ROUNDING:
+            if packet.remaining > amount + self.rest:
                 packet.remaining -= amount
                 return
             amount = max(amount - packet.remaining, 0.0)
@@ -174,9 +178,10 @@ class Packets:
         self._residual, self._sensors = state.residual[0], state.sensors[0]
         arrivals, nodes = scenario.arrivals, len(scenario.nodes)
         self._measures_age = scenario.age.measured
-        self._sources = sources_of(scenario.node_rates)
+        self._message = scenario.message
+        self._sources = sources_of(scenario.message_rates)
         self._factors = factors_of(arrivals)
-        self.buffers = Buffers(nodes, arrivals.buffer, arrivals.service == "newest")
+        self.buffers = Buffers(nodes, arrivals.buffer, arrivals.service == "newest", self._message)
         for k in range(nodes):
             if self._residual[k] > 0.0:
                 self.buffers.store(k, 0.0, float(self._residual[k]))
@@ -200,13 +205,14 @@ class Packets:
         """
         mission, sensor, b = self._mission, self._sensors[k], self.buffers
         time, is_silent = float(self._sources["time"][k]), sensor["silent"]
-        mission["arrived"] += 1.0
-        lost = b.store(k, time, 1.0)
-        gained = 1.0 if lost < 0 else 1.0 - b.all[lost].remaining
+        amount = self._message
+        mission["arrived"] += amount
+        lost = b.store(k, time, amount)
+        gained = amount if lost < 0 else amount - b.all[lost].remaining
         if is_silent and mission["node_data_lost"]:
             lost, gained = len(b.all) - 1, 0.0
             b.lose(k, time)
-            mission["lost"] += 1.0
+            mission["lost"] += amount
         elif lost >= 0:
             mission["lost"] += b.all[lost].remaining
         if is_silent:
@@ -247,7 +253,11 @@ class Packets:
         for number in numbers:
             p = self.buffers.all[number]
             time = p.generated if event == "arrival" else p.left
-            value = {"arrival": 1.0, "delivery": p.left - p.generated, "loss": p.remaining}[event]
+            value = {
+                "arrival": self._message,
+                "delivery": p.left - p.generated,
+                "loss": p.remaining,
+            }[event]
             self._listener.note_packet(event, time, number, p.node, p.uav, value, p.generated)
 
     def write(self, out: np.void) -> None:

@@ -33,10 +33,12 @@ from dess.model.state import (
     draw_parameters,
 )
 from dess.physics import age, fleet, streams, wind
+from dess.physics.arrivals import draw_messages, has_messages
 from dess.physics.charging import gain, is_before, share_power
 from dess.physics.chart import is_open
 from dess.physics.failures import strike_if_on, take_pad, working_pads
 from dess.physics.landing import flies, has_finished, is_over, lands, next_latch, stands
+from dess.physics.radio import is_below_steps
 from dess.physics.section import for_sections
 
 
@@ -299,9 +301,9 @@ def communicate(
     """Run communication slot ``n`` = 1..m: each flying UAV serves its best node (eq. 9-11).
 
     UAVs are served in index order; each takes ``min(R, D_k)`` of the node with the highest SNR
-    among those with residual data, the lowest index on a tie. ``served`` and ``amount`` of each
-    UAV are set. The arguments after ``teeth`` are arrays of ``World`` and ``Scratch``;
-    ``channel.open_slot`` must have begun the mission slot.
+    among those with residual data, the lowest index on a tie, unless this SNR is below the lowest
+    step of the rate. ``served`` and ``amount`` of each UAV are set. The arguments after ``teeth``
+    are arrays of ``World`` and ``Scratch``; ``channel.open_slot`` must have begun the mission slot.
     """
     for i in range(mission.uavs):
         u = uavs[i]
@@ -311,7 +313,7 @@ def communicate(
         if (n - 1) % channel.GROUP == 0 or mission.continuous != 0:
             channel.open_group(i, search)
         snr, node = channel.best_node(mission, i, residual, order, means, batches, search, n)
-        if node < 0:
+        if node < 0 or is_below_steps(mission, snr):
             continue
         amount = min(channel.rate(mission, snr) * u.rate, residual[node])
         residual[node] -= amount
@@ -334,7 +336,9 @@ def _communicate_all(mission, uavs, residual, sensors, teeth, order, means, batc
 
 @kernel
 def arrive(mission, residual, sensors, arrivals, batches, search):
-    """Add the new data of one slot (eq. 12): a Poisson number of data units per node.
+    """Add the new data of one slot (eq. 12): a Poisson number of messages per node.
+
+    A message is a data unit, unless the scenario has another size.
 
     Args:
         mission: ``MISSION`` record.
@@ -358,12 +362,15 @@ def arrive(mission, residual, sensors, arrivals, batches, search):
                 batch.node, batch.words, search[0, channel.WIDTH],
             )  # fmt: skip
         word = batch.words[k % 4, block]
-        arrivals[k] = 0
+        arrivals[k] = 0.0
         if _has_own_rates(mission):
             rate = sensors[k].rate
             probability_of_none = exp(-rate)
-        if streams.uniform(word) > probability_of_none:
+        if has_messages(mission):
+            arrivals[k] = draw_messages(mission, sensors[k].rate, word)
+        elif streams.uniform(word) > probability_of_none:
             arrivals[k] = streams.poisson(word, rate)
+        if arrivals[k] > 0.0:
             residual[k] += arrivals[k]
             mission.arrived += arrivals[k]
 

@@ -16,6 +16,7 @@ from dess.base.errors import InputError, check_type
 from dess.base.kernels import kernel
 from dess.physics import fleet, streams, wind
 from dess.physics.failures import MOST_PADS
+from dess.physics.radio import MOST_STEPS
 from dess.scenario.fields import MOST_ZONES, SAMPLED
 from dess.scenario.scenario import AnyScenario, Scenario, ScenarioSpace, loaded
 
@@ -60,9 +61,14 @@ MISSION = np.dtype(
         ("uav_data_lost", np.int64),
         *fields(np.float64, "pad_rate pad_repair node_rate node_repair"),
         ("node_data_lost", np.int64),
-        # Channel.
+        # Channel; the length of a communication slot is the part of it that the duty cycle leaves.
         *fields(np.float64, "communication_slot_length shadowing_deviation"),
-        *fields(np.float64, "range max_rate"),  # of the radio [m], [bit/s/Hz]; 0 for none
+        # Radio (dess.physics.radio): range [m], largest efficiency [bit/s/Hz], both 0 for none, and
+        # the steps of the rate: from which SNR [dB] on the efficiency is which.
+        *fields(np.float64, "range max_rate"),
+        ("steps", np.int64),
+        ("step_snr", np.float64, MOST_STEPS),
+        ("step_rate", np.float64, MOST_STEPS),
         # Wind: what its mean takes of moves and its deviation from cell to cell [% of battery per
         # cell], and the largest surcharge of a move [%], 0 without wind.
         *fields(np.float64, "wind_north wind_east wind_south wind_west wind_gusts"),
@@ -74,6 +80,7 @@ MISSION = np.dtype(
         *fields(np.float64, "reward_depleted reward_charging reward_quota reward_step"),
         ("continuous", np.int64),  # whether arrivals are
         ("own_rates", np.int64),  # whether nodes have their own, and arrival_rate is their mean
+        ("message", np.float64),  # what a node makes at once [data units], 0 without messages
         ("age_measured", np.int64),  # in the slotted model
         ("age_reward", np.float64),
         # Progress: mission slots done, UAVs still active, and data [data units], of which
@@ -195,15 +202,18 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         "zones": len(scenario.rectangles),
         **{"initial_low": low.min(), "initial_high": high.max()},
         **{"own_rates": own_rates, "slowest": fleet.slowest(scenario.fleet)},
-        "communication_slot_length": scenario.slot_length / scenario.communication_slots,
+        "communication_slot_length": (
+            scenario.slot_length / scenario.communication_slots * scenario.radio.duty_cycle
+        ),
         "shadowing_deviation": np.sqrt(scenario.shadowing_variance),
         **{"continuous": scenario.needs_events, "age_measured": slotted_age},
+        "message": arrivals.message,
         "charge_rate": scenario.charge_fraction.numerator,
         "charge_slots": scenario.charge_fraction.denominator,
-        **{"range": scenario.radio.range, "max_rate": scenario.radio.max_rate},
         "age_reward": scenario.age.reward,
         **({"arrival_rate": fmean(scenario.node_rates)} if own_rates else {}),
         **wind.constants(scenario.wind, scenario.size),
+        **scenario.radio.constants(),
         **scenario.charging.constants(),
         **scenario.failures.constants(),
     }

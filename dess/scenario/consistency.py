@@ -8,6 +8,7 @@ import numpy as np
 from dess.base.errors import InputError, listed
 from dess.physics.age import MOST_TEETH
 from dess.physics.arrivals import MOST as MOST_RATE
+from dess.physics.arrivals import MOST_MESSAGES
 from dess.physics.chart import FAR, MOST_CHARTED, NO_FLY, Cell, parking_of, spread, zones_of
 from dess.physics.failures import MOST_PADS
 from dess.physics.fleet import legs, places_per_slot
@@ -158,6 +159,9 @@ def _unfit(c: Fields) -> Iterator[InputError]:
     if max(c.node_rates) > MOST_RATE:
         problem = f"a node has the rate {max(c.node_rates):g}"
         yield InputError("arrivals.merged", problem, str(MOST_RATE))
+    if c.needs_events and c.arrivals.message and max(c.message_rates) > MOST_MESSAGES:
+        problem = f"a node makes {max(c.message_rates):,.4g} messages in a slot, each a packet"
+        yield InputError("arrivals.process", problem, f"{MOST_MESSAGES} at most, or slotted")
     for number, ((*_, width, height), pads) in enumerate(
         zip(c.rectangles, c.zone_pads, strict=True)
     ):

@@ -12,13 +12,14 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 from statistics import fmean
-from typing import Any, NamedTuple, NoReturn, Self
+from typing import Any, Literal, NamedTuple, NoReturn, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from dess.base.descriptions import Description, description_of
 from dess.base.elementary import log10
 from dess.base.errors import InputError, shown
+from dess.physics.radio import MOST_STEPS
 from dess.physics.section import Section
 from dess.physics.wind import Moves, largest_wind, moves_in
 from dess.scenario.quantities import KINDS, exactly, form_of, measured, printed, refuse
@@ -32,10 +33,31 @@ _ORIGINS = {
     "charge_rate": ("endurance", "charging"),
     "arrival_rate": ("data_rate", "bandwidth"),
     "arrivals.rates": ("data_rate", "bandwidth"),
+    "arrivals.message": ("message", "endurance", "bandwidth"),
+    "radio.steps": ("modulation", "rates", "bandwidth"),
     "initial_data": ("backlog", "endurance", "bandwidth"),
     "arrivals.initial": ("backlog", "endurance", "bandwidth"),
     "edge_snr": ("snr", *LINK_BUDGET, "free_space", "bandwidth"),
 }
+
+# What is assumed where the sheet does not say it.
+_ASSUMED = {
+    "modulation": "shannon",
+    "max_rate": "6 bit/s/Hz",
+    "altitude": "10 m",
+    "message": "1 kB",
+    "free_space": "1 m",
+}
+
+LORA = "lora"
+# The least SNR [dB] at which LoRa receives a spreading factor, the slowest first (SX1276 data
+# sheet); the bandwidths [Hz] that it has, and its usual coding rate.
+_LORA_SNR = {12: -20.0, 11: -17.5, 10: -15.0, 9: -12.5, 8: -10.0, 7: -7.5}
+_LORA_BANDWIDTHS = (7.8e3, 1.625e6)
+_LORA_CODING = 4 / 5
+
+# A step of a rate: from which SNR on it is which, and the limits of both.
+_STEP = (("dB", (-200, 200)), ("bit/s", (1e-6, 1e15)))
 
 # The fields that a scenario with a sheet may set otherwise.
 OPEN = ("flying_time", "charge_start", "charge_complete", "landing", "quota")
@@ -88,6 +110,13 @@ def _quantity(
     return Field(None, description=description, examples=examples, json_schema_extra=extra)
 
 
+def _as_listed(value: Any) -> Any:
+    """A tuple as the list that was typed."""
+    if isinstance(value, tuple):
+        return [*value]
+    return value
+
+
 class DataSheet(Section):
     """What an engineer knows of the UAVs, the radio and the nodes, each with its unit."""
 
@@ -106,6 +135,7 @@ class DataSheet(Section):
         ),
         0,
     )
+    message: str | None = _quantity("bit", "what a node makes at once", 1, example="1 kB")
     bandwidth: str | None = _quantity("Hz", "bandwidth of the radio")
     snr: str | None = _quantity("dB at m", "mean SNR at a distance", -200, 200, second=_DISTANCES)
     tx_power: str | None = _quantity("dBm", "transmitted power (EIRP), without snr", -99, 99)
@@ -118,7 +148,21 @@ class DataSheet(Section):
         "1 m",
     )
     range: str | None = _quantity("m", "distance beyond which there is no service", 0.01, 1e7)
-    max_rate: str | None = _quantity("bit/s/Hz", "largest spectral efficiency", 0.001, 1000)
+    modulation: Literal["shannon", "lora"] | None = Field(
+        None, description="how the rate follows from the SNR, without rates", examples=[LORA]
+    )
+    max_rate: str | None = _quantity(
+        "bit/s/Hz", "largest spectral efficiency of shannon", 0.001, 1000
+    )
+    rates: tuple[tuple[str, str], ...] | None = Field(
+        None,
+        description=Description("from which SNR on the rate is which", form="a list, both rising"),
+        examples=['[["-7.5 dB", "5.5 kbit/s"], ["0 dB", "50 kbit/s"]]'],
+    )
+    duty_cycle: str | None = _quantity(
+        "percent", "share of the time in which a node may send", 0.01, 100, "1 %"
+    )
+    altitude: str | None = _quantity("m", "flying altitude above the nodes", 1, 500, "10 m")
     wind: str | None = _quantity(
         "m/s from deg", "mean wind, and where it comes from", 0, second=(-360, 360)
     )
@@ -143,6 +187,14 @@ class DataSheet(Section):
         Raises:
             InputError: If it has no unit or another one, or is out of range.
         """
+        if name == "rates":
+            cls._check_rates(value)
+        elif name != "modulation":
+            cls._check_quantities(name, value)
+
+    @classmethod
+    def _check_quantities(cls, name: str, value: Any) -> None:
+        """Refuse a value, or an item of a list, that is no quantity of its kind."""
         units, limits = cls.extra(name)["units"], cls.extra(name)["limits"]
         items: Any = (value,)
         if isinstance(value, list | tuple):
@@ -155,6 +207,25 @@ class DataSheet(Section):
             elif item is not None:
                 problem = f"is of type {type(item).__name__}, not text"
                 refuse(item, problem, units, f"text in quotes: {form_of(units)}")
+
+    @classmethod
+    def _check_rates(cls, value: Any) -> None:
+        """Refuse what is no list of pairs of an SNR and a rate."""
+        if value is None:
+            return
+        allowed = f"a list of at most {MOST_STEPS} pairs, such as {cls.example('rates')[0]}"
+        pairs: Any = ()
+        if isinstance(value, list | tuple):
+            pairs = value
+        if not 0 < len(pairs) <= MOST_STEPS:
+            raise InputError("", f"{shown(_as_listed(value))} has no such pairs", allowed)
+        for pair in pairs:
+            if not (isinstance(pair, list | tuple) and len(pair) == len(_STEP)):
+                raise InputError("", f"{shown(_as_listed(pair))} is no pair", allowed)
+            for item, (units, limits) in zip(pair, _STEP, strict=True):
+                if not isinstance(item, str):
+                    refuse(item, "has no unit", units)
+                _check_limits(item, units, [limits])
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
@@ -178,13 +249,16 @@ class DataSheet(Section):
     def example(cls, name: str) -> tuple[str, str]:
         """A quantity that a field may have, and its meaning."""
         field = cls.model_fields[name]
-        return (field.examples or [""])[0], field.description or ""
+        return str((field.examples or [""])[0]), field.description or ""
 
     @classmethod
     def form_of(cls, name: str) -> str:
         """What a field means, with an example."""
         brief = description_of(cls.model_fields[name]).brief
-        return f'{brief}, such as "{cls.example(name)[0]}"'
+        example = cls.example(name)[0]
+        if name != "rates":
+            example = f'"{example}"'
+        return f"{brief}, such as {example}"
 
     @property
     def units(self) -> Units:
@@ -201,10 +275,26 @@ class DataSheet(Section):
 
     def number(self, name: str, missing: float = 0.0) -> float:
         """The first number of a field in SI units, bits, percent or decibels."""
-        text = getattr(self, name)
+        text = getattr(self, name) or _ASSUMED.get(name)
         if text:
             return measured(text, self.extra(name)["units"])[0]
         return missing
+
+    @property
+    def assumed(self) -> dict[str, str]:
+        """What the sheet does not say, and is assumed."""
+        unused = set()
+        if self.modulation == LORA or self.rates:
+            unused.add("max_rate")
+        if self.rates:
+            unused.add("modulation")
+        if self.snr:
+            unused.add("free_space")
+        return {
+            name: value
+            for name, value in _ASSUMED.items()
+            if name not in unused and getattr(self, name) is None
+        }
 
     def fields(self) -> dict[str, Any]:
         """The fields of a scenario that follow, those of sections dotted.
@@ -260,8 +350,9 @@ class DataSheet(Section):
         return slots
 
     def _data(self) -> dict[str, Any]:
-        """New data and initial data [data units]."""
-        fields: dict[str, Any] = {"initial_data": (0.0, 0.0)}
+        """New data, their messages, and initial data [data units]."""
+        message = self.number("message") / self.units.data
+        fields: dict[str, Any] = {"initial_data": (0.0, 0.0), "arrivals.message": message}
         if self.data_rate:
             mean, of_nodes = self._of_nodes("data_rate", self.number("bandwidth"))
             fields |= {"arrival_rate": mean, "arrivals.rates": of_nodes}
@@ -281,11 +372,11 @@ class DataSheet(Section):
         return fmean(values), () if isinstance(amount, str) else values
 
     def _radio(self) -> dict[str, Any]:
-        """The SNR at a distance, the range and the largest rate."""
+        """The altitude, the SNR at a distance, the range and the rates."""
         if self.snr:
             snr, anchor = measured(self.snr, "dB at m")
         else:  # Friis' equation, and thermal noise at 290 K
-            anchor = self.number("free_space", 1.0)
+            anchor = self.number("free_space")
             loss = 20 * log10(4 * math.pi * anchor * self.number("frequency") / 299_792_458)
             noise = 10 * log10(1.380649e-20 * 290 * self.number("bandwidth"))
             snr = self.number("tx_power") - loss - noise - self.number("noise_figure")
@@ -295,10 +386,53 @@ class DataSheet(Section):
             size = printed(cell, "m")
             problem = f"is less than a cell of {size}, the way of a slot at {self.cruise}"
             self._refuse("range", problem, f"{size} or more")
+        altitude = self.number("altitude")
+        if self.range and reach <= altitude:
+            height = printed(altitude, "m")
+            self._refuse("range", f"ends above the sea, {height} below", f"above {height}")
+        steps = self._steps()
+        max_rate = 0.0
+        if not steps:
+            max_rate = self.number("max_rate")
         return {
-            **{"edge_snr": snr, "radio.anchor": anchor},
-            **{"radio.range": reach, "radio.max_rate": self.number("max_rate")},
+            "altitude": altitude,
+            "edge_snr": snr,
+            "radio.anchor": anchor,
+            "radio.range": reach,
+            "radio.max_rate": max_rate,
+            "radio.steps": steps,
+            "radio.duty_cycle": self.number("duty_cycle", 100.0) / 100,
         }
+
+    def _steps(self) -> tuple[tuple[float, float], ...]:
+        """From which SNR [dB] on the spectral efficiency is which [bit/s/Hz]; none for shannon."""
+        for name, other in (("modulation", "rates"), ("max_rate", "rates")):
+            if getattr(self, name) and getattr(self, other):
+                raise InputError(name, f"is given beside {other}", "one of both")
+        if self.modulation == LORA:
+            return self._lora_steps()
+        bandwidth = self.number("bandwidth")
+        steps: list[tuple[float, float]] = []
+        for pair in self.rates or ():
+            numbers = [
+                measured(text, units)[0] for text, (units, _) in zip(pair, _STEP, strict=True)
+            ]
+            snr, efficiency = numbers[0], numbers[1] / bandwidth
+            if steps and not (snr > steps[-1][0] and efficiency > steps[-1][1]):
+                before = (self.rates or ())[len(steps) - 1]
+                problem = f"{shown(_as_listed(pair))} comes after {shown(_as_listed(before))}"
+                raise InputError("rates", problem, "pairs whose SNR and rate rise")
+            steps.append((snr, efficiency))
+        return tuple(steps)
+
+    def _lora_steps(self) -> tuple[tuple[float, float], ...]:
+        """The steps of LoRa's spreading factors."""
+        if self.max_rate:
+            raise InputError("max_rate", "is given beside lora, which has rates", "one of both")
+        least, most = _LORA_BANDWIDTHS
+        if not least <= self.number("bandwidth") <= most:
+            self._refuse("bandwidth", "is none of lora", "7.8 kHz..1.625 MHz")
+        return tuple((snr, factor * _LORA_CODING / 2**factor) for factor, snr in _LORA_SNR.items())
 
     def _wind(self, speed: float, direction: float) -> Moves:
         """The surcharge of each move [% per cell]."""

@@ -357,13 +357,23 @@ class Fields(Strict):
         if not self.needs_events:
             return 0.0
         highest = max([1.0, *(factor for _, factor in self.arrivals.schedule)])
-        return fsum(self.node_rates) * highest * self.max_slots
+        return fsum(self.message_rates) * highest * self.max_slots
 
     @property
     def node_rates(self) -> tuple[float, ...]:
         """The arrival rate of each node [data units per slot]."""
         merged = self.arrivals.merged or (1,) * len(self.nodes)
         return self.arrivals.rates or tuple(self.arrival_rate * count for count in merged)
+
+    @property
+    def message(self) -> float:
+        """What a node makes at once [data units]: a message or packet."""
+        return self.arrivals.message or 1.0
+
+    @property
+    def message_rates(self) -> tuple[float, ...]:
+        """The messages of each node per slot."""
+        return tuple(rate / self.message for rate in self.node_rates)
 
     @property
     def node_data(self) -> tuple[tuple[float, float], ...]:

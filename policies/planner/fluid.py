@@ -29,7 +29,7 @@ from dess.physics.chart import distance, in_zone, is_open
 from dess.physics.failures import working_pads
 from dess.physics.fleet import leg
 from dess.physics.landing import has_finished, lands, next_latch
-from dess.physics.radio import has_range
+from dess.physics.radio import has_limit
 from dess.physics.section import for_sections
 
 WAYPOINT = np.dtype(
@@ -398,7 +398,7 @@ def _collect_data(mission, rates, sea, v, t, wait, data_left):
         c = candidates[row, rank]
         node = sea[c.node]
         rank += 1
-        if has_range(mission) and c.rate == 0.0:
+        if has_limit(mission) and c.rate == 0.0:
             break
         if t < node.since:
             continue
@@ -414,7 +414,7 @@ def _collect_data(mission, rates, sea, v, t, wait, data_left):
         node.base = -rate * t
         node.since = t + wait
     is_empty = rate * mission.nodes < _SOME_ARRIVE and data_left - collected < _NOTHING
-    if is_empty or (has_range(mission) and left > 0):
+    if is_empty or (has_limit(mission) and left > 0):
         v.counted -= left
     return collected
 

@@ -6,7 +6,6 @@ tables.candidates[row, 0]      # the node with the highest rate in a step
 A step is an action together with the cell that it leads to.
 """
 
-import math
 from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
@@ -16,7 +15,7 @@ import numpy as np
 from dess.base.files.memory import check_memory
 from dess.base.kernels import kernel
 from dess.model.channel import efficiency
-from dess.model.state import STEP_X, STEP_Y
+from dess.model.state import MISSION, STEP_X, STEP_Y
 from dess.model.view import View
 from dess.physics import wind
 from dess.physics.chart import Chart
@@ -36,6 +35,12 @@ _RULE = (
     (6.630878198393129, 1.4978147231618397e-10),
 )
 
+
+# The fields of ``MISSION`` on which the rate at a mean SNR depends.
+_CHANNEL = (
+    *("communication_slot_length", "shadowing_deviation"),
+    *("max_rate", "steps", "step_snr", "step_rate"),
+)
 
 # A node that a UAV may serve in a slot, and its mean rate [data units per communication slot].
 CANDIDATE = np.dtype([("node", np.int32), ("rate", np.float32)])
@@ -69,9 +74,7 @@ def load_rates(view: View) -> Rates:
         (columns, rows),
         int(mission["communication_slots"]),
         int(mission["slowest"]),
-        float(mission["communication_slot_length"]),
-        float(mission["shadowing_deviation"]),
-        float(mission["max_rate"]) or math.inf,
+        _channel_of(view.state.missions),
     )
     extra = np.zeros((0, 0, 0), np.int64)
     if mission["wind_most"] > 0:
@@ -82,14 +85,13 @@ def load_rates(view: View) -> Rates:
 
 @lru_cache(maxsize=8)
 def _rank_nodes(
-    nodes: bytes, mean_snr: bytes, size: tuple[int, int], m: int, slowest: int, length: float,
-    deviation: float, most: float,
+    nodes: bytes, mean_snr: bytes, size: tuple[int, int], m: int, slowest: int, channel: bytes
 ) -> np.ndarray:  # fmt: skip
     cells = np.frombuffer(nodes, np.int64).reshape(-1, 2)
     snr = np.frombuffer(mean_snr)
     columns, rows = size
     longest = max(size)
-    rates = _mean_rate(snr.reshape(longest, -1), length, deviation, most)
+    rates = _mean_rate(snr.reshape(longest, -1), np.frombuffer(channel, MISSION))
     kept = min(_RANKS, len(cells))
     legs = slowest * (slowest + 1) // 2
     check_memory(
@@ -133,22 +135,31 @@ def _mean_rates_of_steps(
     return total / len(ahead)
 
 
-def _mean_rate(snr: np.ndarray, length: float, deviation: float, most: float) -> np.ndarray:
-    """The mean of the rate (eq. 9), at most ``most``, over the shadowing, for mean SNRs [dB].
+def _channel_of(missions: np.ndarray) -> bytes:
+    """The first mission, of which nothing is kept but what the rate depends on."""
+    channel = np.zeros(1, MISSION)
+    for name in _CHANNEL:
+        channel[name] = missions[name][:1]
+    return channel.tobytes()
+
+
+def _mean_rate(snr: np.ndarray, channel: np.ndarray) -> np.ndarray:
+    """The mean of the rate (eq. 9) over the shadowing, for mean SNRs [dB].
 
     It is computed once for each SNR, so that nodes at equal distances have equal rates.
     """
     distinct, places = np.unique(snr, return_inverse=True)
     rates = np.zeros(len(distinct))
-    _add_rates(distinct, length, deviation, most, rates)
+    _add_rates(distinct, channel[0], rates)
     return rates[places].reshape(snr.shape)
 
 
 @kernel
-def _add_rates(snr, length, deviation, most, rates):
+def _add_rates(snr, mission, rates):
     """Add the mean rate at each mean SNR [dB] to ``rates``."""
+    length = mission.communication_slot_length
     for number in range(len(snr)):
         for point, weight in _RULE:
             for deviate in (-point, point):
-                level = snr[number] + deviation * deviate
-                rates[number] += length * weight * min(efficiency(level), most)
+                level = snr[number] + mission.shadowing_deviation * deviate
+                rates[number] += length * weight * efficiency(mission, level)

@@ -39,9 +39,14 @@ def mean_snr(scenario: World, distance: Any) -> Any:
 
 def rate_at_snr(scenario: World, snr: Any) -> Any:
     """Data units per communication slot at an SNR [dB] (eq. 9)."""
-    length = scenario.slot_length / scenario.communication_slots
+    radio = scenario.radio
+    length = scenario.slot_length / scenario.communication_slots * radio.duty_cycle
+    if radio.steps:
+        least, efficiencies = np.transpose(radio.steps)
+        reached = np.searchsorted(least, snr, side="right")
+        return length * np.concatenate(([0.0], efficiencies))[reached]
     efficiency = np.log1p(10 ** (np.asarray(snr) / 10)) / np.log(2)
-    return length * np.minimum(efficiency, scenario.radio.max_rate or np.inf)
+    return length * np.minimum(efficiency, radio.max_rate or np.inf)
 
 
 def snr_of(scenario: World, rate: Any) -> Any:

@@ -32,7 +32,6 @@ _NORMS = np.array([1.0, 2.5, 8.0], np.float32)  # by which sums of data x nearne
 # By which the nearness changes if the way is one cell shorter, and longer.
 _FACTORS = np.stack([exp_of_each(1 / SCALES), exp_of_each(-1 / SCALES)]).astype(np.float32)
 _FARTHEST = 255  # [cells]; all longer ways count as this one
-_efficiency_of_each = np.vectorize(efficiency, otypes=[float])
 # Euclidean distances [cells] at which the rate tells what the channel is like.
 _PROBES = (1.0, 3.0, 8.0)
 
@@ -40,7 +39,8 @@ _PROBES = (1.0, 3.0, 8.0)
 # The fields of ``MISSION`` that ``sea_of`` reads and that a batch need not share.
 _FIELDS = (
     *("zone_pads", "initial_low", "initial_high", "arrival_rate", "charge_rate"),
-    *("charge_slots", "max_rate", "communication_slot_length"),
+    *("charge_slots", "communication_slot_length"),
+    *("max_rate", "steps", "step_snr", "step_rate"),
 )
 
 
@@ -77,8 +77,7 @@ def sea_of(mission: Any, world: World) -> Sea:
     snr = world.mean_snr[0, :: (world.mean_snr.shape[1] - 1) // (len(world.mean_snr) - 1)]
     low, high, arriving = (mission[n] for n in ("initial_low", "initial_high", "arrival_rate"))
     unit = max(0.75 * low + 0.25 * high, 40 * arriving, 1e-3)
-    most = length * (float(mission["max_rate"]) or np.inf)
-    rates = np.minimum(length * _efficiency_of_each(snr), most) / unit
+    rates = length * _efficiencies_at(mission, snr.copy()) / unit
     probes = np.interp(_PROBES, np.arange(len(rates)), rates)
     charging = mission["charge_rate"] / mission["charge_slots"]
     others = [40 * arriving / unit, charging / 10]
@@ -90,6 +89,15 @@ def sea_of(mission: Any, world: World) -> Sea:
         rates.astype(np.float32),
         np.array([*log10(probes + 1e-3), *others], np.float32),
     )
+
+
+@kernel
+def _efficiencies_at(mission, snr):
+    """(L,) spectral efficiencies [bit/s/Hz] at mean SNRs [dB]."""
+    efficiencies = np.empty(len(snr))
+    for number in range(len(snr)):
+        efficiencies[number] = efficiency(mission, snr[number])
+    return efficiencies
 
 
 def sea_constants(mission: Any) -> bytes:

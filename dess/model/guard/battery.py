@@ -5,7 +5,7 @@ import math
 from dess.base.kernels import inlined
 from dess.physics.failures import working_pads
 from dess.physics.landing import flies, lands
-from dess.physics.radio import has_range
+from dess.physics.radio import has_limit
 from dess.physics.section import for_sections
 
 # Margin [cells] on the way to the zone per active teammate, since each may cause a detour.
@@ -36,7 +36,7 @@ def slots_expected(mission, u, data):
 
     A UAV collects some ``MEAN_RATE`` data units in a slot. Once the residual data are collected,
     it may count on ``SLOTS_PER_PACKET`` communication slots for each data unit that arrives. Where
-    slots out of range do not count, it cannot tell, and expects to fly to the end.
+    slots without service do not count, it cannot tell, and expects to fly to the end.
 
     Args:
         mission: ``MISSION`` record.
@@ -44,7 +44,7 @@ def slots_expected(mission, u, data):
         data: Residual data of all nodes together [data units].
     """
     needed = slots_needed(mission, u)
-    if has_range(mission):
+    if has_limit(mission):
         return mission.max_slots
     rate = _rate(mission, u)
     if data >= rate * needed:
@@ -99,7 +99,7 @@ def must_charge(mission, u, data):
 def will_charge(mission, u):
     """Whether a UAV in the air cannot fill its quota with its battery, or has to land."""
     needs = u.battery < mission.flight_cost * slots_needed(mission, u)
-    return flies(u) and (needs or lands(mission) or has_range(mission))
+    return flies(u) and (needs or lands(mission) or has_limit(mission))
 
 
 @inlined

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import tomli_w
 
-from dess import InputError, load_scenario, simulate
+from dess import InputError, load_scenario, policies, simulate
 from dess.model.channel import world_of
 from dess.model.state import constants_of
 from dess.physics.wind import MOST, largest_wind, moves_in
@@ -57,6 +57,103 @@ def test_a_link_budget_gives_the_snr_of_friis_equation():
     assert space.edge_snr == pytest.approx(20 - loss - noise)
     assert space.radio.anchor == 100
     assert float(closed_forms.mean_snr(space, 1000.0)) == pytest.approx(space.edge_snr - 22.7)
+
+
+ABOVE_NODE = {"nodes": [[5, 0]], "zone": [4, 0, 1, 1], "uavs": 1, "shadowing_variance": 0}
+
+
+def _bits_per_second(snr: float, **sheet: Any) -> float:
+    """What a UAV collects that hovers 10 m above a node, where the SNR has this value [dB]."""
+    above = {"snr": f"{snr} dB at 10 m", "backlog": "90 GB", "data_rate": "0 B/h", "wind": None}
+    space = _space({**above, "horizon": "3 min", **sheet}, **ABOVE_NODE)
+    events = simulate(space, Script("E" + 99 * "."), 1, events=True).events
+    assert events is not None
+    served = [e.value for e in events if e.event == "communication" and 2 < e.time <= 3]
+    return sum(served) * space.units.data / space.units.slot
+
+
+@pytest.mark.parametrize(
+    ("snr", "rate"),
+    [
+        (30, 5468.75),  # 7 * 125,000 / 2^7 * 4/5
+        (-7.5, 5468.75),
+        (-7.501, 3125),  # 8 * 125,000 / 2^8 * 4/5
+        (-20, 292.96875),  # 12 * 125,000 / 2^12 * 4/5
+        (-20.001, 0),
+    ],
+)
+def test_lora_has_the_rates_of_its_spreading_factors(snr, rate):
+    assert _bits_per_second(snr, modulation="lora") == pytest.approx(rate)
+
+
+def test_a_node_is_served_at_the_highest_step_that_its_snr_reaches():
+    rates = [["-2.5 dB", "5.5 kbit/s"], ["3 dB", "1 Mbit/s"]]
+    collected = [_bits_per_second(snr, rates=rates) for snr in (-2.6, -2.5, 2.9, 3.0, 90)]
+    assert collected == pytest.approx([0, 5500, 5500, 1e6, 1e6])
+
+
+def test_rates_are_multiplied_by_the_duty_cycle():
+    assert _bits_per_second(0, modulation="lora", duty_cycle="1 %") == pytest.approx(54.6875)
+    assert _bits_per_second(0, duty_cycle="25 %") == pytest.approx(125e3 * 1 / 4)
+    assert _bits_per_second(90) == pytest.approx(6 * 125e3), "6 bit/s/Hz at most"
+
+
+def test_the_altitude_counts_in_every_distance():
+    """12 dB at 2 km: 120 m above a node the SNR is that of 120 m, also in the table of rates."""
+    space = _space({"altitude": "120 m", "range": "400 m"})
+    mean = world_of(space).mean_snr
+    assert mean[0, 0] == pytest.approx(12 + 22.7 * math.log10(2000 / 120))
+    assert mean[0, 4] == pytest.approx(12 + 22.7 * math.log10(2000 / math.hypot(315, 120)))
+    assert mean[1, 4] == -math.inf, "a cell to the east and one to the south it is 461 m"
+    assert _space().altitude == 10
+
+
+def _arrivals(space: ScenarioSpace) -> list[tuple[float, float]]:
+    """The times and sizes [data units] of new data."""
+    events = simulate(space, Script(""), 1, events=True).events
+    assert events is not None
+    return [(e.time, e.value) for e in events if e.event == "arrival"]
+
+
+ONE_NODE = {"nodes": [[0, 0]], "zone": [9, 9, 1, 1], "uavs": 1}
+
+
+def test_new_data_come_in_messages():
+    space = _space({"data_rate": "20 kB/h", "wind": None}, **ONE_NODE)
+    message = 8000 / (125e3 * 21)  # 1 kB, in data units
+    counts = [value / message for _, value in _arrivals(space)]
+    assert counts == pytest.approx(np.round(counts)) and max(counts) <= 3
+    assert sum(counts) == pytest.approx(20 * 500 * 21 / 3600, abs=25)  # 58 of them, within 3.3 s
+    large = ScenarioSpace.of(space, **{"data_sheet.message": "10 kB"})
+    assert sum(value for _, value in _arrivals(large)) / message % 10 == pytest.approx(0)
+
+
+def test_of_more_than_50_messages_a_slot_a_node_has_exactly_its_rate_from_the_first_slot():
+    space = _space({"data_rate": "3 MB/h", "message": "340 B", "wind": None}, **ONE_NODE)
+    rate = 3e6 * 8 * 21 / 3600 / (125e3 * 21)
+    assert space.message_rates[0] == pytest.approx(51.47, abs=0.01)
+    assert _arrivals(space) == [(t + 1, pytest.approx(rate)) for t in range(500)]
+    fewer = ScenarioSpace.of(space, **{"data_sheet.message": "351 B"})  # 49.86 messages
+    assert len({value for _, value in _arrivals(fewer)}) > 20
+
+
+def test_in_continuous_time_each_message_is_a_packet():
+    values = {"data_rate": "20 kB/h", "wind": None}
+    space = _space(values, **ONE_NODE, arrivals={"process": "continuous"})
+    arrivals = _arrivals(space)
+    assert [*{value for _, value in arrivals}] == pytest.approx([8000 / (125e3 * 21)])
+    assert 40 < len(arrivals) < 80 and any(time % 1 for time, _ in arrivals)
+    with pytest.raises(InputError, match="messages in a slot, each a packet; allowed: 50 at most"):
+        _space({"message": "100 B"}, **ONE_NODE, arrivals={"process": "continuous"})
+
+
+def test_the_data_of_a_slow_node_are_not_old():
+    """One buoy a cell from the base: in packets of a data unit its data were 9.3 h old."""
+    sheet = {"data_rate": "20 kB/h", "wind": None, "horizon": "24 h"}
+    sea = {"nodes": [[2, 0]], "zone": [0, 0, 2, 1], "uavs": 1, "age": {"measured": True}}
+    space = _space(sheet, **sea)
+    record = simulate(space, policies.load("greedy"), 1)
+    assert record.operations["age"] * space.units.slot / 3600 < 0.5
 
 
 def test_the_snr_is_that_of_the_distance_and_not_of_the_grid():
@@ -212,6 +309,31 @@ def test_a_quantity_of_another_library_is_refused_in_a_line(field):
         ({"snr": "12 dB at -2 km"}, {}, "is out of range; allowed: 0.01..1e+06 m"),
         ({"snr": "12 dB at 2000 km"}, {}, "is out of range; allowed: 0.01..1e+06 m"),
         ({"wind": "5 m/s from 400 deg"}, {}, "is out of range; allowed: -360..360 deg"),
+        (
+            {"rates": [["0 dB", "1 kbit/s"], ["-3 dB", "2 kbit/s"]]},
+            {},
+            "rates: ['-3 dB', '2 kbit/s'] comes after ['0 dB', '1 kbit/s']; allowed: pairs whose",
+        ),
+        ({"rates": [["0 dB", "1 kbit/s"], ["3 dB", "1 kbit/s"]]}, {}, "comes after"),
+        ({"rates": [["0 dB", "1 kbit"]]}, {}, "'1 kbit' has a unit of another kind"),
+        ({"rates": [["0 dB"]]}, {}, "rates: ['0 dB'] is no pair; allowed: a list of at most 32"),
+        ({"rates": []}, {}, "rates: [] has no such pairs; allowed: a list of at most 32 pairs"),
+        ({"rates": [["0 dB", 5]]}, {}, 'rates: 5 has no unit; allowed: a data rate, such as "3'),
+        ({"rates": [["0 dB", "1 kbit/s"]], "modulation": "lora"}, {}, "is given beside rates"),
+        ({"rates": [["0 dB", "1 kbit/s"]], "max_rate": "6 bit/s/Hz"}, {}, "beside rates"),
+        ({"modulation": "lora", "max_rate": "6 bit/s/Hz"}, {}, "is given beside lora"),
+        ({"modulation": "fsk"}, {}, "modulation: 'fsk' is unknown"),
+        (
+            {"modulation": "lora", "bandwidth": "20 MHz"},
+            {},
+            "bandwidth: '20 MHz' is none of lora; allowed: 7.8 kHz..1.625 MHz",
+        ),
+        ({"altitude": "0.5 m"}, {}, "altitude: '0.5 m' is out of range; allowed: 1..500 m"),
+        (
+            {"altitude": "400 m", "range": "350 m"},
+            {},
+            "range: '350 m' ends above the sea, 400 m below; allowed: above 400 m",
+        ),
         # What follows is refused in the words of the sheet.
         ({"cruise": "1000 km/s", "wind": None}, {}, "endurance '35 min', cruise '1000 km/s', cell"),
         ({"data_rate": "3 TB/s"}, {}, "data_sheet: with data_rate '3 TB/s', bandwidth '125 kHz'"),

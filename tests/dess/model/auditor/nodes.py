@@ -33,7 +33,9 @@ class Nodes:
         low, high = constants["initial_data"]
         own = [(data, data) for data in arrivals.get("initial", ())]
         self.ranges = own or [(low * n, high * n) for n in merged]
-        self.radio = constants.get("radio", {"range": 0.0, "max_rate": 0.0, "anchor": 0.0})
+        self.message = arrivals.get("message") or 1.0
+        off = {"range": 0.0, "max_rate": 0.0, "anchor": 0.0, "steps": (), "duty_cycle": 1.0}
+        self.radio = constants.get("radio", off)
         is_continuous = arrivals["process"] == "continuous"
         self.packets = Packets(log, arrivals, self.cells) if is_continuous else None
 
@@ -69,7 +71,7 @@ class Nodes:
             self._packets_arrive(self.packets, time)
         for i, u in enumerate(self.fleet.uavs):
             serves = u.flies and not self.fleet.stands(u)
-            if serves and self._in_range(u, n):
+            if serves and self._in_range(u, n) and not self._is_too_far(i, n, time):
                 served.append((i, self._serve(i, n, time)))
         if self.packets is not None:
             self._deliver(self.packets, served)
@@ -86,15 +88,27 @@ class Nodes:
         far = (self._distance(*place, k) for k in range(len(self.cells)))
         return [k for k, d in enumerate(far) if d <= reach and self.residual[k] > 0]
 
+    def _is_too_far(self, i: int, n: int, time: float) -> bool:
+        """Whether a UAV serves no node although some have data: all are below the lowest step."""
+        row = self.log.next_row
+        is_served = row.event == "communication" and (row.time, row.uav) == (time, i)
+        if is_served or not self.radio["steps"]:
+            return False
+        u = self.fleet.uavs[i]
+        place = self._place(u, n)
+        best = max(self._mean_snr(place, k) for k in self._in_range(u, n))
+        can_be_low = best - self._largest_shadowing() < self.radio["steps"][0][0]
+        self.log.require(can_be_low, "no node is served")
+        return True
+
     def _serve(self, i: int, n: int, time: float) -> Any:
         u, m, log = self.fleet.uavs[i], self.c["communication_slots"], self.log
         x, y = self._place(u, n)
         k, value = log.next_row.node, log.next_row.value
         row = self.fleet.take("communication", time, i, x=x, y=y, node=k, value=value)
         self._check_snr(row, self._in_range(u, n))
-        efficiency = math.log1p(10 ** (row.snr / 10)) / math.log(2)
-        rate = self.c["slot_length"] / m * min(efficiency, self.radio["max_rate"] or math.inf)
-        amount = min(rate * u.rate, self.residual[k])
+        length = self.c["slot_length"] / m * self.radio["duty_cycle"]
+        amount = min(length * self._efficiency(row.snr) * u.rate, self.residual[k])
         log.require(math.isclose(value, amount, rel_tol=1e-9), "its SNR has another rate")
         self.residual[k] -= value
         log.require(self.residual[k] >= 0, "more data than the node has")
@@ -106,20 +120,31 @@ class Nodes:
             self.fleet.take("quota_filled", time, i, value=u.communications)
         return row
 
+    def _efficiency(self, snr: float) -> float:
+        if not self.radio["steps"]:
+            shannon = math.log1p(10 ** (snr / 10)) / math.log(2)
+            return min(shannon, self.radio["max_rate"] or math.inf)
+        reached = [efficiency for least, efficiency in self.radio["steps"] if least <= snr]
+        self.log.require(len(reached) > 0, "served below the lowest step")
+        return max(reached)
+
     def _check_snr(self, row: Any, nodes: list[int]) -> None:
         """The node must be one of these, and may have the highest SNR, given their shadowing."""
-        reach = LARGEST_DEVIATE * math.sqrt(self.c["shadowing_variance"]) + 1e-9
-        mean = {k: self._mean_snr(row, k) for k in nodes}
+        reach = self._largest_shadowing()
+        mean = {k: self._mean_snr((row.x, row.y), k) for k in nodes}
         self.log.require(row.node in mean, "a node without data, or out of range")
         self.log.require(abs(row.snr - mean[row.node]) <= reach, "an SNR that its node cannot have")
         self.log.require(row.snr >= max(mean.values()) - reach, "another node has a higher SNR")
+
+    def _largest_shadowing(self) -> float:
+        return LARGEST_DEVIATE * math.sqrt(self.c["shadowing_variance"]) + 1e-9
 
     def _distance(self, from_x: float, from_y: float, k: int) -> float:
         c, (x, y) = self.c, self.cells[k]
         return math.hypot(c["cell_size"] * math.hypot(from_x - x, from_y - y), c["altitude"])
 
-    def _mean_snr(self, row: Any, k: int) -> float:
-        c, distance = self.c, self._distance(row.x, row.y, k)
+    def _mean_snr(self, place: tuple[float, float], k: int) -> float:
+        c, distance = self.c, self._distance(*place, k)
         edge = math.hypot(c["grid"], c.get("rows") or c["grid"]) / 2 * c["cell_size"]
         edge = self.radio["anchor"] or edge
         return c["edge_snr"] - 10 * c["path_loss_exponent"] * math.log10(distance / edge)
@@ -148,11 +173,17 @@ class Nodes:
             amount, k = self.log.next_row.value, self.log.next_row.node
             self.log.require(last < k < len(self.cells), "an arrival out of order")
             self.take("arrival", self.log.slot, k, value=amount)
-            is_count = amount >= 1 and amount == int(amount)
-            self.log.require(is_count and self.rates[k] > 0, "no number of packets")
+            self.log.require(self._is_made(amount, self.rates[k]), "no number of messages")
             self.residual[k] += amount
             self.arrived += amount
             last = k
+
+    def _is_made(self, amount: float, rate: float) -> bool:
+        """Whether a node can make that much in a slot: whole messages, or of many its rate."""
+        if self.c.get("arrivals", {}).get("message") and rate / self.message > 50:
+            return math.isclose(amount, rate)
+        count = amount / self.message
+        return rate > 0 and count > 0.5 and math.isclose(count, round(count))
 
     def _packets_arrive(self, packets: Packets, until: float) -> None:
         """Take the packets that arrive before a communication slot from the log."""
@@ -160,11 +191,11 @@ class Nodes:
         while (row := self.log.next_row).event == "arrival" and row.time < until:
             time, k, number = row.time, row.node, len(packets.all)
             self.log.require(now <= time and 0 <= k < len(self.cells), "an arrival out of order")
-            self.take("arrival", time, k, value=1.0, packet=number, generated=time)
+            self.take("arrival", time, k, value=self.message, packet=number, generated=time)
             packets.check_rate(k, time, self.rates[k])
-            now, gained = time, 1.0
-            self.arrived += 1.0
-            lost = packets.store(k, time, 1.0)
+            now, gained = time, self.message
+            self.arrived += self.message
+            lost = packets.store(k, time, self.message)
             lost = number if k in self.silent and self.loses else lost
             if lost >= 0:
                 amount = packets.lose(lost, time)

@@ -7,7 +7,7 @@ from typing import Any
 
 from tests.dess.model.auditor.log import Log
 
-ROUNDING = 1e-9  # data units; a smaller rest is no part of a packet
+ROUNDING = 1e-9  # messages; a smaller rest is no part of a packet
 
 
 class Packets:
@@ -18,6 +18,7 @@ class Packets:
         self.all, self.latencies = list[Any](), list[float]()
         self.waiting: list[list[int]] = [[] for _ in cells]
         self.newest_first = arrivals.get("service") == "newest"
+        self.rest = ROUNDING * (arrivals.get("message") or 1.0)
 
     def store(self, node: int, time: float, amount: float) -> int:
         """Store a packet; return the number of the one that the full buffer loses, or -1."""
@@ -39,7 +40,7 @@ class Packets:
     def serve(self, node: int, time: float, amount: float, uav: int, battery: int) -> list[Any]:
         """Collect data units; return the packets that are delivered with them."""
         own, delivered, place = self.waiting[node], [], -1 if self.newest_first else 0
-        while own and self.all[own[place]].remaining <= amount + ROUNDING:
+        while own and self.all[own[place]].remaining <= amount + self.rest:
             amount = max(amount - self.all[own[place]].remaining, 0.0)
             delivered.append(own.pop(place))
         if own:
