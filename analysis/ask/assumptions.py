@@ -7,7 +7,9 @@ from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
+from dess.scenario.data_sheet import LORA
 from dess.scenario.quantities import printed
+from dess.scenario.scenario import ScenarioSpace
 
 
 def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
@@ -41,6 +43,10 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
             return value
         return "a list of them"
 
+    duty_cycle = given("duty_cycle", "")
+    duty = ""
+    if duty_cycle:
+        duty = f", for {duty_cycle} of the time on average"
     repair = given("repair", "")
     if repair:
         fate = f"is repaired in {repair}"
@@ -57,16 +63,32 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
         f"node; UAVs fly {value_text(space.altitude)} m high.",
         f"A battery charges from empty to full in {given('charging', '')}; of it, "
         f"{given('reserve', 'nothing')} is kept in reserve.",
-        f"Data: {given('data_rate', listed)} at each of {nodes}, "
+        f"Data: {given('data_rate', listed)} at each of {nodes} in messages of "
+        f"{given('message', sheet.assumed.get('message', ''))}, "
         f"{given('backlog', listed if space.arrivals.initial else 'none')} at the start.",
         f"Radio: an SNR of {given('snr', 'a link budget')}, path loss exponent "
         f"{value_text(space.path_loss_exponent)}; range {given('range', 'without end')}; "
-        f"{given('bandwidth', '')} with at most {given('max_rate', 'any bit/s/Hz')}.",
+        f"{given('bandwidth', '')} with {_rates_of(space, varied)}{duty}.",
         f"Wind: {given('wind', 'none')}, the same everywhere and always.",
         f"Failures: {failures}." if sheet.mtbf or "mtbf" in varied else "Failures: none.",
         f"A mission takes {given('horizon', printed(space.max_slots * units.slot, 's'))}; means "
         "are over random missions, with 95 % intervals.",
     ]
+
+
+def _rates_of(space: ScenarioSpace, varied: set[str]) -> str:
+    """The rates of a radio in words."""
+    sheet = space.data_sheet
+    if varied & {"modulation", "rates", "max_rate"}:
+        return "rates as asked"
+    if sheet.rates:
+        slowest, fastest = sheet.rates[0], sheet.rates[-1]
+        if slowest == fastest:
+            return f"{slowest[1]} from {slowest[0]} on"
+        return f"{slowest[1]} from {slowest[0]} on to {fastest[1]} from {fastest[0]} on"
+    if sheet.modulation == LORA:
+        return "the rates of LoRa"
+    return f"at most {sheet.max_rate or sheet.assumed['max_rate']}"
 
 
 def _policy_of(results: Results, metric: str) -> str:

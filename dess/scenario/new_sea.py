@@ -8,13 +8,15 @@ text = new.text()
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from dess.base.elementary import hypot
 from dess.base.errors import InputError, shown, unknown_name, validated
+from dess.base.files.reading import parse_toml
 from dess.scenario.data_sheet import LINK_BUDGET, DataSheet
 from dess.scenario.nodes import MAX_GRID, RATES, NodesFile, NodesFound
 from dess.scenario.places import GEOGRAPHIC, LIMITS, Projection
@@ -81,7 +83,7 @@ class NewScenario:
             raise unknown_name(f"--set: {name}", "unknown key", name, allowed)
         if name in DataSheet.model_fields:
             with _told(name):
-                DataSheet.check(name, answer or None)
+                DataSheet.check(name, _read_value(name, answer))
         elif name == "base":
             self._check_base(answer)
         elif name == "no_fly":
@@ -129,7 +131,7 @@ class NewScenario:
         """Refuse answers from which no slots and cells follow, or a sea that is too large."""
         if not (answers.get("endurance") and answers.get("cruise")):
             return
-        sheet = {name: answers[name] for name in DataSheet.model_fields if answers.get(name)}
+        sheet = _sheet_of(answers)
         sheet = {"charging": sheet["endurance"], **_UNANSWERED, **sheet}
         if any(sheet.get(name) for name in LINK_BUDGET) and not answers.get("snr"):
             examples = {name: DataSheet.example(name)[0] for name in LINK_BUDGET}
@@ -170,7 +172,7 @@ class NewScenario:
             InputError: If the sea is too large for the UAVs, or they are for slots and cells.
         """
         answers = self.answers
-        sheet = {name: answers[name] for name in DataSheet.model_fields if answers.get(name)}
+        sheet = _sheet_of(answers)
         cell = validated(DataSheet, sheet, "data_sheet").units.cell
         self._check_size(answers, cell)
         columns, rows, side = self._sides(answers, cell)
@@ -200,6 +202,20 @@ class NewScenario:
         return "\n".join(lines) + "\n"
 
 
+def _sheet_of(answers: Mapping[str, str]) -> dict[str, Any]:
+    """The data sheet of the answers so far."""
+    answered = [name for name in DataSheet.model_fields if answers.get(name)]
+    return {name: _read_value(name, answers[name]) for name in answered}
+
+
+def _read_value(name: str, answer: str) -> Any:
+    """The value of a field of the sheet: a text, or a list that is written as in TOML; or None."""
+    if name == "rates" and answer:
+        with suppress(InputError):
+            return parse_toml(f"value = {answer}", name)["value"]
+    return answer or None
+
+
 @contextmanager
 def _told(name: str) -> Iterator[None]:
     """Say in an error which answer is refused."""
@@ -220,6 +236,10 @@ def _place(answer: str) -> list[float]:
     return [x, y]
 
 
-def _line(name: str, value: str | None, example: str, meaning: str) -> str:
+def _line(name: str, value: Any, example: str, meaning: str) -> str:
     """A line of the file, commented out if there is no value."""
-    return f"{'' if value else '# '}{name} = {json.dumps(value or example)} # {meaning}"
+    mark = "" if value else "# "
+    text = json.dumps(value or example)
+    if not value and example.startswith("["):
+        text = example
+    return f"{mark}{name} = {text} # {meaning}"

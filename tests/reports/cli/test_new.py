@@ -67,6 +67,15 @@ def test_what_is_missing_is_asked_a_question_a_line(dess, buoys, tmp_path, monke
     assert space.radio.range == 2000 and space.wind.moves[3] > 1 and space.uavs == (3, 3)
 
 
+def test_rates_are_given_as_a_list(dess, buoys, tmp_path, refusal):
+    rates = '[["-7.5 dB", "5.5 kbit/s"], ["0 dB", "50 kbit/s"]]'
+    code, _, err = dess("scenarios", "new", "my.toml", *buoys, *_set(ANSWERS | {"rates": rates}))
+    assert (code, err) == (0, "")
+    assert load_scenario(tmp_path / "my.toml").radio.steps == ((-7.5, 0.044), (0, 0.4))
+    line = refusal("scenarios", "new", "no.toml", *buoys, *_set(ANSWERS | {"rates": "5 kbit/s"}))
+    assert "rates: '5 kbit/s' has no such pairs; allowed: a list of at most 32 pairs" in line
+
+
 LINK_BUDGET = {"tx_power": "14 dBm", "noise_figure": "6 dB", "frequency": "868 MHz"}
 
 
