@@ -3,6 +3,7 @@
 #   dess:
 #     studies: [fig1, fig4]
 #     scripts: true
+#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py
@@ -28,6 +29,7 @@ from dess.analysis.metrics import RATIO
 from dess.analysis.paper import values
 from dess.analysis.results.resimulate import Mission
 from dess.reports.pages import html
+from dess.reports.pages.panel import make_another
 from dess.reports.player import READING, Shown, join_players, make_player, player_script
 
 # %%
@@ -84,6 +86,14 @@ html.write_markdown("{reading}", reading=READING)
 # %% [markdown]
 # On the maps, an arrow is a move in one slot, in the colour of the node that was served most, or
 # grey. A cross is hovering, a star charging, a numbered diamond the start, a dot the end.
+
+# %% [markdown]
+# ## Another mission
+#
+# With other settings, another policy or another number.
+
+# %%
+make_another(fig4.scenario(points[-1]), fig4.study.scenario, [shown_policy], seed)
 
 # %% [markdown]
 # ## Two policies in step

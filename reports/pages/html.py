@@ -112,11 +112,11 @@ def load_template(name: str, **filters: Callable[..., str]) -> Template:
 
 
 @cache
-def panel_script() -> str:
-    """The script of a panel."""
+def panel_script(name: str = "panel_script.js") -> str:
+    """The script of a panel, from its template."""
     from dess.analysis.figures import style  # for the pages that have one
 
-    return load_template("panel_script.js").render(style=style)
+    return load_template(name).render(style=style)
 
 
 def panel_hash() -> str:
@@ -133,7 +133,8 @@ def fill_page(name: str, scripts: bool = False, simulates: bool = False, **value
     """Fill a template with values, and seal the page.
 
     A browser makes no request for the page, and runs scripts only if ``scripts`` is set. If
-    ``simulates`` is set, it runs the script of a panel, and its WebAssembly module.
+    ``simulates`` is set, it runs the script of a panel, and its WebAssembly module; the script of
+    *another mission* needs both.
     """
     permitted = {"scripts": scripts, "simulates": simulates}
     page = load_template(name).render(version=dess.__version__, **permitted, **values)

@@ -57,6 +57,7 @@ _PRICED = {
     "missions": "Missions planned for the fleet",
 }
 _NO_COSTS = Markup("<p>The panel of this page has no costs, since they are those of a year.</p>\n")
+_NO_NOTE = Markup("")
 _HASH = r'"([0-9a-f]{64})"'
 _PACKED = re.compile('(?<=type="text/plain">)([A-Za-z0-9+/=]+)(?=</script>)')
 _ENCODED = re.compile("[A-Za-z0-9+/=]*")
@@ -91,6 +92,7 @@ class Panel(Document):
         costs: The prices, if the missions have costs.
         requirements: The bounds on the means of metrics that the page is about.
         varied: By setting, the values that the study of the page has.
+        is_single: Whether it only shows single missions of the baseline.
     """
 
     scenario: str
@@ -103,6 +105,7 @@ class Panel(Document):
     costs: Costs | None = None
     requirements: dict[str, float] = {}
     varied: dict[str, list[Any]] = {}
+    is_single: bool = False
 
     @property
     def spaces(self) -> tuple[ScenarioSpace, ScenarioSpace]:
@@ -160,12 +163,12 @@ class Panel(Document):
         }
         return str(
             render_part(
-                "panel.html",
+                "another.html" if self.is_single else "panel.html",
                 data=data,
                 module=_pack(read_module()),
                 image=_pack(json.dumps(image.document()).encode()),
                 sides=SIDES,
-                script=panel_script(),
+                script=panel_script("another_script.js" if self.is_single else "panel_script.js"),
                 currency=self.costs.currency if self.costs else "",
                 start={side: {"policy": self.policy, "positions": starts[side]} for side in SIDES},
                 missions=MISSIONS,
@@ -212,12 +215,53 @@ def make_panel(
         requirements: Those that the page is about.
         varied: By setting, the values that the study of the page has, which the panel has too.
     """
-    note = Markup("")
+    note = _NO_NOTE
     if costs is not None and costs.years is not None:
         costs = None
         note = _NO_COSTS
+    more = {
+        "costs": costs,
+        "requirements": {
+            name: requirement.bound
+            for requirement in requirements
+            for name in METRICS
+            if requirement.column in (name, metric_of(name).in_units.column)
+        },
+        "varied": {
+            key: [value for value in values if is_number(value)]
+            for key, values in varied.items()
+            if key in _OFFERED
+        },
+    }
+    panel = _panel_of(baseline, variation, scenario, policies, seed).model_copy(update=more)
+    return _show_panel(panel, note)
+
+
+def make_another(
+    space: ScenarioSpace, scenario: str, policies: Sequence[str], seed: int
+) -> HTML | Markdown:
+    """What shows any single mission of a scenario, or of settings that its reader chooses.
+
+    Args:
+        space: The scenario.
+        scenario: Its name, as in ``make_panel``.
+        policies: The policies of the page, as in ``make_panel``.
+        seed: The seed of the missions.
+    """
+    panel = _panel_of(space, space, scenario, policies, seed)
+    return _show_panel(panel.model_copy(update={"is_single": True}))
+
+
+def _panel_of(
+    baseline: ScenarioSpace,
+    variation: ScenarioSpace,
+    scenario: str,
+    policies: Sequence[str],
+    seed: int,
+) -> Panel:
+    """A panel of two scenarios without costs and requirements."""
     named = scenario if is_scenario_name(scenario) else PAPER
-    panel = Panel(
+    return Panel(
         scenario=named,
         named=ScenarioSpace.of(named).model_dump(mode="json"),
         baseline=baseline.model_dump(mode="json"),
@@ -225,19 +269,11 @@ def make_panel(
         policy=next((name for name in policies if name in KINDS), "greedy"),
         seed=seed,
         module=sha256(read_module()).hexdigest(),
-        costs=costs,
-        requirements={
-            name: requirement.bound
-            for requirement in requirements
-            for name in METRICS
-            if requirement.column in (name, metric_of(name).in_units.column)
-        },
-        varied={
-            key: [value for value in values if is_number(value)]
-            for key, values in varied.items()
-            if key in _OFFERED
-        },
     )
+
+
+def _show_panel(panel: Panel, note: Markup = _NO_NOTE) -> HTML | Markdown:
+    """A panel, with what it is made of; a sentence instead where it is not possible."""
     try:
         rendered = panel.render()
     except InputError as error:

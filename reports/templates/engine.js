@@ -107,6 +107,21 @@ class Engine {
         return this.view(BigInt64Array, bytes.byteOffset, bytes.length / 8);
     }
 
+    /**
+     * The bytes of the records of a mission: of itself, of its UAVs, and of what was measured.
+     * @param {number} row
+     */
+    record(row) {
+        const parts = ["mission_records", "uav_records", "operations"].map((name) => {
+            const bytes = this.bytes(name), {shape} = this.image.arrays.find((array) => array.name === name);
+            const size = bytes.length / shape[0];
+            return bytes.subarray(row * size, (row + 1) * size);
+        });
+        const record = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
+        parts.reduce((end, part) => (record.set(part, end), end + part.length), 0);
+        return record;
+    }
+
     // A field of all records of an array.
     field(array, name) {
         const [offset, kind] = this.image.fields[array][name], bytes = this.bytes(array);

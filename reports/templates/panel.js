@@ -1,8 +1,6 @@
 // The panel of a page: a baseline and a variation that its reader simulates and compares.
 // What it shows is exploration; only known settings come from the address, and nothing is sent.
 
-/** @typedef { {positions: number[], policy: string}} Choice */
-
 (() => {
 "use strict";
 const root = document.getElementById("panel");
@@ -44,8 +42,6 @@ const choice = (side) => ({
     positions: inputs[side].sliders.map((input) => Number(input.value)),
     policy: inputs[side].policy.value,
 });
-/** @type {(choice: Choice) => string} */
-const keyOf = ({positions, policy}) => [policy, ...positions].join(" ");
 /** @type {(choice: Choice) => Record<string, number>} */
 const settingOf = ({positions}) => Object.fromEntries(data.settings.map(({key}, n) => [key, positions[n]]));
 const isSame = () => keyOf(choice("a")) === keyOf(choice("b"));
@@ -431,7 +427,7 @@ function showMission(row) {
         engine.follow(image.policies[chosen.policy]);
         playMission(`panel-player-${side}`, [replay(engine, row, data.sea, `Mission ${row} of ${NAMES[side]}`)]);
     }
-    find("mission-command").textContent = SIDES.map((side) => simulateCommand(side, row)).join("\n");
+    find("mission-command").textContent = SIDES.map((side) => simulateCommand(data, run.choices[side], row)).join("\n");
 }
 
 // A player without a mission.
@@ -443,29 +439,15 @@ function playerOf(side) {
     return figure;
 }
 
-// Commands are made of the page's own names and numbers, and quoted for the shell.
-const quoted = (text) => /^[\w.=,-]+$/.test(text) ? text : `'${text.replaceAll("'", `'\\''`)}'`;
-const isOfScenario = ({positions}) => ({default: position}, n) => positions[n] === position;
-const optionsOf = ({positions}, option, isLeftOut) => data.settings.flatMap((setting, n) =>
-    isLeftOut(setting, n) ? [] : [`${option} ${quoted(setting.options[positions[n]])}`]);
-const allOptionsOf = (chosen, option) =>
-    [...data.fixed.map((setting) => `${option} ${quoted(setting)}`), ...optionsOf(chosen, option, isOfScenario(chosen))];
-
-function simulateCommand(side, replication) {
-    const chosen = run.choices[side];
-    return ["dess simulate", `--policy ${quoted(chosen.policy)}`, `--scenario ${quoted(data.scenario)}`,
-        ...allOptionsOf(chosen, "--set"), `--seed ${data.seed}`, `--replication ${replication}`].join(" ");
-}
-
 function commandOf() {
     const [a, b] = SIDES.map(choice), count = Math.max(asked(), 2);
     const common = [`--scenario ${quoted(data.scenario)}`, `--seed ${data.seed}`, `--missions ${count}`];
     const isEqual = (_, n) => a.positions[n] === b.positions[n], areEqual = data.settings.every(isEqual);
     if (a.policy === b.policy && !areEqual)
-        return ["dess what-if", `--policy ${quoted(a.policy)}`, ...allOptionsOf(a, "--baseline"),
-            ...optionsOf(b, "--set", isEqual), ...common].join(" ");
+        return ["dess what-if", `--policy ${quoted(a.policy)}`, ...allOptionsOf(data, a, "--baseline"),
+            ...optionsOf(data, b, "--set", isEqual), ...common].join(" ");
     const evaluate = (chosen, policies) => ["dess evaluate", ...policies.map((policy) => `--policy ${quoted(policy)}`),
-        ...allOptionsOf(chosen, "--set"), ...common].join(" ");
+        ...allOptionsOf(data, chosen, "--set"), ...common].join(" ");
     if (areEqual) return evaluate(a, [...new Set([a.policy, b.policy])]);
     return [a, b].map((chosen) => evaluate(chosen, [chosen.policy])).join("\n");
 }

@@ -71,7 +71,7 @@ class Grid {
     /** @param {Answer} answer */
     take(answer) {
         const {values} = answer, {image} = this.cells[0].track.series, width = image.metrics.length;
-        for (let place = 0; place < values.length; place++) // what nobody asks for needs no interval
+        for (let place = 0; place < values.length; place++) // what no requirement asks for needs no interval
             if (!this.columns.has(place % width)) values[place] = NaN;
         this.cells.find(({track}) => track.order.name === answer.name)?.track.take(answer);
         this.away -= 1;

@@ -8,6 +8,8 @@
 
 {% include "panel_numbers.js" %}
 
+{% include "panel_commands.js" %}
+
 {% include "panel_crew.js" %}
 
 {% include "panel_grid.js" %}

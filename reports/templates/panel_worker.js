@@ -19,7 +19,7 @@ onmessage = ({data}) => {
     engine.call("play", first, count);
     engine.call("measure", count);
     const values = engine.floats("values").slice(0, count * image.metrics.length);
-    const records = wantsRecords ? recordsOf(engine, count) : null;
+    const records = wantsRecords ? Array.from({length: count}, (_, row) => engine.record(row)) : null;
     postMessage({name, first, count, job, values, records, took: performance.now() - began});
 };
 
@@ -36,21 +36,4 @@ function engineOf({key, setting, policy, prices}) {
     engine.follow(policy);
     engine.floats("prices").set(prices);
     return engine;
-}
-
-// The bytes of the records of each mission: of the mission, of its UAVs, and of what was measured.
-function recordsOf(engine, count) {
-    const parts = ["mission_records", "uav_records", "operations"].map((name) => {
-        const bytes = engine.bytes(name), rows = image.arrays.find((array) => array.name === name).shape[0];
-        return [bytes, bytes.length / rows];
-    });
-    return Array.from({length: count}, (_, row) => {
-        const record = new Uint8Array(parts.reduce((sum, [, size]) => sum + size, 0));
-        let end = 0;
-        for (const [bytes, size] of parts) {
-            record.set(bytes.subarray(row * size, (row + 1) * size), end);
-            end += size;
-        }
-        return record;
-    });
 }

@@ -20,8 +20,9 @@ from dess.analysis.wasm.image import copy_inputs, make_image
 from dess.reports.pages import panel as panels
 from dess.reports.pages.html import fill_page
 from dess.reports.pages.page import PANEL, Page
-from dess.reports.pages.panel import CHECKED, PORTION, hash_missions, make_panel
+from dess.reports.pages.panel import CHECKED, PORTION, hash_missions, make_another, make_panel
 from dess.reports.pages.verify import verify_page
+from dess.reports.player import player_script
 from tests.flown import Engine
 
 SEED = 7
@@ -381,6 +382,37 @@ def test_the_grid_is_stopped_and_goes_on(visit, searched):
     (later,) = re.findall(r"([\d,]+) missions\.", str(status.text_content()))
     assert int(later.replace(",", "")) == int(stopped.replace(",", "")) + 50
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_another_mission_is_played(visit, tmp_path):
+    """It is the one of Python: the page compares its records, and ends after as many slots."""
+    space = load_scenario("paper", uavs=2)
+    shown = {"title": "Another", "outcome": "", "library": player_script().data}
+    shown["player"] = make_another(space, "paper", ["ddqn"], SEED).data
+    path = tmp_path / "page.html"
+    path.write_text(fill_page("mission.html", scripts=True, simulates=True, **shown), "utf-8")
+    assert not any(check.differing for check in verify_page(path, 1, 0))
+    opened = visit(path, 390)
+    tab = opened.page
+    tab.locator("[name=number]").fill("5")
+    tab.get_by_role("button", name="Show the next one").click()
+    status = tab.locator("[data-panel=status]")
+    assert "same as that of Python, bit for bit" in str(status.text_content())
+    tab.locator("[name=a-uavs]").press("ArrowRight")
+    tab.get_by_role("button", name="Show this mission").click()
+    record = simulate_batch(
+        load_scenario("paper", uavs=3), policies.load("greedy"), SEED, [6]
+    ).missions[0]
+    assert f"collection ratio {100 * record['collection_ratio']:.1f} %" in str(
+        status.text_content()
+    )
+    assert f"of {record['slots']} · " in str(tab.locator("#another output").last.text_content())
+    command = str(tab.locator("[data-panel=command]").text_content())
+    assert command == (
+        f"dess simulate --policy greedy --scenario paper --set uavs=3 --seed {SEED} --replication 6"
+    )
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+    assert opened.complaints == []
 
 
 def test_missions_are_stopped(visit, document):
