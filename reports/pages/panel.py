@@ -25,7 +25,7 @@ from dess import InputError, simulate_batch
 from dess.analysis.answers.fleet.requirements import Requirement
 from dess.analysis.execution.effort import seconds_of
 from dess.analysis.figures import style
-from dess.analysis.metrics import PRODUCT, choose_units, metric_of
+from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, choose_units, metric_of
 from dess.analysis.names import RANGES, field_named, value_text
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS, PRICES
@@ -75,6 +75,8 @@ _LEVELS = {
     "failures.uav_rate": (0.0, 0.0005, 0.001, 0.002, 0.005),
 }
 _SIDE = 8  # of the grid, the most numbers of UAVs and of pads
+# What a search can require, by the names of the command line.
+_REQUIRED = {SUCCESS: "success", RATIO: "ratio", PRODUCT: "product", AGE: "age"}
 _OFFERED = (*_COUNTS, *_SCALED, *_LEVELS)
 
 
@@ -150,6 +152,7 @@ class Panel(Document):
             "policies": [name for name in KINDS if name != "random-unguarded"],
             "metrics": metrics,
             "prices": [*_describe_prices(self.costs)],
+            "priced": [*_other_prices(self.costs)],
             "grid": self._grid(settings),
             "sea": _describe_sea(baseline, fleet),
             "product": METRICS.index(PRODUCT),
@@ -458,6 +461,14 @@ def _describe_prices(costs: Costs | None) -> Iterator[dict[str, Any]]:
             yield {"name": name, "label": _PRICED[name], "value": getattr(costs, name)}
 
 
+def _other_prices(costs: Costs | None) -> Iterator[str]:
+    """What commands say of prices beside them."""
+    if costs is not None:
+        yield f"currency={costs.currency}"
+        if costs.slot_seconds is not None:
+            yield f"slot_seconds={costs.slot_seconds:g}"
+
+
 def _describe_metrics(space: ScenarioSpace, costs: Costs | None) -> Iterator[dict[str, Any]]:
     """What the panel writes of each metric, by its column in the values of missions."""
     offered = {*METRICS[: METRICS.index("reward")], *measures_of(space)}
@@ -477,6 +488,7 @@ def _describe_metrics(space: ScenarioSpace, costs: Costs | None) -> Iterator[dic
             "unit": metric.unit,
             "less": metric.less_is_better,
             "isOffered": name in offered,
+            "option": _REQUIRED.get(name, ""),
         }
 
 

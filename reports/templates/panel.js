@@ -226,7 +226,22 @@ const keyOfGrid = () => [
 ].join(" ");
 
 const askedOfGrid = () => Math.min(Math.max(Math.round(Number(named("grid-missions").value)) || 0, 1), MOST_MISSIONS);
-let gridKey = "";
+let gridKey = "", gridCommand = "";
+
+// The search of which the grid is an exploration, where the command can require the metrics.
+function sweepCommand() {
+    const required = requirements(), a = choice("a");
+    if (!required.every(({metric}) => metric.option)) return "";
+    const isAxis = ({key}) => key === "uavs" || key === "pads";
+    const axes = data.settings.filter(isAxis).map(({key, texts}) => `--set ${key}=${data.grid[key].map((position) => texts[position]).join(",")}`);
+    const isLeftOut = (setting, n) => isAxis(setting) || a.positions[n] === setting.default;
+    return ["dess sweep", `--policy ${quoted(a.policy)}`, ...data.fixed.map((setting) => `--set ${quoted(setting)}`),
+        ...optionsOf(data, a, "--set", isLeftOut), ...axes,
+        ...required.map(({metric, bound}) => `--require ${quoted(`${metric.option}=${bound}`)}`),
+        ...data.prices.map(({name}, n) => `--price ${quoted(`${name}=${prices()[n]}`)}`),
+        ...data.priced.map((price) => `--price ${quoted(price)}`),
+        `--scenario ${quoted(data.scenario)}`, `--seed ${data.seed}`].join(" ");
+}
 
 function fill() {
     stop();
@@ -259,11 +274,14 @@ function showGrid() {
     const isRunning = grid !== null && crew.job !== run && !grid.isOver, isNew = keyOfGrid() !== gridKey;
     find("fill").disabled = isRunning || !requirements().length;
     find("fill-stop").disabled = !isRunning;
+    find("fill-csv").disabled = grid === null || isNew;
     find("grid").classList.toggle("stale", grid !== null && isNew);
     if (!requirements().length) find("grid-status").textContent = "Choose what is required.";
     else if (grid && isNew) find("grid-status").textContent = "The grid is of the settings before: press Fill the grid.";
     else if (grid) {
         grid.requirements = requirements();
+        gridCommand = sweepCommand();
+        find("fill-command").textContent = gridCommand;
         if (isRunning) crew.wake(); // a bound that has moved may have opened a cell
         find("grid-status").textContent = `${grid.inWords()} ${grouped(grid.count)} missions${isRunning ? ", running" : ""}.`;
         grid.show(find("grid"));
@@ -387,6 +405,20 @@ function showDots() {
         context.fill();
     }
     context.globalAlpha = 1;
+    context.fillStyle = style.getPropertyValue("--muted");
+    context.font = "20px system-ui, sans-serif";
+    context.textAlign = "right";
+    context.fillText(EXPLORATION, side - 10, side - 12);
+}
+
+// The missions of the sides: a line for each, with the metrics that they have.
+function rowsOfMissions() {
+    const told = data.metrics.filter((metric) => run.sides.some((side) => run.tracks[side].series.estimate(metric).count));
+    const width = image.metrics.length, count = Math.min(...run.sides.map((side) => run.count(side)));
+    const head = ["mission", ...run.sides.flatMap((side) => told.map(({key}) => `${key}_${side}`))];
+    const rows = Array.from({length: count}, (_, row) =>
+        [row, ...run.sides.flatMap((side) => told.map(({column}) => run.valuesOf(side)[row * width + column]))]);
+    return [head, ...rows];
 }
 
 /**
@@ -554,6 +586,8 @@ async function open() {
     required.forEach(({line}) => line.addEventListener("input", require));
     if (data.grid) {
         find("fill").addEventListener("click", fill);
+        find("fill-csv").addEventListener("click", () => save("exploration-grid.csv",
+            new Blob([csvOf(grid.rows(), gridCommand)], {type: "text/csv"})));
         find("fill-stop").addEventListener("click", () => stop());
         named("grid-missions").addEventListener("input", (event) => event.stopPropagation());
     }
@@ -564,6 +598,9 @@ async function open() {
     find("link").addEventListener("click", (event) => copy(event.target, addressOf()));
     find("copy").addEventListener("click", (event) => copy(event.target, commandOf()));
     find("dots").addEventListener("click", pick);
+    const saveTable = (name, rows) => save(name, new Blob([csvOf(rows, commandOf())], {type: "text/csv"}));
+    find("csv").addEventListener("click", () => saveTable("exploration.csv", rowsOfMissions()));
+    find("picture").addEventListener("click", () => find("dots").toBlob((content) => save("exploration.png", content)));
     find("loss").addEventListener("click", () => pickWorst("loss"));
     find("worst").addEventListener("click", () => pickWorst("worst"));
     show();

@@ -36,6 +36,28 @@ const allOptionsOf = (about, choice, option) => [
     ...optionsOf(about, choice, option, (setting, n) => choice.positions[n] === setting.default),
 ];
 
+/**
+ * A table as CSV, which says that it is exploration, and what a study of it is.
+ * @type {(rows: (string | number)[][], command: string) => string}
+ */
+function csvOf(rows, command) {
+    const cell = (/** @type {string | number} */ content) => /[",]/.test(String(content)) ? `"${String(content).replaceAll('"', '""')}"` : content;
+    const lines = [...`${EXPLORATION}\n${command}`.trim().split("\n").map((line) => `# ${line}`), ...rows.map((row) => row.map(cell).join(","))];
+    return `${lines.join("\n")}\n`;
+}
+
+/**
+ * Let the reader save a file.
+ * @type {(name: string, content: Blob) => void}
+ */
+function save(name, content) {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(content);
+    link.download = name;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
 /** @type {(about: Named, choice: Choice, replication: number) => string} */
 function simulateCommand(about, choice, replication) {
     return ["dess simulate", `--policy ${quoted(choice.policy)}`, `--scenario ${quoted(about.scenario)}`,

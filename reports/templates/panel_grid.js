@@ -116,6 +116,19 @@ class Grid {
     }
 
     /**
+     * What is known of each cell, as lines of a table.
+     * @returns {(string | number)[][]}
+     */
+    rows() {
+        const metrics = [...this.requirements.map(({metric}) => metric), this.cost];
+        const head = metrics.flatMap(({key}) => [key, `${key}_low`, `${key}_high`]);
+        return [["fleet", "verdict", "missions", ...head], ...this.cells.map((cell) => {
+            const {series} = cell.track, estimates = metrics.map((metric) => series.estimate(metric));
+            return [cell.name, this.verdict(cell), series.count, ...estimates.flatMap(({mean, low, high}) => [mean, low, high])];
+        })];
+    }
+
+    /**
      * Write into the table what is known of each cell, and frame the cheapest.
      * @param {HTMLElement} table
      */

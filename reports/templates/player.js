@@ -223,6 +223,7 @@ function sceneOf(mission, canvas) {
                 frame(p);
                 p.draw();
             }
+            if (mission.note) text(mission.note, canvas.clientWidth - 4, canvas.clientHeight - 6, "right", "10px", MUTED);
             still = pen.getImageData(0, 0, canvas.width, canvas.height);
         }
         for (const p of panels) p.move(slot);

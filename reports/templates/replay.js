@@ -1,3 +1,5 @@
+const EXPLORATION = "exploration, not verified"; // what leaves a panel says so
+
 // A mission that the engine of a page simulates slot by slot, as player.js shows it.
 // `sea` is what the player draws of the scenario.
 function replay(engine, replication, sea, title) {
@@ -30,6 +32,7 @@ function replay(engine, replication, sea, title) {
         filled: counts[0].map((count, i) => count >= counts[1][i] && !lost[i]),
         status: residual.map((data, slot) => statusOf(slot, end, data, fleet, pads, sea.units)),
         events: [...eventsOf(fleet)],
+        note: EXPLORATION,
         ages: null,
         meanAge: null,
     };

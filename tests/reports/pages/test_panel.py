@@ -1,6 +1,7 @@
 """A panel simulates in a page what Python simulates; ``dess verify`` finds what was changed."""
 
 import gzip
+import io
 import json
 import re
 from base64 import b64decode, b64encode
@@ -8,6 +9,7 @@ from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from playwright.sync_api import Page as Tab
 
@@ -358,6 +360,16 @@ def test_the_grid_says_what_is_known_of_each_fleet(visit, searched):
     assert "The cheapest so far is 2 UAVs, 1 pad for 2,300 EUR; 1 UAV, 1 pad" in str(
         status.text_content()
     )
+    command = str(tab.locator("[data-panel=fill-command]").text_content())
+    assert (
+        "dess sweep --policy greedy --set uavs=1,2 --set pads=1,4 --require product=0." in command
+    )
+    with tab.expect_download() as saved:
+        tab.get_by_role("button", name="Save CSV").click()
+    lines = Path(saved.value.path()).read_text("utf-8").splitlines()
+    assert lines[0] == "# exploration, not verified"
+    assert lines[1] == f"# {command}"
+    assert len(lines) == 3 + len(grid)
     looks = {fleet: look for fleet, (look, _) in grid_of(tab).items()}
     assert (looks[1, 1], looks[2, 1]) == ("open", "meets leading")
     tab.locator("[name=bound-0]").fill("20")
@@ -382,6 +394,40 @@ def test_the_grid_is_stopped_and_goes_on(visit, searched):
     (later,) = re.findall(r"([\d,]+) missions\.", str(status.text_content()))
     assert int(later.replace(",", "")) == int(stopped.replace(",", "")) + 50
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+# Before the scripts of a page: keeps the texts that it draws.
+KEEP_TEXTS = """window.drawn = [];
+const fill = CanvasRenderingContext2D.prototype.fillText;
+CanvasRenderingContext2D.prototype.fillText = function (text, ...place) {
+    window.drawn.push(text);
+    fill.call(this, text, ...place);
+};"""
+
+
+def test_what_is_saved_says_that_it_is_exploration(visit, document):
+    """Pictures and CSV, whose missions are those of Python."""
+    tab = visit(document, 1280).page
+    tab.add_init_script(KEEP_TEXTS)
+    tab.reload()
+    run(tab)
+    assert "exploration, not verified" in tab.evaluate("window.drawn")
+    tab.evaluate("window.drawn = []")
+    tab.get_by_role("button", name="worst of B").click()
+    assert tab.evaluate("window.drawn").count("exploration, not verified") >= 2
+    with tab.expect_download() as saved:
+        tab.get_by_role("button", name="Save the missions as CSV").click()
+    text = Path(saved.value.path()).read_text("utf-8")
+    assert text.startswith("# exploration, not verified\n# dess what-if ")
+    table = pd.read_csv(io.StringIO(text), comment="#")
+    for side, uavs in (("a", 1), ("b", 2)):
+        records = simulate_batch(
+            load_scenario("paper", uavs=uavs), policies.load("greedy"), SEED, MISSIONS
+        )
+        assert np.array_equal(table[f"{PRODUCT}_{side}"], records.missions[PRODUCT])
+    with tab.expect_download() as saved:
+        tab.get_by_role("button", name="Save picture").click()
+    assert Path(saved.value.path()).read_bytes().startswith(b"\x89PNG")
 
 
 def test_another_mission_is_played(visit, tmp_path):
