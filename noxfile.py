@@ -48,6 +48,7 @@ QUICK_COMPILING = {"NUMBA_OPT": "1", "NUMBA_CACHE_DIR": str(Path("build/numba").
 # They start many processes, each of which would compile all modules for Python.
 QUICK_COMPILING["PYTHONDONTWRITEBYTECODE"] = ""
 RESULTS, REPORTS = Path("results"), Path("build/reports")
+TYPESCRIPT, TYPESCRIPT_VERSION = Path("build/typescript"), "5.9.3"
 # Beside the quick tests, what shows the lowest versions of the libraries for pages and commands.
 LOWEST = ("tests/reports/pages/test_body.py", "tests/reports/cli/test_lists.py")
 LOWEST += ("tests/reports/cli/test_console.py", "tests/analysis/results/test_parquet.py")
@@ -120,11 +121,27 @@ def fuzz(session: nox.Session) -> None:
 
 @nox.session
 def lint(session: nox.Session) -> None:
-    """Check style, format and types."""
+    """Check style, format and types; of the scripts of pages too, where Node.js is."""
     install(session, "[all,lint]")  # types of the optional libraries are checked too
     session.run("ruff", "check")
     session.run("ruff", "format", "--check")
     session.run("mypy")
+    check_scripts(session)
+
+
+def check_scripts(session: nox.Session) -> None:
+    """Check the types that scripts of pages have in comments, with a pinned TypeScript."""
+    tsc = TYPESCRIPT / "node_modules/.bin/tsc"
+    if not tsc.exists() and shutil.which("npm"):
+        TYPESCRIPT.mkdir(parents=True, exist_ok=True)
+        wanted = (f"typescript@{TYPESCRIPT_VERSION}", "--no-save", "--no-audit", "--no-fund")
+        once = ("--fetch-retries=0", "--prefix", str(TYPESCRIPT))
+        session.run("npm", "install", *wanted, *once, external=True, success_codes=range(256))
+    if not tsc.exists():
+        session.warn("The scripts of pages are not checked: there is no Node.js with TypeScript.")
+        return
+    for scripts in ("page", "worker"):
+        session.run(str(tsc), "-p", f"tools/types/{scripts}.json", external=True)
 
 
 @nox.session

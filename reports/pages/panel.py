@@ -489,6 +489,7 @@ def _describe_metrics(space: ScenarioSpace, costs: Costs | None) -> Iterator[dic
             "less": metric.less_is_better,
             "isOffered": name in offered,
             "option": _REQUIRED.get(name, ""),
+            "suffix": f" {metric.unit}" if name == AGE and space.units else "",
         }
 
 

@@ -2,6 +2,7 @@
 
 (() => {
 "use strict";
+/** @type {any} */
 const root = document.getElementById("another");
 const data = JSON.parse(document.getElementById("panel-data").textContent);
 const MOST = 99_999; // the largest number of a mission

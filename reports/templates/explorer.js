@@ -1,5 +1,6 @@
 (() => {
 "use strict";
+/** @type {any} */
 const root = document.getElementById("explorer");
 const {sliders, estimates} = JSON.parse(document.getElementById("explorer-data").textContent);
 const inputs = [...root.querySelectorAll("input[type=range]")];

@@ -3,6 +3,7 @@
 
 (() => {
 "use strict";
+/** @type {any} */
 const root = document.getElementById("panel");
 const data = JSON.parse(document.getElementById("panel-data").textContent);
 const SIDES = ["a", "b"], NAMES = {a: "A", b: "B"};
@@ -237,7 +238,7 @@ function sweepCommand() {
     const isLeftOut = (setting, n) => isAxis(setting) || a.positions[n] === setting.default;
     return ["dess sweep", `--policy ${quoted(a.policy)}`, ...data.fixed.map((setting) => `--set ${quoted(setting)}`),
         ...optionsOf(data, a, "--set", isLeftOut), ...axes,
-        ...required.map(({metric, bound}) => `--require ${quoted(`${metric.option}=${bound}`)}`),
+        ...required.map(({metric, bound}) => `--require ${quoted(`${metric.option}=${bound}${metric.suffix}`)}`),
         ...data.prices.map(({name}, n) => `--price ${quoted(`${name}=${prices()[n]}`)}`),
         ...data.priced.map((price) => `--price ${quoted(price)}`),
         `--scenario ${quoted(data.scenario)}`, `--seed ${data.seed}`].join(" ");
@@ -467,7 +468,7 @@ function playerOf(side) {
     const figure = document.createElement("figure");
     figure.className = "player";
     figure.id = `panel-player-${side}`;
-    figure.append(document.getElementById("panel-player").content.cloneNode(true));
+    figure.append(/** @type {any} */ (document.getElementById("panel-player")).content.cloneNode(true));
     return figure;
 }
 
@@ -579,7 +580,7 @@ async function open() {
     readAddress();
     root.hidden = false;
     find("choices").open = !matchMedia(NARROW).matches;
-    document.querySelectorAll("[data-to=panel]").forEach((link) => { link.hidden = false; });
+    document.querySelectorAll("[data-to=panel]").forEach((/** @type {any} */ link) => { link.hidden = false; });
     document.querySelectorAll("[data-replaced-by=panel]").forEach((element) => element.classList.add("replaced"));
     root.querySelectorAll("fieldset").forEach((fieldset) => { fieldset.disabled = false; });
     root.addEventListener("input", change);

@@ -10,6 +10,7 @@
  * @property {string} unit
  * @property {boolean} less - whether less is better
  * @property {boolean} isOffered - whether a reader may require it
+ * @property {string} suffix - of an amount on the command line
  * @property {string} option - its name on the command line, if a search can require it
  */
 

@@ -196,7 +196,8 @@ function sceneOf(mission, canvas) {
         }
         const bottom = y;
         y = wide ? 28 : y + 20;
-        const curves = [[battery, 1.5], [data, 1.5], ...(age ? [[age, 1.5]] : []), [charging, 1]];
+        /** @type {[any, number][]} */
+        const every = [[battery, 1.5], [data, 1.5], [age, 1.5], [charging, 1]], curves = every.filter(([make]) => make);
         const share = curves.reduce((sum, [, part]) => sum + part, 0);
         const unit = wide ? (Math.max(bottom, 360) - 40 - 38 * curves.length) / share : 80;
         for (const [make, part] of curves) {
@@ -304,7 +305,7 @@ function playMission(id, missions) {
         if (together) together.dispatchEvent(new CustomEvent("shown", { detail: { id, next } }));
     }
 
-    function join({ detail }) {
+    function join(/** @type {CustomEvent} */ { detail }) {
         if (detail.id === id) return;
         pause();
         slot = Math.max(0, Math.min(scene.end, Math.round(detail.next)));
@@ -344,7 +345,8 @@ function playMission(id, missions) {
     about.addEventListener("change", draw);
     if (choice) choice.addEventListener("change", () => choose(Number(choice.value)));
     figure.addEventListener("keydown", (event) => {
-        if (!(event.key in KEYS) || event.target.matches("button, select, a")) return;
+        const target = /** @type {HTMLElement} */ (event.target);
+        if (!(event.key in KEYS) || target.matches("button, select, a")) return;
         event.preventDefault();
         KEYS[event.key]();
     });
@@ -366,7 +368,7 @@ function playMission(id, missions) {
     canvas.style.width = "100%";
     find(".still").classList.add("replaced");
     find(".played").hidden = false;
-    if (together) together.addEventListener("shown", join);
+    if (together) together.addEventListener("shown", /** @type {any} */ (join));
     window.addEventListener("resize", () => { scene.arrange(); draw(); });
     window.addEventListener("hashchange", follow);
     choose(0);
