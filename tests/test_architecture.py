@@ -31,7 +31,15 @@ ROOMS = {
     ),
     "analysis": (
         *("numbers", "names", "metrics", "stats", "tables", "bound", "study", "wasm", "results"),
-        *("execution", "figures", "answers.settings", "answers.fleet", "answers", "paper"),
+        *(
+            "flights",
+            "execution",
+            "figures",
+            "answers.settings",
+            "answers.fleet",
+            "answers",
+            "paper",
+        ),
         "ask",
     ),
     "reports": (

@@ -2,12 +2,14 @@
 
 import json
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
+from dess.base.errors import InputError
 from dess.physics.chart import spread
 from dess.physics.fleet import type_of
 from dess.scenario.places import Projection
@@ -282,6 +284,10 @@ def _uavs_in_words(uavs: pd.Series, first: int) -> str:
 _KML = """<?xml version='1.0' encoding='UTF-8'?>
 <kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">"""
 
+_GPX = """<?xml version='1.0' encoding='UTF-8'?>
+<gpx xmlns="http://www.topografix.com/GPX/1/1" version="1.1" creator="dess">"""
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
 
 def paths_of(events: Events, scenario: Scenario) -> pd.DataFrame:
     """Where every UAV was at the start of every mission slot, and at its end.
@@ -313,29 +319,50 @@ def paths_of(events: Events, scenario: Scenario) -> pd.DataFrame:
     return table[[*table.columns.drop("battery"), "battery"]]
 
 
-def path_text(events: Events, scenario: Scenario, kind: str) -> str:
+def path_text(events: Events, scenario: Scenario, kind: str, start: datetime | None = None) -> str:
     """The paths in a file.
 
     Args:
         events: The event log (a data frame, or the columns, of ``dess.model.events.EventLog``).
         scenario: The scenario of the mission.
-        kind: ``csv``, ``geojson``, with cells where the sea has no degrees, or ``kml``.
+        kind: ``csv``, ``geojson``, with cells where the sea has no degrees, ``kml`` or ``gpx``.
+        start: When the mission starts. Without it KML and GPX, which have times of days only, count
+            from 1970 on. Without a data sheet, a mission slot is a second.
+
+    Raises:
+        InputError: If the mission lasts for longer than times of days go on.
     """
     table = paths_of(events, scenario)
+    if start or kind in ("kml", "gpx"):
+        table["utc"] = _moments(table, start or _EPOCH)
     if kind == "csv":
         return table.to_csv(index=False)
     if scenario.centre:
         axes = ["lon", "lat"]
     else:
         axes = ["x", "y"]
-    others = table.columns.intersection(["time", "seconds", "battery"])
+    others = table.columns.intersection(["time", "seconds", "battery", "utc"])
     paths = {uav: rows[[*axes, "altitude", *others]] for uav, rows in table.groupby("uav")}
-    return (_paths_as_kml if kind == "kml" else _paths_as_geojson)(paths)
+    writers = {"geojson": _paths_as_geojson, "kml": _paths_as_kml, "gpx": _paths_as_gpx}
+    return writers[kind](paths)
+
+
+def _moments(table: pd.DataFrame, start: datetime) -> pd.Series:
+    """The times of a table of paths as texts such as ``2026-06-01T08:00:00Z``."""
+    seconds = table["seconds"] if "seconds" in table else table["time"]
+    try:
+        moments = pd.Timestamp(start) + pd.to_timedelta(seconds, unit="s")
+    except (OverflowError, ValueError):
+        problem = f"the mission lasts for {seconds.max():g} s"
+        raise InputError(
+            "--path", problem, "less than 200 years, or .csv without --start"
+        ) from None
+    return moments.dt.round("s").dt.strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def _paths_as_geojson(paths: dict[int, pd.DataFrame]) -> str:
     """A line for each UAV, with the times and the battery at each of its places."""
-    names = {"time": "times", "seconds": "seconds", "battery": "battery"}
+    names = {"time": "times", "seconds": "seconds", "battery": "battery", "utc": "coordTimes"}
     features = [
         {
             "type": "Feature",
@@ -348,17 +375,25 @@ def _paths_as_geojson(paths: dict[int, pd.DataFrame]) -> str:
 
 
 def _paths_as_kml(paths: dict[int, pd.DataFrame]) -> str:
-    """A track for each UAV, with times from 1970 on, as KML has no others.
-
-    Without a data sheet, a mission slot is a second.
-    """
+    """A track for each UAV."""
     marks = []
     for uav, path in paths.items():
-        times = pd.to_datetime(path["seconds"] if "seconds" in path else path["time"], unit="s")
-        times = times.dt.round("s")
-        track = [f"<when>{time:%Y-%m-%dT%H:%M:%SZ}</when>" for time in times]
+        track = [f"<when>{moment}</when>" for moment in path["utc"]]
         track += ["<gx:coord>{} {} {}</gx:coord>".format(*at) for at in path.iloc[:, :3].to_numpy()]
         track.insert(0, "<altitudeMode>relativeToGround</altitudeMode>")
         mark = f"<name>UAV {uav + 1}</name><gx:Track>{''.join(track)}</gx:Track>"
         marks.append(f"<Placemark>{mark}</Placemark>")
     return f"{_KML}<Document>{''.join(marks)}</Document></kml>"
+
+
+def _paths_as_gpx(paths: dict[int, pd.DataFrame]) -> str:
+    """A track for each UAV; its longitudes are those from -180 to 180 degrees."""
+    tracks = []
+    for uav, path in paths.items():
+        points = [
+            f'<trkpt lat="{row.lat}" lon="{(row.lon + 180) % 360 - 180}">'
+            f"<ele>{row.altitude}</ele><time>{row.utc}</time></trkpt>"
+            for row in path.itertuples()
+        ]
+        tracks.append(f"<trk><name>UAV {uav + 1}</name><trkseg>{''.join(points)}</trkseg></trk>")
+    return f"{_GPX}{''.join(tracks)}</gpx>"

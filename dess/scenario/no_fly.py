@@ -317,6 +317,43 @@ def centres_in(rings: list[np.ndarray], size: Size) -> np.ndarray:
     return inside
 
 
+def polygons_hold(
+    path: Path, projection: Projection, source: NoFlyFile, spots: np.ndarray
+) -> np.ndarray:
+    """(K,) whether places on the grid lie in a polygon of a file of no-fly cells.
+
+    Args:
+        path: The file; a map, a picture and a file of cells have no polygons.
+        projection: That of the sea.
+        source: What is taken of the file.
+        spots: (K, 2) places [cells].
+
+    Raises:
+        InputError: If the file cannot be read.
+    """
+    is_held = np.zeros(len(spots), np.bool_)
+    if path.suffix.lower() not in places.READERS:
+        return is_held
+    for place in source.chosen(places.reader(path, places.READERS)(path).places):
+        for kind, rings in place.shapes:
+            for turned in projection.shapes(rings) if kind == places.POLYGON else ():
+                is_held |= _lie_in(turned, spots)
+    return is_held
+
+
+def _lie_in(rings: list[np.ndarray], spots: np.ndarray) -> np.ndarray:
+    """(K,) whether (K, 2) places lie in a polygon, by the even-odd rule as in ``centres_in``."""
+    x0, y0 = np.concatenate([ring[:-1] for ring in rings]).T
+    x1, y1 = np.concatenate([ring[1:] for ring in rings]).T
+    is_held = np.zeros(len(spots), np.bool_)
+    for number, (x, y) in enumerate(spots):
+        crosses = (y0 <= y) != (y1 <= y)
+        shares = (y - y0[crosses]) / (y1 - y0)[crosses]
+        crossings = x0[crosses] + shares * (x1 - x0)[crosses]
+        is_held[number] = (crossings < x).sum() % 2 == 1
+    return is_held
+
+
 _READERS: dict[str, Callable[..., np.ndarray]] = {
     **{".txt": _of_text, ".map": _of_text, ".png": _of_picture},
     **dict.fromkeys(places.READERS, _of_places),

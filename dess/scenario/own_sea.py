@@ -14,9 +14,9 @@ from pydantic import BaseModel, Field
 
 from dess.base.errors import InputError, validated
 from dess.physics.arrivals import MOST, MOST_AMOUNT
-from dess.physics.chart import Rectangle
+from dess.physics.chart import Cell, Rectangle
 from dess.physics.section import Integer, Number, Strict
-from dess.scenario.no_fly import NoFlyFile, no_fly_in, zones_in
+from dess.scenario.no_fly import NoFlyFile, no_fly_in, polygons_hold, zones_in
 from dess.scenario.nodes import DATA, RATES, Amounts, NodesFile, NodesFound
 from dess.scenario.places import Projection
 
@@ -55,6 +55,19 @@ def _are_places(zones: Any) -> bool:
     if isinstance(zones, list | tuple):
         tables = zones
     return any(isinstance(table, dict) and isinstance(table.get("cells"), dict) for table in tables)
+
+
+class Positions(NamedTuple):
+    """The places of nodes and zones that a scenario has in degrees, besides their cells.
+
+    Attributes:
+        nodes: Longitude and latitude of the first node of a cell [degrees], by the cell; without
+            those that lie in a no-fly polygon.
+        zones: Longitude and latitude of the middle of a zone [degrees], by its number from 0.
+    """
+
+    nodes: Mapping[Cell, tuple[float, float]]
+    zones: Mapping[int, tuple[float, float]]
 
 
 class OwnSea(NamedTuple):
@@ -106,6 +119,49 @@ class OwnSea(NamedTuple):
             placed |= nodes_found.fields(size, projection, closed, amounts, is_cell_fixed)
         return placed
 
+    def positions(self, values: Mapping[str, Any], of_nodes: Any) -> Positions:
+        """The places that its files and tables have in degrees; ``grid`` is the placed scenario.
+
+        Args:
+            values: The fields of the scenario, as for ``placed``.
+            of_nodes: What the scenario's file has for the nodes, as for ``placed``.
+
+        Raises:
+            InputError: If a file cannot be read.
+        """
+        zones: dict[int, tuple[float, float]] = {}
+        tables = [values.get("zone"), *(table["cells"] for table in values.get("zones") or ())]
+        for number, table in enumerate(tables):
+            if isinstance(table, dict):
+                zones[number] = (float(table["lon"]), float(table["lat"]))
+        nodes: dict[Cell, tuple[float, float]] = {}
+        if _is_named(of_nodes) and values["nodes"] is of_nodes:
+            nodes = self._node_positions(values, of_nodes)
+        return Positions(nodes, zones)
+
+    def _node_positions(
+        self, values: Mapping[str, Any], of_nodes: Any
+    ) -> dict[Cell, tuple[float, float]]:
+        """Longitude and latitude of the first node of each cell, outside of no-fly polygons."""
+        source = self._file(NodesFile, of_nodes, "nodes")
+        nodes_found = NodesFound.read(self.beside("nodes", source.file), source)
+        if not nodes_found.is_geographic:
+            return {}
+        projection = Projection(self.grid.centre, self.grid.size, self.grid.cell_size)
+        spots = projection.cells(nodes_found.spots)
+        is_closed = np.zeros(len(spots), np.bool_)
+        for no_fly in self._no_fly_files(values):
+            path = self.beside("no_fly", no_fly.file)
+            is_closed |= polygons_hold(path, projection, no_fly, spots)
+        positions: dict[Cell, tuple[float, float]] = {}
+        taken = set()
+        for (x, y), (lon, lat), closed in zip(spots, nodes_found.spots, is_closed, strict=True):
+            cell = (int(np.floor(x)), int(np.floor(y)))
+            if cell in self.grid.nodes and cell not in taken and not closed:
+                positions[cell] = (float(lon), float(lat))
+            taken.add(cell)
+        return positions
+
     def _replaces(self, kind: Amounts) -> bool:
         """Whether a field that replaces those of the file says what its nodes have."""
         return not self.replaced.isdisjoint({kind.field, kind.for_all})
@@ -141,16 +197,23 @@ class OwnSea(NamedTuple):
 
     def _no_fly(self, values: Mapping[str, Any], projection: Projection | None) -> dict[str, Any]:
         """The no-fly cells, row by row."""
-        if not _is_named(tables := values.get("no_fly")):
+        sources = self._no_fly_files(values)
+        if not sources:
             return {}
         closed = np.zeros(self.grid.size[::-1], np.bool_)
-        if not isinstance(tables, list):
-            tables = [tables]
-        for table in tables:
-            source = self._file(NoFlyFile, table, "no_fly")
+        for source in sources:
             path = self.beside("no_fly", source.file)
             closed |= no_fly_in(path, self.grid.size, projection, source)
         return {"no_fly": [(x, y) for y, x in np.argwhere(closed).tolist()]}
+
+    def _no_fly_files(self, values: Mapping[str, Any]) -> list[NoFlyFile]:
+        """The files of no-fly cells that the scenario names."""
+        tables = values.get("no_fly")
+        if not _is_named(tables):
+            return []
+        if not isinstance(tables, list):
+            tables = [tables]
+        return [self._file(NoFlyFile, table, "no_fly") for table in tables]
 
     def _zones(self, values: Mapping[str, Any], projection: Projection | None) -> dict[str, Any]:
         """The charging zones."""

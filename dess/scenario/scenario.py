@@ -47,7 +47,7 @@ from dess.scenario.fields import (
 )
 from dess.scenario.no_fly import notes_after
 from dess.scenario.nodes import AMOUNTS
-from dess.scenario.own_sea import OwnSea, unread
+from dess.scenario.own_sea import OwnSea, Positions, unread
 
 # What a design calls the scenario of its points, if it differs from point to point.
 SEA = "scenario"
@@ -280,6 +280,23 @@ def _of_values(
         values = merged(placed, read_values)
         values = merged(values, of_nodes)
     return validated(ScenarioSpace, values, where, context)
+
+
+def positions_in(name_or_path: str | Path, /, **overrides: Any) -> Positions:
+    """The places of the nodes and zones of a sea that its files and tables have in degrees.
+
+    Args:
+        name_or_path: The scenario, as for ``load_scenario``.
+        **overrides: Values that replace those of its file, as for ``load_scenario``.
+
+    Raises:
+        InputError: If there is no such scenario, or it is not valid.
+    """
+    space = load_scenario(name_or_path, **overrides)
+    where, read = _read(name_or_path)
+    values = merged(read, overrides)
+    own_sea = OwnSea(where, partial(_SCENARIOS.beside, name_or_path), space)
+    return own_sea.positions(values, read.get("nodes"))
 
 
 # What a function takes for a scenario: one, or what ``load_scenario`` takes.

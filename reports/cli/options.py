@@ -141,7 +141,16 @@ def load_space(name: str, settings: list[str] | None) -> "ScenarioSpace":
     """
     from dess import load_scenario
 
-    return load_scenario(name, **dict(parse_setting(text) for text in settings or []))
+    return load_scenario(name, **parse_settings(settings))
+
+
+def parse_settings(settings: list[str] | None) -> dict[str, Any]:
+    """The fields that ``--set`` sets; the last one counts where a field is set twice.
+
+    Raises:
+        InputError: If a setting is not valid.
+    """
+    return dict(parse_setting(text) for text in settings or [])
 
 
 def parse_setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, Any]:

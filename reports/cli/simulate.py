@@ -3,7 +3,9 @@
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -17,14 +19,16 @@ if TYPE_CHECKING:
     import numpy as np
     from matplotlib.figure import Figure
 
+    from dess.analysis.flights.flight_plan import FlightPlan
     from dess.model.record import MissionRecord
     from dess.policies.registry import Policy
+    from dess.scenario.own_sea import Positions
     from dess.scenario.scenario import Scenario, ScenarioSpace
 
 LOGS = (".parquet", ".csv")
 FIGURES = (".png", ".pdf", ".svg")
 ANIMATIONS = (".gif", ".mp4", ".html")
-PATHS = (".geojson", ".kml", ".csv")
+PATHS = (".geojson", ".kml", ".gpx", ".csv")
 # Metrics of ``--json``, between the names and the UAVs.
 METRICS = (
     *("slots", "success", "collection_ratio", "collection_ratio_and_communication"),
@@ -53,6 +57,8 @@ def simulate(
     figure: Annotated[Path | None, typer.Option(metavar="FILE.png")] = None,
     animation: Annotated[Path | None, typer.Option(metavar="FILE.gif")] = None,
     path: Annotated[Path | None, typer.Option(metavar="FILE.geojson")] = None,
+    plan: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
+    start: Annotated[str | None, typer.Option(metavar="TIME")] = None,
     yes: YesOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -71,13 +77,18 @@ def simulate(
         animation: Write the mission as an animation: .gif, .mp4 (needs ffmpeg), or .html, a
             page with its player.
         path: Write the path of each UAV with its times, in degrees where the sea has them:
-            .geojson, .kml or .csv.
+            .geojson, .kml, .gpx or .csv.
+        plan: Write each flight into this new folder, as a .plan that QGroundControl reads, and a
+            table of them. The mission is simulated with forbid_swaps; the sea needs degrees and a
+            data sheet.
+        start: Time of the start for --path and --plan, e.g. 2026-06-01T08:00Z.
     """
     from dess import simulate
     from dess.analysis.execution.effort import check_missions
     from dess.base.files.writing import writable
     from dess.model.state import check_seed, sample_scenario
     from dess.policies.registry import load_team
+    from dess.scenario.scenario import ScenarioSpace
 
     if of:
         _refuse_given(context, "scenario", "settings", "seed")
@@ -92,8 +103,15 @@ def simulate(
     if not yes:
         check_missions("simulate", [asked.space])
     check_seed(asked.seed, asked.replication)
-    if path and path.suffix.lower() == ".kml" and asked.space.centre is None:
+    if path and path.suffix.lower() in (".kml", ".gpx") and asked.space.centre is None:
         raise InputError(f"--path: {path}", "the sea has no degrees", ".geojson, .csv")
+    begin = None
+    if start is not None:
+        begin = _parse_start(start, is_used=path is not None or plan is not None)
+    positions = None
+    if plan is not None:
+        positions = _prepare_plan(plan, asked, settings)
+        asked = replace(asked, space=ScenarioSpace.of(asked.space, forbid_swaps=True))
     writers = {
         events: _write_log,
         figure: _write_map,
@@ -114,14 +132,18 @@ def simulate(
     is_binary = events is not None and console.is_stdout(events)
     if is_binary and as_json:
         raise InputError("--json", "standard output has the event log", "--events FILE")
-    with console.open_outputs(paths) as temporaries:
+    with console.open_outputs(paths) as temporaries, _open_folder(plan) as folder:
         with console.compile_notice():
             which = asked.seed, asked.replication
-            record = simulate(asked.space, asked.team, *which, events=bool(paths) or not as_json)
-        mission = _Mission(record, sample_scenario(asked.space, *which), asked.title)
+            has_log = bool(paths) or plan is not None or not as_json
+            record = simulate(asked.space, asked.team, *which, events=has_log)
+        mission = _Mission(record, sample_scenario(asked.space, *which), asked.title, begin)
         for file, temporary in zip(paths, temporaries, strict=True):
             with writable(file):
                 writers[file](mission, temporary, file.suffix[1:].lower())
+        flight_plan = None
+        if folder and positions:
+            flight_plan = _write_plan(mission, positions, folder)
     options.note_departures([asked.policy], [asked.space])
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
@@ -131,9 +153,17 @@ def simulate(
         measured = {}
         if record.operations is not None:
             measured["operations"] = in_units
+        if flight_plan:
+            measured["plan"] = flight_plan.summary()
         print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
     elif not is_binary:
         _print_mission(mission)
+    if flight_plan and not as_json:
+        stream = sys.stdout
+        if is_binary:
+            stream = sys.stderr
+        for line in flight_plan.lines():
+            console.print_text(line, stream)
 
 
 @dataclass(frozen=True)
@@ -219,6 +249,7 @@ class _Mission:
     record: "MissionRecord"
     scenario: "Scenario"
     title: str
+    start: datetime | None = None
 
     @property
     def log(self) -> "dict[str, np.ndarray]":
@@ -283,7 +314,64 @@ def _write_path(mission: _Mission, path: Path, kind: str) -> None:
     from dess.analysis.results.event_log import path_text
     from dess.base.files.writing import fill
 
-    fill(path, path_text(mission.log, mission.scenario, kind).encode())
+    fill(path, path_text(mission.log, mission.scenario, kind, mission.start).encode())
+
+
+def _parse_start(text: str, *, is_used: bool) -> datetime:
+    """A time of day with its date, in UTC unless it says otherwise.
+
+    Raises:
+        InputError: If it is none, or if no output has times of day.
+    """
+    if not is_used:
+        raise InputError("--start", "no output has times", "with --path FILE or --plan DIR")
+    allowed = "a date and a time from 1970 to 2100, e.g. 2026-06-01T08:00Z"
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        raise InputError("--start", f"{shown(text)} is no time", allowed) from None
+    if not 1970 <= moment.year <= 2100:
+        raise InputError("--start", f"{shown(text)} is out of range", allowed)
+    if moment.tzinfo is None:
+        return moment.replace(tzinfo=UTC)
+    return moment.astimezone(UTC)
+
+
+def _prepare_plan(plan: Path, asked: "_Asked", settings: list[str] | None) -> "Positions":
+    """The places that the sea of a plan has in degrees.
+
+    Raises:
+        InputError: If the mission cannot become a plan, or the folder cannot be made.
+    """
+    from dess.analysis.flights.flight_plan import check_plannable
+    from dess.base.files.writing import check_new_folder
+    from dess.scenario.scenario import positions_in
+
+    if asked.point is not None:
+        allowed = "without --of, with the --scenario, --seed and --replication of the mission"
+        raise InputError("--plan", "needs the files of the sea, which a study has not", allowed)
+    check_plannable(asked.space)
+    check_new_folder(plan)
+    return positions_in(asked.scenario, **options.parse_settings(settings))
+
+
+def _open_folder(plan: Path | None) -> AbstractContextManager[Path | None]:
+    """A temporary folder that becomes that of the plan, if there is one."""
+    from dess.base.files.writing import creating_folder
+
+    if plan is None:
+        return nullcontext()
+    return creating_folder(plan)
+
+
+def _write_plan(mission: _Mission, positions: "Positions", folder: Path) -> "FlightPlan":
+    from dess.analysis.flights.flight_plan import FlightPlan
+    from dess.base.files.writing import fill
+
+    flight_plan = FlightPlan.of(mission.log, mission.scenario, positions, mission.start)
+    for name, text in flight_plan.files().items():
+        fill(folder / name, text)
+    return flight_plan
 
 
 def _write_page(mission: _Mission, path: Path) -> None:

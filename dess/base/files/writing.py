@@ -53,9 +53,9 @@ def write_zip(path: Path, entries: Iterable[tuple[str, bytes]]) -> None:
 
 # The longest name of a file or a folder in the usual file systems [bytes].
 _LONGEST = 255
-# Temporary files: the number of their process, and a random one.
+# Temporary files and folders: the number of their process, and a random one.
 _TEMPORARY = re.compile(r"\.dess-(\d{1,9})-[0-9a-f]+\.tmp")
-_OWN: set[Path] = set()  # temporary files of this process
+_OWN: set[Path] = set()  # temporary files and folders of this process
 
 
 def write_file(path: Path, content: str | bytes) -> None:
@@ -122,9 +122,7 @@ def _temporary(path: Path) -> Iterator[Path]:
     """An empty file in the folder of ``path``, deleted at the end."""
     with writable(path):
         check_place(path)
-        temporary = path.with_name(f".dess-{os.getpid()}-{secrets.token_hex(4)}.tmp")
-        _OWN.add(temporary)
-        _sweep(path.parent.absolute())
+        temporary = _temporary_name(path)
         try:
             temporary.touch(exist_ok=False)  # an interrupt may come as soon as the file is there
             yield temporary
@@ -133,10 +131,48 @@ def _temporary(path: Path) -> Iterator[Path]:
             _OWN.discard(temporary)
 
 
-def remove_temporaries() -> None:
-    """Delete the temporary files of this process, which ends without a cleanup."""
-    for temporary in [*_OWN]:
+def _temporary_name(path: Path) -> Path:
+    """A name beside ``path`` that belongs to this process."""
+    temporary = path.with_name(f".dess-{os.getpid()}-{secrets.token_hex(4)}.tmp")
+    _OWN.add(temporary)
+    _sweep(path.parent.absolute())
+    return temporary
+
+
+@contextmanager
+def creating_folder(path: Path) -> Iterator[Path]:
+    """Yield a temporary folder that becomes ``path`` at the end, and is deleted on an error.
+
+    So there is either no such folder, or one with all its files.
+
+    Raises:
+        InputError: If it cannot be made, or as ``check_new_folder`` does.
+    """
+    check_new_folder(path)
+    target = Path(os.path.realpath(path))
+    with writable(path):
+        temporary = _temporary_name(target)
+        try:
+            temporary.mkdir()
+            yield temporary
+            temporary.rename(target)  # which replaces an empty folder
+        finally:
+            _discard(temporary)
+            _OWN.discard(temporary)
+
+
+def _discard(temporary: Path) -> None:
+    """Delete a temporary file, or a temporary folder with its files."""
+    if temporary.is_dir() and not temporary.is_symlink():
+        shutil.rmtree(temporary, ignore_errors=True)
+    else:
         temporary.unlink(missing_ok=True)
+
+
+def remove_temporaries() -> None:
+    """Delete the temporary files and folders of this process, which ends without a cleanup."""
+    for temporary in [*_OWN]:
+        _discard(temporary)
 
 
 def check_target(path: Path) -> None:
@@ -173,11 +209,11 @@ def _check_name(path: Path) -> None:
 
 @cache
 def _sweep(folder: Path) -> None:
-    """Delete the temporary files that processes have left which were killed, once per process."""
+    """Delete what processes have left there which were killed, once per process."""
     with suppress(OSError):
         for path in folder.iterdir():
             if (match := _TEMPORARY.fullmatch(path.name)) and not pid_exists(int(match[1])):
-                path.unlink(missing_ok=True)
+                _discard(path)
 
 
 @contextmanager
@@ -208,6 +244,21 @@ def check_folder(path: Path) -> None:
         if nearest.is_dir():
             reason = "Permission denied"
         raise InputError(path, f"cannot be written: {reason}", "another path")
+
+
+def check_new_folder(path: Path) -> None:
+    """Refuse a folder that ``creating_folder`` could not make, before a long computation begins.
+
+    Raises:
+        InputError: If there is a file or a folder with files, or if no folder can be made there.
+    """
+    check_folder(path)
+    target = Path(os.path.realpath(path))
+    if target.is_dir() and any(target.iterdir()):
+        raise InputError(path, "is a folder with files", "a new folder, or an empty one")
+    if not target.parent.is_dir():
+        raise InputError(path, f"there is no folder {path.parent}", "a new folder in one")
+    check_folder(target.parent)
 
 
 def make_folder(path: Path) -> None:

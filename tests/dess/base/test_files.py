@@ -23,7 +23,9 @@ from dess.base.files.reading import (
 )
 from dess.base.files.writing import (
     check_folder,
+    check_new_folder,
     check_target,
+    creating_folder,
     locked,
     replacing,
     replacing_all,
@@ -173,8 +175,27 @@ def test_the_next_process_deletes_what_a_killed_one_has_left(tmp_path):
     names = [f".dess-{n}-12345678.tmp" for n in (dead.pid, os.getpid(), os.getppid())]
     for name in (*names, other := f".notes-{dead.pid}.tmp"):
         (tmp_path / name).touch()
+    (folder := tmp_path / f".dess-{dead.pid}-0.tmp").mkdir()
+    (folder / "half").touch()
     write_file(tmp_path / "file", "")
     assert {*files_of(tmp_path)} == {"file", other, *names[1:]}
+
+
+def test_a_folder_is_there_with_all_its_files_or_not_at_all(tmp_path):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "link").symlink_to("empty")
+    for name in ("new", "empty"):
+        with pytest.raises(KeyError), creating_folder(tmp_path / name) as folder:
+            (folder / "half").touch()
+            raise KeyError
+    assert files_of(tmp_path) == {} and not (tmp_path / "new").exists()
+    for name in ("new", "link"):
+        with creating_folder(tmp_path / name) as folder:
+            (folder / "file").touch()
+    assert files_of(tmp_path) == {"new/file": b"", "empty/file": b""}
+    for name, line in {"new": "with files", "none/a": "no folder", "new/file": "Not a dir"}.items():
+        with pytest.raises(InputError, match=line):
+            check_new_folder(tmp_path / name)
 
 
 @pytest.mark.parametrize("name", ["a\0b", "x" * 256, "none/" + "x" * 256, "loop", "loop/a", "gone"])

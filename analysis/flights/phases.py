@@ -1,0 +1,174 @@
+"""What each UAV of a mission does, one phase after the other: it flies, charges or stands."""
+
+from collections.abc import Collection, Iterator
+from itertools import groupby
+from typing import Any, NamedTuple
+
+import pandas as pd
+
+from dess.analysis.results.event_log import Events, battery_levels, uav_slots
+from dess.base.errors import InputError
+from dess.physics.chart import Cell
+from dess.physics.fleet import type_of
+from dess.scenario.scenario import Scenario
+
+FLIGHT, CHARGING, STANDING = "flight", "charging", "standing"
+
+
+class Visit(NamedTuple):
+    """A cell that a UAV flies to.
+
+    Attributes:
+        cell: The cell.
+        slots: How long the UAV hovers there [mission slots].
+    """
+
+    cell: Cell
+    slots: int
+
+
+class Phase(NamedTuple):
+    """What a UAV does from one time to another.
+
+    Attributes:
+        uav: The number of the UAV, from 0.
+        kind: ``FLIGHT``, ``CHARGING`` or ``STANDING``.
+        start: When it begins [mission slots].
+        end: When it ends [mission slots].
+        battery: The battery at both times [%].
+        visits: The cells, from that of the take-off to that of the landing; on the ground only the
+            cell where the UAV is.
+    """
+
+    uav: int
+    kind: str
+    start: int
+    end: int
+    battery: tuple[int, int]
+    visits: tuple[Visit, ...]
+
+    @property
+    def moves(self) -> int:
+        """The cells that the UAV flies."""
+        return len(self.visits) - 1
+
+
+def list_phases(
+    events: Events, scenario: Scenario, bases: Collection[int] = ()
+) -> list[list[Phase]]:
+    """The phases of each UAV.
+
+    Args:
+        events: The event log (a data frame, or the columns, of ``dess.model.events.EventLog``).
+        scenario: The scenario of the mission, whose UAVs land.
+        bases: The numbers of zones that are one place: who moves from one of its cells to another
+            stands there.
+
+    Raises:
+        InputError: If a UAV fails, or does not end its mission on the ground.
+    """
+    log = pd.DataFrame(events)
+    _check_landings(log, scenario)
+    levels = battery_levels(log).set_index(["uav", "time"])["battery"]
+    of_uavs = []
+    for uav, rows in enumerate(slots for _, slots in uav_slots(log).groupby("uav")):
+        phases: list[Phase] = []
+        labelled = _label_slots(rows, scenario, uav)
+        for kind, group in groupby(labelled, key=lambda slot: slot.kind):
+            slots = [*group]
+            start = slots[0].number
+            end = slots[-1].number + 1
+            battery = (int(levels[uav, start]), int(levels[uav, end]))
+            phases.append(Phase(uav, kind, start, end, battery, tuple(_visits(slots, kind))))
+        of_uavs.append([*_without_hops(phases, scenario, bases)])
+    return of_uavs
+
+
+def _without_hops(
+    phases: list[Phase], scenario: Scenario, bases: Collection[int]
+) -> Iterator[Phase]:
+    """The phases; a UAV that moves within a base stands there."""
+    zones = scenario.chart.zones
+    pending: Phase | None = None
+    for phase in phases:
+        visited = {int(zones[y, x]) for (x, y), _ in phase.visits}
+        is_hop = len(visited) == 1 and visited <= {*bases}
+        if phase.kind == STANDING or (phase.kind == FLIGHT and is_hop):
+            standing = phase._replace(kind=STANDING, visits=phase.visits[-1:])
+            if pending:
+                battery = (pending.battery[0], standing.battery[1])
+                standing = standing._replace(start=pending.start, battery=battery)
+            pending = standing
+            continue
+        if pending:
+            yield pending
+            pending = None
+        yield phase
+    if pending:
+        yield pending
+
+
+class _Slot(NamedTuple):
+    """A slot of a UAV.
+
+    Attributes:
+        number: The number of the slot.
+        kind: The kind of its phase.
+        source: The cell from which the UAV comes.
+        target: The cell to which it flies, or where it is.
+        begins_move: Whether the UAV departs to another cell in this slot.
+        hovers: Whether it hovers in the air.
+    """
+
+    number: int
+    kind: str
+    source: Cell
+    target: Cell
+    begins_move: bool
+    hovers: bool
+
+
+def _check_landings(log: pd.DataFrame, scenario: Scenario) -> None:
+    failed = log.loc[log["event"] == "uav_failure", "uav"]
+    landed = log.loc[log["event"] == "landing", "uav"]
+    at_sea = sorted(set(range(scenario.uavs)) - {*landed})
+    allowed = "a mission in which every UAV lands, such as another --replication or --policy"
+    if len(failed):
+        raise InputError("--plan", f"UAV {failed.iloc[0] + 1} fails in this mission", allowed)
+    if at_sea:
+        raise InputError("--plan", f"UAV {at_sea[0] + 1} does not land in this mission", allowed)
+
+
+def _label_slots(rows: pd.DataFrame, scenario: Scenario, uav: int) -> Iterator[_Slot]:
+    """The slots of a UAV; that of a slow UAV is in the air as long as its move takes."""
+    zones = scenario.chart.zones
+    duration = type_of(scenario.fleet, uav).slots_per_cell
+    until = 0  # the slot in which the present move has ended
+    row: Any
+    for row in rows.itertuples():
+        source = (int(row.from_x), int(row.from_y))
+        target = (int(row.x), int(row.y))
+        if row.moved:
+            until = row.slot + duration
+        is_moving = row.slot < until
+        if is_moving or zones[target[1], target[0]] < 0:
+            kind = FLIGHT
+        elif row.charging:
+            kind = CHARGING
+        else:
+            kind = STANDING
+        hovers = kind == FLIGHT and not is_moving
+        yield _Slot(int(row.slot), kind, source, target, bool(row.moved), hovers)
+
+
+def _visits(slots: list[_Slot], kind: str) -> Iterator[Visit]:
+    """The cells of a phase, each with the slots of hovering."""
+    cell = slots[0].source
+    hovering = 0
+    for slot in slots:
+        if kind == FLIGHT and slot.begins_move:
+            yield Visit(cell, hovering)
+            cell = slot.target
+            hovering = 0
+        hovering += slot.hovers
+    yield Visit(cell, hovering)

@@ -1,0 +1,282 @@
+"""Plans of flights: their phases, way points, lengths and files, worked out by hand."""
+
+import json
+import math
+from pathlib import Path
+
+import jsonschema
+import mavsdk
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mavsdk.plugins.mission_raw import MissionRaw
+
+from dess import InputError, load_scenario, simulate
+from dess.analysis.flights.flight_plan import TABLE, FlightPlan
+from dess.analysis.flights.plan_file import outline_pieces
+from dess.model.state import sample_scenario
+from dess.physics.chart import NO_FLY
+from dess.scenario.no_fly import centres_in
+from dess.scenario.scenario import ScenarioSpace, positions_in
+from tests.analysis.flights.hand import (
+    CELL,
+    SHEET,
+    SLOT,
+    SPEED,
+    TYPED,
+    log_of,
+    middle,
+    scenario_of,
+    write_sea,
+)
+
+SCHEMA = json.loads(Path(__file__).with_name("plan.schema.json").read_text("utf-8"))
+# A quadrotor with PX4 says that it is there: a HEARTBEAT of MAVLink 2, with its checksum.
+HEARTBEAT = bytes.fromhex("fd09000000010100000000000000020c000003d7de")
+
+# To the node in cell (2, 1), where the UAV hovers for two slots, and back.
+THERE = [(1, 0), (1, 0), (2, 0), (2, 1), (2, 1), (2, 1), (2, 0), (1, 0), (0, 0), (0, 0)]
+
+
+def plan_of(path, *ways, uavs=1, **fields):
+    """The plan of a hand-made log of a sea."""
+    scenario = scenario_of(path, uavs=uavs, **fields)
+    return FlightPlan.of(log_of(*ways), scenario, positions_in(path))
+
+
+def items_of(text):
+    """Command and parameters of all items of a file."""
+    return [(item["command"], item["params"]) for item in json.loads(text)["mission"]["items"]]
+
+
+@pytest.fixture(scope="module")
+def jade_bight():
+    """The plan of a mission in the Jade Bight."""
+    space = ScenarioSpace.of(load_scenario("jade-bight"), forbid_swaps=True)
+    log = simulate(space, "tour", events=True).events.columns()
+    return FlightPlan.of(log, sample_scenario(space, 0, 0), positions_in("jade-bight"))
+
+
+# --- a flight by hand ---
+
+
+def test_a_flight_from_cell_to_cell_has_its_turns_its_stop_and_its_times(tmp_path):
+    plan = plan_of(write_sea(tmp_path), THERE)
+    (name, text), (table, _) = plan.files().items()
+    assert (name, table) == ("uav01-flight01-00h00m10s.plan", TABLE)
+    node = [0.0021, -0.0012]  # latitude and longitude of the first of two nodes in the cell
+    start, turn, end = ([lat, lon] for lon, lat in (middle(1, 0), middle(2, 0), middle(0, 0)))
+    assert items_of(text) == [
+        (22, [0, 0, 0, None, *map(pytest.approx, start), 10]),
+        (178, [1, pytest.approx(SPEED), -1, 0, 0, 0, 0]),
+        (16, [0, 0, 0, None, *map(pytest.approx, turn), 10]),
+        (19, [20, 0, 0, 0, *node, 10]),
+        (16, [0, 0, 0, None, *map(pytest.approx, turn), 10]),
+        (21, [0, 0, 0, None, *map(pytest.approx, end), 0]),
+    ]
+    # The node is 0.3 of a cell east of the middle of its cell, and 0.4 south of it.
+    (route,) = plan.routes.values()
+    assert route.shift == pytest.approx(0.5 * CELL, rel=1e-3)
+    assert route.ground_shift == 0
+    assert route.simulated_metres == pytest.approx(5 * CELL)
+    assert route.simulated_seconds == pytest.approx(7 * SLOT)
+    assert route.metres == pytest.approx((3 + 2 * math.hypot(0.3, 1.4)) * CELL, rel=1e-4)
+    assert route.seconds == pytest.approx(route.metres / SPEED + 2 * SLOT)
+    assert route.battery_end == pytest.approx(99 - 7 * route.seconds / route.simulated_seconds)
+
+
+def test_a_base_that_was_typed_in_degrees_is_where_it_was_typed(tmp_path):
+    """The UAV leaves it over the middle of the cell at its border, to stay in open cells."""
+    way = [(0, 0), (1, 0), (2, 0), (2, 1), (2, 0), (1, 0), (1, 0), (0, 0), (0, 0)]
+    plan = plan_of(write_sea(tmp_path, TYPED), way)
+    (route,) = plan.routes.values()  # a move from one of its cells to the other is no flight
+    places = [tuple(point.place) for point in route.points]
+    assert places[0] == places[-1] == (-0.0031, 0.0036)
+    assert [*map(pytest.approx, places[1:-1])] == [
+        *(middle(1, 0), middle(2, 0), middle(2, 1), middle(2, 0), middle(1, 0))
+    ]
+    assert route.ground_shift == pytest.approx(math.hypot(0.6, 0.1) * CELL, rel=1e-3)
+    document = json.loads([*plan.files().values()][0])
+    assert document["mission"]["plannedHomePosition"] == [0.0036, -0.0031, 0]
+    assert document["rallyPoints"]["points"] == [[0.0036, -0.0031, 10.0]]
+    assert [phase.kind for phase in plan.phases] == ["flight", "standing"]
+
+
+def test_charging_and_standing_lie_between_the_files(tmp_path):
+    hop = [(1, 0), (2, 0), (1, 0)]
+    log = log_of([(1, 0), (1, 0), *hop, (1, 0), (1, 0), *hop, (1, 0)])
+    rows = pd.DataFrame(log)
+    charge = rows.iloc[:2].assign(time=[4.0, 7.0], event=["charge_start", "charge_end"], uav=0)
+    scenario = scenario_of(write_sea(tmp_path), uavs=1)
+    plan = FlightPlan.of(pd.concat([rows, charge]), scenario, positions_in(tmp_path / "sea.toml"))
+    table = plan.table()
+    kinds = ["standing", "flight", "charging", "flight", "standing"]
+    assert table["phase"].tolist() == kinds
+    assert (table["start"][1:].to_numpy() == table["end"][:-1].to_numpy()).all()
+    assert table["file"].ne("").tolist() == [kind == "flight" for kind in kinds]
+
+
+def test_a_slow_uav_is_in_the_air_as_long_as_its_moves_take(tmp_path):
+    """Its log has the next cell from the first of the slots on."""
+    sea = write_sea(tmp_path, sheet="[[fleet]]\nslots_per_cell = 2\n" + SHEET)
+    out = [(1, 0), (2, 0), (2, 0), (3, 0), (3, 0), (3, 0)]  # it hovers for the last slot
+    plan = plan_of(sea, [*out, (2, 0), (2, 0), (1, 0), (1, 0), (1, 0)])
+    (route,) = plan.routes.values()
+    assert route.speed == pytest.approx(SPEED / 2)
+    assert route.simulated_metres == pytest.approx(4 * CELL)
+    assert [point.seconds for point in route.points] == [0, SLOT, 0]
+    assert route.seconds == pytest.approx(route.simulated_seconds, rel=1e-4) == 9 * SLOT
+
+
+# --- what cannot be a plan ---
+
+
+def test_a_mission_in_which_a_uav_does_not_land_is_refused(tmp_path):
+    scenario = scenario_of(write_sea(tmp_path), uavs=1)
+    positions = positions_in(tmp_path / "sea.toml")
+    with pytest.raises(InputError, match="UAV 1 does not land in this mission; allowed: "):
+        FlightPlan.of(log_of(THERE, landed=False), scenario, positions)
+    log = pd.DataFrame(log_of(THERE))
+    failure = log.iloc[:1].assign(event="uav_failure")
+    with pytest.raises(InputError, match="UAV 1 fails in this mission; allowed: "):
+        FlightPlan.of(pd.concat([log, failure]), scenario, positions)
+
+
+# --- where way points are ---
+
+
+def test_no_way_point_lies_in_a_no_fly_polygon(tmp_path):
+    """The polygon covers the node, and not the middle of its cell, which is therefore open."""
+    ring = [[-0.0013, 0.002], [-0.0011, 0.002], [-0.0011, 0.0022], [-0.0013, 0.002]]
+    polygon = {"type": "Polygon", "coordinates": [ring]}
+    (tmp_path / "land.geojson").write_text(json.dumps({"features": [{"geometry": polygon}]}))
+    sea = write_sea(tmp_path, fields='no_fly = "land.geojson"\n')
+    assert load_scenario(sea).no_fly == ()
+    assert positions_in(sea).nodes == {(5, 5): (0.0018, -0.0012)}
+    assert plan_of(sea, THERE).summary()["largest_shift_m"] == 0
+
+
+def test_places_that_the_files_do_not_decide_are_the_middles_of_cells(tmp_path):
+    sea = write_sea(tmp_path, TYPED)
+    assert positions_in(sea).nodes.keys() == {(2, 1), (5, 5)}
+    other = positions_in(sea, nodes=[[2, 1]], zone=[3, 3, 2, 2])
+    assert (other.nodes, other.zones) == ({}, {})
+
+
+def test_the_ways_of_a_mission_stay_in_open_cells_of_the_grid(jade_bight):
+    sea = jade_bight.sea
+    zones = sea.scenario.chart.zones
+    for route in jade_bight.routes.values():
+        spots = sea.projection.cells(np.array([point.place for point in route.points]))
+        for start, end in zip(spots, spots[1:], strict=False):
+            x, y = np.floor(np.linspace(start, end, 99).T).astype(int)
+            assert (zones[y, x] != NO_FLY).all()
+
+
+def test_flights_agree_with_the_simulation_within_what_is_told(jade_bight):
+    """The lengths are computed from the files again, on a sphere as well."""
+    summary = jade_bight.summary()
+    table = jade_bight.table().query("file != ''").set_index("file")
+    assert summary["flights"] == len(table) > 20
+    for name, text in jade_bight.files().items():
+        if name == TABLE:
+            continue
+        places = [params[4:6] for command, params in items_of(text) if command != 178]
+        lat, lon = np.radians(np.array(places)).T
+        steps = np.hypot(np.diff(lat), np.diff(lon) * np.cos((lat[1:] + lat[:-1]) / 2))
+        metres = 6_371_008.8 * steps.sum()
+        waits = sum(params[0] for command, params in items_of(text) if command == 19)
+        row = table.loc[name]
+        assert row["metres"] == pytest.approx(metres, abs=1)
+        assert row["seconds"] == pytest.approx(metres / 15 + waits, abs=1)
+        assert abs(metres - row["simulated_metres"]) <= summary["largest_difference_m"] + 1
+        assert abs(row["seconds"] - row["simulated_seconds"]) <= summary["largest_difference_s"]
+        assert row["simulated_seconds"] == pytest.approx(row["end"] - row["start"])
+        assert row["shift"] <= summary["largest_shift_m"]
+
+
+def test_longitudes_are_those_of_the_earth_on_both_sides_of_the_180th_meridian(tmp_path):
+    sea = write_sea(tmp_path)
+    (tmp_path / "nodes.csv").write_text("lon,lat\n179.9994,-0.0012\n")
+    sea.write_text(sea.read_text().replace("centre = [0, 0]", "centre = [180, 0]"))
+    way = [(1, 0), *((x, 0) for x in range(2, 7)), *((x, 0) for x in range(5, 0, -1)), (1, 0)]
+    plan = plan_of(sea, way)
+    (route,) = plan.routes.values()
+    assert [point.place.lon for point in route.points] == pytest.approx(
+        [179.9975, -179.9975, 179.9975]
+    )
+    assert route.metres == pytest.approx(route.simulated_metres, rel=1e-4)
+    assert json.loads([*plan.files().values()][0])["geoFence"]["polygons"] == []
+    assert plan.lines()[-1].startswith("There is no geofence")
+
+
+# --- who is near ---
+
+
+def test_the_closest_approach_of_two_uavs_is_that_of_their_ways_and_altitudes(tmp_path):
+    """One leaves the cell that another enters from its side, when both are half on their way."""
+    first = [(1, 0), (2, 0), (3, 0), (3, 1), (3, 2), (3, 1), (3, 0), (2, 0), (1, 0), (1, 0)]
+    second = [(0, 0), (0, 0), (0, 1), (0, 0), (0, 0), (0, 0), (0, 0), (0, 0), (0, 0), (0, 0)]
+    plan = plan_of(write_sea(tmp_path), first, second, uavs=2)
+    # Both fly in the slots 1 and 2: the nearest is the start of slot 1, two cells apart.
+    assert plan.summary()["closest_approach_m"] == pytest.approx(math.hypot(2 * CELL, 5), rel=1e-3)
+    second = [(0, 0), (0, 0), (1, 0), (1, 0)]
+    first = [(1, 0), (1, 0), (1, 1), (1, 1), (1, 0), (1, 0)]
+    plan = plan_of(write_sea(tmp_path), first, second, uavs=2)
+    nearest = math.hypot(CELL / math.sqrt(2), 5)
+    assert plan.summary()["closest_approach_m"] == pytest.approx(nearest, rel=1e-3)
+    assert plan.summary()["closest_approach_outside_zones_m"] is None
+    altitudes = [route.altitude for route in plan.routes.values()]
+    assert altitudes == [10.0, 15.0]
+
+
+# --- files ---
+
+
+@given(st.lists(st.lists(st.booleans(), min_size=7, max_size=7), min_size=1, max_size=7))
+def test_the_pieces_of_a_fence_cover_the_no_fly_cells_and_no_others(rows):
+    closed = np.array(rows)
+    covered = np.zeros(closed.shape, int)
+    for corners in outline_pieces(closed):
+        ring = np.array([*corners, corners[0]], float)
+        covered += centres_in([ring], closed.shape[::-1])
+        x, y = ring.T
+        # On the grid y grows south, so that a positive area is clockwise on a map.
+        assert (x[:-1] * y[1:] - x[1:] * y[:-1]).sum() > 0
+    assert (covered == closed).all()
+
+
+def test_the_files_have_the_form_of_qgroundcontrol(jade_bight, tmp_path):
+    validator = jsonschema.Draft202012Validator(SCHEMA)
+    plans = [jade_bight, plan_of(write_sea(tmp_path), THERE)]
+    for name, text in (entry for plan in plans for entry in plan.files().items()):
+        if name != TABLE:
+            validator.validate(json.loads(text))
+    wrong = json.loads(text := [*plans[1].files().values()][0])
+    wrong["mission"]["items"][0]["params"].pop()
+    assert not validator.is_valid(wrong) and validator.is_valid(json.loads(text))
+
+
+def test_mavsdk_reads_the_files(jade_bight):
+    """Its importer, with no autopilot but a message that says that there is one."""
+    component = mavsdk.ComponentType.GROUND_STATION
+    with mavsdk.Mavsdk(mavsdk.Configuration.create_with_component_type(component)) as station:
+        station.add_any_connection("raw://")
+        station.pass_received_raw_bytes(HEARTBEAT)
+        importer = MissionRaw(station.first_autopilot())
+        for name, text in jade_bight.files().items():
+            if name == TABLE:
+                continue
+            data = importer.import_qgroundcontrol_mission_from_string(text)
+            document = json.loads(text)
+            items = document["mission"]["items"]
+            assert [item.command for item in data.mission_items] == [i["command"] for i in items]
+            for item, written in zip(data.mission_items, items, strict=True):
+                assert [item.x, item.y] == [round(1e7 * part) for part in written["params"][4:6]]
+                assert item.z == pytest.approx(written["params"][6])
+                assert item.frame == written["frame"]
+            corners = sum(len(p["polygon"]) for p in document["geoFence"]["polygons"])
+            assert len(data.geofence_items) == corners == jade_bight.fence.corners
+            assert len(data.rally_items) == 2
