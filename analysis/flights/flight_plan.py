@@ -5,6 +5,7 @@ from datetime import datetime, timedelta
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from dess.analysis.flights.phases import Phase, list_phases
@@ -14,9 +15,11 @@ from dess.analysis.numbers import format_count
 from dess.analysis.results.event_log import Events
 from dess.base.errors import InputError
 from dess.scenario.own_sea import Positions
+from dess.scenario.places import Projection
 from dess.scenario.scenario import Constants, Scenario
 
 TABLE = "plan.csv"
+MOST_DAYS = 1000  # of a mission
 
 
 def check_plannable(scenario: Constants) -> None:
@@ -33,6 +36,13 @@ def check_plannable(scenario: Constants) -> None:
         raise InputError("--plan", "the scenario has no cruise and no slot in seconds", allowed)
     if not scenario.landing:
         raise InputError("--plan", "the UAVs do not land", "landing = true")
+    days = scenario.max_slots * scenario.units.slot / 86_400
+    if days > MOST_DAYS:
+        raise InputError("--plan", f"the mission lasts for {days:,.0f} d", f"{MOST_DAYS} d at most")
+    projection = Projection(scenario.centre, scenario.size, scenario.cell_size)
+    (west, north), (east, south) = projection.degrees(np.array([(0, 0), scenario.size], float))
+    if north > 90 or south < -90 or east - west > 180:
+        raise InputError("--plan", "the grid reaches beyond a pole", "a smaller grid")
 
 
 @dataclass(frozen=True)
@@ -81,7 +91,7 @@ class FlightPlan:
         for phase in self.phases:
             if phase.moves:
                 numbers[phase.uav] = numbers.get(phase.uav, 0) + 1
-                route = self.sea.route(phase)
+                route = self.sea.plan_route(phase)
                 flight = f"uav{phase.uav + 1:02}-flight{numbers[phase.uav]:02}"
                 routes[f"{flight}-{_name_time(route.start)}.plan"] = route
         return routes
@@ -91,14 +101,14 @@ class FlightPlan:
         """The geofence of all files."""
         return Fence(self.sea)
 
-    def files(self) -> dict[str, str]:
+    def make_files(self) -> dict[str, str]:
         """The names of all files with their contents."""
         files = {
             name: plan_text(route, self.sea, self.fence) for name, route in self.routes.items()
         }
-        return files | {TABLE: self.table().to_csv(index=False)}
+        return files | {TABLE: self.make_table().to_csv(index=False)}
 
-    def table(self) -> pd.DataFrame:
+    def make_table(self) -> pd.DataFrame:
         """All phases of all UAVs.
 
         Returns:
@@ -115,10 +125,10 @@ class FlightPlan:
         rows = []
         for phase in self.phases:
             name, route = named.get(phase, ("", None))
-            rows.append(self._row(phase) | {"file": name} | _row_of_flight(route))
+            rows.append(self._make_row(phase) | {"file": name} | _row_of_flight(route))
         return pd.DataFrame(rows)
 
-    def _row(self, phase: Phase) -> dict[str, Any]:
+    def _make_row(self, phase: Phase) -> dict[str, Any]:
         units = self.sea.scenario.units
         assert units
         times = {"start": phase.start * units.slot, "end": phase.end * units.slot}
@@ -129,28 +139,28 @@ class FlightPlan:
                 moment = self.start + timedelta(seconds=time)
                 row[name] = moment.isoformat(timespec="seconds")
         row["battery_start"], row["battery_end"] = phase.battery
-        row["lon"], row["lat"] = self.sea.ground(phase.visits[-1].cell)
+        row["lon"], row["lat"] = self.sea.place_on_ground(phase.visits[-1].cell)
         return row
 
-    def summary(self) -> dict[str, Any]:
+    def summarise_errors(self) -> dict[str, Any]:
         """How exact the plan is, by the names that the JSON of a mission has."""
         routes = [*self.routes.values()]
         return {
             "flights": len(routes),
-            "largest_shift_m": _largest(r.shift for r in routes),
-            "largest_ground_shift_m": _largest(r.ground_shift for r in routes),
-            "largest_difference_m": _largest(r.metres - r.simulated_metres for r in routes),
-            "largest_difference_s": _largest(r.seconds - r.simulated_seconds for r in routes),
+            "largest_shift_m": _largest_of(r.shift for r in routes),
+            "largest_ground_shift_m": _largest_of(r.ground_shift for r in routes),
+            "largest_difference_m": _largest_of(r.metres - r.simulated_metres for r in routes),
+            "largest_difference_s": _largest_of(r.seconds - r.simulated_seconds for r in routes),
             "lowest_battery": min((r.phase.battery[1] for r in routes), default=None),
             "lowest_battery_planned": min((round(r.battery_end, 1) for r in routes), default=None),
-            "closest_approach_m": self._metres(outside_zones=False),
-            "closest_approach_outside_zones_m": self._metres(outside_zones=True),
+            "closest_approach_m": _metres_of(self.approach),
+            "closest_approach_outside_zones_m": _metres_of(self.approach_outside_zones),
             "fence_corners": self.fence.corners,
         }
 
-    def lines(self) -> list[str]:
+    def list_sentences(self) -> list[str]:
         """The same in sentences."""
-        summary = self.summary()
+        summary = self.summarise_errors()
         if not self.routes:
             return [f"No UAV flies in this mission; {TABLE} says what they do."]
         lines = [
@@ -161,14 +171,13 @@ class FlightPlan:
             f"{summary['largest_difference_m']:g} m and {summary['largest_difference_s']:g} s.",
             f"The lowest battery at a landing is {summary['lowest_battery']} % in the simulation, "
             f"and about {summary['lowest_battery_planned']:g} % on the ways of the files.",
-            self._approach_sentence("Closest approach of two UAVs", outside_zones=False),
-            self._approach_sentence("Outside of the zones", outside_zones=True),
+            f"Closest approach of two UAVs: {self._describe_approach(self.approach)}",
+            f"Outside of the zones: {self._describe_approach(self.approach_outside_zones)}",
         ]
         short = sum(route.battery_end <= 0 for route in self.routes.values())
         if short:
-            lines.append(
-                f"Of {format_count(short, 'flight')} the battery may not last for its way."
-            )
+            flights = format_count(short, "flight")
+            lines.append(f"The battery may not last for the ways of {flights}.")
         if self.fence.corners:
             count = format_count(summary["fence_corners"], "corner")
             lines.append(f"The geofence has {count}; autopilots keep only so many.")
@@ -176,23 +185,29 @@ class FlightPlan:
             lines.append("There is no geofence, since the sea crosses the 180th meridian.")
         return lines
 
-    def _approach(self, outside_zones: bool) -> Approach | None:
-        return closest_approach(self.routes.values(), self.sea, outside_zones)
+    @cached_property
+    def approach(self) -> Approach | None:
+        """When two UAVs in flight are nearest to each other."""
+        return closest_approach(self.routes.values(), self.sea)
 
-    def _metres(self, outside_zones: bool) -> float | None:
-        approach = self._approach(outside_zones)
-        if approach:
-            return round(approach.metres, 1)
-        return None
+    @cached_property
+    def approach_outside_zones(self) -> Approach | None:
+        """The same in the time in which both are outside of all zones."""
+        return closest_approach(self.routes.values(), self.sea, outside_zones=True)
 
-    def _approach_sentence(self, title: str, outside_zones: bool) -> str:
-        approach = self._approach(outside_zones)
+    def _describe_approach(self, approach: Approach | None) -> str:
         if approach is None:
-            return f"{title}: no two fly at the same time."
+            return "no two fly at the same time."
         names = {id(route): name for name, route in self.routes.items()}
         first, second = (names[id(route)] for route in approach.routes)
         time = _name_time(approach.seconds)
-        return f"{title}: {approach.metres:.1f} m, after {time}, of {first} and {second}."
+        return f"{approach.metres:.1f} m, after {time}, of {first} and {second}."
+
+
+def _metres_of(approach: Approach | None) -> float | None:
+    if approach:
+        return round(approach.metres, 1)
+    return None
 
 
 def _row_of_flight(route: Route | None) -> dict[str, Any]:
@@ -212,7 +227,7 @@ def _row_of_flight(route: Route | None) -> dict[str, Any]:
     }
 
 
-def _largest(differences: Any) -> float:
+def _largest_of(differences: Any) -> float:
     """The largest of some differences, whatever their signs, to a tenth."""
     return round(max(map(abs, differences), default=0.0), 1)
 

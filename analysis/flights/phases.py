@@ -79,7 +79,7 @@ def list_phases(
             start = slots[0].number
             end = slots[-1].number + 1
             battery = (int(levels[uav, start]), int(levels[uav, end]))
-            phases.append(Phase(uav, kind, start, end, battery, tuple(_visits(slots, kind))))
+            phases.append(Phase(uav, kind, start, end, battery, tuple(_list_visits(slots, kind))))
         of_uavs.append([*_without_hops(phases, scenario, bases)])
     return of_uavs
 
@@ -161,7 +161,7 @@ def _label_slots(rows: pd.DataFrame, scenario: Scenario, uav: int) -> Iterator[_
         yield _Slot(int(row.slot), kind, source, target, bool(row.moved), hovers)
 
 
-def _visits(slots: list[_Slot], kind: str) -> Iterator[Visit]:
+def _list_visits(slots: list[_Slot], kind: str) -> Iterator[Visit]:
     """The cells of a phase, each with the slots of hovering."""
     cell = slots[0].source
     hovering = 0

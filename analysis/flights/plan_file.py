@@ -37,9 +37,9 @@ class Fence:
         columns, rows = sea.scenario.size
         grid: Corners = [(0, 0), (columns, 0), (columns, rows), (0, rows)]
         closed = sea.scenario.chart.zones == NO_FLY
-        self.inside = [sea.corner(*corner) for corner in grid]
+        self.inside = [sea.place_at(*corner) for corner in grid]
         self.outside = [
-            [sea.corner(*corner) for corner in piece] for piece in outline_pieces(closed)
+            [sea.place_at(*corner) for corner in piece] for piece in outline_pieces(closed)
         ]
         if self.inside[0].lon > self.inside[1].lon:
             self.inside = []
@@ -50,11 +50,11 @@ class Fence:
         """The number of all corners."""
         return len(self.inside) + sum(map(len, self.outside))
 
-    def document(self) -> dict[str, Any]:
+    def make_document(self) -> dict[str, Any]:
         """The fence as the file has it."""
-        polygons = [_polygon(corners, inclusion=False) for corners in self.outside]
+        polygons = [_make_polygon(corners, inclusion=False) for corners in self.outside]
         if self.inside:
-            polygons.insert(0, _polygon(self.inside, inclusion=True))
+            polygons.insert(0, _make_polygon(self.inside, inclusion=True))
         return {"circles": [], "polygons": polygons, "version": 2}
 
 
@@ -75,21 +75,21 @@ def outline_pieces(closed: np.ndarray) -> Iterator[Corners]:
         for start, end in runs:
             above = [piece for piece in growing if piece[-1][1] < end and start < piece[-1][2]]
             piece = []
-            if len(above) == 1 and _touching(above[0][-1], runs) == 1:
+            if len(above) == 1 and _count_touching(above[0][-1], runs) == 1:
                 piece = above[0]
             piece.append((row, start, end))
             still_growing.append(piece)
-        yield from (_outline(piece) for piece in growing if piece[-1][0] < row)
+        yield from (_trace_outline(piece) for piece in growing if piece[-1][0] < row)
         growing = still_growing
-    yield from map(_outline, growing)
+    yield from map(_trace_outline, growing)
 
 
-def _touching(above: tuple[int, int, int], runs: list[tuple[int, int]]) -> int:
+def _count_touching(above: tuple[int, int, int], runs: list[tuple[int, int]]) -> int:
     """How many runs of a row touch a run of the row above."""
     return sum(start < above[2] and above[1] < end for start, end in runs)
 
 
-def _outline(piece: list[tuple[int, int, int]]) -> Corners:
+def _trace_outline(piece: list[tuple[int, int, int]]) -> Corners:
     """The corners of a piece: down its right side, and up its left one."""
     right = [(end, y) for row, _, end in piece for y in (row, row + 1)]
     left = [(start, y) for row, start, _ in piece for y in (row, row + 1)]
@@ -106,22 +106,22 @@ def _outline(piece: list[tuple[int, int, int]]) -> Corners:
 
 def plan_text(route: Route, sea: SeaMap, fence: Fence) -> str:
     """The file of a flight."""
-    return json.dumps(_document(route, sea, fence), indent=4) + "\n"
+    return json.dumps(_make_document(route, sea, fence), indent=4) + "\n"
 
 
-def _document(route: Route, sea: SeaMap, fence: Fence) -> dict[str, Any]:
+def _make_document(route: Route, sea: SeaMap, fence: Fence) -> dict[str, Any]:
     home = route.points[0].place
-    zones = [sea.zone(number) for number in range(len(sea.scenario.rectangles))]
+    zones = [sea.place_of_zone(number) for number in range(len(sea.scenario.rectangles))]
     return {
         "fileType": "Plan",
-        "geoFence": fence.document(),
+        "geoFence": fence.make_document(),
         "groundStation": "QGroundControl",
         "mission": {
             "cruiseSpeed": route.speed,
             "firmwareType": _PX4,
             "globalPlanAltitudeMode": _RELATIVE,
             "hoverSpeed": route.speed,
-            "items": [*_items(route)],
+            "items": [*_list_items(route)],
             "plannedHomePosition": [home.lat, home.lon, 0],
             "vehicleType": _QUADROTOR,
             "version": 2,
@@ -134,27 +134,27 @@ def _document(route: Route, sea: SeaMap, fence: Fence) -> dict[str, Any]:
     }
 
 
-def _items(route: Route) -> Iterator[dict[str, Any]]:
+def _list_items(route: Route) -> Iterator[dict[str, Any]]:
     """The items of a flight, numbered from 1."""
     take_off, *points, landing = route.points
     items = [
-        _item(TAKE_OFF, [0, 0, 0, None], take_off, route.altitude),
+        _make_item(TAKE_OFF, [0, 0, 0, None], take_off, route.altitude),
         _change_speed(route.speed),
-        *(_at(point, route.altitude) for point in points),
-        _item(LAND, [0, 0, 0, None], landing, 0),
+        *(_item_at(point, route.altitude) for point in points),
+        _make_item(LAND, [0, 0, 0, None], landing, 0),
     ]
     for number, item in enumerate(items, 1):
         yield item | {"doJumpId": number}
 
 
-def _at(point: WayPoint, altitude: float) -> dict[str, Any]:
+def _item_at(point: WayPoint, altitude: float) -> dict[str, Any]:
     """The item of a way point, where the UAV may hover."""
     if point.seconds:
-        return _item(LOITER, [point.seconds, 0, 0, 0], point, altitude)
-    return _item(WAY_POINT, [0, 0, 0, None], point, altitude)
+        return _make_item(LOITER, [point.seconds, 0, 0, 0], point, altitude)
+    return _make_item(WAY_POINT, [0, 0, 0, None], point, altitude)
 
 
-def _item(
+def _make_item(
     command: int, parameters: list[float | None], point: WayPoint, altitude: float
 ) -> dict[str, Any]:
     """An item at a place; the altitude is that above home."""
@@ -180,7 +180,7 @@ def _change_speed(speed: float) -> dict[str, Any]:
     }
 
 
-def _polygon(corners: list[Place], *, inclusion: bool) -> dict[str, Any]:
+def _make_polygon(corners: list[Place], *, inclusion: bool) -> dict[str, Any]:
     return {
         "inclusion": inclusion,
         "polygon": [[corner.lat, corner.lon] for corner in corners],

@@ -41,7 +41,7 @@ class Place(NamedTuple):
         wrapped = (lon + 180) % 360 - 180
         return cls(round(wrapped, _DECIMALS), round(lat, _DECIMALS))
 
-    def distance(self, other: "Place") -> float:
+    def distance_to(self, other: "Place") -> float:
         """The length of the shortest way to another place [m], on a sphere."""
         north = math.radians(other.lat - self.lat)
         east = math.radians(other.lon - self.lon)
@@ -93,7 +93,7 @@ class Route:
         times = []
         before = self.points[0].place
         for point in self.points:
-            time += before.distance(point.place) / self.speed
+            time += before.distance_to(point.place) / self.speed
             times.append((time, point.place))
             if point.seconds:
                 time += point.seconds
@@ -115,7 +115,7 @@ class Route:
     def metres(self) -> float:
         """How long its way is."""
         places = [point.place for point in self.points]
-        return math.fsum(map(Place.distance, places, places[1:]))
+        return math.fsum(map(Place.distance_to, places, places[1:]))
 
     @property
     def shift(self) -> float:
@@ -164,21 +164,21 @@ class SeaMap:
         """The numbers of the zones that are one place, since they were typed in degrees."""
         return {*self._positions.zones}
 
-    def corner(self, x: float, y: float) -> Place:
+    def place_at(self, x: float, y: float) -> Place:
         """A place on the grid [cells]."""
         [(lon, lat)] = self.projection.degrees(np.array([[x, y]], float))
         return Place.of(float(lon), float(lat))
 
-    def middle(self, cell: Cell) -> Place:
+    def middle_of(self, cell: Cell) -> Place:
         """The middle of a cell."""
-        return self.corner(cell[0] + 0.5, cell[1] + 0.5)
+        return self.place_at(cell[0] + 0.5, cell[1] + 0.5)
 
-    def zone(self, number: int) -> Place:
+    def place_of_zone(self, number: int) -> Place:
         """The place of a zone: where it was typed, or else the middle of its cells."""
         if number in self._positions.zones:
             return Place.of(*self._positions.zones[number])
         x, y, width, height = self.scenario.rectangles[number]
-        return self.corner(x + width / 2, y + height / 2)
+        return self.place_at(x + width / 2, y + height / 2)
 
     def in_zones(self, spots: np.ndarray) -> np.ndarray:
         """(N,) whether places on the grid [cells] are in a zone."""
@@ -194,14 +194,14 @@ class SeaMap:
         latitudes = np.radians((degrees[:, 1] + others_in_degrees[:, 1]) / 2)
         return step * np.stack([np.cos(latitudes), np.ones_like(latitudes)], axis=1)
 
-    def ground(self, cell: Cell) -> Place:
+    def place_on_ground(self, cell: Cell) -> Place:
         """Where a UAV stands that is in a cell of a zone."""
         number = self._zone_of(cell)
         if number in self.bases:
-            return self.zone(number)
-        return self.middle(cell)
+            return self.place_of_zone(number)
+        return self.middle_of(cell)
 
-    def route(self, flight: Phase) -> Route:
+    def plan_route(self, flight: Phase) -> Route:
         """The way of a flight."""
         kind = type_of(self.scenario.fleet, flight.uav)
         cells = [visit.cell for visit in flight.visits]
@@ -235,32 +235,32 @@ class SeaMap:
 
     def _leave_ground(self, cell: Cell, border: Cell) -> list[WayPoint]:
         """The take-off from a cell, and the way to the middle of a cell at the zone's border."""
-        place = self.ground(cell)
-        points = [WayPoint(place, 0.0, place.distance(self.middle(cell)))]
+        place = self.place_on_ground(cell)
+        points = [WayPoint(place, 0.0, place.distance_to(self.middle_of(cell)))]
         [spot] = self.projection.cells(np.array([place]))
         if tuple(np.floor(spot)) != border:
-            points.append(WayPoint(self.middle(border), 0.0, 0.0))
+            points.append(WayPoint(self.middle_of(border), 0.0, 0.0))
         return points
 
     def _way_point(self, visit: Visit) -> WayPoint:
         """A way point: where a UAV hovers at a node, that of the node."""
-        middle = self.middle(visit.cell)
-        place = middle
+        cell_middle = self.middle_of(visit.cell)
+        place = cell_middle
         if visit.slots and visit.cell in self._positions.nodes:
             place = Place.of(*self._positions.nodes[visit.cell])
         seconds = round(visit.slots * self._units.slot, 3)
-        return WayPoint(place, seconds, place.distance(middle))
+        return WayPoint(place, seconds, place.distance_to(cell_middle))
 
 
 def _turns_and_stops(visits: Sequence[Visit]) -> Iterator[Visit]:
     """The cells between the first and the last where a UAV turns or hovers."""
     for before, visit, after in zip(visits, visits[1:], visits[2:], strict=False):
-        turns = _step(before, visit) != _step(visit, after)
+        turns = _step_between(before, visit) != _step_between(visit, after)
         if turns or visit.slots:
             yield visit
 
 
-def _step(source: Visit, target: Visit) -> tuple[int, int]:
+def _step_between(source: Visit, target: Visit) -> tuple[int, int]:
     return target.cell[0] - source.cell[0], target.cell[1] - source.cell[1]
 
 
@@ -281,7 +281,7 @@ def closest_approach(
     for pair in combinations(tracks, 2):
         if pair[0].route.phase.uav == pair[1].route.phase.uav:
             continue
-        approach = _approach(*pair, outside_zones)
+        approach = _find_approach(*pair, outside_zones)
         if approach and (nearest is None or approach.metres < nearest.metres):
             nearest = approach
     return nearest
@@ -307,13 +307,13 @@ class _Track(NamedTuple):
         times, places = zip(*route.times, strict=True)
         return cls(route, np.array(times), sea.projection.cells(np.array(places)), sea)
 
-    def at(self, times: np.ndarray) -> np.ndarray:
+    def spots_at(self, times: np.ndarray) -> np.ndarray:
         """(N, 2) places on the grid at N times."""
         axes = [np.interp(times, self.times, axis) for axis in self.spots.T]
         return np.stack(axes, axis=1)
 
 
-def _approach(track: _Track, other: _Track, outside_zones: bool) -> Approach | None:
+def _find_approach(track: _Track, other: _Track, outside_zones: bool) -> Approach | None:
     """When two UAVs are nearest to each other in the time in which both fly."""
     start = max(track.times[0], other.times[0])
     end = min(track.times[-1], other.times[-1])
@@ -326,8 +326,8 @@ def _approach(track: _Track, other: _Track, outside_zones: bool) -> Approach | N
     times = np.unique(np.clip(joined, start, end))
     if len(times) == 1:
         times = np.repeat(times, 2)
-    spots = track.at(times)
-    others = other.at(times)
+    spots = track.spots_at(times)
+    others = other.spots_at(times)
     away = sea.metres_between(spots, others)
     step = np.diff(away, axis=0)
     length = (step * step).sum(axis=1)

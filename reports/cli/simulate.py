@@ -154,7 +154,7 @@ def simulate(
         if record.operations is not None:
             measured["operations"] = in_units
         if flight_plan:
-            measured["plan"] = flight_plan.summary()
+            measured["plan"] = flight_plan.summarise_errors()
         print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
     elif not is_binary:
         _print_mission(mission)
@@ -162,7 +162,7 @@ def simulate(
         stream = sys.stdout
         if is_binary:
             stream = sys.stderr
-        for line in flight_plan.lines():
+        for line in flight_plan.list_sentences():
             console.print_text(line, stream)
 
 
@@ -369,7 +369,7 @@ def _write_plan(mission: _Mission, positions: "Positions", folder: Path) -> "Fli
     from dess.base.files.writing import fill
 
     flight_plan = FlightPlan.of(mission.log, mission.scenario, positions, mission.start)
-    for name, text in flight_plan.files().items():
+    for name, text in flight_plan.make_files().items():
         fill(folder / name, text)
     return flight_plan
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from mavsdk.plugins.mission_raw import MissionRaw
 
 from dess import InputError, load_scenario, simulate
+from dess.analysis.flights import flight_plan
 from dess.analysis.flights.flight_plan import TABLE, FlightPlan
 from dess.analysis.flights.plan_file import outline_pieces
 from dess.model.state import sample_scenario
@@ -64,7 +65,7 @@ def jade_bight():
 
 def test_a_flight_from_cell_to_cell_has_its_turns_its_stop_and_its_times(tmp_path):
     plan = plan_of(write_sea(tmp_path), THERE)
-    (name, text), (table, _) = plan.files().items()
+    (name, text), (table, _) = plan.make_files().items()
     assert (name, table) == ("uav01-flight01-00h00m10s.plan", TABLE)
     node = [0.0021, -0.0012]  # latitude and longitude of the first of two nodes in the cell
     start, turn, end = ([lat, lon] for lon, lat in (middle(1, 0), middle(2, 0), middle(0, 0)))
@@ -98,7 +99,7 @@ def test_a_base_that_was_typed_in_degrees_is_where_it_was_typed(tmp_path):
         *(middle(1, 0), middle(2, 0), middle(2, 1), middle(2, 0), middle(1, 0))
     ]
     assert route.ground_shift == pytest.approx(math.hypot(0.6, 0.1) * CELL, rel=1e-3)
-    document = json.loads([*plan.files().values()][0])
+    document = json.loads([*plan.make_files().values()][0])
     assert document["mission"]["plannedHomePosition"] == [0.0036, -0.0031, 0]
     assert document["rallyPoints"]["points"] == [[0.0036, -0.0031, 10.0]]
     assert [phase.kind for phase in plan.phases] == ["flight", "standing"]
@@ -111,7 +112,7 @@ def test_charging_and_standing_lie_between_the_files(tmp_path):
     charge = rows.iloc[:2].assign(time=[4.0, 7.0], event=["charge_start", "charge_end"], uav=0)
     scenario = scenario_of(write_sea(tmp_path), uavs=1)
     plan = FlightPlan.of(pd.concat([rows, charge]), scenario, positions_in(tmp_path / "sea.toml"))
-    table = plan.table()
+    table = plan.make_table()
     kinds = ["standing", "flight", "charging", "flight", "standing"]
     assert table["phase"].tolist() == kinds
     assert (table["start"][1:].to_numpy() == table["end"][:-1].to_numpy()).all()
@@ -144,6 +145,13 @@ def test_a_mission_in_which_a_uav_does_not_land_is_refused(tmp_path):
         FlightPlan.of(pd.concat([log, failure]), scenario, positions)
 
 
+def test_a_mission_for_which_there_are_no_times_of_day_is_refused(tmp_path, monkeypatch):
+    scenario = scenario_of(write_sea(tmp_path, sheet=SHEET.replace("300 s", "9 d")), uavs=1)
+    monkeypatch.setattr(flight_plan, "MOST_DAYS", 8)
+    with pytest.raises(InputError, match="--plan: the mission lasts for 9 d; allowed: 8 d at most"):
+        flight_plan.check_plannable(scenario)
+
+
 # --- where way points are ---
 
 
@@ -155,7 +163,7 @@ def test_no_way_point_lies_in_a_no_fly_polygon(tmp_path):
     sea = write_sea(tmp_path, fields='no_fly = "land.geojson"\n')
     assert load_scenario(sea).no_fly == ()
     assert positions_in(sea).nodes == {(5, 5): (0.0018, -0.0012)}
-    assert plan_of(sea, THERE).summary()["largest_shift_m"] == 0
+    assert plan_of(sea, THERE).summarise_errors()["largest_shift_m"] == 0
 
 
 def test_places_that_the_files_do_not_decide_are_the_middles_of_cells(tmp_path):
@@ -177,10 +185,10 @@ def test_the_ways_of_a_mission_stay_in_open_cells_of_the_grid(jade_bight):
 
 def test_flights_agree_with_the_simulation_within_what_is_told(jade_bight):
     """The lengths are computed from the files again, on a sphere as well."""
-    summary = jade_bight.summary()
-    table = jade_bight.table().query("file != ''").set_index("file")
+    summary = jade_bight.summarise_errors()
+    table = jade_bight.make_table().query("file != ''").set_index("file")
     assert summary["flights"] == len(table) > 20
-    for name, text in jade_bight.files().items():
+    for name, text in jade_bight.make_files().items():
         if name == TABLE:
             continue
         places = [params[4:6] for command, params in items_of(text) if command != 178]
@@ -192,7 +200,8 @@ def test_flights_agree_with_the_simulation_within_what_is_told(jade_bight):
         assert row["metres"] == pytest.approx(metres, abs=1)
         assert row["seconds"] == pytest.approx(metres / 15 + waits, abs=1)
         assert abs(metres - row["simulated_metres"]) <= summary["largest_difference_m"] + 1
-        assert abs(row["seconds"] - row["simulated_seconds"]) <= summary["largest_difference_s"]
+        late = row["seconds"] - row["simulated_seconds"]
+        assert abs(late) <= summary["largest_difference_s"] + 0.2
         assert row["simulated_seconds"] == pytest.approx(row["end"] - row["start"])
         assert row["shift"] <= summary["largest_shift_m"]
 
@@ -208,8 +217,8 @@ def test_longitudes_are_those_of_the_earth_on_both_sides_of_the_180th_meridian(t
         [179.9975, -179.9975, 179.9975]
     )
     assert route.metres == pytest.approx(route.simulated_metres, rel=1e-4)
-    assert json.loads([*plan.files().values()][0])["geoFence"]["polygons"] == []
-    assert plan.lines()[-1].startswith("There is no geofence")
+    assert json.loads([*plan.make_files().values()][0])["geoFence"]["polygons"] == []
+    assert plan.list_sentences()[-1].startswith("There is no geofence")
 
 
 # --- who is near ---
@@ -221,13 +230,14 @@ def test_the_closest_approach_of_two_uavs_is_that_of_their_ways_and_altitudes(tm
     second = [(0, 0), (0, 0), (0, 1), (0, 0), (0, 0), (0, 0), (0, 0), (0, 0), (0, 0), (0, 0)]
     plan = plan_of(write_sea(tmp_path), first, second, uavs=2)
     # Both fly in the slots 1 and 2: the nearest is the start of slot 1, two cells apart.
-    assert plan.summary()["closest_approach_m"] == pytest.approx(math.hypot(2 * CELL, 5), rel=1e-3)
+    nearest = math.hypot(2 * CELL, 5)
+    assert plan.summarise_errors()["closest_approach_m"] == pytest.approx(nearest, rel=1e-3)
     second = [(0, 0), (0, 0), (1, 0), (1, 0)]
     first = [(1, 0), (1, 0), (1, 1), (1, 1), (1, 0), (1, 0)]
     plan = plan_of(write_sea(tmp_path), first, second, uavs=2)
     nearest = math.hypot(CELL / math.sqrt(2), 5)
-    assert plan.summary()["closest_approach_m"] == pytest.approx(nearest, rel=1e-3)
-    assert plan.summary()["closest_approach_outside_zones_m"] is None
+    assert plan.summarise_errors()["closest_approach_m"] == pytest.approx(nearest, rel=1e-3)
+    assert plan.summarise_errors()["closest_approach_outside_zones_m"] is None
     altitudes = [route.altitude for route in plan.routes.values()]
     assert altitudes == [10.0, 15.0]
 
@@ -251,10 +261,10 @@ def test_the_pieces_of_a_fence_cover_the_no_fly_cells_and_no_others(rows):
 def test_the_files_have_the_form_of_qgroundcontrol(jade_bight, tmp_path):
     validator = jsonschema.Draft202012Validator(SCHEMA)
     plans = [jade_bight, plan_of(write_sea(tmp_path), THERE)]
-    for name, text in (entry for plan in plans for entry in plan.files().items()):
+    for name, text in (entry for plan in plans for entry in plan.make_files().items()):
         if name != TABLE:
             validator.validate(json.loads(text))
-    wrong = json.loads(text := [*plans[1].files().values()][0])
+    wrong = json.loads(text := [*plans[1].make_files().values()][0])
     wrong["mission"]["items"][0]["params"].pop()
     assert not validator.is_valid(wrong) and validator.is_valid(json.loads(text))
 
@@ -266,7 +276,7 @@ def test_mavsdk_reads_the_files(jade_bight):
         station.add_any_connection("raw://")
         station.pass_received_raw_bytes(HEARTBEAT)
         importer = MissionRaw(station.first_autopilot())
-        for name, text in jade_bight.files().items():
+        for name, text in jade_bight.make_files().items():
             if name == TABLE:
                 continue
             data = importer.import_qgroundcontrol_mission_from_string(text)

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from dess.analysis.flights import flight_plan
-from tests.analysis.flights.hand import SHEET, write_sea
+from tests.analysis.flights.hand import FIELDS, SHEET, write_sea
 from tests.analysis.small import files_of
 
 AT_SEA = ("simulate", "--scenario", "sea.toml", "--policy", "tour")
@@ -66,22 +66,32 @@ def test_a_plan_is_written_completely_or_not_at_all(dess, refusal, tmp_path, sea
     assert dess(*AT_SEA, "--plan", "empty")[0] == 0
 
 
-# Fields of the sea or options, and what the line says.
+# What is replaced in the file of the sea by what, the options, and what the line says.
+PLACES = FIELDS.removeprefix("uavs = 1\n")
+IN_CELLS = "grid = 8\nnodes = [[2, 1]]\n"
+AT_A_POLE = f"{IN_CELLS}centre = [0, 90]\n"
 REFUSED = {
-    "no degrees": ({"fields": "", "sheet": ""}, (), "--plan: the sea has no degrees"),
-    "no sheet": ({"sheet": ""}, (), "--plan: the scenario has no cruise and no slot in seconds"),
-    "no landing": ({"fields": "landing = false\nquota = 9\n"}, (), "--plan: the UAVs do not land"),
-    "no time": ({}, ("--start", "soon"), "--start: 'soon' is no time"),
-    "no such time": ({}, ("--start", "2900-01-01"), "--start: '2900-01-01' is out of range"),
+    "no degrees": (PLACES, IN_CELLS, (), "--plan: the sea has no degrees"),
+    "no sheet": (SHEET, "", (), "--plan: the scenario has no cruise and no slot in seconds"),
+    "no landing": (
+        *("uavs = 1\n", "uavs = 1\nlanding = false\nquota = 9\n", ()),
+        "--plan: the UAVs do not land",
+    ),
+    "a pole": (
+        PLACES,
+        f"{IN_CELLS}centre = [0, 90]\n",
+        (),
+        "--plan: the grid reaches beyond a pole",
+    ),
+    "no time": ("", "", ("--start", "soon"), "--start: 'soon' is no time"),
+    "no such time": ("", "", ("--start", "2900-01-01"), "--start: '2900-01-01' is out of range"),
 }
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_a_plan_is_refused_in_one_line(refusal, tmp_path, case):
-    sea, options, line = REFUSED[case]
-    path = write_sea(tmp_path, **sea)
-    if case == "no degrees":
-        path.write_text("uavs = 1\ngrid = 8\nnodes = [[2, 1]]\nzone = [0, 0, 2, 1]\n" + SHEET)
+def test_what_cannot_be_a_plan_is_refused_in_one_line(refusal, sea, case):
+    replaced, by, options, line = REFUSED[case]
+    sea.write_text(sea.read_text().replace(replaced, by))
     assert line in refusal(*AT_SEA, "--plan", "plans", *options)
 
 

@@ -154,7 +154,7 @@ def test_the_flown_path_is_written_with_its_times_in_degrees(dess, refusal, tmp_
     small = ("simulate", "--scenario", "small.toml")
     assert dess(*small, "--path", "q.geojson")[0] == 0  # in cells
     assert "no degrees" in refusal(*small, "--path", "q.kml")
-    assert refusal(*small, "--path", "q.txt").endswith("allowed: .geojson, .kml, .csv")
+    assert refusal(*small, "--path", "q.txt").endswith("allowed: .geojson, .kml, .gpx, .csv")
 
 
 def test_nodes_have_their_names_in_table_log_and_maps(dess, tmp_path, buoys):
