@@ -13,16 +13,11 @@ from contextlib import AbstractContextManager
 from types import FrameType
 from typing import Any
 
-NUMBERS = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-]
+from dess.base.signals import ENDING, SOON, is_fragile
+
 AGAIN = 0.25  # seconds until an interrupt that something has swallowed is raised again
-SOON = 0.01  # seconds until an interrupt that had to wait is raised
 UNNOTICED = 1.0  # seconds of CPU time until a signal that is not noticed ends the process
 EXIT_CODE = 130  # after a signal, as shells and typer have it: 128 + SIGINT
-# Modules of Python that compiled code and its compiler call, and that share objects with them: an
-# exception in one of them may crash the process.
-FRAGILE = ("numba.core.serialize", "llvmlite.binding")
 LINE = "interrupted: run the same command again to complete it"
 
 
@@ -60,7 +55,7 @@ class Interrupts(AbstractContextManager["Interrupts"]):
     def __enter__(self) -> "Interrupts":
         if threading.current_thread() is threading.main_thread():
             sys.unraisablehook = self._ignore_unraisable
-            for number in NUMBERS:
+            for number in ENDING:
                 if signal.getsignal(number) not in (signal.SIG_IGN, None):
                     self._handlers[number] = signal.signal(number, self._receive_signal)
             if self.is_last and os.name == "posix":
@@ -76,7 +71,7 @@ class Interrupts(AbstractContextManager["Interrupts"]):
         if self.received and hasattr(signal, "setitimer"):
             signal.setitimer(signal.ITIMER_REAL, 0)
         for number, handler in self._handlers.items():
-            if self.is_last and number in NUMBERS:
+            if self.is_last and number in ENDING:
                 handler = signal.SIG_IGN
             signal.signal(number, handler)
         if threading.current_thread() is threading.main_thread():
@@ -90,18 +85,25 @@ class Interrupts(AbstractContextManager["Interrupts"]):
         self.received = True
         if self.is_over or _is_handled():
             return
-        if has_timer and _is_fragile(frame):
+        if has_timer and is_fragile(frame):
             signal.setitimer(signal.ITIMER_REAL, SOON, AGAIN)
             return
         raise KeyboardInterrupt
 
     def _watch_main_thread(self, seen: int) -> None:
-        """End the process if the main thread does not notice a signal."""
+        """End the process if the main thread does not notice a signal.
+
+        A signal that came while it had another handler, such as that of a training, is noticed by
+        this one.
+        """
         while number := os.read(seen, 1):
+            if signal.getsignal(number[0]) != self._receive_signal:
+                continue
             end = time.process_time() + UNNOTICED
-            while time.process_time() < end and not self.received:
+            while time.process_time() < end and not (self.received or self.is_over):
                 time.sleep(0.05)
-            if not self.received and signal.getsignal(number[0]) == self._receive_signal:
+            is_noticed = self.received or self.is_over
+            if not is_noticed and signal.getsignal(number[0]) == self._receive_signal:
                 if writing := sys.modules.get("dess.base.files.writing"):
                     writing.remove_temporaries()
                 os.write(2, f"\n{LINE}\n".encode())  # there may be a progress bar
@@ -119,12 +121,3 @@ def _is_handled() -> bool:
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__context__
     return error is not None
-
-
-def _is_fragile(frame: FrameType | None) -> bool:
-    """Whether a frame, or one that has called it, is of a fragile module."""
-    while frame is not None:
-        if str(frame.f_globals.get("__name__")).startswith(FRAGILE):
-            return True
-        frame = frame.f_back
-    return False

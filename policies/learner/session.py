@@ -24,6 +24,7 @@ from dess.base.files.memory import check_memory
 from dess.base.files.reading import paths_in
 from dess.base.files.tables import write_table
 from dess.base.files.writing import check_folder, locked, writable
+from dess.base.signals import ENDING, SOON, is_fragile
 from dess.envs.observations.observer import encoder_of
 from dess.model.batch import BATCH_SIZE
 from dess.model.record import MISSION_RECORD
@@ -39,9 +40,6 @@ from dess.scenario.scenario import ScenarioSpace
 CURVE, EVENTS, LOCK = "training.parquet", "tensorboard", ".lock"
 CHECKPOINT_EVERY = 240.0  # seconds between checkpoints
 TICK_END = 1.0  # seconds that a tick has to end after a signal
-SIGNALS = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-]
 
 # Weights times rows of a batch up to which a network is small: one thread computes it fastest.
 SMALL = 100_000_000
@@ -296,21 +294,29 @@ def _save_results(out: Path, training: Training) -> None:
 def _watch_for_signal() -> Iterator[Callable[[], bool]]:
     """Let a signal stop the session after the tick; a second signal stops it at once.
 
-    A tick that compiles or evaluates may take long: then the first signal is sent once more. A
-    signal that is ignored, as SIGHUP under ``nohup``, stays ignored.
+    A tick that compiles or evaluates may take long: then the first signal is sent once more. The
+    second one waits while compiled code or its compiler calls Python, where it might crash the
+    process. A signal that is ignored, as SIGHUP under ``nohup``, stays ignored.
     """
     received: list[int] = []
     again: list[threading.Timer] = []
 
+    def send_again(number: int, seconds: float) -> None:
+        timer = threading.Timer(seconds, signal.raise_signal, [number])
+        timer.daemon = True
+        timer.start()
+        again.append(timer)
+
     def receive(number: int, frame: Any) -> None:
         received.append(number)
-        if len(received) > 1:
+        if len(received) == 1:
+            send_again(number, TICK_END)
+        elif is_fragile(frame):
+            send_again(number, SOON)
+        else:
             raise KeyboardInterrupt
-        again.append(threading.Timer(TICK_END, signal.raise_signal, [number]))
-        again[0].daemon = True
-        again[0].start()
 
-    numbers = [n for n in SIGNALS if signal.getsignal(n) not in (signal.SIG_IGN, None)]
+    numbers = [n for n in ENDING if signal.getsignal(n) not in (signal.SIG_IGN, None)]
     handlers = {number: signal.signal(number, receive) for number in numbers}
     try:
         yield lambda: bool(received)

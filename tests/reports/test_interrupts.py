@@ -162,6 +162,33 @@ def test_a_signal_during_the_imports_ends_the_command(tmp_path):
     assert files_of(tmp_path) == before
 
 
+NOTICED = """
+import hashlib, signal, sys, time, typer
+import dess.model.mission
+from dess.reports.cli import main
+
+def noticed(*_, **__):
+    before = signal.signal(signal.SIGTERM, lambda *_: None)
+    signal.raise_signal(signal.SIGTERM)
+    time.sleep(0.2)
+    signal.signal(signal.SIGTERM, before)
+    hashlib.pbkdf2_hmac("md5", b"", b"", 4_000_000)  # two seconds
+    raise typer.Exit(7)
+
+dess.model.mission.simulate, sys.argv = noticed, ["dess", "simulate"]
+sys.exit(main())
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.brief
+def test_a_signal_that_another_handler_has_noticed_does_not_end_the_process(tmp_path):
+    """As that of a training, which ends after its tick and restores the handler of before."""
+    words = [sys.executable, "-c", NOTICED]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (7, "")
+
+
 BUSY = """
 import hashlib, pathlib, sys
 import dess.model.mission

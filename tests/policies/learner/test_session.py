@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,14 +12,16 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 import torch
+from numba.core import serialize
 
 from dess import policies
+from dess.base.signals import ENDING
 from dess.policies.learner import session
 from dess.policies.learner.checkpoint import load_training
 from dess.policies.learner.config import CHECKPOINT, CONFIG, MODEL, load_config
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.network import make_network, to_arrays
-from dess.policies.learner.session import CURVE, LOCK, SIGNALS, choose_device, train
+from dess.policies.learner.session import CURVE, LOCK, choose_device, train
 from dess.policies.learner.trained import hash_arrays, make_observation, read_weights
 from dess.policies.learner.training import DivergenceError, Training
 from tests.analysis.small import files_of
@@ -121,11 +124,11 @@ STOPS = [(signal.SIGINT, 5), (signal.SIGTERM, 20), (signal.SIGHUP, 33)]
 
 @pytest.mark.parametrize(("number", "tick"), STOPS)
 def test_a_signal_ends_it_after_the_tick_and_it_can_go_on(number, tick, whole, tmp_path):
-    handlers = [signal.getsignal(kind) for kind in SIGNALS]
+    handlers = [signal.getsignal(kind) for kind in ENDING]
     stop = _at(tick, lambda: signal.raise_signal(number))
     training = train(SHORT, tmp_path, progress=stop)
     assert (training.tick, training.done) == (tick, False)
-    assert [signal.getsignal(kind) for kind in SIGNALS] == handlers
+    assert [signal.getsignal(kind) for kind in ENDING] == handlers
     assert not [name for name in os.listdir(tmp_path) if name.endswith(".tmp")]
     resumed = train(SHORT, tmp_path, resume=True)
     assert_same(resumed, whole)
@@ -161,6 +164,25 @@ def test_a_second_signal_ends_it_at_once(whole, tmp_path):
         train(SHORT, tmp_path, progress=_at(7, _twice))
     assert signal.getsignal(signal.SIGINT) == before
     assert_same(train(SHORT, tmp_path, resume=True), whole)  # from the last checkpoint
+
+
+def test_a_second_signal_waits_while_compiled_code_calls_python(tmp_path, monkeypatch):
+    class Signalling(dict):
+        def __getitem__(self, key):
+            _twice()
+            return "object"
+
+    unpickled = []
+
+    def call():
+        with monkeypatch.context() as patches:
+            patches.setattr(serialize, "_unpickled_memo", Signalling())
+            unpickled.append(serialize._numba_unpickle(0, b"", b""))  # as what boxes an array does
+        threading.Event().wait(60)
+
+    with pytest.raises(KeyboardInterrupt):
+        train(SHORT, tmp_path, progress=_at(7, call))
+    assert unpickled == ["object"]
 
 
 def test_it_is_saved_every_now_and_then(whole, tmp_path, monkeypatch):
