@@ -20,12 +20,13 @@ _UNUSED = {"--install-completion", "--show-completion"}  # about the shell of a 
 SEA, RESULTS, POLICY, PAGE = (
     f"../in/{name}" for name in (ready.SCENARIO, ready.RESULTS, ready.POLICY, ready.PAGE)
 )
-ENDINGS = {  # of files that an option writes
+ENDINGS = {  # of files, or of a folder, that an option writes
     "--events": (".parquet",),
     "--figure": (".png",),
     "--animation": (".gif", ".html"),
     "--crate": (".zip",),
     "--path": (".geojson", ".csv"),
+    "--plan": ("",),
     "scenarios new path": (".toml",),
 }
 OUTPUTS = {"--out", *ENDINGS}
@@ -89,6 +90,7 @@ PLAIN: dict[str, tuple[str, ...]] = {
     "--replication": ("0", "3"),
     "--of": (RESULTS,),
     "--point": ("0", "1"),
+    "--start": ("2026-06-01T08:00Z",),
     "--engine": ("batch", "events"),
     "--device": ("cpu",),
     "--from": (POLICY,),
