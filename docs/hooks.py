@@ -1,9 +1,11 @@
 """What MkDocs builds into the site besides the pages of this folder.
 
 - A line ``<!-- [[ NAME ]] -->`` of a page becomes a part made from the code: the commands, the
-  fields of a scenario, the public names of a package, the changelog, a section of the README.
+  fields of a scenario, the public names of a package, the changelog, a section of the README, a
+  rendered report.
 - A link from a page to a file of the repository outside of ``docs/`` leads to a page of the site
   that shows this file. So the same link works in the repository and in the site.
+- The reports that ``nox -s reports`` has rendered lie in the site as well; it builds without them.
 """
 
 import json
@@ -26,8 +28,9 @@ from dess.reports.cli.commands import app
 
 ROOT = Path(__file__).parents[1]
 LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)")
-PART = re.compile(r"^<!-- \[\[ (\w+)(?: ([\w ]+))? \]\] -->$", re.M)
+PART = re.compile(r"^<!-- \[\[ (\w+)(?: ([\w -]+))? \]\] -->$", re.M)
 README = "README.md"
+REPORTS = ROOT / "build" / "reports"
 
 
 # --- parts made from the code ---
@@ -92,8 +95,25 @@ def section_of_readme(heading: str) -> str:
     return below.partition("\n## ")[0] + "\n"
 
 
+def live(report: str) -> str:
+    """A rendered report inside a page in the root of the site; without it, how to make it."""
+    name = f"{report}.html"
+    if not (REPORTS / name).is_file():
+        return f"(`nox -s reports` makes such a page, `build/reports/{name}`.)"
+    frame = f'<iframe class="live" src="reports/{name}#panel" title="{report}" loading="lazy">'
+    return f"[The page alone](reports/{name}), and here:\n\n{frame}</iframe>"
+
+
+def reports() -> str:
+    """A link to the rendered reports; without them, how to make them."""
+    if not (REPORTS / "index.html").is_file():
+        return "(This site was built without the reports, which `nox -s reports` makes.)"
+    return "[All rendered reports](reports/index.html) are part of this site."
+
+
 PARTS: dict[str, Callable[..., str]] = {
-    part.__name__: part for part in (commands, scenario_fields, names, changelog, readme)
+    part.__name__: part
+    for part in (commands, scenario_fields, names, changelog, readme, live, reports)
 }
 
 
@@ -130,7 +150,7 @@ def shown(path: str) -> str:
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add a page for every file outside of ``docs/`` that a page links to."""
+    """Add a page for every file outside of ``docs/`` that a page links to, and the reports."""
     pending = [f"docs/{file.src_uri}" for file in files.documentation_pages()]
     seen = set(pending)
     while pending:
@@ -150,7 +170,15 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
                 config, place(path), content=shown(path), inclusion=InclusionLevel.NOT_IN_NAV
             )
             files.append(page)
+    for path in rendered():
+        files.append(File.generated(config, f"reports/{path.name}", abs_src_path=str(path)))
     return files
+
+
+def rendered() -> list[Path]:
+    """The pages of the reports that did not fail, and their notebooks."""
+    paths = sorted([*REPORTS.glob("*.html"), *REPORTS.glob("*.ipynb")])
+    return [path for path in paths if not path.name.endswith(".partial.html")]
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:

@@ -26,6 +26,7 @@ from dess.model.events import EVENT_NAMES, EventLog
 from dess.model.record import MISSION_RECORD, UAV_RECORD
 from dess.reports import cli
 from dess.reports.cli import commands, options
+from dess.reports.pages import notebook
 from docs import hooks, pictures
 from tests.outside import install_package
 
@@ -218,6 +219,21 @@ def test_the_first_page_of_the_site_has_the_start_and_the_results_of_the_readme(
     assert "pip install" in start and "dess sweep" in start
     assert "](how-to/own-sea.md)" in start and "](source/CONTRIBUTING.md)" in start
     assert len(re.findall(r"^\d\. ", results, re.M)) == 3
+
+
+def test_the_tutorial_has_a_live_page_where_it_was_rendered(tmp_path, monkeypatch):
+    """The site has the rendered reports, but not what failed; without them it says how to."""
+    ((_, name),) = hooks.PART.findall(PAGES["docs/tutorial.md"])
+    assert name in notebook.NAMES
+    monkeypatch.setattr(hooks, "REPORTS", tmp_path / "reports")
+    absent = hooks.live(name)
+    assert "nox -s reports" in absent and "](" not in absent
+    assert hooks.rendered() == []
+    hooks.REPORTS.mkdir()
+    for file in (f"{name}.html", f"{name}.ipynb", "mission.partial.html"):
+        (hooks.REPORTS / file).write_text("", "utf-8")
+    assert f'src="reports/{name}.html#panel"' in hooks.live(name)
+    assert {path.name for path in hooks.rendered()} == {f"{name}.html", f"{name}.ipynb"}
 
 
 # --- links and names ---
