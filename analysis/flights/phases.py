@@ -6,7 +6,12 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from dess.analysis.results.event_log import Events, battery_levels, uav_slots
+from dess.analysis.results.event_log import (
+    Events,
+    battery_levels,
+    causes_of_failure,
+    uav_slots,
+)
 from dess.base.errors import InputError
 from dess.physics.chart import Cell
 from dess.physics.fleet import type_of
@@ -129,14 +134,14 @@ class _Slot(NamedTuple):
 
 
 def _check_landings(log: pd.DataFrame, scenario: Scenario) -> None:
-    failed = log.loc[log["event"] == "uav_failure", "uav"]
-    landed = log.loc[log["event"] == "landing", "uav"]
-    at_sea = sorted(set(range(scenario.uavs)) - {*landed})
     allowed = "a mission in which every UAV lands, such as another --replication or --policy"
+    causes = causes_of_failure(log, scenario)
+    if causes:
+        problem, *_ = causes[0].split(";")
+        raise InputError("--plan", problem, allowed)
+    failed = log.loc[log["event"] == "uav_failure", "uav"]
     if len(failed):
         raise InputError("--plan", f"UAV {failed.iloc[0] + 1} fails in this mission", allowed)
-    if at_sea:
-        raise InputError("--plan", f"UAV {at_sea[0] + 1} does not land in this mission", allowed)
 
 
 def _label_slots(rows: pd.DataFrame, scenario: Scenario, uav: int) -> Iterator[_Slot]:

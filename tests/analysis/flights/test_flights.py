@@ -137,7 +137,7 @@ def test_a_slow_uav_is_in_the_air_as_long_as_its_moves_take(tmp_path):
 def test_a_mission_in_which_a_uav_does_not_land_is_refused(tmp_path):
     scenario = scenario_of(write_sea(tmp_path), uavs=1)
     positions = positions_in(tmp_path / "sea.toml")
-    with pytest.raises(InputError, match="UAV 1 does not land in this mission; allowed: "):
+    with pytest.raises(InputError, match="UAV 1 was lost .* without having landed; allowed: "):
         FlightPlan.of(log_of(THERE, landed=False), scenario, positions)
     log = pd.DataFrame(log_of(THERE))
     failure = log.iloc[:1].assign(event="uav_failure")

@@ -52,7 +52,9 @@ def test_a_plan_is_written_completely_or_not_at_all(dess, refusal, tmp_path, sea
     assert "no folder none" in refusal(*AT_SEA, "--plan", "none/plans")
     assert "cannot be written: Not a directory" in refusal(*AT_SEA, "--plan", "sea.toml")
     lost = ("--policy", "random-unguarded")
-    assert "UAV 1 does not land" in refusal(*AT_SEA, *lost, "--plan", "plans")
+    assert "without having landed; allowed: a mission in which" in refusal(
+        *AT_SEA, *lost, "--plan", "plans"
+    )
     before = files_of(tmp_path)
 
     def fail(*arguments):
