@@ -187,7 +187,7 @@ def test_flights_agree_with_the_simulation_within_what_is_told(jade_bight):
     """The lengths are computed from the files again, on a sphere as well."""
     summary = jade_bight.summarise_errors()
     table = jade_bight.make_table().query("file != ''").set_index("file")
-    assert summary["flights"] == len(table) > 20
+    assert summary["flights"] == len(table) > 3
     for name, text in jade_bight.make_files().items():
         if name == TABLE:
             continue
@@ -198,7 +198,7 @@ def test_flights_agree_with_the_simulation_within_what_is_told(jade_bight):
         waits = sum(params[0] for command, params in items_of(text) if command == 19)
         row = table.loc[name]
         assert row["metres"] == pytest.approx(metres, abs=1)
-        assert row["seconds"] == pytest.approx(metres / 15 + waits, abs=1)
+        assert row["seconds"] == pytest.approx(metres / row["speed"] + waits, abs=1)
         assert abs(metres - row["simulated_metres"]) <= summary["largest_difference_m"] + 1
         late = row["seconds"] - row["simulated_seconds"]
         assert abs(late) <= summary["largest_difference_s"] + 0.2
