@@ -20,7 +20,8 @@ ROOMS = {
     "dess": (
         *("base", "physics", "scenario"),
         *("model.state", "model.channel", "model.rules", "model.events", "model.record"),
-        *("model.packets", "model.view", "model.guard", "model.batch", "model.mission"),
+        *("model.packets", "model.view", "model.guard", "model.reach", "model.batch"),
+        "model.mission",
         *("envs.observations", "envs", "envs.integrations"),
     ),
     "policies": (
@@ -30,17 +31,9 @@ ROOMS = {
         "registry",
     ),
     "analysis": (
-        *("numbers", "names", "metrics", "stats", "tables", "bound", "study", "wasm", "results"),
-        *(
-            "flights",
-            "execution",
-            "figures",
-            "answers.settings",
-            "answers.fleet",
-            "answers",
-            "paper",
-        ),
-        "ask",
+        *("numbers", "names", "metrics", "sheet", "stats", "tables", "bound", "study", "wasm"),
+        *("results", "flights", "execution", "figures"),
+        *("answers.settings", "answers.fleet", "answers", "paper", "ask"),
     ),
     "reports": (
         *("pages", "player", "explorer", "crate"),

@@ -32,6 +32,7 @@ from dess.analysis.execution.jobs import Progress
 from dess.analysis.execution.runner import Round
 from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
+from dess.analysis.sheet import unreachable_sentences
 from dess.analysis.tables import Table
 from dess.base.errors import unknown_name
 
@@ -120,7 +121,7 @@ class Answer:
         return table.drop_duplicates("policy", ignore_index=True)
 
     def answers(self, metric: str | None = None) -> list[str]:
-        """The answer in sentences.
+        """The answer in sentences, and with a data sheet which nodes no UAV can serve.
 
         They tell the best setting, and what other policies would have said. With requirements, the
         cheapest fleet of all policies first, the prices, how sure the answer is, and then the
@@ -132,16 +133,21 @@ class Answer:
                 the product.
         """
         if self.question.is_comparison:
-            return [*map(strip_markdown, self.variation.sentences())]
+            return [*map(strip_markdown, self.variation.sentences()), *self._unreachable()]
         if self.question.study.selection:
             search = search_of(self.results)
-            return [*map(strip_markdown, search.sentences())]
+            return [*map(strip_markdown, search.sentences()), *self._unreachable()]
         ranking = metric or PRODUCT
         ranked = rank_settings(self.results, ranking)
         lines = best_settings_sentences(self.results, ranked, ranking)
         if self.question.study.costs:
             lines.append(self.results.prices.in_words)
-        return lines
+        return [*lines, *self._unreachable()]
+
+    def _unreachable(self) -> list[str]:
+        """Which nodes no UAV can serve, and the highest collection ratio without them."""
+        sentences = unreachable_sentences(self.results.store.manifest.scenarios)
+        return [f"{sentence[0].upper()}{sentence[1:]}." for sentence in sentences]
 
     def tables(self, metric: str | None = None) -> dict[str, pd.DataFrame]:
         """The numbers of the answer by name: ``table``, and with requirements ``fleets``."""

@@ -7,6 +7,7 @@ from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
+from dess.analysis.sheet import unreachable_sentences
 from dess.scenario.data_sheet import LORA
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
@@ -69,6 +70,10 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
         f"Radio: an SNR of {given('snr', 'a link budget')}, path loss exponent "
         f"{value_text(space.path_loss_exponent)}; range {given('range', 'without end')}; "
         f"{given('bandwidth', '')} with {_rates_of(space, varied)}{duty}.",
+        *(
+            f"{line[0].upper()}{line[1:]}."
+            for line in unreachable_sentences(results.store.manifest.scenarios)
+        ),
         f"Wind: {given('wind', 'none')}, the same everywhere and always.",
         f"Failures: {failures}." if sheet.mtbf or "mtbf" in varied else "Failures: none.",
         f"A mission takes {given('horizon', printed(space.max_slots * units.slot, 's'))}; means "

@@ -19,6 +19,7 @@ from dess.model.state import STEP_X, STEP_Y
 from dess.physics import fleet, streams
 from dess.physics.chart import Chart, read_only
 from dess.physics.radio import has_max_rate, has_steps, step_efficiency
+from dess.scenario.fields import Fields
 from dess.scenario.scenario import ScenarioSpace
 
 GROUP = 4  # communication slots whose shadowing one Philox block holds
@@ -142,20 +143,25 @@ def make_world(scenario: ScenarioSpace) -> World:
     steps = 5 * columns * rows * fleet.legs(scenario.fleet)
     longest = max(columns, rows)
     fine = np.arange(places * (longest - 1) + 1)
-    diagonal = np.sqrt(2) * np.sqrt((columns * columns + rows * rows) / 2) * scenario.cell_size
-    edge = scenario.radio.anchor or diagonal / 2
-    reach = scenario.radio.range or math.inf
     mean_snr = np.empty((longest, len(fine)))
     for row in range(longest):  # each takes a moment, all of a large grid may take seconds
         # From an integer: at equal distances, the SNR is equal to the bit.
         coarse = places * row
         squares = coarse * coarse + fine * fine
-        horizontal = scenario.cell_size * (np.sqrt(squares) / places)
-        distance = hypot(horizontal, scenario.altitude)
-        loss = 10 * scenario.path_loss_exponent * log10(distance / edge)
-        mean_snr[row] = np.where(distance <= reach, scenario.edge_snr - loss, -math.inf)
+        mean_snr[row] = mean_snr_at(scenario, scenario.cell_size * (np.sqrt(squares) / places))
     nodes = np.array(scenario.nodes, np.int64)
     return World.of(nodes, mean_snr, scenario.chart, steps, m)
+
+
+def mean_snr_at(scenario: Fields, horizontal: np.ndarray) -> np.ndarray:
+    """The mean SNR [dB] at horizontal distances [m], minus infinity out of range (eq. 10)."""
+    columns, rows = scenario.size
+    diagonal = np.sqrt(2) * np.sqrt((columns * columns + rows * rows) / 2) * scenario.cell_size
+    edge = scenario.radio.anchor or diagonal / 2
+    distance = hypot(horizontal, scenario.altitude)
+    loss = 10 * scenario.path_loss_exponent * log10(distance / edge)
+    reach = scenario.radio.range or math.inf
+    return np.where(distance <= reach, scenario.edge_snr - loss, -math.inf)
 
 
 @large_kernel

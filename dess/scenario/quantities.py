@@ -237,11 +237,12 @@ _PRINTED = {
     "s": ("s", "min", "h", "d"),
     "m": ("m", "km"),
     "bit": ("bit", "B", "kB", "MB", "GB"),
+    "bit/s": ("bit/s", "kbit/s", "Mbit/s", "Gbit/s"),
 }
 
 
 def printed(value: float, unit: str) -> str:
-    """An amount of ``s``, ``m`` or ``bit`` in the unit that suits it: 2100 s as ``35 min``."""
+    """An amount of a unit of ``_PRINTED`` in the unit that suits it: 2100 s as ``35 min``."""
     sizes = {name: float(_sizes(unit)[name]) for name in _PRINTED[unit]}
     name = max(
         (name for name in sizes if sizes[name] <= value), key=sizes.__getitem__, default=unit

@@ -88,6 +88,7 @@ def show_scenario(
         figure: Draw the map of the sea into this file, also if its nodes or zones are refused.
     """
     from dess.analysis.names import declared_fields
+    from dess.analysis.sheet import sheet_facts, sheet_lines
     from dess.scenario.scenario import draft_scenario, scenario_description
 
     console.check_ending("--figure", figure, FIGURES, "a picture")
@@ -104,11 +105,15 @@ def show_scenario(
         shown: dict[str, Any] = {"scenario": name, "description": description, "fields": rows}
         if space.units:
             shown["units"] = space.units._asdict()
+            shown["follows"] = sheet_facts(space)
         print(json.dumps(shown, indent=2))
         return
-    for text in (description, space.units):
-        if text:
-            console.print_text(text)
+    if description:
+        console.print_text(description)
+    if space.units:
+        console.print_text(str(space.units))
+        for line in sheet_lines(space):
+            console.print_text(line)
     if everything:
         for f in declared_fields(space):
             default = "no default"
@@ -146,6 +151,7 @@ def new_scenario(
     """
     from dess.analysis.figures.missions import sea_figure
     from dess.analysis.names import node_placing_sentence
+    from dess.analysis.sheet import reach_sentences
     from dess.scenario.new_sea import NewScenario
     from dess.scenario.scenario import DRAFT, parsed_scenario
 
@@ -177,6 +183,8 @@ def new_scenario(
     except InputError as error:
         raise error.within(f"{path} is written, but cannot be simulated") from None
     console.print_text(f"{path}, {picture}: {space.units}")
+    for line in reach_sentences(space):
+        console.print_text(line)
 
 
 @studies.callback()

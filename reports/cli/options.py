@@ -133,6 +133,14 @@ def note_departures(policies: Iterable[str], spaces: "Iterable[ScenarioSpace]") 
         print_text(f"note: {line}", sys.stderr)
 
 
+def note_unreachable(spaces: "Iterable[ScenarioSpace]") -> None:
+    """Say on stderr which nodes no UAV can serve, and what ratio is possible without them."""
+    from dess.analysis.sheet import unreachable_sentences
+
+    for line in unreachable_sentences(spaces):
+        print_text(f"note: {line}", sys.stderr)
+
+
 def load_space(name: str, settings: list[str] | None) -> "ScenarioSpace":
     """A scenario by name or file, with the fields that ``--set`` sets.
 

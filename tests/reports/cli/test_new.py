@@ -158,3 +158,31 @@ def test_what_cannot_be_is_refused_in_a_line(refusal, buoys, changes, words):
     answers = {name: of for name, of in (ANSWERS | changes).items() if of is not None}
     line = refusal("scenarios", "new", "my.toml", *buoys, *_set(answers))
     assert all(word in line for word in words), line
+
+
+def test_what_follows_from_a_sheet_is_shown(dess, buoys, tmp_path):
+    far = ANSWERS | {"range": "1 km", "reserve": "60 %", "base": "8.26, 54.0", "modulation": "lora"}
+    code, out, err = dess("scenarios", "new", "far.toml", *buoys, *_set(far))
+    assert (code, err) == (0, "")
+    unreachable = "out of reach of a UAV from a full battery: A, B, D"
+    assert unreachable in out
+    code, out, _ = dess("scenarios", "show", "far.toml")
+    assert code == 0 and unreachable in out
+    assert "rates: 293 bit/s from -20 dB on, 537.1 bit/s from -17.5 dB on, " in out
+    assert "messages of a node: 17.5 a slot" in out
+    assert "without these nodes a collection ratio of 25.0 % is the highest" in out
+    assert "not in the sheet, and assumed: altitude 10 m, message 1 kB" in out
+    _, out, _ = dess("scenarios", "show", "far.toml", "--json")
+    follows = json.loads(out)["follows"]
+    assert follows["out_of_reach"] == ["A", "B", "D"] and follows["largest_ratio"] == 0.25
+    assert follows["steps"][-1] == [-7.5, pytest.approx(5468.75)]
+    assert follows["assumed"] == {"altitude": "10 m", "message": "1 kB"}
+    assert (follows["slot_s"], follows["cell_m"], follows["data_unit_bit"]) == (21, 315, 2625e3)
+    assert follows["messages_per_slot"] == [pytest.approx(17.5)] * 2
+    code, out, _ = dess("scenarios", "show", "far.toml", "--set", "data_sheet.duty_cycle=1 %")
+    assert "54.69 bit/s from -7.5 dB on" in out
+
+
+def test_without_a_limit_the_scenario_says_so(dess, buoys, tmp_path):
+    code, out, _ = dess("scenarios", "new", "my.toml", *buoys, *_set(ANSWERS))
+    assert code == 0 and "every node is in range: no limit: give range or rates" in out

@@ -1,0 +1,162 @@
+"""What follows from the data sheet of a scenario: as numbers for programs, and in lines."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from dess.analysis import numbers
+from dess.base.errors import listed
+from dess.model.channel import efficiency, mean_snr_at
+from dess.model.reach import Reach, reach_of_nodes
+from dess.model.state import constants_of
+from dess.physics.arrivals import MOST_MESSAGES
+from dess.scenario.quantities import printed
+from dess.scenario.scenario import ScenarioSpace
+
+FAR_CELLS = 10  # the second distance [cells] of which the rate is told, if there is no range
+_MOST_STEPS = 6  # of which all are told
+
+
+def sheet_facts(space: ScenarioSpace) -> dict[str, Any]:
+    """What follows from the data sheet of a scenario, in SI units and bits.
+
+    Args:
+        space: A scenario with a data sheet.
+
+    Returns:
+        Slot, cell and data unit; the rates by distance, or the steps by SNR, each as a pair; the
+        least and the largest number of messages that a node makes in a slot; how far a UAV can fly
+        along a line and back; the names of the nodes that cannot be served, and the largest
+        collection ratio without them; and what the sheet does not say.
+    """
+    units = space.units
+    assert units
+    reach = reach_of_nodes(space)
+    return {
+        "slot_s": units.slot,
+        "cell_m": units.cell,
+        "data_unit_bit": units.data,
+        "rates": _rates_by_distance(space),
+        "steps": _steps_by_snr(space),
+        "messages_per_slot": [min(space.message_rates), max(space.message_rates)],
+        "reach_m": reach.cells * units.cell,
+        "has_limit": reach.has_limit,
+        "out_of_reach": _titles(space, reach.lost),
+        "beyond_margins": _titles(space, reach.margins),
+        "largest_ratio": reach.largest_ratio,
+        "assumed": space.data_sheet.assumed,
+    }
+
+
+def sheet_lines(space: ScenarioSpace) -> list[str]:
+    """What follows from the data sheet of a scenario, a line for each."""
+    facts = sheet_facts(space)
+    lines = [
+        _rates_in_words(facts),
+        _messages_in_words(facts),
+        f"a UAV flies up to {printed(facts['reach_m'], 'm')} along a line, and back",
+        *reach_sentences(space),
+    ]
+    if facts["assumed"]:
+        named = ", ".join(f"{name} {value}" for name, value in facts["assumed"].items())
+        lines.append(f"not in the sheet, and assumed: {named}")
+    return lines
+
+
+def reach_sentences(space: ScenarioSpace) -> list[str]:
+    """Which nodes UAVs cannot serve, and what ratio is possible without them; none if they can."""
+    return _reach_in_words(space, reach_of_nodes(space))
+
+
+def unreachable_sentences(spaces: Iterable[ScenarioSpace]) -> list[str]:
+    """``reach_sentences`` of the scenario with a data sheet in which the fewest data can be served.
+
+    A scenario without limits has none: nothing about it is known to be wrong.
+    """
+    with_sheet = [space for space in spaces if space.units]
+    reaches = [reach_of_nodes(space) for space in with_sheet]
+    limited = [pair for pair in zip(with_sheet, reaches, strict=True) if _is_short(pair[1])]
+    if not limited:
+        return []
+    worst = min(limited, key=lambda pair: pair[1].largest_ratio)
+    return _reach_in_words(*worst)
+
+
+def _is_short(reach: Reach) -> bool:
+    return bool(reach.lost or reach.margins)
+
+
+def _reach_in_words(space: ScenarioSpace, reach: Reach) -> list[str]:
+    sentences = []
+    if not reach.has_limit:
+        sentences.append("every node is in range: no limit: give range or rates")
+    if reach.lost:
+        names = listed(_titles(space, reach.lost))
+        sentences.append(f"out of reach of a UAV from a full battery: {names}")
+    if reach.margins:
+        names = listed(_titles(space, reach.margins))
+        fleet = numbers.format_count(space.uavs[1], "UAV")
+        sentences.append(f"beyond the margins that the return guard keeps for {fleet}: {names}")
+    if _is_short(reach):
+        ratio = numbers.format_percent(reach.largest_ratio)
+        sentences.append(f"without these nodes a collection ratio of {ratio} is the highest")
+    return sentences
+
+
+def _titles(space: ScenarioSpace, nodes: tuple[int, ...]) -> list[str]:
+    """The names of nodes, or their cells."""
+    return [space.names[k] if space.names else f"{[*space.nodes[k]]}" for k in nodes]
+
+
+def _rates_by_distance(space: ScenarioSpace) -> list[tuple[float, float]]:
+    """The rate [bit/s] at two distances through the air [m]; none if it has steps."""
+    units = space.units
+    assert units
+    if space.radio.steps:
+        return []
+    far = space.radio.range or FAR_CELLS * units.cell
+    mission = constants_of(space).view(np.recarray)[0]
+    rates = []
+    for distance in sorted({max(units.cell, space.altitude), max(far, space.altitude)}):
+        horizontal = np.sqrt(distance * distance - space.altitude * space.altitude)
+        snr = float(mean_snr_at(space, np.array([horizontal]))[0])
+        rates.append((distance, efficiency(mission, snr) * _bits_per_second(space)))
+    return rates
+
+
+def _steps_by_snr(space: ScenarioSpace) -> list[tuple[float, float]]:
+    """From which SNR [dB] on the rate is which [bit/s]."""
+    size = _bits_per_second(space)
+    return [(snr, step * size) for snr, step in space.radio.steps]
+
+
+def _bits_per_second(space: ScenarioSpace) -> float:
+    """The rate [bit/s] of a spectral efficiency of 1 bit/s/Hz."""
+    units = space.units
+    assert units
+    return units.data / units.slot * space.radio.duty_cycle
+
+
+def _rates_in_words(facts: dict[str, Any]) -> str:
+    if facts["rates"]:
+        rates = [
+            f"{printed(rate, 'bit/s')} at {printed(distance, 'm')}"
+            for distance, rate in facts["rates"]
+        ]
+        return f"rate: {', '.join(rates)}"
+    steps = [f"{printed(rate, 'bit/s')} from {snr:g} dB on" for snr, rate in facts["steps"]]
+    if len(steps) > _MOST_STEPS:
+        steps = [steps[0], "...", steps[-1]]
+    return f"rates: {', '.join(steps)}"
+
+
+def _messages_in_words(facts: dict[str, Any]) -> str:
+    least, most = facts["messages_per_slot"]
+    count = f"{most:.4g}"
+    if least != most:
+        count = f"{least:.4g} to {most:.4g}"
+    evenly = ""
+    if most > MOST_MESSAGES:
+        evenly = f"; those of more than {MOST_MESSAGES} come evenly"
+    return f"messages of a node: {count} a slot{evenly}"

@@ -1,0 +1,198 @@
+"""Which nodes a lone UAV can serve, from a full battery and back within the horizon.
+
+    reach = reach_of_nodes(space)
+    space.names[reach.lost[0]]      # a node that no UAV of the fleet can serve
+
+A node is in range of a cell if its mean SNR there, without shadowing, reaches the lowest rate, and
+it lies within the range of the radio. A UAV flies from some zone to a cell where the node is in
+range, hovers there for a slot, and flies to some zone, where it has to stand in the last slot.
+"""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from dess.model.channel import mean_snr_at
+from dess.model.guard.battery import margin
+from dess.model.state import constants_of, types_of
+from dess.physics import fleet, wind
+from dess.physics.chart import FAR, NO_FLY, parking_of, read_only, spread, zones_of
+from dess.scenario.scenario import ScenarioSpace
+
+PERCENT = 1000  # the thousandths of one percent, in which costs are counted
+
+_STEPS = ((0, -1), (1, 0), (0, 1), (-1, 0))  # of the moves north, east, south and west [cells]
+
+
+class Costs(NamedTuple):
+    """What a UAV takes of its battery in the air [% / 1000].
+
+    Attributes:
+        moves: (4, H, W) a move into a cell: to the north, east, south and west.
+        hover: A slot of hovering.
+    """
+
+    moves: np.ndarray
+    hover: int
+
+
+class Reach(NamedTuple):
+    """The nodes that cannot be served.
+
+    Attributes:
+        lost: The nodes that no UAV can serve, by their numbers.
+        margins: The further nodes to which the return guard lets no UAV of the fleet fly, because
+            of the margins that it keeps for teammates.
+        largest_ratio: The share of all data that the other nodes have.
+        cells: How far a UAV can fly along a line and back [cells], the more expensive of both axes.
+        has_limit: Whether there is a range or a lowest rate; otherwise every node is in range.
+    """
+
+    lost: tuple[int, ...]
+    margins: tuple[int, ...]
+    largest_ratio: float
+    cells: int
+    has_limit: bool
+
+
+def reach_of_nodes(space: ScenarioSpace) -> Reach:
+    """What the UAVs of the largest fleet of a scenario can serve."""
+    uavs = space.uavs[1]
+    nodes = range(len(space.nodes))
+    served_alone: set[int] = set()
+    served_in_fleet: set[int] = set()
+    cells = 0
+    for number in range(min(uavs, max(len(space.fleet), 1))):
+        costs = costs_of(space, number)
+        battery = PERCENT * _full_battery(space, number)
+        kept = _battery_of_guard(space, number, costs)
+        trips = battery_of_trips(space, costs)
+        slots = _slots_of_trips(space, number)
+        is_lasting = slots < space.max_slots
+        served_alone |= _served(space, is_lasting & (trips < battery))
+        served_in_fleet |= _served(space, is_lasting & (trips <= battery - kept))
+        cells = max(cells, _cells_along_a_line(costs, battery))
+    lost = tuple(k for k in nodes if k not in served_alone)
+    margins = tuple(k for k in nodes if k in served_alone and k not in served_in_fleet)
+    return Reach(
+        lost, margins, _share_of_others(space, {*lost, *margins}), cells, _has_limit(space)
+    )
+
+
+def costs_of(space: ScenarioSpace, uav: int) -> Costs:
+    """What a UAV takes of its battery, by its number in the fleet."""
+    constants = constants_of(space)[0]
+    slots = fleet.type_of(space.fleet, uav).slots_per_cell
+    columns, rows = space.size
+    moves = np.full((4, rows, columns), slots, np.int64)
+    if space.is_extended:
+        moves += wind.surcharges(space.size, *(constants[name].item() for name in wind.FIELDS))
+    return Costs(PERCENT * moves, PERCENT)
+
+
+def battery_of_trips(space: ScenarioSpace, costs: Costs) -> np.ndarray:
+    """(H, W) the battery [% / 1000] to a cell, for a slot there, and to a zone.
+
+    It is infinite where no trip leads, and in zones, where a UAV that hovers is on the ground.
+    """
+    zones = zones_of(*space.size, space.rectangles, space.no_fly)
+    out = _cheapest(zones, costs.moves, is_outward=True)
+    back = _cheapest(zones, costs.moves, is_outward=False)
+    return np.where(zones >= 0, math.inf, out + costs.hover + back)
+
+
+def in_range(space: ScenarioSpace, node: int) -> np.ndarray:
+    """(H, W) whether a node is in range of a UAV in a cell, by its mean SNR."""
+    columns, rows = space.size
+    x, y = space.nodes[node]
+    about = _in_range_about(space)
+    return about[rows - 1 - y : 2 * rows - 1 - y, columns - 1 - x : 2 * columns - 1 - x]
+
+
+@lru_cache(maxsize=8)
+def _in_range_about(space: ScenarioSpace) -> np.ndarray:
+    """(2 H - 1, 2 W - 1) whether a node is in range, by where the UAV is about it."""
+    columns, rows = space.size
+    across = np.arange(1 - columns, columns)
+    down = np.arange(1 - rows, rows)[:, None]
+    snr = mean_snr_at(space, space.cell_size * np.sqrt(across * across + down * down))
+    least = -math.inf
+    if space.radio.steps:
+        least = space.radio.steps[0][0]
+    return read_only((snr > -math.inf) & (snr >= least))
+
+
+def _has_limit(space: ScenarioSpace) -> bool:
+    return bool(space.radio.range or space.radio.steps)
+
+
+def _served(space: ScenarioSpace, is_reached: np.ndarray) -> set[int]:
+    """The nodes that are in range of some of these cells."""
+    return {k for k in range(len(space.nodes)) if (is_reached & in_range(space, k)).any()}
+
+
+def _cheapest(zones: np.ndarray, moves: np.ndarray, is_outward: bool) -> np.ndarray:
+    """(H, W) the cheapest ways from some zone to each cell, or from each cell to some zone."""
+    rows, columns = zones.shape
+    costs = np.full((rows + 2, columns + 2), math.inf)  # with a rim that no way enters
+    own = costs[1:-1, 1:-1]
+    own[zones >= 0] = 0.0
+    is_closed = zones == NO_FLY
+    changed = True
+    while changed:
+        before = own.copy()
+        for move, (east, south) in zip(moves, _STEPS, strict=True):
+            if is_outward:  # the cell from which the move leads here
+                others = costs[1 - south : rows + 1 - south, 1 - east : columns + 1 - east]
+                np.minimum(own, others + move, out=own)
+            else:  # the cell to which the move leads from here
+                into = np.full_like(costs, math.inf)
+                into[1:-1, 1:-1] = own + move
+                others = into[1 + south : rows + 1 + south, 1 + east : columns + 1 + east]
+                np.minimum(own, others, out=own)
+            own[is_closed] = math.inf
+        changed = not np.array_equal(before, own)
+    return own
+
+
+def _slots_of_trips(space: ScenarioSpace, uav: int) -> np.ndarray:
+    """(H, W) the slots of the shortest way to a cell, of a slot there, and of the way back."""
+    zones = zones_of(*space.size, space.rectangles, space.no_fly)
+    ways, _ = spread(zones, np.array(parking_of(space.rectangles)))
+    slots = fleet.type_of(space.fleet, uav).slots_per_cell
+    cells = np.where(ways == FAR, math.inf, ways).reshape(zones.shape)
+    return 2 * cells * slots + 1
+
+
+def _full_battery(space: ScenarioSpace, uav: int) -> int:
+    """The battery of a charged UAV [%]."""
+    return fleet.type_of(space.fleet, uav).flying_time or max(space.charge_complete)
+
+
+def _battery_of_guard(space: ScenarioSpace, uav: int, costs: Costs) -> int:
+    """What the return guard keeps of the battery [% / 1000]: its margins, and the last slot."""
+    mission = constants_of(space).view(np.recarray)[0]
+    mission.active = space.uavs[1]
+    u = types_of(space).view(np.recarray)[uav]
+    return PERCENT * int(margin(mission, u)) + costs.hover
+
+
+def _cells_along_a_line(costs: Costs, battery: int) -> int:
+    """The cells along a line for which a battery lasts there and back, with a slot there."""
+    north, east, south, west = (int(move.max()) for move in costs.moves)
+    most_expensive = max(north + south, east + west)
+    return max((battery - costs.hover - 1) // most_expensive, 0)
+
+
+def _share_of_others(space: ScenarioSpace, nodes: set[int]) -> float:
+    """The share that the other nodes have of all data of a mission; 1 if there are none."""
+    amounts = [
+        (low + high) / 2 + rate * space.max_slots
+        for (low, high), rate in zip(space.node_data, space.node_rates, strict=True)
+    ]
+    total = math.fsum(amounts)
+    if total == 0:
+        return 1.0
+    return math.fsum(amount for k, amount in enumerate(amounts) if k not in nodes) / total

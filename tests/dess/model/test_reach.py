@@ -1,0 +1,97 @@
+"""Which nodes a lone UAV can serve, by trips that are computed by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from dess import simulate
+from dess.model.reach import Costs, battery_of_trips, in_range, reach_of_nodes
+from dess.scenario.scenario import ScenarioSpace
+from tests.drawn import Script
+
+SHEET = {
+    **{"endurance": "35 min", "cruise": "15 m/s", "charging": "40 min", "data_rate": "20 kB/h"},
+    **{"bandwidth": "125 kHz", "snr": "12 dB at 2 km", "range": "2 km", "backlog": "1 MB"},
+}
+# A cell is 315 m, so 2 km are 6 cells, and 7 are too far.
+CELLS_IN_RANGE = 6
+
+
+def _space(farthest: int, sheet: dict[str, str] | None = None, **values: object) -> ScenarioSpace:
+    """Nodes along the north of a sea, whose base is in the north-west."""
+    nodes = [[x, 0] for x in range(1, farthest + 1)]
+    sea = {"grid": 64, "rows": 4, "zone": [0, 0, 1, 2], "nodes": nodes, "uavs": 1}
+    return ScenarioSpace.of(**(sea | values), data_sheet=SHEET | (sheet or {}))
+
+
+def _farthest(nodes: tuple[int, ...], space: ScenarioSpace) -> int:
+    """The cell of the last node before these."""
+    return space.nodes[nodes[0]][0] - 1
+
+
+@pytest.mark.parametrize(
+    ("sheet", "cells"),
+    [
+        ({}, 49),  # 49 out, a slot there, and 49 back are 99 %
+        ({"reserve": "20 %"}, 39),
+        ({"horizon": "21 min"}, 29),  # of 60 slots, the last one stands on the ground
+    ],
+)
+def test_a_node_is_out_of_reach_where_no_trip_leads_into_its_range(sheet, cells):
+    space = _space(60, sheet)
+    reach = reach_of_nodes(space)
+    assert _farthest(reach.lost, space) == cells + CELLS_IN_RANGE
+    assert reach.largest_ratio == pytest.approx((cells + CELLS_IN_RANGE) / 60)
+    assert not reach.margins or sheet
+
+
+def test_a_uav_flies_that_far_and_no_farther():
+    space = _space(60)
+    home = {}
+    for cells in (49, 50):
+        route = "E" * cells + "." + "W" * cells
+        home[cells] = simulate(space, Script(route), 1, events=True)
+    landed, lost = (home[cells].metrics["success"] for cells in (49, 50))
+    assert (landed, lost) == (1, 0)
+    events = home[49].events
+    assert events is not None
+    served = {e.node for e in events if e.event == "communication"}
+    assert max(served) + 1 <= 49 + CELLS_IN_RANGE
+
+
+def test_the_margins_of_the_guard_leave_less_of_the_sea_to_a_fleet():
+    alone, together = _space(60), _space(60, uavs=2)
+    assert reach_of_nodes(alone).lost == reach_of_nodes(together).lost
+    # With a teammate, 5 % for detours and one slot: 46 out, a slot there, 46 back.
+    assert _farthest(reach_of_nodes(together).margins, together) == 46 + CELLS_IN_RANGE
+
+
+def test_each_direction_has_its_cost_and_coasts_are_flown_around():
+    wall = [[2, y] for y in range(3)]
+    space = _space(1, no_fly=wall, zone=[0, 0, 1, 1])
+    moves = np.empty((4, 4, 64))
+    moves[:] = np.array([900, 2072, 1100, 500])[:, None, None]  # north, east, south, west
+    trips = battery_of_trips(space, Costs(moves, 1216))
+    assert trips[0, 1] == 2072 + 1216 + 500
+    assert trips[0, 3] == 3 * (2072 + 500) + 3 * (900 + 1100) * 2 + 1216
+    assert trips[0, 2] == trips[0, 0] == math.inf, "land, and the zone, where a UAV would stand"
+
+
+def test_a_node_is_in_range_where_its_mean_snr_reaches_the_lowest_step():
+    """With 12 dB at 2 km and an exponent of 2.27, -7.5 dB are reached up to 14.45 km."""
+    rates = {"range": None, "rates": [["-7.5 dB", "5.5 kbit/s"], ["0 dB", "50 kbit/s"]]}
+    sheet = {name: value for name, value in (SHEET | rates).items() if value is not None}
+    space = ScenarioSpace.of(grid=64, nodes=[[0, 0]], data_sheet=sheet)
+    reached = in_range(space, 0)[0]
+    limit = 2000 * 10 ** (19.5 / 22.7)
+    assert [*reached[:50]] == [math.hypot(315 * x, 10) <= limit for x in range(50)]
+    assert 0 < np.count_nonzero(reached) < 64
+
+
+def test_without_range_and_steps_every_node_is_in_range():
+    sheet = {name: value for name, value in SHEET.items() if name != "range"}
+    space = ScenarioSpace.of(grid=64, nodes=[[0, 0], [63, 63]], data_sheet=sheet)
+    reach = reach_of_nodes(space)
+    assert in_range(space, 1).all() and not reach.has_limit
+    assert (reach.lost, reach.margins, reach.largest_ratio) == ((), (), 1)
