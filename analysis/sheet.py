@@ -74,13 +74,18 @@ def unreachable_sentences(spaces: Iterable[ScenarioSpace]) -> list[str]:
 
     A scenario without limits has none: nothing about it is known to be wrong.
     """
-    with_sheet = [space for space in spaces if space.units]
-    reaches = [reach_of_nodes(space) for space in with_sheet]
-    limited = [pair for pair in zip(with_sheet, reaches, strict=True) if _is_short(pair[1])]
+    distinct = {_reach_key(space): space for space in spaces if space.units}
+    reaches = [(space, reach_of_nodes(space)) for space in distinct.values()]
+    limited = [pair for pair in reaches if _is_short(pair[1])]
     if not limited:
         return []
-    worst = min(limited, key=lambda pair: pair[1].largest_ratio)
-    return _reach_in_words(*worst)
+    return _reach_in_words(*min(limited, key=lambda pair: pair[1].largest_ratio))
+
+
+def _reach_key(space: ScenarioSpace) -> Any:
+    """What the nodes that UAVs can serve depend on; a sweep has many scenarios that share it."""
+    sea = (space.size, space.rectangles, space.no_fly, space.nodes, space.path_loss_exponent)
+    return (*sea, space.uavs[1], space.fleet, space.charge_complete, space.data_sheet)
 
 
 def _is_short(reach: Reach) -> bool:
