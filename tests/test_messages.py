@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from dess import InputError
 from dess.analysis.answers.comparison import Times
+from dess.analysis.ask.limits import Limits
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.results.resimulate import Evidence
 from dess.analysis.study.study import Study
@@ -89,6 +90,7 @@ def documents() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     yield Card, {"title": "", "finding": "", "picture": {"alt": "", "source": "", "narrow": ""}}
     yield Learned, {"files": {"a": ""}}
     scenario = {"scenario": "paper", "named": {}, "baseline": {}, "variation": {}}
+    yield Limits, {"missions": 1, "limits": [], "has_wind": False}
     yield Panel, scenario | {"policy": "greedy", "seed": 0, "module": "", "costs": {"uav": 1.0}}
     yield About, {"module": "", "code": "", "built_with": {"numba": "1"}}
     geometries = {"type": "GeometryCollection", "geometries": [point]}

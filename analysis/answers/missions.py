@@ -99,6 +99,17 @@ def map_caption(mission: Mission, fleet: str) -> str:
     )
 
 
+def typical_replication(missions: pd.DataFrame, metric: str) -> int:
+    """The replication of the mission whose metric is the median, or the next one above it.
+
+    Args:
+        missions: Missions of a policy at a design point.
+        metric: The column of the metric.
+    """
+    ordered = missions.sort_values([metric, "replication"], kind="stable")
+    return int(ordered["replication"].iloc[len(ordered) // 2])
+
+
 def keep_logs(
     results: Results,
     wanted: Sequence[tuple[str, int]],

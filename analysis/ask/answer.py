@@ -21,6 +21,8 @@ from dess.analysis.answers.settings.ranking import (
 )
 from dess.analysis.answers.variation import VARIATION, Variation, best_policy_of_side
 from dess.analysis.ask import around
+from dess.analysis.ask.assumptions import assumption_sentences
+from dess.analysis.ask.brief import brief_sentences
 from dess.analysis.ask.question import (
     Question,
     strip_markdown,
@@ -135,8 +137,9 @@ class Answer:
         if self.question.is_comparison:
             return [*map(strip_markdown, self.variation.sentences()), *self._unreachable()]
         if self.question.study.selection:
-            search = search_of(self.results)
-            return [*map(strip_markdown, search.sentences()), *self._unreachable()]
+            first, *others = search_of(self.results).sentences()
+            sentences = (first, *brief_sentences(self.results), *others)
+            return [*map(strip_markdown, sentences), *self._unreachable()]
         ranking = metric or PRODUCT
         ranked = rank_settings(self.results, ranking)
         lines = best_settings_sentences(self.results, ranked, ranking)
@@ -148,6 +151,18 @@ class Answer:
         """Which nodes no UAV can serve, and the highest collection ratio without them."""
         sentences = unreachable_sentences(self.results.store.manifest.scenarios)
         return [f"{sentence[0].upper()}{sentence[1:]}." for sentence in sentences]
+
+    def assumptions(self, metric: str | None = None) -> list[str]:
+        """What the answer to a sweep of a scenario with a data sheet assumes; otherwise nothing.
+
+        Args:
+            metric: The metric that ranks the settings, where there are no requirements. By default
+                the product.
+        """
+        has_sheets = all(space.units for space in self.results.store.manifest.scenarios)
+        if self.question.is_comparison or not has_sheets:
+            return []
+        return assumption_sentences(self.results, metric or PRODUCT)
 
     def tables(self, metric: str | None = None) -> dict[str, pd.DataFrame]:
         """The numbers of the answer by name: ``table``, and with requirements ``fleets``."""

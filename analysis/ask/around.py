@@ -1,4 +1,4 @@
-"""What-ifs around a cheapest fleet: one more UAV or pad, and what breaks its requirements first.
+"""What-ifs around a cheapest fleet: one more UAV or pad.
 
 question = question_around(results, "my-sea.toml")  # results of a search for the cheapest setting
 question.ask()
@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from dess import InputError
+from dess.analysis import numbers
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import priced_settings, setting_cells
 from dess.analysis.answers.fleet.requirements import (
@@ -23,7 +24,7 @@ from dess.analysis.answers.fleet.requirements import (
 )
 from dess.analysis.answers.settings.points import fleets_in_words
 from dess.analysis.ask.question import LONGEST, Question
-from dess.analysis.metrics import metric_of
+from dess.analysis.metrics import COST, metric_of
 from dess.analysis.names import field_named
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.tables import Results, load_results
@@ -31,15 +32,11 @@ from dess.analysis.stats.differences import compare
 from dess.analysis.study.study import study_from
 from dess.analysis.tables import INTERVALS, Table, format_counts
 from dess.policies.registry import is_path
-from dess.scenario.quantities import times
 from dess.scenario.scenario import ScenarioSpace, load_scenario
-
-FACTOR = 2  # harder conditions have twice the wind, the failures and the data
-WIND, HOURS = 0.5, 100  # without any: the wind as a share of the cruising speed; between failures
 
 
 def question_around(results: Results, scenario: str, missions: int = 100) -> Question | None:
-    """The question of what changes if the cheapest fleet or its conditions change a little.
+    """The question of what changes if the cheapest fleet changes a little.
 
     A fleet for several conditions is asked about under the last of them.
 
@@ -63,7 +60,7 @@ def question_around(results: Results, scenario: str, missions: int = 100) -> Que
     for change in _changed_fields(results.scenario(points[-1])):
         try:
             load_scenario(scenario, **fixed | values | change)
-        except InputError:  # such as a wind that UAVs cannot fly against
+        except InputError:  # such as more pads than the zone has cells
             continue
         changes.append(change)
     varied = {*values, *(field for change in changes for field in change)}
@@ -72,7 +69,7 @@ def question_around(results: Results, scenario: str, missions: int = 100) -> Que
     data |= {
         "name": _place_of_question(results).name,
         "scenario": scenario,
-        "description": "a fleet, and what changes if it or its conditions change a little",
+        "description": "a fleet, and what changes if it changes a little",
         "set": {field: value for field, value in fixed.items() if field not in varied},
         "design": {"kind": "table", "rows": [start, *(start | change for change in changes)]},
         "policies": [best.policy],
@@ -88,24 +85,20 @@ def is_known(results: Results) -> bool:
 
 def _place_of_question(results: Results) -> Path:
     """The results folder of the question, beside that of the study."""
+    return place_beside(results, "spare")
+
+
+def place_beside(results: Results, what: str) -> Path:
+    """Where something about the cheapest fleet of a study is kept, beside its results folder."""
     about = f"{results.store.manifest.key} {search_of(results).best.policy}"
-    name = f"{results.store.manifest.study.name[:LONGEST]}-around-{short_hash(about.encode())}"
+    name = f"{results.store.manifest.study.name[:LONGEST]}-{what}-{short_hash(about.encode())}"
     return results.store.folder.parent / name
 
 
 def _changed_fields(space: ScenarioSpace) -> Iterator[dict[str, Any]]:
-    """What is changed, one after the other: the fleet, then its conditions."""
-    sheet = space.data_sheet
-    rate = space.data_sheet.data_rate or ""
+    """What is changed, one after the other."""
     yield {"uavs": space.uavs[1] + 1}
     yield {"pads": space.zone_pads[0] + 1}
-    calm = f"{times(sheet.cruise or '', WIND)} from W"
-    yield {"data_sheet.wind": times(sheet.wind, FACTOR) if sheet.wind else calm}
-    yield {"data_sheet.mtbf": times(sheet.mtbf, 1 / FACTOR) if sheet.mtbf else f"{HOURS} h"}
-    doubled = [
-        times(rate_of_node, FACTOR) for rate_of_node in ([rate] if isinstance(rate, str) else rate)
-    ]
-    yield {"data_sheet.data_rate": doubled[0] if isinstance(rate, str) else doubled}
 
 
 def table_around(results: Results) -> Table:
@@ -143,13 +136,36 @@ def table_around(results: Results) -> Table:
     cells.insert(1, "Requirements", data["verdict"].astype(str))
     cells["Missions"] = format_counts(data["n"])
     caption = (
-        "The fleet, one more of it, and harder conditions: means, and changes on the same "
-        f"missions, with {INTERVALS}; requirements are met or missed if whole intervals say so, "
-        "otherwise open"
+        "The fleet, and one more of it: means, and changes on the same missions, with "
+        f"{INTERVALS}; requirements are met or missed if whole intervals say so, otherwise open"
     )
     if refused:
         caption += f". Cannot be simulated here: {'; '.join(map(_in_words, refused))}"
     return Table(cells, caption, data)
+
+
+def spare_sentence(results: Results) -> str:
+    """What a spare UAV costs and brings; empty if ``question_around`` does not know it.
+
+    Args:
+        results: The study.
+    """
+    if not is_known(results):
+        return ""
+    changed_results = load_results(_place_of_question(results))
+    start, *rows = [point.values for point in changed_results.store.manifest.points]
+    with_spare = [n for n, row in enumerate(rows, 1) if row.get("uavs") != start.get("uavs")]
+    if not with_spare:
+        return ""
+    costs = priced_settings(changed_results).set_index("point")[COST]
+    more = numbers.format_money(costs[with_spare[0]] - costs[0], results.prices.unit)
+    metric = search_of(results).best.tightest_first[0].metric
+    differences = compare(
+        changed_results.missions, 0, [metric.column], correction=None, of="point"
+    ).set_index("point")
+    row = differences.loc[with_spare[0], ["difference", "low", "high"]]
+    change = metric.change(*row)
+    return f"A spare UAV costs {more} more; with it, the {metric.within} changes by {change}."
 
 
 def _verdict_on_row(row: pd.Series, requirements: Sequence[Requirement]) -> Verdict:
@@ -163,8 +179,4 @@ def _verdict_on_row(row: pd.Series, requirements: Sequence[Requirement]) -> Verd
 
 def _in_words(change: dict[str, Any]) -> str:
     ((field, value),) = change.items()
-    name = field_named(field)
-    is_list = isinstance(value, list | tuple)
-    if is_list:
-        return f"{name.within} doubled"
-    return name.words(value)
+    return field_named(field).words(value)

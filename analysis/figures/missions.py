@@ -196,6 +196,18 @@ def mission_figure(events: event_log.Events, scenario: Scenario) -> Figure:
     return figure
 
 
+def map_figure(events: event_log.Events, scenario: Scenario) -> Figure:
+    """The map of a mission alone."""
+    with style.figure_look():
+        figure = style.Picture(figsize=(5.6, 6.4), dpi=style.DPI)
+        figure.set_layout_engine("constrained", rect=(0, 0, 0.94, 1))
+        ax = figure.subplots()
+        plot_trajectories(events, scenario, ax)
+        ax.set_title(_outcome_in_words(events, scenario))
+        _map_legend(ax)
+    return figure
+
+
 def sea_figure(space: ScenarioSpace) -> Figure:
     """The map of a scenario: its sensor nodes, each in its colour, and its zone."""
     with style.figure_look():

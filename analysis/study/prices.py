@@ -262,8 +262,8 @@ def spent_battery(
     mission = np.repeat(np.arange(len(fleet)), fleet)
     number = np.arange(len(mission)) - np.repeat(np.cumsum(fleet) - fleet, fleet)
     most = max(space.uavs[1] for space in spaces)
-    of_types = np.stack([types_of(space, most)["battery"] for space in spaces])
-    start = of_types[np.asarray(missions["point"])[mission], number]
+    batteries = np.stack([types_of(space, most)["battery"] for space in spaces])
+    start = batteries[np.asarray(missions["point"])[mission], number]
     start = np.where(start > 0, start, np.asarray(missions["flying_time"])[mission])
     spent = start + np.asarray(uavs["charged"]) - np.asarray(uavs["battery"])
     return np.bincount(mission, spent, len(fleet))

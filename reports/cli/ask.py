@@ -175,12 +175,15 @@ def what_if(
 def _answer_question(
     question: "Question", page: str, out: Path, workers: int, dry_run: bool, yes: bool
 ) -> "Answer":
-    """Ask a question, and what changes around a cheapest fleet that it finds."""
+    """Ask a question; of a cheapest fleet that it finds, also what one more brings, and limits."""
     from dess.analysis.ask.answer import Answer
+    from dess.analysis.ask.limits import find_limits
 
     answer = Answer(question, _run_question(question, page, out, workers, dry_run, yes))
     if changes := answer.question_around():
         _run_question(changes, page, out, workers, dry_run, yes)
+        with console.compile_notice(), console.progress_bar("mission") as shown:
+            find_limits(answer.results, question.study.scenario, workers, shown.update)
     return answer
 
 
@@ -215,6 +218,7 @@ def _print_answer(
 
     question = answer.question
     sentences = answer.answers(metric)
+    assumed = answer.assumptions(metric)
     if not as_json:
         for table in answer.brief_tables(metric):
             print_cells(table.cells)
@@ -222,6 +226,10 @@ def _print_answer(
                 console.print_text(table.caption)
         for line in sentences:
             console.print_text(line)
+        if assumed:
+            console.print_text("What is assumed:")
+        for line in assumed:
+            console.print_text(f"- {line}")
         console.print_text(f"study: {question.file}")
     page = None
     if absent := missing("reports", f"the page of a {asked}"):
@@ -236,7 +244,8 @@ def _print_answer(
             name: json.loads(table.to_json(orient="records"))
             for name, table in answer.tables(metric).items()
         }
-        print(json.dumps({**about, "answers": sentences, **rows}, indent=2))
+        told = {"answers": sentences, "assumptions": assumed}
+        print(json.dumps({**about, **told, **rows}, indent=2))
     elif page:
         console.print_text(f"page: {page}")
 

@@ -39,6 +39,8 @@ from dess.analysis.answers.missions import map_caption
 from dess.analysis.answers.settings.points import fleets_in_words, has_conditions
 from dess.analysis.ask import around
 from dess.analysis.ask.assumptions import assumption_sentences
+from dess.analysis.ask.brief import brief_sentences
+from dess.analysis.ask.limits import find_limits
 from dess.analysis.figures.missions import mission_figure, sea_figure
 from dess.analysis.names import node_placing_sentence
 from dess.analysis.results.resimulate import resimulate
@@ -54,11 +56,21 @@ answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **
 
 # %%
 found = answer.results
+if asked := around.question_around(found, scenario):
+    asked.ask(workers, yes=yes)
+    find_limits(found, scenario, workers)
 search = search_of(found)
 html.make_answer(search.sentence(), search.best.fleet)
 
 # %%
 html.lead_figure(*draw_cheapest(found))
+
+# %%
+if sea.units:
+    html.show_parts(
+        study.draw_typical_mission(found),
+        html.render_part("brief.html", lines=brief_sentences(found)),
+    )
 
 # %%
 point = search.shown_point
@@ -92,8 +104,7 @@ html.make_gallery(
 )
 
 # %%
-if asked := around.question_around(found, scenario):
-    asked.ask(workers, yes=yes)
+if around.is_known(found):
     html.show_parts(around.table_around(found))
 
 # %% [markdown]

@@ -86,6 +86,14 @@ html.make_answer(variance_sentence(study, by))
 # %%
 html.lead_figure(*draw_main_figure(study, by))
 
+# %% tags=["if-brief"]
+from dess.analysis.ask.brief import brief_sentences
+
+html.show_parts(
+    page.draw_typical_mission(study),
+    html.render_part("brief.html", lines=brief_sentences(study)),
+)
+
 # %%
 page.make_panel_of(study, by)
 
@@ -112,8 +120,7 @@ html.show_parts(fleet_tables.condition_table(study))
 # %% [markdown] tags=["if-around"]
 # ## What if
 #
-# One more UAV or pad, and twice the wind, the failures and the data, on the same missions; what is
-# nearest to breaking the requirements, or breaks them most, comes first.
+# One more UAV or pad, on the same missions.
 
 # %% tags=["if-around"]
 from dess.analysis.ask import around

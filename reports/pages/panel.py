@@ -56,7 +56,9 @@ _PRICED = {
     "lost_uav": "A lost UAV",
     "missions": "Missions planned for the fleet",
 }
-_NO_COSTS = Markup("<p>The panel of this page has no costs, since they are those of a year.</p>\n")
+_NO_COSTS = Markup(
+    '<p class="no-costs">The panel of this page has no costs, since they are those of a year.</p>\n'
+)
 _NO_NOTE = Markup("")
 _HASH = r'"([0-9a-f]{64})"'
 _PACKED = re.compile('(?<=type="text/plain">)([A-Za-z0-9+/=]+)(?=</script>)')

@@ -13,15 +13,25 @@ from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.requirements import requirements_of
+from dess.analysis.answers.missions import map_caption, typical_replication
 from dess.analysis.answers.settings.baseline import check_baseline
-from dess.analysis.answers.settings.points import has_conditions, metrics_of_page, varied_values
+from dess.analysis.answers.settings.points import (
+    fleets_in_words,
+    has_conditions,
+    metrics_of_page,
+    varied_values,
+)
 from dess.analysis.answers.settings.ranking import rank_settings, ranking_metric
 from dess.analysis.ask import around
+from dess.analysis.figures import Drawing
+from dess.analysis.figures.missions import map_figure
+from dess.analysis.metrics import metric_of
 from dess.analysis.names import field_named, value_text
+from dess.analysis.results.resimulate import resimulate
 from dess.analysis.results.tables import Results
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.selection import Selection
-from dess.policies.registry import list_departures
+from dess.policies.registry import is_path, list_departures
 from dess.reports.pages import PREFIX, html, notebook
 from dess.reports.pages.notebook import Report, cell_tags
 from dess.reports.pages.panel import make_panel
@@ -241,6 +251,29 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
     return make_panel(space, space, name, [policy], manifest.seed, *about)
 
 
+def draw_typical_mission(results: Results) -> list[Drawing]:
+    """The map of a typical mission of the cheapest fleet, with the names of its nodes.
+
+    It is the mission with the median of what decides the search. None is drawn if the policy is a
+    Python file, which may be anybody's code.
+
+    Args:
+        results: A study that searches for the cheapest fleet.
+    """
+    search = search_of(results)
+    policy = search.best.policy
+    if is_path(policy):
+        return []
+    column = search.tightest_requirement()[0].column
+    replication = typical_replication(search.shown_missions, column)
+    mission = resimulate(results, policy, search.shown_point, replication)
+    fleet = fleets_in_words(results)[search.shown_point]
+    alt = "Map of a typical mission of the fleet, with the names of the nodes"
+    figure = map_figure(mission.events, mission.scenario)
+    caption = f"{map_caption(mission, fleet)} Its {metric_of(column).within} is the median."
+    return [Drawing(figure, alt, caption)]
+
+
 def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]:
     """For each tag, whether the page of a study has the cells of the notebook with this tag.
 
@@ -290,5 +323,6 @@ def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]
         "if-priced-search": is_search and results.prices.pays_for_missions,
         # A scenario in units, and what changes a little around the cheapest fleet.
         "if-sheet": all(space.units for space in manifest.scenarios),
+        "if-brief": is_search and all(space.units for space in manifest.scenarios),
         "if-around": is_search and around.is_known(results),
     }

@@ -94,10 +94,10 @@ def rule_of_thumb(results: Results, policy: str, points: Sequence[int]) -> RuleO
     scenarios = results.store.manifest.scenarios
     if "pad_requests" not in missions or not all(scenarios[point].units for point in points):
         return None
-    of_fleet = (missions["policy"] == policy) & missions["point"].isin(points)
-    of_its_uavs = (results.uavs["policy"] == policy) & results.uavs["point"].isin(points)
-    missions = missions[of_fleet]
-    uavs = results.uavs[of_its_uavs]
+    is_of_fleet = (missions["policy"] == policy) & missions["point"].isin(points)
+    is_of_its_uavs = (results.uavs["policy"] == policy) & results.uavs["point"].isin(points)
+    missions = missions[is_of_fleet]
+    uavs = results.uavs[is_of_its_uavs]
     flights = missions["pad_requests"].sum()
     if not flights > 0:
         return None

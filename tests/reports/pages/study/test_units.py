@@ -1,6 +1,9 @@
 """The page of a sea with a data sheet: for the one who pays, on one sheet of paper."""
 
-from dess.analysis.ask import around
+from dess.analysis import load_results
+from dess.analysis.ask import around, limits
+from dess.analysis.ask.assumptions import assumption_sentences
+from dess.analysis.ask.brief import brief_sentences
 from dess.analysis.ask.question import sweep_question
 from dess.reports.pages.render import render_study
 from dess.reports.pages.study import make_study_report
@@ -10,6 +13,7 @@ from tests.reports.small import said_by, words_of
 
 A4 = 182, 269  # less the margins [mm]
 PIXEL = 25.4 / 96  # [mm]
+SHEET_OF_PAPER = ("h1", "figure.lead", "main > .gallery", ".brief", ".assumptions")
 
 
 def test_a_sheet_needs_no_prices_and_prices_no_requirement(tmp_path):
@@ -25,6 +29,29 @@ def test_a_sheet_needs_no_prices_and_prices_no_requirement(tmp_path):
         assert ("Prices: 20,000 EUR for a UAV." in said) == bool(prices)
 
 
+def test_the_page_of_an_own_sea_tells_what_the_terminal_tells(tmp_path):
+    scenario = write_scenario(tmp_path, **SHEET)
+    said = said_by(
+        "own-sea",
+        results=str(tmp_path / "results"),
+        scenario=str(scenario),
+        fields={"uavs": [1, 2]},
+        policies=["greedy"],
+        prices={"uav": 20_000, "hour": 30, "years": 5, "days": 200},
+        requirements={"success": 0.6, "age": "50 min"},
+        missions=3,
+    )
+    folder, _ = sorted(
+        (tmp_path / "results" / "sweeps").glob("*/"), key=lambda path: len(path.name)
+    )
+    found = load_results(folder)
+    for sentence in (*brief_sentences(found), *assumption_sentences(found)):
+        assert sentence in said
+    assert "EUR a year" in said
+    assert "The panel of this page has no costs" in said
+    assert "Its age of information is the median." in said
+
+
 def test_the_answer_the_figure_and_what_is_assumed_are_one_sheet_of_paper(tmp_path, visit):
     question = sweep_question(
         {"uavs": (1, 2)},
@@ -37,17 +64,18 @@ def test_the_answer_the_figure_and_what_is_assumed_are_one_sheet_of_paper(tmp_pa
     )
     found = question.ask()
     around.question_around(found, question.study.scenario, 5).ask()
+    limits.find_limits(found, question.study.scenario, missions=3)
     with notebooks_here(is_drawn=True):
         path = render_study(found, tmp_path / "reports")
     text = words_of(path.read_text("utf-8"))
-    for words in ("A slot is 21 s", "A cell is 315 m", "mean time between failures 100 h"):
+    for words in ("A slot is 21 s", "A cell is 315 m", "What breaks it first", "A spare UAV costs"):
         assert words in text
     assert "slots" not in text.split("How this page was made")[0].replace("communication slots", "")
     page = visit(path, round(A4[0] / PIXEL)).page
     told = ["Why", "What if", "What the model leaves out", "How this page was made"]
     assert [each for each in page.locator("h2").all_inner_texts() if each in told] == told
     page.emulate_media(media="print")
-    tops = [page.locator(name).bounding_box() for name in ("h1", "figure.lead", ".assumptions")]
+    tops = [page.locator(name).bounding_box() for name in SHEET_OF_PAPER]
     assert [box["y"] for box in tops] == sorted(box["y"] for box in tops)
     assert (tops[-1]["y"] + tops[-1]["height"]) * PIXEL < A4[1]
     box = page.locator(".assumptions")

@@ -1,0 +1,52 @@
+"""The risk of a fleet: how often it loses a UAV, and how bad its worst missions are."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from dess.analysis import numbers
+from dess.analysis.answers.fleet.requirements import requirements_of
+from dess.analysis.metrics import AGE, RATIO, column_in_sheet_unit, metric_of
+from dess.analysis.results.tables import Results
+
+_WORST = 0.1  # the share of the missions that are called the worst
+
+
+def risk_sentence(results: Results, policy: str, points: Sequence[int]) -> str:
+    """In how many missions that check a fleet a UAV is lost, and how old the data are in the worst.
+
+    Args:
+        results: A study that searches for the cheapest setting.
+        policy: The policy.
+        points: The design points of the fleet, one for each condition; none if there is no fleet.
+
+    Returns:
+        The sentence; empty without a fleet or a check.
+    """
+    checks = results.checks
+    if not points or checks.empty:
+        return ""
+    checks = checks[(checks["policy"] == policy) & checks["point"].isin(points)]
+    lost = _missions_with_losses(results, policy, points)
+    missions = numbers.format_count(len(checks), "mission")
+    text = f"In {lost:,} of {missions} that check it, a UAV is lost"
+    return f"{text}; {_worst_in_words(results, checks)}."
+
+
+def _missions_with_losses(results: Results, policy: str, points: Sequence[int]) -> int:
+    """The number of missions of the check in which a UAV is lost."""
+    manifest = results.store.manifest
+    parts = manifest.parts_of_check(results.policies.index(policy))
+    uavs = results.store.uavs([part for part in parts if part.cell.point in points])
+    return int(uavs.groupby(["point", "replication"])["down"].max().sum())
+
+
+def _worst_in_words(results: Results, missions: pd.DataFrame) -> str:
+    """How old the data are in the worst tenth of missions, or how few are collected."""
+    age = column_in_sheet_unit(AGE, missions)
+    asked = [requirement.column for requirement in requirements_of(results)]
+    if age in asked:
+        oldest = metric_of(age).amount(missions[age].quantile(1 - _WORST))
+        return f"in the worst tenth of them, the data are {oldest} old or older"
+    least = metric_of(RATIO).amount(missions[RATIO].quantile(_WORST))
+    return f"in the worst tenth of them, at most {least} of the data are collected"
