@@ -361,7 +361,9 @@ def list_departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) ->
     if not trained:
         return []
     lines = []
+    spaces = [*spaces]
     present = field_ranges(spaces)
+    has_steps = any(space.radio.steps for space in spaces)
     for name, folder in trained.items():
         with suppress(InputError):  # whoever loads it says what is wrong
             beyond = [
@@ -369,6 +371,8 @@ def list_departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) ->
                 for field, (low, high) in read_description(folder).ranges.items()
                 if field in present and not low <= present[field][0] <= present[field][1] <= high
             ]
+            if has_steps:  # no policy that is shipped was trained on them
+                beyond.append("a rate in steps (trained on eq. 9)")
             if beyond:
                 lines.append(f"{name} acts outside of its training: {listed(beyond)}")
     return lines

@@ -211,6 +211,39 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
 
 
 @st.composite
+def sheet_spaces(draw: st.DrawFn) -> ScenarioSpace:
+    """Spaces with a data sheet: rates in steps or not, few large messages or many small ones."""
+    minutes = draw(st.integers(10, 60))
+    radio: dict[str, Any] = draw(
+        st.sampled_from(
+            [
+                {"modulation": "lora", "bandwidth": "125 kHz"},
+                {"rates": [["-3 dB", "1 Mbit/s"], ["4 dB", "20 Mbit/s"]], "bandwidth": "20 MHz"},
+                {"max_rate": "2 bit/s/Hz", "bandwidth": "500 kHz"},
+                {"bandwidth": "125 kHz"},
+            ]
+        )
+    )
+    sheet = {
+        "endurance": f"{minutes} min",
+        "cruise": f"{draw(st.integers(4, 20))} m/s",
+        "charging": f"{draw(st.integers(5, 90))} min",
+        "horizon": f"{minutes * 60 * draw(st.integers(20, 120)) / 100} s",
+        "data_rate": draw(st.sampled_from(["0 B/h", "20 kB/h", "3 MB/h", "90 MB/h"])),
+        "message": draw(st.sampled_from(["100 B", "1 kB", "2 MB"])),
+        "backlog": draw(st.sampled_from(["0 B", "5 MB"])),
+        "snr": f"{draw(st.integers(-20, 20))} dB at {draw(st.integers(1, 3))} km",
+        "altitude": f"{draw(st.integers(1, 500))} m",
+        "duty_cycle": draw(st.sampled_from(["1 %", "100 %"])),
+    }
+    sea = draw(seas(**PLAIN_SEA))
+    spots = sea["zone"][2] * sea["zone"][3]
+    uavs = draw(_ranges(1, min(4, spots)))
+    age = {"measured": True}
+    return ScenarioSpace.of(**sea, uavs=uavs, pads=1, age=age, data_sheet=sheet | radio)
+
+
+@st.composite
 def continuous_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
     """Spaces whose packets arrive in continuous time; only the SimPy engine has them."""
     nodes = draw(st.lists(cells(4), min_size=1, max_size=5, unique=True))

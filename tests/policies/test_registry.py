@@ -17,7 +17,7 @@ from dess.policies.heuristics import Greedy
 from dess.policies.learner.config import validate_config
 from dess.policies.learner.trained import expected_weights, make_observation, save_policy
 from dess.policies.registry import CLASSES, Policy, describe_policy
-from dess.scenario.scenario import Scenario, load_scenario, scenario_names
+from dess.scenario.scenario import Scenario, ScenarioSpace, load_scenario, scenario_names
 from tests.outside import install_package
 from tests.policies.learner.tiny import refusal_of
 
@@ -210,3 +210,10 @@ def test_which_policies_are_python_files_is_known_without_running_them(tmp_path,
     for team in ("greedy", "ddqn,tour", "data.py:Trap", "greedy, ./data.py:Trap", "unknown", ""):
         assert registry.python_files_in(team) == []
     assert "trap" not in sys.modules
+
+
+def test_a_rate_in_steps_is_outside_of_every_training():
+    plain, steps = (ScenarioSpace.of(radio={"steps": s}) for s in ([], [[-7.5, 0.04], [0, 0.4]]))
+    assert not any("steps" in line for line in registry.list_departures(["any"], [plain]))
+    [line] = registry.list_departures(["any", "greedy"], [plain, steps])
+    assert line.startswith("any acts outside") and "a rate in steps (trained on eq. 9)" in line

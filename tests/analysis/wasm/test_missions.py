@@ -38,6 +38,15 @@ SCENARIOS = {
     "failures and ages": ("paper", FAILURES),
     "a fleet of types": ("paper", FLEET),
 }
+# Rates in steps, and nodes of which one makes messages and one has exactly its rate.
+SHEET: dict[str, Any] = {
+    **{"grid": 16, "nodes": [[2, 2], [12, 5], [8, 14]], "zone": [8, 8, 2, 2], "uavs": 2},
+    "data_sheet": {
+        **{"endurance": "35 min", "cruise": "15 m/s", "charging": "40 min", "bandwidth": "125 kHz"},
+        **{"data_rate": ["3 MB/h", "20 kB/h", "12 MB/h"], "snr": "-12 dB at 1 km"},
+        **{"modulation": "lora", "duty_cycle": "40 %", "altitude": "60 m", "horizon": "2 h"},
+    },
+}
 HEURISTICS = ("random", "random-unguarded", "nearest", "greedy", "tour", "age")
 
 
@@ -62,6 +71,12 @@ def test_the_module_flies_the_missions_of_the_batch_engine(name: str):
     scenario, values = SCENARIOS[name]
     missions = 20 if name == "jade-bight" else 100
     assert_same(load_scenario(scenario, **values), "greedy", 7, missions)
+
+
+def test_the_module_has_rates_in_steps_and_messages():
+    space = ScenarioSpace.of(**SHEET)
+    assert min(space.message_rates) < 1 and max(space.message_rates) > 50 and space.radio.steps
+    assert_same(space, "greedy", 7, 20)
 
 
 @pytest.mark.parametrize("team", [*HEURISTICS, "greedy,random"])

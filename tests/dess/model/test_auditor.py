@@ -1,24 +1,52 @@
 """An event log tells the whole mission: an auditor that knows only the page can replay it."""
 
 from math import isnan
+from typing import Any
 
 import pytest
 from hypothesis import given
 
 from dess.model.mission import simulate
 from dess.model.record import MISSION_RECORD, measures_of
+from dess.physics.section import Section
+from dess.scenario.scenario import ScenarioSpace
 from tests.dess.model.auditor import audit
-from tests.drawn import continuous_spaces, extended_spaces, policies, replications, seeds, spaces
+from tests.drawn import (
+    continuous_spaces,
+    extended_spaces,
+    policies,
+    replications,
+    seeds,
+    sheet_spaces,
+    spaces,
+)
 
 # Nothing was delivered, no age has come to its end, or no UAV has asked for a pad.
 NOT_ALWAYS = {"latency", "latency_p99", "peak_age", "waiting"}
 
 
-@given(spaces() | extended_spaces() | continuous_spaces(), policies, seeds, replications)
+def constants_of(space: ScenarioSpace) -> dict[str, Any]:
+    """The fields of a scenario, and those that follow from its data sheet."""
+    constants = space.model_dump()
+    if space.units:
+        for field in space.data_sheet.fields():
+            name = field.partition(".")[0]
+            value = getattr(space, name)
+            constants[name] = value.model_dump() if isinstance(value, Section) else value
+        constants["charge_rate"] = space.charge_fraction  # exactly, as the times were typed
+    return constants
+
+
+@given(
+    spaces() | extended_spaces() | continuous_spaces() | sheet_spaces(),
+    policies,
+    seeds,
+    replications,
+)
 def test_an_auditor_finds_the_record_in_the_log(space, policy, seed, replication):
     record = simulate(space, policy, seed % 2**53, replication, events=True)
     assert record.events is not None
-    report = audit(record.events.columns(), space.model_dump())
+    report = audit(record.events.columns(), constants_of(space))
     metrics = report["metrics"]
     if space.wind.is_on:  # the auditor does not know what the way home costs
         metrics["home"] = record.home

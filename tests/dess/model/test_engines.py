@@ -28,6 +28,7 @@ from tests.drawn import (
     extended_spaces,
     replications,
     seeds,
+    sheet_spaces,
     spaces,
     teams,
 )
@@ -54,7 +55,9 @@ def _equal(one: Records, other: Records) -> bool:
     return all(a.tobytes() == b.tobytes() for a, b in zip(one, other, strict=True))
 
 
-@given(extended_spaces(), teams, seeds, st.lists(replications, min_size=1, max_size=4))
+@given(
+    extended_spaces() | sheet_spaces(), teams, seeds, st.lists(replications, min_size=1, max_size=4)
+)
 def test_both_engines_give_the_same_record(space, team, seed, numbers):
     assert_same_alone(space, team[: space.uavs[1]], seed, numbers, batch_size=2)
 

@@ -25,6 +25,13 @@ PLAIN = (
     'data_sheet.data_rate="3 MB/h"',
     "data_sheet.data_rate=20 kB/h",
     "data_sheet.backlog=[1 MB, 2 MB, 0 MB]",
+    "data_sheet.modulation=lora",
+    "data_sheet.rates=[[-7.5 dB, 5.5 kbit/s], [0 dB, 50 kbit/s]]",
+    "data_sheet.duty_cycle=1 %",
+    "data_sheet.altitude=120 m",
+    "data_sheet.message=100 B",
+    "radio={steps=[[-20, 0.002], [3, 1.5]], duty_cycle=0.5}",
+    "arrivals={message=0.003}",
     "landing=true",
     "quota=0",  # which needs landing
 )
@@ -36,6 +43,7 @@ _ENDS = st.sampled_from(
     + ['"/dev/zero"', "{}", "{measured=true}", "[{slots_per_cell=0}]", "[{a=1}]"]
     + ["[{slots_per_cell=100000}]", '"0 km"', '"1e300 h"', '"-3 MB"', '"5 m/s from nowhere"']
     + ['"12 dB at 0 m"', "3,5 MB/h", "54 kmph", "[1 kB, 2 kB]"]
+    + ['[["0 dB", "1 bit/s"], ["0 dB", "2 bit/s"]]', '[["0 dB"]]', "[[0, 1], [1, 1]]", '"fsk"']
 )
 _names = st.sampled_from(FIELDS) | st.sampled_from(SECTIONS).flatmap(
     lambda section: texts.map(lambda name: f"{section}.{name}")
