@@ -159,7 +159,8 @@ def wasm(session: nox.Session) -> None:
     if session.virtualenv.venv_backend != "none":
         session.install("ziglang", "-c", "constraints.txt")
     fixed = {"PYTHONHASHSEED": "0"}
-    session.run("python", "tools/wasm/build_module.py", *session.posargs, env=fixed)
+    for script in ("build_module.py", "make_example.py"):  # the example needs the module
+        session.run("python", f"tools/wasm/{script}", *session.posargs, env=fixed)
 
 
 @nox.session

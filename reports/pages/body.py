@@ -18,7 +18,7 @@ from nbformat import NotebookNode
 from pygments.formatters import HtmlFormatter
 
 import dess
-from dess.reports.pages.html import JINJA, PART, panel_hash, set_indices
+from dess.reports.pages.html import JINJA, PANEL_SCRIPT, PART, panel_hash, set_indices
 from dess.reports.pages.notebook import SCORECARD, Report
 from dess.reports.pages.page import Card, Page, Picture
 
@@ -100,6 +100,7 @@ def make_page(report: Report) -> Page:
         "scripts": report.scripts,
         "simulates": report.simulates,
         "panel_hash": panel_hash,
+        "script": PANEL_SCRIPT,
         "version": dess.__version__,
         "answer": card.finding,
         "card": card.hidden,

@@ -8,6 +8,7 @@ html.make_table(frame, "Means with 95 % intervals")
 html.make_gallery([(drawing, "Success of every policy", "n = 300 missions")])
 """
 
+import gzip
 import io
 import json
 import os
@@ -42,6 +43,9 @@ STUDIES_BESIDE = 6  # studies with a column in one table of what they were made 
 FEW_WORDS = 18  # characters of a cell that is not broken
 SENTENCES = 150  # characters of a cell from which on its column is wide
 SHORT = 12  # characters of a hash that are shown
+# The templates of the scripts that simulate: a panel, another mission, the example of the index.
+PANEL_SCRIPT, SINGLE_SCRIPT = "panel_script.js", "another_script.js"
+EXAMPLE_SCRIPT = "try_script.js"
 PART = "application/vnd.dess.part+json"  # type of the output of a cell that contains a ``Part``
 
 if TYPE_CHECKING:  # an index is made without figures
@@ -112,16 +116,24 @@ def load_template(name: str, **filters: Callable[..., str]) -> Template:
 
 
 @cache
-def panel_script(name: str = "panel_script.js") -> str:
+def panel_script(name: str) -> str:
     """The script of a panel, from its template."""
+    template = load_template(name)
+    if name == EXAMPLE_SCRIPT:  # which draws nothing
+        return template.render()
     from dess.analysis.figures import style  # for the pages that have one
 
-    return load_template(name).render(style=style)
+    return template.render(style=style)
 
 
-def panel_hash() -> str:
+def panel_hash(name: str) -> str:
     """The hash by which a page lets a browser run the script of a panel, and no other."""
-    return b64encode(sha256(panel_script().encode()).digest()).decode()
+    return b64encode(sha256(panel_script(name).encode()).digest()).decode()
+
+
+def pack(content: bytes) -> str:
+    """Compressed bytes as text; equal bytes give equal text."""
+    return b64encode(gzip.compress(content, 9, mtime=0)).decode()
 
 
 def render_part(name: str, **values: Any) -> HTML:
@@ -129,14 +141,20 @@ def render_part(name: str, **values: Any) -> HTML:
     return HTML(load_template(name).render(**values))
 
 
-def fill_page(name: str, scripts: bool = False, simulates: bool = False, **values: Any) -> str:
+def fill_page(
+    name: str,
+    scripts: bool = False,
+    simulates: bool = False,
+    script: str = PANEL_SCRIPT,
+    **values: Any,
+) -> str:
     """Fill a template with values, and seal the page.
 
     A browser makes no request for the page, and runs scripts only if ``scripts`` is set. If
     ``simulates`` is set, it runs the script of a panel, and its WebAssembly module; the script of
-    *another mission* needs both.
+    *another mission* needs both. The templates of these scripts have the names ``..._script.js``.
     """
-    permitted = {"scripts": scripts, "simulates": simulates}
+    permitted = {"scripts": scripts, "simulates": simulates, "script": script}
     page = load_template(name).render(version=dess.__version__, **permitted, **values)
     return Page(page).sealed.text
 

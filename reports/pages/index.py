@@ -4,17 +4,26 @@ The index has tiles, the figure of the scorecard, and a card per page. Anybody m
 in the folder. So of older pages, the index takes only what cannot run.
 """
 
+import json
 import logging
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
 
 from dess import InputError
-from dess.base.files.reading import paths_in
+from dess.analysis.wasm.module import MOST_BYTES, read_module
+from dess.base.files.reading import paths_in, read_bytes
 from dess.reports.pages import INDEX, PREFIX
-from dess.reports.pages.html import fill_page, load_template
+from dess.reports.pages.html import (
+    EXAMPLE_SCRIPT,
+    fill_page,
+    load_template,
+    pack,
+    panel_script,
+)
 from dess.reports.pages.notebook import GROUPS, SCORECARD
 from dess.reports.pages.page import Page
 
@@ -25,6 +34,7 @@ TILES = {  # pages whose number has a tile, and what it is
     "planner.html": "Planning against learning",
     "own-sea.html": "The cheapest fleet of the example",
 }
+EXAMPLE = Path(__file__).with_name("example.json")  # of ``panel.describe_example``
 _OF_STUDY = re.compile(rf"{PREFIX}.+(?<!\.partial)\.html")
 
 
@@ -48,6 +58,27 @@ def make_index(
         picture=scorecard and scorecard.picture,
         groups=group_pages(pages),
         left_out=left_out,
+        simulates=True,
+        script=EXAMPLE_SCRIPT,
+        example=render_example(),
+    )
+
+
+def render_example() -> str:
+    """Three controls with which a reader simulates missions of the paper's sea, as HTML.
+
+    They are left out if they were made for another version of the WebAssembly module.
+    """
+    about = json.loads(read_bytes(EXAMPLE, MOST_BYTES, "a part of the package"))
+    module = read_module()
+    if about["module"] != sha256(module).hexdigest():
+        return ""
+    return load_template("try.html").render(
+        data=about["data"],
+        missions="1,000",
+        module=pack(module),
+        image=pack(json.dumps(about["image"]).encode()),
+        script=panel_script(EXAMPLE_SCRIPT),
     )
 
 

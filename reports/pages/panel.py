@@ -10,7 +10,7 @@ import gzip
 import json
 import re
 import zlib
-from base64 import b64decode, b64encode
+from base64 import b64decode
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
@@ -36,7 +36,14 @@ from dess.base.files.writing import toml_value
 from dess.model.record import Records, empty_records, measures_of
 from dess.policies.heuristics import KINDS
 from dess.policies.registry import load
-from dess.reports.pages.html import panel_script, render_part, write_markdown
+from dess.reports.pages.html import (
+    PANEL_SCRIPT,
+    SINGLE_SCRIPT,
+    pack,
+    panel_script,
+    render_part,
+    write_markdown,
+)
 from dess.reports.pages.page import PANEL, hidden_element
 from dess.scenario.fields import dotted, is_number
 from dess.scenario.scenario import ScenarioSpace, is_scenario_name
@@ -76,6 +83,7 @@ _LEVELS = {
     "charge_complete": (60, 70, 80, 90, 100),
     "failures.uav_rate": (0.0, 0.0005, 0.001, 0.002, 0.005),
 }
+_EXAMPLE_SETTINGS = ("uavs", "pads", "arrival_rate")
 _SIDE = 8  # of the grid, the most numbers of UAVs and of pads
 # What a search can require, by the names of the command line.
 _REQUIRED = {SUCCESS: "success", RATIO: "ratio", PRODUCT: "product", AGE: "age"}
@@ -170,10 +178,10 @@ class Panel(Document):
             render_part(
                 "another.html" if self.is_single else "panel.html",
                 data=data,
-                module=_pack(read_module()),
-                image=_pack(json.dumps(image.document()).encode()),
+                module=pack(read_module()),
+                image=pack(json.dumps(image.document()).encode()),
                 sides=SIDES,
-                script=panel_script("another_script.js" if self.is_single else "panel_script.js"),
+                script=panel_script(SINGLE_SCRIPT if self.is_single else PANEL_SCRIPT),
                 currency=self.costs.currency if self.costs else "",
                 start={side: {"policy": self.policy, "positions": starts[side]} for side in SIDES},
                 missions=MISSIONS,
@@ -506,6 +514,31 @@ def _describe_requirements(
         yield "", ""
 
 
-def _pack(content: bytes) -> str:
-    """Compressed bytes as text; equal bytes give equal text."""
-    return b64encode(gzip.compress(content, 9, mtime=0)).decode()
+def describe_example() -> dict[str, Any]:
+    """What the index of pages simulates: fleets and data of the paper's sea.
+
+    It is a file of the package, so that an index is made without simulating:
+    ``python tools/wasm/make_example.py`` writes it.
+    """
+    space, other = (ScenarioSpace.of(PAPER, uavs=uavs) for uavs in (3, 4))
+    settings = {
+        key: values for key, values in _settings_of(space, other) if key in _EXAMPLE_SETTINGS
+    }
+    image = make_image(space, ["greedy"], 0, PORTION, settings)
+    starts = {
+        side: [values.index(_value_of(version, key)) for key, values in settings.items()]
+        for side, version in (("a", space), ("b", other))
+    }
+    return {
+        "module": sha256(read_module()).hexdigest(),
+        "data": {
+            "policy": "greedy",
+            "settings": [
+                _describe_setting(key, values, _value_of(space, key))
+                for key, values in settings.items()
+            ],
+            "metrics": [metric for metric in _describe_metrics(space, None) if metric["isOffered"]],
+            "start": starts,
+        },
+        "image": image.document(),
+    }

@@ -30,7 +30,7 @@ let module;
 let image;
 /** @type {Crew} */
 let crew;
-/** @type {Comparison | null} */
+/** @type {Run | null} */
 let run = null;
 /** @type {Grid | null} */
 let grid = null;
@@ -61,64 +61,26 @@ function trackOf(name, chosen, error = null) {
     });
 }
 
-// The missions of A and B, and their differences.
-class Comparison {
+// The missions of A and B as the reader has chosen them, with those of the page's own baseline checked.
+class Run extends Comparison {
     constructor() {
-        this.sides = isSame() ? ["a"] : SIDES;
-        this.target = asked();
-        this.isOver = false;
-        this.seconds = 0;
-        this.began = performance.now();
+        const sides = isSame() ? ["a"] : SIDES;
+        super(Object.fromEntries(sides.map((side) => [side, trackOf(side, choice(side))])), asked());
         /** @type {Record<string, Choice>} */
-        this.choices = Object.fromEntries(this.sides.map((side) => [side, choice(side)]));
-        /** @type {Record<string, Track>} */
-        this.tracks = Object.fromEntries(this.sides.map((side) => [side, trackOf(side, choice(side))]));
-        /** @type {Record<string, Float64Array[]>} */
-        this.values = Object.fromEntries(this.sides.map((side) => [side, []]));
-        /** @type {Series | null} */
-        this.difference = this.sides.length > 1 ? Series.ofDifferences(this.tracks.a.series, this.tracks.b.series) : null;
+        this.choices = Object.fromEntries(sides.map((side) => [side, choice(side)]));
     }
 
-    // The next missions of the side of which fewer have been given out.
     next() {
-        const open = this.sides.filter((side) => this.tracks[side].asked < this.target);
-        if (!open.length) return null;
-        const side = open.reduce((least, other) => this.tracks[other].asked < this.tracks[least].asked ? other : least);
-        const order = this.tracks[side].next(this.target - this.tracks[side].asked);
-        return {...order, wantsRecords: isChecked(this.choices[side]) && order.first < data.check.hashes.length};
+        const order = super.next();
+        if (!order) return null;
+        return {...order, wantsRecords: isChecked(this.choices[order.name]) && order.first < data.check.hashes.length};
     }
 
     /** @param {Answer} answer */
     take(answer) {
         if (answer.records) check(answer.first, answer.records);
-        this.values[answer.name].push(...this.tracks[answer.name].take(answer));
-        this.addDifferences();
-        this.isOver = this.sides.every((side) => this.count(side) >= this.target);
-        if (this.isOver) this.seconds = (performance.now() - this.began) / 1000;
+        super.take(answer);
         schedule();
-    }
-
-    /** @param {string} side */
-    count(side) {
-        return this.tracks[side].series.count;
-    }
-
-    // The differences B - A of the missions that both sides have.
-    addDifferences() {
-        if (!this.difference) return;
-        const [a, b] = SIDES.map((side) => this.valuesOf(side)), from = this.difference.count * image.metrics.length;
-        const end = Math.min(a.length, b.length);
-        if (end > from) this.difference.add(b.subarray(from, end), a.subarray(from, end));
-    }
-
-    /**
-     * The values of the missions of a side, in their order.
-     * @param {string} side
-     */
-    valuesOf(side) {
-        const parts = this.values[side];
-        if (parts.length !== 1) this.values[side] = [joined(parts)];
-        return this.values[side][0];
     }
 
     /**
@@ -129,13 +91,6 @@ class Comparison {
     product(side, row) {
         return this.valuesOf(side)[row * image.metrics.length + data.product];
     }
-}
-
-/** @param {Float64Array[]} parts */
-function joined(parts) {
-    const whole = new Float64Array(parts.reduce((sum, part) => sum + part.length, 0));
-    parts.reduce((end, part) => (whole.set(part, end), end + part.length), 0);
-    return whole;
 }
 
 /**
@@ -163,7 +118,7 @@ function start() {
     find("results").classList.remove("stale");
     data.check.compared = 0;
     data.check.differing = null;
-    run = new Comparison();
+    run = new Run();
     crew.begin(run);
     show();
 }
@@ -357,17 +312,9 @@ function checkInWords() {
 function showMetric(metric) {
     const row = root.querySelector(`tr[data-metric="${metric.column}"]`);
     const cells = [...row.querySelectorAll("td")];
-    const estimates = run.sides.map((side) => run.tracks[side].series.estimate(metric));
-    row.hidden = !estimates.some(({count}) => count);
-    estimates.forEach((estimate, n) => { cells[n].textContent = estimate.count ? interval(metric, estimate) : ""; });
-    if (!run.difference) {
-        cells[1].textContent = "the same as A";
-        cells[2].textContent = cells[3].textContent = "";
-        return;
-    }
-    const gap = run.difference.estimate(metric);
-    cells[2].textContent = gap.count ? difference(metric, gap) : "";
-    cells[3].textContent = gap.count ? decision(metric, gap) : "";
+    const texts = run.inWords(metric);
+    row.hidden = texts === null;
+    texts?.forEach((text, n) => { cells[n].textContent = text; });
 }
 
 // The least and the largest product of both sides, in steps of 5 %.

@@ -158,6 +158,88 @@ class Track {
     }
 }
 
+// The missions of one or two tracks, and the differences of two, B - A.
+class Comparison {
+    /**
+     * @param {Record<string, Track>} tracks
+     * @param {number} target - the missions of each
+     */
+    constructor(tracks, target) {
+        this.tracks = tracks;
+        this.sides = Object.keys(tracks);
+        this.target = target;
+        this.isOver = false;
+        this.seconds = 0;
+        this.began = performance.now();
+        this.width = tracks[this.sides[0]].series.image.metrics.length;
+        /** @type {Record<string, Float64Array[]>} */
+        this.values = Object.fromEntries(this.sides.map((side) => [side, []]));
+        const [a, b] = this.sides.map((side) => tracks[side].series);
+        /** @type {Series | null} */
+        this.difference = b ? Series.ofDifferences(a, b) : null;
+    }
+
+    // The next missions of the side of which fewer have been given out.
+    next() {
+        const open = this.sides.filter((side) => this.tracks[side].asked < this.target);
+        if (!open.length) return null;
+        const side = open.reduce((least, other) => this.tracks[other].asked < this.tracks[least].asked ? other : least);
+        return this.tracks[side].next(this.target - this.tracks[side].asked);
+    }
+
+    /** @param {Answer} answer */
+    take(answer) {
+        this.values[answer.name].push(...this.tracks[answer.name].take(answer));
+        this.addDifferences();
+        this.isOver = this.sides.every((side) => this.count(side) >= this.target);
+        if (this.isOver) this.seconds = (performance.now() - this.began) / 1000;
+    }
+
+    /** @param {string} side */
+    count(side) {
+        return this.tracks[side].series.count;
+    }
+
+    // The differences of the missions that both sides have.
+    addDifferences() {
+        if (!this.difference) return;
+        const [a, b] = this.sides.map((side) => this.valuesOf(side)), from = this.difference.count * this.width;
+        const end = Math.min(a.length, b.length);
+        if (end > from) this.difference.add(b.subarray(from, end), a.subarray(from, end));
+    }
+
+    /**
+     * The values of the missions of a side, in their order.
+     * @param {string} side
+     */
+    valuesOf(side) {
+        const parts = this.values[side];
+        if (parts.length !== 1) this.values[side] = [joined(parts)];
+        return this.values[side][0];
+    }
+
+    /**
+     * What a table says of a metric: A, B, the difference, and whether it is decided; nothing if
+     * no mission has it.
+     * @param {Metric} metric
+     */
+    inWords(metric) {
+        const estimates = this.sides.map((side) => this.tracks[side].series.estimate(metric));
+        if (!estimates.some(({count}) => count)) return null;
+        const texts = estimates.map((estimate) => estimate.count ? interval(metric, estimate) : "");
+        if (!this.difference) return [...texts, "the same as A", "", ""];
+        const gap = this.difference.estimate(metric);
+        return [...texts, gap.count ? difference(metric, gap) : "", gap.count ? decision(metric, gap) : ""];
+    }
+}
+
+/** @param {Float64Array[]} parts */
+function joined(parts) {
+    const whole = new Float64Array(parts.reduce((sum, part) => sum + part.length, 0));
+    parts.reduce((end, part) => (whole.set(part, end), end + part.length), 0);
+    return whole;
+}
+
 // The workers, which do one job at a time.
 class Crew {
     /**

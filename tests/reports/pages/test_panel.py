@@ -18,9 +18,12 @@ from dess.analysis.answers.fleet.requirements import Requirement
 from dess.analysis.metrics import HOME, METRICS, PRODUCT, metric_of
 from dess.analysis.stats.sequences import add_values, new_sequence, sequence_ends
 from dess.analysis.study.prices import Costs
+from dess.analysis.wasm.entry import METRICS as METRICS_OF_MODULE
 from dess.analysis.wasm.image import copy_inputs, make_image
+from dess.reports.pages import index
 from dess.reports.pages import panel as panels
 from dess.reports.pages.html import fill_page
+from dess.reports.pages.index import make_index
 from dess.reports.pages.page import PANEL, Page
 from dess.reports.pages.panel import CHECKED, PORTION, hash_missions, make_another, make_panel
 from dess.reports.pages.verify import verify_page
@@ -459,6 +462,35 @@ def test_another_mission_is_played(visit, tmp_path):
     )
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
     assert opened.complaints == []
+
+
+def test_the_index_simulates_its_example(visit, tmp_path):
+    """As Python does: the paper's sea with three UAVs, and with as many as the reader chooses."""
+    path = tmp_path / "index.html"
+    path.write_text(make_index({}), "utf-8")
+    opened = visit(path, 390)
+    tab = opened.page
+    tab.locator("[name=b-uavs]").press("Home")
+    tab.get_by_role("button", name="Run").click()
+    done = re.compile(r"^1,000 missions of each\.")
+    tab.locator("[data-panel=status]").get_by_text(done).wait_for(timeout=PATIENCE)
+    column = METRICS_OF_MODULE.index(PRODUCT)
+    cells = tab.locator(f"tr[data-metric='{column}'] td").all_text_contents()
+    for cell, uavs in zip(cells, (3, 1), strict=False):
+        space = load_scenario("paper", uavs=uavs)
+        mean = simulate_batch(space, policies.load("greedy"), 0, 1000).missions[PRODUCT].mean()
+        assert cell.startswith(f"{100 * mean:.1f} % [")
+    assert cells[3].startswith("decided: B is lower")
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+    assert opened.complaints == []
+
+
+def test_an_index_has_no_example_of_another_version(monkeypatch, tmp_path):
+    assert 'id="try"' in make_index({})
+    example = json.loads(index.EXAMPLE.read_text("utf-8"))
+    monkeypatch.setattr(index, "EXAMPLE", tmp_path / "example.json")
+    index.EXAMPLE.write_text(json.dumps(example | {"module": "0" * 64}), "utf-8")
+    assert 'id="try"' not in make_index({})
 
 
 def test_missions_are_stopped(visit, document):
