@@ -386,14 +386,13 @@ function pick(event) {
 }
 
 /**
- * The mission with the largest loss from A to B, or the worst of B.
- * @param {"loss" | "worst"} kind
+ * The mission with the largest loss from A to B, with the median difference, or the worst of B.
+ * @param {"loss" | "typical" | "worst"} kind
  */
-function pickWorst(kind) {
-    const value = (row) => run.product("b", row) - (kind === "loss" ? run.product("a", row) : 0);
-    let worst = 0;
-    for (let row = 1; row < run.difference.count; row++) if (value(row) < value(worst)) worst = row;
-    showMission(worst);
+function pickKind(kind) {
+    const value = (row) => run.product("b", row) - (kind === "worst" ? 0 : run.product("a", row));
+    const rows = Array.from({length: run.difference.count}, (_, row) => row).sort((one, other) => value(one) - value(other));
+    showMission(rows[kind === "typical" ? (rows.length - 1) >> 1 : 0]);
 }
 
 /** @param {number} row */
@@ -549,8 +548,7 @@ async function open() {
     const saveTable = (name, rows) => save(name, new Blob([csvOf(rows, commandOf())], {type: "text/csv"}));
     find("csv").addEventListener("click", () => saveTable("exploration.csv", rowsOfMissions()));
     find("picture").addEventListener("click", () => find("dots").toBlob((content) => save("exploration.png", content)));
-    find("loss").addEventListener("click", () => pickWorst("loss"));
-    find("worst").addEventListener("click", () => pickWorst("worst"));
+    for (const kind of /** @type {const} */ (["typical", "loss", "worst"])) find(kind).addEventListener("click", () => pickKind(kind));
     show();
     if (isAsked) root.scrollIntoView();
     root.dataset.ready = "yes";

@@ -241,6 +241,24 @@ def test_a_mission_is_played_on_both_sides(visit, document):
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
 
 
+def test_the_typical_mission_has_the_median_difference(visit, document):
+    tab = visit(document, 1280).page
+    run(tab)
+    differences = np.subtract(
+        *[
+            simulate_batch(
+                load_scenario("paper", uavs=uavs), policies.load("greedy"), SEED, MISSIONS
+            ).missions[PRODUCT]
+            for uavs in (2, 1)
+        ]
+    )
+    shown = tab.locator("[data-panel=mission-text]")
+    for kind, rank in (("typical mission", (MISSIONS - 1) // 2), ("largest loss", 0)):
+        tab.get_by_role("button", name=kind).click()
+        (number,) = re.findall(r"Mission (\d+):", str(shown.text_content()))
+        assert differences[int(number)] == np.sort(differences)[rank]
+
+
 def test_a_mission_that_differs_is_named(visit, document, tmp_path):
     """As if the module simulated something else than Python did."""
     text = document.read_text("utf-8")
