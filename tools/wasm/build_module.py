@@ -1,4 +1,4 @@
-"""Build the WebAssembly module: python tools/wasm/build_module.py [--check].
+"""Build the WebAssembly module and what the index simulates: build_module.py [--check].
 
 With ``--check`` nothing is written: the module that is there has to have the bytes that are built,
 on the system and with the Python that built it, and otherwise this ends with 1.
@@ -7,6 +7,7 @@ on the system and with the Python that built it, and otherwise this ends with 1.
 import argparse
 import os
 import platform
+import subprocess
 import sys
 from hashlib import sha256
 from importlib.metadata import version
@@ -16,6 +17,7 @@ import fingerprint
 
 ROOT = Path(__file__).parents[2]
 RUNTIME = Path(__file__).parent / "runtime.c"
+EXAMPLE = Path(__file__).parent / "make_example.py"
 EXPORTS = ("reserve", "forget", "arrays", "prepare", "play", "launch", "advance", "measure")
 EXPORTS += ("subtract", "begin", "add")
 BUILDERS = ("numba", "llvmlite", "ziglang")
@@ -63,10 +65,17 @@ def is_same_system() -> bool:
 
 
 def main() -> int:
-    """Build, and write the module or compare it."""
+    """Build, and write the module and the example of the index, or compare them."""
     parser = argparse.ArgumentParser(description="build the WebAssembly module")
     parser.add_argument("--check", action="store_true", help="compare it with the one there")
-    is_check = parser.parse_args().check
+    if code := build_module(parser.parse_args().check):
+        return code
+    # Not in this process, whose compiler has another target.
+    return subprocess.call([sys.executable, str(EXAMPLE), *sys.argv[1:]])
+
+
+def build_module(is_check: bool) -> int:
+    """Build, and write the module or compare it; 1 if it differs."""
     check_versions()
     if is_check and not is_same_system():
         print("Another Python or system may build other bytes, so they are not compared.")
