@@ -48,7 +48,7 @@ def _count(
     nodes, mean_snr, order, means, chart, batches, search,
 ):  # fmt: skip
     """Simulate one mission and count."""
-    arrivals = np.empty(len(nodes), np.int64)
+    arrivals = np.empty(len(nodes))
     reach = mission.shadowing_deviation * streams.MAX_NORMAL
     blocks = deviates = 0
     while mission.active > 0:

@@ -74,7 +74,7 @@ class TinySea:
         rules.launch(state, 0, starts_of([space], seed), 0, 0)
         self.mission, self.uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
         self.start, self.data = self._team(), [residual.copy()]
-        arrivals = np.empty(len(residual), np.int64)
+        arrivals = np.empty(len(residual))
         for slot in range(space.max_slots):
             self.mission["slot"] = slot
             compiled.arrive(self.mission, residual, arrivals)
