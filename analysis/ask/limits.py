@@ -29,7 +29,7 @@ from dess.policies.registry import is_path, load_team
 from dess.scenario.quantities import measured, times
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 
-MISSIONS = 50  # of the check, at most
+MISSIONS = 30  # of the check, at most
 CLOSE = 0.05  # the width of the last interval, as a share of its end
 MOST_DATA = 8.0  # times the data of the sheet
 FAILURES = 1 / 1000, 1.0  # the rarest and the most frequent that are tried [1/h of flying]
