@@ -13,6 +13,7 @@
 /** @typedef {"meets" | "misses" | "open"} Verdict */
 
 const GRID_ERROR = 0.05; // the probability that an interval of any cell fails
+const BLOCK = 50; // missions of a cell before it is another one's turn
 const FEWEST = 30; // missions of a cell, with which its cost has an interval
 
 class Grid {
@@ -59,11 +60,15 @@ class Grid {
         return cell.track.series.count < FEWEST || this.verdict(cell) === "open";
     }
 
-    // The next missions of the cell that has the fewest of those that are not decided.
+    // The next missions of a cell that is not decided. The cells take turns by blocks, since a worker
+    // has the arrays of few cells at a time.
     next() {
         if (!this.hasWork()) return null;
+        const turns = (/** @type {Cell} */ {track}) => Math.floor(track.asked / BLOCK);
+        const isBefore = (/** @type {Cell} */ one, /** @type {Cell} */ other) =>
+            turns(one) < turns(other) || (turns(one) === turns(other) && one.track.asked > other.track.asked);
         const undecided = this.cells.filter((cell) => this.isUndecided(cell));
-        const {track} = undecided.reduce((least, other) => other.track.asked < least.track.asked ? other : least);
+        const {track} = undecided.reduce((first, other) => isBefore(other, first) ? other : first);
         this.away += 1;
         return track.next(this.target - this.asked);
     }

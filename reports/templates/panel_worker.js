@@ -14,8 +14,8 @@ onmessage = ({data}) => {
         ({module, image} = data);
         return;
     }
-    const {name, first, count, job, wantsRecords} = data, began = performance.now();
-    const engine = engineOf(data);
+    const {name, first, count, job, wantsRecords} = data;
+    const engine = engineOf(data), began = performance.now();
     engine.call("play", first, count);
     engine.call("measure", count);
     const values = engine.floats("values").slice(0, count * image.metrics.length);
