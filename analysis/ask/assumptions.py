@@ -47,7 +47,7 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
     duty_cycle = given("duty_cycle", "")
     duty = ""
     if duty_cycle:
-        duty = f", for {duty_cycle} of the time on average"
+        duty = f", for {duty_cycle} of the time on average, bursts left out"
     repair = given("repair", "")
     if repair:
         fate = f"is repaired in {repair}"
