@@ -23,7 +23,7 @@ from dess.analysis.answers.fleet.requirements import (
     requirements_of,
 )
 from dess.analysis.answers.settings.points import fleets_in_words
-from dess.analysis.ask.question import LONGEST, Question
+from dess.analysis.ask.question import FIRST, LONGEST, Question
 from dess.analysis.metrics import COST, metric_of
 from dess.analysis.names import field_named
 from dess.analysis.results.chunks import MANIFEST, short_hash
@@ -35,7 +35,7 @@ from dess.policies.registry import is_path
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 
 
-def question_around(results: Results, scenario: str, missions: int = 100) -> Question | None:
+def question_around(results: Results, scenario: str, missions: int = FIRST) -> Question | None:
     """The question of what changes if the cheapest fleet changes a little.
 
     A fleet for several conditions is asked about under the last of them.
@@ -43,7 +43,8 @@ def question_around(results: Results, scenario: str, missions: int = 100) -> Que
     Args:
         results: A study that searches for the cheapest setting.
         scenario: The scenario of the study, with the path of its file.
-        missions: Number of missions of every change.
+        missions: Number of missions of every change. By default as many as a sweep begins with, so
+            that those of settings that it has are there.
 
     Returns:
         The question, a design point for the fleet and one for every change of it. None without a
