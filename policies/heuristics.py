@@ -10,17 +10,26 @@ from functools import lru_cache
 import numpy as np
 
 from dess.base.kernels import inlined, kernel
-from dess.model.guard.battery import margin, must_charge, slots_left, slots_needed
+from dess.model.guard.battery import (
+    dearest_slot,
+    late_slots,
+    margin,
+    margin_slots,
+    must_charge,
+    slots_needed,
+    usable_battery,
+)
 from dess.model.guard.moves import contest, contests, safe_moves
 from dess.model.guard.parking import parking_cell, parking_memory, stays
-from dess.model.guard.ways import path_length, round_trip
+from dess.model.guard.ways import path_length, round_trip, slots_of_round_trip
 from dess.model.rules import data_left, legal_moves
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
 from dess.physics import streams
 from dess.physics.chart import Chart, distance, spread
+from dess.physics.consumption import has_consumption
 from dess.physics.landing import flies
-from dess.physics.wind import reach_of
+from dess.physics.ways_home import reach_of
 
 # The numbers of the policies in compiled code.
 RANDOM, UNGUARDED, NEAREST, GREEDY, TOUR, AGE = range(6)
@@ -232,7 +241,8 @@ def _choose_goal(
     u = team[i]
     spare = slots_needed(mission, u)
     if charge:
-        spare = slots_left(mission, u) - 1 - margin(mission, u) - home.wait
+        spare = usable_battery(mission, u) - margin(mission, u)
+        spare -= dearest_slot(mission) * (1 + home.wait)
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best = 0.0
     node = -1
@@ -244,7 +254,7 @@ def _choose_goal(
         spent = slots
         if charge:
             spent = round_trip(mission, u, chart, x, y, home, reach)
-        if spent > spare:
+        if spent > spare or (charge and _is_too_late(mission, u, chart, x, y)):
             continue
         if kind == NEAREST:
             score = 1.0 / (slots + _SLOTS_AT_NODE)
@@ -264,6 +274,18 @@ def _choose_goal(
             best = score
             node = k
     return node
+
+
+@inlined
+def _is_too_late(mission, u, chart, x, y):
+    """Whether UAV ``u`` would not come home from a cell before the mission ends on the ground.
+
+    Where a slot takes one percent of the battery, this says so as well.
+    """
+    if not has_consumption(mission):
+        return False
+    slots = slots_of_round_trip(mission, u, chart, x, y)
+    return late_slots(mission, slots + 1 + margin_slots(mission, u)) > 0
 
 
 @inlined

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
 from dess.physics import streams
+from dess.physics.wind import Wind
 from dess.scenario.scenario import Scenario, ScenarioSpace
 from tests import compiled
 
@@ -143,6 +144,10 @@ _uav_types = st.fixed_dictionaries(
 )
 
 
+# What slots take of the battery in each direction and when hovering [% / 1000].
+_costs = st.tuples(*[st.integers(1, 999) | st.integers(1000, 4000)] * 5)
+
+
 @st.composite
 def failures(draw: st.DrawFn) -> dict[str, Any]:
     """A section of failures: each kind happens often, seldom or not at all."""
@@ -191,6 +196,7 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
             "gusts": draw(st.just(0.0) | _numbers(0.0, 10.0)),
             "seed": draw(st.integers(0, 2**32 - 1)),
         },
+        "consumption": {"slots": draw(st.just([]) | st.lists(_costs, min_size=8, max_size=8))},
         # With at most eleven decimals, a rate is exact (``charge_fraction``).
         "charge_rate": draw(
             st.integers(1, 25) | _numbers(0.2, 20.0).map(lambda rate: round(rate, 11))
@@ -203,8 +209,12 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
     if (sections | fixed)["landing"] and draw(st.booleans()):
         sections["quota"] = 0
     values = sections | fixed
+    if values["consumption"]["slots"]:
+        values["wind"] = Wind.off().model_dump()
     wind, slots = values["wind"], [of.get("slots_per_cell", 1) for of in values["fleet"]]
-    if max(slots, default=1) == 1 and not any((wind["strength"], *wind["moves"], wind["gusts"])):
+    is_calm = not any((wind["strength"], *wind["moves"], wind["gusts"]))
+    is_calm = is_calm and not values["consumption"]["slots"]
+    if max(slots, default=1) == 1 and is_calm:
         # For seas with islands, guard and heuristics would be compiled once more.
         values = PLAIN_SEA | values
     return draw(spaces(**values))

@@ -58,6 +58,7 @@ SECTIONS = {
     "radio": Row({"range": 1000.0}, "has_limit", "has_limit", REFUSED),
     "failures": Row({"pad_rate": 0.1}, "working_pads", "working_pads", REFUSED),
     "wind": Row({"strength": 0.5}, "wind_most", "wind_most", REFUSED),
+    "consumption": Row({"slots": [[900] * 5]}, "slot_cost", "slot_cost", REFUSED),
     "fleet": Row([{"slots_per_cell": 2}], "slots_per_cell", "slots_per_cell", REFUSED),
     "data_sheet": Row(SHEET, WITHOUT_EFFECT, WITHOUT_EFFECT, REFUSED),
     "landing": Row(True, "lands", "lands", REFUSED),

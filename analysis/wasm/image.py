@@ -35,7 +35,7 @@ from dess.model.state import (
 from dess.model.view import check_team
 from dess.physics.chart import neighbours_of
 from dess.physics.fleet import legs
-from dess.physics.wind import reach_of, ways_home
+from dess.physics.ways_home import reach_of, ways_home
 from dess.policies.heuristics import KINDS, plan_circuit
 from dess.scenario.scenario import ScenarioSpace
 
@@ -222,7 +222,7 @@ def _arrays_of(
     records = empty_records(missions, fleet, is_extended=True)
     reach = reach_of(starts.constants, chart)
     if reach is None:
-        reach = np.zeros((0, 0, 0, 0), np.int16)
+        reach = np.zeros((0, 0, 0, 0), np.int32)
     neighbours = np.zeros((0, 4), np.int32)
     if chart.ways.size:
         neighbours = neighbours_of(chart.zones)

@@ -25,7 +25,7 @@ from dess.model.record import Records, empty_records, write_record
 from dess.model.state import check_seed, spaces_of, starts_of, state_of, teeth_lengths
 from dess.model.view import decide, team_of
 from dess.physics.landing import is_over
-from dess.physics.wind import ways_home
+from dess.physics.ways_home import ways_home
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
 
 # Enough missions that the time spent in Python is a small part, few enough for the CPU's cache.
@@ -151,9 +151,9 @@ def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
         radio = (s.radio.anchor, s.radio.range)
         channel = (s.edge_snr, s.path_loss_exponent, s.cell_size, s.altitude, radio)
         speeds = tuple(kind.slots_per_cell for kind in s.fleet)
-        wind = tuple(s.wind.model_dump().values())
+        flight = (*s.wind.model_dump().values(), s.consumption.slots)
         geometry = (s.size, s.rectangles, s.no_fly, s.nodes)
-        return (s.is_extended, geometry, s.communication_slots, channel, speeds, wind)
+        return (s.is_extended, geometry, s.communication_slots, channel, speeds, flight)
 
     ordered = sorted(range(len(spaces)), key=key)
     return [np.array(sorted(members)) for _, members in groupby(ordered, key)]

@@ -56,7 +56,7 @@ EVENT_NAMES = (
     *("mission_start", *PARAMETER_EVENTS, "move", "collision"),
     *("charge_request", "charge_start", "charge_end", "charge_withdrawal"),
     *("communication", "arrival", "quota_filled", "battery_empty", "landing"),
-    *(*FAILURE_EVENTS, *PACKET_EVENTS, "mission_end"),
+    *(*FAILURE_EVENTS, *PACKET_EVENTS, "remainder", "mission_end"),
 )
 
 
@@ -176,6 +176,9 @@ class LogWriter(Listener):
 
     def note_end(self) -> None:
         """Log the state with which the mission ends."""
+        if self._mission["has_consumption"]:
+            for uav, remainder in enumerate(self._uavs["remainder"].tolist()):
+                self._add("remainder", uav, remainder)
         self._add_state("mission_end", {})
 
     def note_request(self, uav: int) -> None:

@@ -12,6 +12,7 @@ from dess.model.rules import data_left
 from dess.model.state import BATTERY, END_NAMES, LANDED, LOST, QUOTA, fields
 from dess.physics.age import write_age
 from dess.physics.charging import write_use
+from dess.physics.consumption import PERCENT, has_consumption, slot_cost
 from dess.physics.failures import write_failures
 from dess.physics.section import for_sections
 from dess.scenario.scenario import Constants
@@ -104,7 +105,7 @@ class Records(NamedTuple):
 def write_records(places, state, ways, records):
     """Write the records of the missions at these (N,) places of the state.
 
-    ``ways`` is the table of ``wind.ways_home``.
+    ``ways`` is the table of ``ways_home.ways_home``.
     """
     for row in range(len(places)):
         b = places[row]
@@ -146,7 +147,7 @@ def write_record(mission, uavs, residual, sensors, teeth, ways, records, row):
         record.reward += u.total_reward
         if u.end != QUOTA and u.end != LANDED:
             record.success = 0
-        way = ways[u.slots_per_cell - 1, u.y, u.x] + u.slots_left
+        way = _battery_home(mission, u, ways)
         out.way_home = mission.flight_cost * way
         out.charged = u.charged
         out.down = u.end == BATTERY or u.end == LOST or (u.grounded and way > 0)
@@ -157,6 +158,20 @@ def write_record(mission, uavs, residual, sensors, teeth, ways, records, row):
     record.collection_ratio = min(max(record.collected / total, 0.0), 1.0) if total > 0.0 else 1.0
     record.collection_ratio_and_communication = record.collection_ratio * record.success
     _write_operations(mission, uavs, sensors, teeth, records.operations, row)
+
+
+@inlined
+def _battery_home(mission, u, ways):
+    """The battery [%] that a UAV must have for its cheapest way to a zone cell, at least.
+
+    Where slots have costs of their own, what it has spent of the next percent is included.
+    """
+    way = ways[u.slots_per_cell - 1, u.y, u.x]
+    if not has_consumption(mission):
+        return way + u.slots_left
+    way += u.slots_left * slot_cost(mission, u.slots_per_cell, u.executed)
+    spent = u.remainder if way > 0 else 0
+    return (way + spent + PERCENT - 1) // PERCENT
 
 
 @for_sections

@@ -36,6 +36,7 @@ from dess.physics import age, fleet, streams, wind
 from dess.physics.arrivals import draw_messages, has_messages
 from dess.physics.charging import gain, is_before, share_power
 from dess.physics.chart import is_open
+from dess.physics.consumption import has_consumption, spend_slot
 from dess.physics.failures import strike_if_on, take_pad, working_pads
 from dess.physics.landing import flies, has_finished, is_over, lands, next_latch, stands
 from dess.physics.radio import is_below_steps
@@ -278,12 +279,21 @@ def spend(mission, uavs):
             mission.slots_grounded += 1
         else:
             if not stands(mission, u):
-                u.battery -= mission.flight_cost
-                _spend_against_wind(mission, u)
+                _spend_in_the_air(mission, u)
                 u.slots_flying += 1
             if u.pad_request >= 0:
                 u.slots_waiting += 1
     mission.slot_collected = 0.0
+
+
+@inlined
+def _spend_in_the_air(mission, u):
+    """Take the battery for a slot in the air."""
+    if has_consumption(mission):
+        spend_slot(mission, u)
+    else:
+        u.battery -= mission.flight_cost
+        _spend_against_wind(mission, u)
 
 
 @for_sections

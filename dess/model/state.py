@@ -15,6 +15,7 @@ import numpy as np
 from dess.base.errors import InputError, check_type
 from dess.base.kernels import kernel
 from dess.physics import fleet, streams, wind
+from dess.physics.consumption import ACTIONS, SPEEDS
 from dess.physics.failures import MOST_PADS
 from dess.physics.radio import MOST_STEPS
 from dess.scenario.fields import MOST_ZONES, SAMPLED
@@ -74,6 +75,11 @@ MISSION = np.dtype(
         *fields(np.float64, "wind_north wind_east wind_south wind_west wind_gusts"),
         ("wind_seed", np.uint64),
         ("wind_most", np.int64),
+        # Consumption: what a slot takes [% / 1000], by the slots per cell and the action, and the
+        # most that one takes.
+        ("has_consumption", np.int64),
+        ("slot_costs", np.int16, SPEEDS * ACTIONS),
+        ("dearest_slot", np.int64),
         ("slowest", np.int64),  # the most slots that a UAV of the fleet takes for a cell
         # Data and rewards.
         *fields(np.float64, "initial_low initial_high arrival_rate reward_data reward_overruled"),
@@ -122,6 +128,8 @@ UAV = np.dtype(
         # ``latch`` is the charging latch iota; who is ``charging`` holds a pad, and who is
         # ``grounded`` is under repair.
         *fields(np.bool_, "active latch charging grounded overruled"),
+        # What it has spent of the next percent of its battery [% / 1000], where slots have costs.
+        ("remainder", np.int16),
         ("rate", np.float64),  # factor of the rate at which it collects data
         # Data and SNR [dB] of the present communication slot, data of the mission, rewards of the
         # present slot and of the mission.
@@ -214,6 +222,7 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         **({"arrival_rate": fmean(scenario.node_rates)} if own_rates else {}),
         **wind.constants(scenario.wind, scenario.size),
         **scenario.radio.constants(),
+        **scenario.consumption.constants(fleet.slowest(scenario.fleet)),
         **scenario.charging.constants(),
         **scenario.failures.constants(),
     }

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from dess.base.descriptions import Description
 from dess.base.kernels import inlined, kernel
+from dess.physics.consumption import ACTIONS, PERCENT, has_consumption
 from dess.physics.section import Integer, Section, for_sections
 
 
@@ -56,8 +57,11 @@ class Charging(Section):
 @inlined
 def is_before(mission, u, other):
     """Whether ``u`` comes before ``other``, which has the lower index, for pads and power."""
-    if mission.lowest_battery_first and u.battery != other.battery:
-        return u.battery < other.battery
+    if mission.lowest_battery_first:
+        if u.battery != other.battery:
+            return u.battery < other.battery
+        if has_consumption(mission) and u.remainder != other.remainder:
+            return u.remainder > other.remainder
     return u.pad_request < other.pad_request
 
 
@@ -65,7 +69,7 @@ def queue_key(mission: np.void, u: np.void, uav: int) -> tuple[int, int, int]:
     """What UAVs are sorted by in the queue for the pads of a zone, in the order of ``is_before``.
 
     The key of a UAV is the same in every slot of its wait. The battery is that in slot 0, had the
-    UAV waited since then, as waiting costs ``flight_cost`` a slot in the air and nothing on ground.
+    UAV waited since then: waiting costs the same in every slot in the air, and nothing on ground.
 
     Args:
         mission: ``MISSION`` record.
@@ -78,8 +82,14 @@ def queue_key(mission: np.void, u: np.void, uav: int) -> tuple[int, int, int]:
         request = slot
     if not mission["lowest_battery_first"]:
         return 0, request, uav
-    cost = 0 if mission["landing"] else int(mission["flight_cost"])
-    return int(u["battery"]) + cost * slot, request, uav
+    battery = int(u["battery"])
+    cost = int(mission["flight_cost"])
+    if mission["has_consumption"]:
+        battery = PERCENT * battery - int(u["remainder"])
+        cost *= int(mission["slot_costs"][int(u["slots_per_cell"]) * ACTIONS - 1])  # of hovering
+    if mission["landing"]:
+        cost = 0
+    return battery + cost * slot, request, uav
 
 
 # The largest denominator of a rate: sums of as many slots as a mission has are 64-bit integers.

@@ -1,13 +1,7 @@
 """Wind: moves against it cost more battery, and so does the way to a parking cell.
 
 The wind in a cell is the mean wind plus a gust. Its components are pushes: what the battery loses
-when the UAV moves one cell against them [%]. The cost of a way depends on the wind and on the speed
-of the UAV; a table has the cheapest way from every cell (Bellman and Ford's algorithm)::
-
-    table = reach_of(view.state.missions, view.world.chart)
-    table[c, s - 1, y, x]       # [%] to parking cell c, for a UAV that takes s slots per cell
-
-Without wind and slow UAVs there is no table.
+when the UAV moves one cell against them [%]. ``dess.physics.ways_home`` has the cheapest ways.
 """
 
 import math
@@ -21,7 +15,6 @@ from dess.base.descriptions import Description
 from dess.base.elementary import cos, sin
 from dess.base.kernels import inlined, kernel
 from dess.physics import streams
-from dess.physics.chart import NO_FLY, Chart, read_only
 from dess.physics.section import Integer, Number, Section, for_sections
 
 MOST = 10  # the largest surcharge of a move in the mean wind [%]
@@ -68,39 +61,6 @@ class Wind(Section):
         x = -self.strength * sin(towards)
         y = self.strength * cos(towards)
         return y + north, -x + east, -y + south, x + west
-
-
-def moves_in(wind: float, direction: float, cruise: float) -> Moves:
-    """What a wind from a direction [degrees] takes of the four moves [% per cell].
-
-    The ground speed along a move is what the wind adds along it, and what the cruising speed has
-    left when it holds against the wind across it.
-
-    Args:
-        wind, cruise: Speeds [m/s]; the wind must not be above ``largest_wind``.
-        direction: Where the wind comes from [degrees from north, clockwise].
-    """
-    extra_slots = []
-    for course in (0, 90, 180, 270):
-        angle = math.radians(direction - course)
-        ground = _along(cruise, wind, angle)
-        extra_slots.append(max(cruise / ground - 1, 0.0))
-    north, east, south, west = extra_slots
-    return north, east, south, west
-
-
-def largest_wind(direction: float, cruise: float) -> float:
-    """The wind [m/s] in which a move against it costs ``MOST`` percent more (law of cosines)."""
-    ground = cruise / (MOST + 1)
-    turn = math.radians(direction % 90)
-    angle = min(turn, math.pi / 2 - turn)
-    return _along(cruise, ground, angle)
-
-
-def _along(cruise: float, speed: float, angle: float) -> float:
-    """What a cruising speed has left along a course, with so much speed at an angle to it."""
-    across = speed * sin(angle)
-    return math.sqrt(cruise * cruise - across * across) - speed * cos(angle)
 
 
 @inlined
@@ -172,91 +132,3 @@ def constants(wind: Wind, size: tuple[int, int]) -> dict[str, float]:
     """The fields of ``MISSION`` that describe the wind."""
     field = (*wind.pushes(), wind.gusts, wind.seed)
     return dict(zip(FIELDS, field, strict=True)) | {"wind_most": surcharges(size, *field).max()}
-
-
-FAR = 2**15 - 1  # [%]: further than any cell
-_MOST_ENTRIES = 2**26  # 128 MB
-
-
-# The table of extended missions without wind and slow UAVs, which needs none.
-_CALM = read_only(np.zeros((0, 0, 0, 0), np.int16))
-
-
-@inlined
-def is_calm(reach):
-    """Whether every cell costs one percent, by the table of ``reach_of``."""
-    return reach is None or len(reach) == 0
-
-
-def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
-    """(C, S, H, W) battery [%] to each of C parking cells, for 1 to S slots per cell.
-
-    If every cell costs one percent, C is 0, or the table is None in missions without sections, so
-    that the compiler leaves out its code. If it would be larger than 128 MB, S is 0: then every
-    cell may cost the most.
-
-    Args:
-        missions: (B,) ``MISSION`` records of one batch, which share wind and fleet.
-        chart: Their chart.
-    """
-    if "is_plain" in (missions.dtype.names or ()):  # neither wind nor slow UAVs
-        return None
-    if missions[0]["wind_most"] == 0 and missions[0]["slowest"] == 1:
-        return _CALM
-    return _table(missions, chart, len(chart.parking))
-
-
-def ways_home(missions: np.ndarray, chart: Chart) -> np.ndarray:
-    """(S, H, W) battery [%] from each cell to the nearest zone cell, for 1 to S slots per cell.
-
-    Args:
-        missions: (B,) ``MISSION`` records of one batch, which share wind and fleet.
-        chart: Their chart.
-    """
-    return _table(missions, chart, 1)[0]
-
-
-def _table(missions: np.ndarray, chart: Chart, groups: int) -> np.ndarray:
-    """(G, S, H, W) battery [%] to the nearest of each of G groups of parking cells."""
-    sea = (chart.zones.shape, chart.zones.tobytes(), chart.parking.tobytes())
-    return _filled(*sea, groups, *(missions[0][field].item() for field in ("slowest", *FIELDS)))
-
-
-@lru_cache(maxsize=16)
-def _filled(
-    shape: tuple[int, int], zones: bytes, parking: bytes, groups: int, slowest: int, *wind
-) -> np.ndarray:
-    cells = np.frombuffer(zones, np.int8).reshape(shape)
-    if groups * slowest * cells.size > _MOST_ENTRIES:
-        return read_only(np.zeros((groups, 0, 0, 0), np.int16))
-    table = np.full((groups, slowest, *shape), FAR, np.int16)
-    extras = surcharges(shape[::-1], *wind)
-    for group, homes in enumerate(np.frombuffer(parking, np.int64).reshape(groups, -1, 2)):
-        table[group, :, homes[:, 1], homes[:, 0]] = 0
-        for s in range(slowest):
-            relax(cells, extras, s + 1, table[group, s])
-    return read_only(table)
-
-
-@kernel
-def relax(zones, extras, slots, costs):
-    """Lower the costs of all cells to those of the cheapest ways to the cell that costs nothing."""
-    rows, columns = zones.shape
-    changed, forth = True, True
-    while changed:
-        changed = False
-        for place in range(zones.size):
-            cell = place if forth else zones.size - 1 - place
-            y = cell // columns
-            x = cell % columns
-            if zones[y, x] == NO_FLY:
-                continue
-            for action, (step_x, step_y) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
-                a = x + step_x
-                b = y + step_y
-                if 0 <= a < columns and 0 <= b < rows and costs[b, a] < FAR:
-                    cost = min(costs[b, a] + slots + extras[action, b, a], FAR - 1)
-                    if cost < costs[y, x]:
-                        costs[y, x] = cost
-                        changed = True
-        forth = not forth

@@ -10,8 +10,10 @@ from dess.physics.age import MOST_TEETH
 from dess.physics.arrivals import MOST as MOST_RATE
 from dess.physics.arrivals import MOST_MESSAGES
 from dess.physics.chart import FAR, MOST_CHARTED, NO_FLY, Cell, parking_of, spread, zones_of
+from dess.physics.consumption import MOST as MOST_COST
+from dess.physics.consumption import PERCENT
 from dess.physics.failures import MOST_PADS
-from dess.physics.fleet import legs, places_per_slot
+from dess.physics.fleet import legs, places_per_slot, slowest
 from dess.scenario.data_sheet import DataSheet
 from dess.scenario.fields import MOST_DATA, Fields
 
@@ -148,6 +150,7 @@ def _unfit(c: Fields) -> Iterator[InputError]:
             if np.max(c.value(name)) > full:
                 problem = f"{c.value(name)} is more than the reserve leaves"
                 yield InputError(name, problem, str(full))
+    yield from _unfit_to_fly(c)
     if 0 < c.radio.anchor < NEAREST:
         yield InputError("radio.anchor", f"{c.radio.anchor:g} m is too near", "0, or 0.001..1e6")
     if c.quota == 0 and not c.landing:
@@ -183,3 +186,22 @@ def _unfit(c: Fields) -> Iterator[InputError]:
             f"{[low, high]} is not a range",
             f"a number 0..{MOST_DATA:,} or [low, high] with 0 <= low <= high <= {MOST_DATA:,}",
         )
+
+
+def _unfit_to_fly(c: Fields) -> Iterator[InputError]:
+    """What slots take of the battery fits to the wind and to the speeds of the fleet."""
+    if not c.consumption.is_on:
+        return
+    if c.wind.is_on:
+        beside = "consumption"
+        if c.data_sheet.is_on:
+            beside = "data_sheet"
+        yield InputError("wind", f"is given beside {beside}", "one of both")
+    slots = slowest(c.fleet)
+    if slots > len(c.consumption.slots):
+        problem = f"there are costs for {len(c.consumption.slots)} speeds"
+        yield InputError("consumption.slots", problem, f"{slots}, one for each slots_per_cell")
+    highest = max(max(costs) for costs in c.consumption.slots[:slots])
+    if highest > MOST_COST:
+        problem = f"a slot takes {highest / PERCENT:.1f} %"
+        yield InputError("consumption.slots", problem, f"{MOST_COST // PERCENT} % at most")

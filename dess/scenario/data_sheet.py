@@ -4,8 +4,10 @@
     endurance = "35 min"
     cruise = "15 m/s"
 
-A full battery is 100 slots: a slot is the hundredth part of the endurance, a cell the way of a slot
-at cruising speed, and a data unit what the bandwidth carries in a slot at 1 bit/s/Hz.
+A full battery is 100 slots of cruising in still air: a slot is the hundredth part of the endurance,
+a cell the way of a slot at cruising speed, and a data unit what the bandwidth carries in a slot at
+1 bit/s/Hz. The cruising speed is the ground speed, which autopilots hold in a mission; what a slot
+takes of the battery follows from the speed through the air (``dess.physics.rotary_wing``).
 """
 
 import math
@@ -19,9 +21,17 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from dess.base.descriptions import Description, description_of
 from dess.base.elementary import log10
 from dess.base.errors import InputError, shown
+from dess.physics.consumption import MOST, PERCENT, SPEEDS, Costs
 from dess.physics.radio import MOST_STEPS
+from dess.physics.rotary_wing import (
+    COURSES,
+    INDUCED_SPEED,
+    TIP_SPEED,
+    RotaryWing,
+    airspeed_along,
+    largest_speed,
+)
 from dess.physics.section import Section
-from dess.physics.wind import Moves, largest_wind, moves_in
 from dess.scenario.quantities import KINDS, exactly, form_of, measured, printed, refuse
 
 _NEEDED = ("endurance", "cruise", "charging", "bandwidth")
@@ -82,6 +92,7 @@ class Units(NamedTuple):
         return f"a slot is {printed(self.slot, 's')}, a cell {printed(self.cell, 'm')}, {data}"
 
 
+_AT_SPEED = "s at m/s"
 _DISTANCES = (0.01, 1e6)  # at which an SNR can be given [m]
 
 
@@ -120,8 +131,30 @@ def _as_listed(value: Any) -> Any:
 class DataSheet(Section):
     """What an engineer knows of the UAVs, the radio and the nodes, each with its unit."""
 
-    endurance: str | None = _quantity("s", "flying time of a full battery")
-    cruise: str | None = _quantity("m/s", "cruising speed in still air")
+    endurance: str | None = _quantity(
+        "s",
+        Description(
+            "flying time of a full battery in still air",
+            form="at the cruising speed, or a time at a speed",
+        ),
+    )
+    cruise: str | None = _quantity("m/s", "cruising speed over ground")
+    max_speed: str | None = _quantity(
+        "m/s", "largest speed through the air, needed with wind", example="23 m/s"
+    )
+    hover: str | None = _quantity(
+        "s", "hovering time of a full battery in still air, or else that of a usual rotary wing"
+    )
+    tip_speed: str | None = _quantity(
+        "m/s", f"speed of the rotor's tips, or else {TIP_SPEED:g} m/s", 1, 1000, "120 m/s"
+    )
+    induced_speed: str | None = _quantity(
+        "m/s",
+        f"speed of the air through the rotor when hovering, or else {INDUCED_SPEED:g} m/s",
+        0.1,
+        100,
+        "4.03 m/s",
+    )
     charging: str | None = _quantity("s", "time to charge a battery from empty to full")
     reserve: str | None = _quantity("percent", "share of the battery that is never used", 0, 60)
     horizon: str | None = _quantity("s", "length of a mission, or else max_slots", example="8 h")
@@ -202,7 +235,9 @@ class DataSheet(Section):
         for item in items:
             if isinstance(item, bool | int | float):
                 refuse(item, "has no unit", units)
-            if isinstance(item, str):
+            if name == "endurance" and isinstance(item, str) and " at " in item:
+                _check_limits(item, _AT_SPEED, [*limits, *limits])
+            elif isinstance(item, str):
                 _check_limits(item, units, limits)
             elif item is not None:
                 problem = f"is of type {type(item).__name__}, not text"
@@ -239,6 +274,8 @@ class DataSheet(Section):
                 needed = [*_NEEDED, *LINK_BUDGET]
             if self.repair:
                 needed.append("mtbf")
+            if self.wind:
+                needed.append("max_speed")
             for name in needed:
                 if getattr(self, name) is None:
                     raise InputError(name, "is missing", self.form_of(name))
@@ -263,7 +300,7 @@ class DataSheet(Section):
     @property
     def units(self) -> Units:
         """What a slot, a cell and a data unit are."""
-        slot = self.number("endurance") / 100
+        slot = self.endurance_at_cruise / 100
         return Units(slot, slot * self.number("cruise"), slot * self.number("bandwidth"))
 
     @property
@@ -271,7 +308,67 @@ class DataSheet(Section):
         """The battery that a charging slot adds [%], exactly as the times were typed."""
         endurance, charging = self.endurance, self.charging
         assert endurance and charging
+        if self._endurance_at:
+            return Fraction(self.endurance_at_cruise) / exactly(charging, "s")[0]
         return exactly(endurance, "s")[0] / exactly(charging, "s")[0]
+
+    @property
+    def wing(self) -> RotaryWing:
+        """The rotary wing of the UAVs, whose drag follows from the hovering time."""
+        wing = RotaryWing(
+            self.number("tip_speed", TIP_SPEED), self.number("induced_speed", INDUCED_SPEED)
+        )
+        if not self.hover:
+            return wing
+        endurance, speed = self._endurance_at or (self.number("endurance"), self.number("cruise"))
+        wing = wing.with_power(speed, self.number("hover") / endurance)
+        if wing.drag < 0:
+            least = wing.power_without_drag(speed) * endurance
+            problem = f"is too short for {shown(self.endurance)} of flight"
+            allowed = f"{printed(least, 's')} and more, or a smaller induced_speed"
+            self._refuse("hover", problem, allowed)
+        return wing
+
+    @property
+    def endurance_at_cruise(self) -> float:
+        """The flying time of a full battery at the cruising speed in still air [s]."""
+        if not self._endurance_at:
+            return self.number("endurance")
+        endurance, speed = self._endurance_at
+        wing = self.wing
+        return endurance * wing.power(speed) / wing.power(self.number("cruise"))
+
+    @property
+    def _endurance_at(self) -> tuple[float, float] | None:
+        """The flying time [s] and the speed for which it is given [m/s]; None for the cruise."""
+        if self.endurance and " at " in self.endurance:
+            endurance, speed = measured(self.endurance, _AT_SPEED)
+            return endurance, speed
+        return None
+
+    def costs(self) -> tuple[Costs, ...]:
+        """What slots take of the battery, for UAVs that take 1, 2, ... slots for a cell.
+
+        Returns:
+            For each of them the costs of the moves north, east, south and west and of hovering, in
+            thousandths of a percent, rounded up.
+        """
+        wind, direction = 0.0, 0.0
+        if self.wind:
+            wind, direction = measured(self.wind, "m/s from deg")
+        wing = self.wing
+        costs = []
+        for slots in range(1, SPEEDS + 1):
+            speed = self.number("cruise") / slots
+            airspeeds = [airspeed_along(course, speed, wind, direction) for course in COURSES]
+            of_cruise = wing.power(speed)
+            shares = [wing.power(airspeed) / of_cruise for airspeed in (*airspeeds, wind)]
+            # A share that is whole but for the rounding of floats is not rounded up.
+            north, east, south, west, hover = (
+                max(math.ceil(PERCENT * share - 1e-6), 1) for share in shares
+            )
+            costs.append((north, east, south, west, hover))
+        return tuple(costs)
 
     def number(self, name: str, missing: float = 0.0) -> float:
         """The first number of a field in SI units, bits, percent or decibels."""
@@ -319,8 +416,11 @@ class DataSheet(Section):
         }
         if self.horizon:
             following["max_slots"] = int(self._slots("horizon", 100_000) + 1e-9)
-        if self.wind:
-            following["wind.moves"] = self._wind(*measured(self.wind, "m/s from deg"))
+        self._check_speeds()
+        following["consumption.slots"] = self.costs()
+        if max(following["consumption.slots"][0]) > MOST:
+            problem = f"a slot takes {max(following['consumption.slots'][0]) / PERCENT:.1f} %"
+            raise InputError("max_speed", problem, f"{MOST // PERCENT} % at most")
         if self.mtbf:
             following["failures.uav_rate"] = 1 / self._slots("mtbf")
             following["failures.uav_repair"] = 0.0
@@ -434,11 +534,29 @@ class DataSheet(Section):
             self._refuse("bandwidth", "is none of lora", "7.8 kHz..1.625 MHz")
         return tuple((snr, factor * _LORA_CODING / 2**factor) for factor, snr in _LORA_SNR.items())
 
-    def _wind(self, speed: float, direction: float) -> Moves:
-        """The surcharge of each move [% per cell]."""
+    def _check_speeds(self) -> None:
+        """Refuse a largest airspeed below the cruising speed, and a wind that it cannot fly in."""
+        if not self.max_speed:
+            return
         cruise = self.number("cruise")
-        most = math.floor(100 * largest_wind(direction, cruise)) / 100
-        if speed > most:
-            problem = f"is too strong for {self.cruise}"
-            self._refuse("wind", problem, f"{most:g} m/s at most")
-        return moves_in(speed, direction, cruise)
+        most = self.number("max_speed")
+        if most < cruise:
+            self._refuse("max_speed", f"is less than the cruise {self.cruise}", str(self.cruise))
+        if not self.wind:
+            return
+        wind, direction = measured(self.wind, "m/s from deg")
+        strongest = _rounded_down(largest_speed(cruise, direction, most))
+        if wind > strongest:
+            fastest = _rounded_down(largest_speed(wind, direction, most))
+            problem = (
+                f"cannot be flown in at {self.cruise} over ground, {self.max_speed} in the air"
+            )
+            allowed = f"{strongest:g} m/s from there at most"
+            if fastest > 0:
+                allowed += f", or a cruise of {fastest:g} m/s at most"
+            self._refuse("wind", problem, allowed)
+
+
+def _rounded_down(speed: float) -> float:
+    """A speed rounded down to 0.01 m/s."""
+    return math.floor(100 * speed) / 100

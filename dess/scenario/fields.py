@@ -14,6 +14,7 @@ from dess.physics.age import Age
 from dess.physics.arrivals import MOST_AMOUNT, Arrivals
 from dess.physics.charging import Charging, charge_fraction
 from dess.physics.chart import MOST_CHARTED, Cell, Chart, Rectangle, chart_at
+from dess.physics.consumption import Consumption
 from dess.physics.failures import Failures
 from dess.physics.fleet import UavType
 from dess.physics.radio import Radio
@@ -33,7 +34,10 @@ MOST_ZONES = 8  # charging zones
 MOST_DATA = MOST_AMOUNT
 
 # The fields that go beyond the paper.
-SECTIONS = ("arrivals", "age", "charging", "radio", "failures", "wind", "fleet", "data_sheet")
+SECTIONS = (
+    *("arrivals", "age", "charging", "radio", "failures", "wind", "consumption", "fleet"),
+    "data_sheet",
+)
 # The fields of seas that the paper does not have; records are the same with and without them.
 GEOMETRY = ("rows", "zones", "no_fly", "names", "moved", "centre")
 LANDING = "landing"
@@ -268,6 +272,7 @@ class Fields(Strict):
     radio: Radio = Radio.off()
     failures: Failures = Failures.off()
     wind: Wind = Wind.off()
+    consumption: Consumption = Consumption.off()
     fleet: tuple[UavType, ...] = Field(
         (),
         max_length=MOST_UAVS,

@@ -30,7 +30,9 @@ _BEYOND = {
     "no_fly": ("file with land and islands", ""),
 }
 _NEEDED = ("endurance", "cruise", "charging", "data_rate", "bandwidth")
-_ASKED = ("range", "horizon", "wind")
+_ASKED = ("range", "horizon", "max_speed", "wind")
+# What an answer needs beside it.
+_NEEDED_WITH = {"repair": "mtbf", "wind": "max_speed"}
 # What stands for an answer that a sheet needs and that is not given yet.
 _UNANSWERED = {"bandwidth": "125 kHz", "snr": "12 dB at 2 km"}
 # A base is refused if it is so many times as far from the nodes as it is with its degrees swapped.
@@ -64,12 +66,13 @@ class NewScenario:
         link: tuple[str, ...] = ("snr",)
         if answered & {*LINK_BUDGET, "free_space"}:
             link = LINK_BUDGET
-        needed = [*_NEEDED, *link, *(["mtbf"] if "repair" in answered else [])]
+        needed = [*_NEEDED, *link]
+        needed += [name for field, name in _NEEDED_WITH.items() if field in answered]
         if self.nodes.has_amounts(RATES):
             needed.remove("data_rate")
         asked: dict[str, tuple[str, str | None]]
         asked = {name: (DataSheet.form_of(name), None) for name in needed}
-        asked |= {name: (DataSheet.form_of(name), "") for name in _ASKED}
+        asked |= {name: (DataSheet.form_of(name), "") for name in _ASKED if name not in needed}
         return asked | _BEYOND
 
     def check(self, name: str, answer: str) -> None:
@@ -138,6 +141,8 @@ class NewScenario:
             sheet = examples | {name: answer for name, answer in sheet.items() if name != "snr"}
         if "repair" in sheet:
             sheet.setdefault("mtbf", DataSheet.example("mtbf")[0])
+        if "max_speed" not in answers:  # until it is answered, no wind is known to be too strong
+            sheet.pop("wind", None)
         cell = validated(DataSheet, sheet, "data_sheet").units.cell
         if answers.get("base"):
             self._check_size(answers, cell)

@@ -27,6 +27,7 @@ KINDS = {
     "dB": ("a ratio", "12 dB"),
     "dBm": ("a power", "20 dBm"),
     "dB at m": ("a ratio at a distance", "12 dB at 2 km"),
+    "s at m/s": ("a time at a speed", "55 min at 8 m/s"),
     "m/s from deg": ("a speed and where it comes from", "10 m/s from SW"),
 }
 

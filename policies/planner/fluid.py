@@ -22,10 +22,17 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel
-from dess.model.guard.battery import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
+from dess.model.guard.battery import (
+    MARGIN_PER_TEAMMATE,
+    SCARCE_SLOTS,
+    battery_left,
+    dearest_slot,
+)
+from dess.model.guard.ways import battery_of_flight
 from dess.model.state import HOVER, STEP_X, STEP_Y, fields
 from dess.physics.charging import gain
 from dess.physics.chart import distance, in_zone, is_open
+from dess.physics.consumption import PERCENT, has_consumption, slot_cost
 from dess.physics.failures import working_pads
 from dess.physics.fleet import leg
 from dess.physics.landing import has_finished, lands, next_latch
@@ -115,8 +122,9 @@ def set_waypoint(w, x, y, stay, turned):
 # A UAV in the model.
 CRAFT = np.dtype(
     [
-        # Its state: ``counted`` are the communication slots counted toward the quota, ``next`` is
-        # its waypoint, ``stayed`` the slots that it has hovered there.
+        # Its state: ``battery`` in the unit of the guard, ``counted`` the communication slots
+        # counted toward the quota, ``next`` its waypoint, ``stayed`` the slots that it has hovered
+        # there.
         *fields(
             np.int64, "x y battery counted active latch charging next stayed action slots_left"
         ),
@@ -183,7 +191,8 @@ def begin_flight(mission, uavs, residual, flight):
     for i in range(mission.uavs):
         u = uavs[i]
         v = flight.team[0, i]
-        v.x, v.y, v.battery, v.counted = u.x, u.y, u.battery, u.communications
+        v.x, v.y, v.counted = u.x, u.y, u.communications
+        v.battery = battery_left(mission, u)
         v.charging = u.charging
         v.latch = u.latch
         v.active = u.active and not u.grounded
@@ -288,7 +297,7 @@ def simulate_flight(mission, rates, plan, source, first, flight, slots, lag):
             if asks and _has_pad(mission, rates.chart, team, v):
                 penalty += _begin_to_charge(mission, v, active)
             elif _stands_on_ground(mission, rates.chart, v):
-                v.battery += mission.flight_cost
+                v.battery += mission.flight_cost * _cost_of_slot(mission, v)
         active = 0
         for i in range(mission.uavs):
             v = team[i]
@@ -339,9 +348,9 @@ def _begin_next_leg(waypoints, i, v, t):
 def _act_for_slot(mission, rates, waypoints, team, i, t, active):
     """Let UAV ``i`` fly or hover for a slot, and return the penalty for teammates in its way."""
     v = team[i]
-    v.battery -= mission.flight_cost
     if v.slots_left > 0:
         v.slots_left -= 1
+        v.battery -= mission.flight_cost * _cost_of_slot(mission, v)
         return 0.0
     v.action = HOVER
     flies_on = False
@@ -380,7 +389,24 @@ def _act_for_slot(mission, rates, waypoints, team, i, t, active):
         v.slots_left = v.slots_per_cell - 1
         if rates.extra.size > 0:
             v.battery -= mission.flight_cost * rates.extra[v.action, v.y, v.x]
+    v.battery -= mission.flight_cost * _cost_of_slot(mission, v)
     return penalty
+
+
+@inlined
+def _cost_of_slot(mission, v):
+    """The battery that a slot in the air takes, without the surcharge of the wind."""
+    if has_consumption(mission):
+        return slot_cost(mission, v.slots_per_cell, v.action)
+    return 1
+
+
+@inlined
+def _percent_left(mission, v):
+    """The battery in whole percent, as the rules have it."""
+    if has_consumption(mission):
+        return (v.battery + PERCENT - 1) // PERCENT
+    return v.battery
 
 
 @inlined
@@ -426,8 +452,9 @@ def _penalty_for_unplanned_charge(mission, v, active, data_left):
     lacking = v.quota - v.counted
     spare = v.battery
     if data_left * m < 0.2 * lacking * active:
-        spare -= SCARCE_SLOTS * mission.flight_cost
-    return _UNPLANNED if spare * m < lacking * mission.flight_cost else 0.0
+        spare -= SCARCE_SLOTS * mission.flight_cost * dearest_slot(mission)
+    needed = lacking * mission.flight_cost * dearest_slot(mission)
+    return _UNPLANNED if spare * m < needed else 0.0
 
 
 @inlined
@@ -502,18 +529,27 @@ def _has_pad(mission, chart, team, v):
 def _charge_for_slot(mission, v):
     """Let a UAV charge for a slot."""
     v.charge_slots += 1
-    v.battery = min(v.battery + gain(mission, v.charge_slots), mission.charge_complete)
+    before = _percent_left(mission, v)
+    after = min(before + gain(mission, v.charge_slots), mission.charge_complete)
+    if has_consumption(mission):
+        v.battery += PERCENT * (after - before)
+    else:
+        v.battery = after
 
 
 @inlined
 def _begin_to_charge(mission, v, active):
     """Let a UAV charge, and return the penalty if its battery is below the guard's reserve."""
-    before = v.battery + mission.flight_cost
+    before = v.battery + mission.flight_cost * _cost_of_slot(mission, v)
     v.charging = 1
     v.charge_slots = 0
     v.battery = before
     _charge_for_slot(mission, v)
-    return _LATE * max(1 + _reserve_for_detours(mission, v, active) - before, 0)
+    kept = dearest_slot(mission) * (1 + _slots_for_detours(mission, v, active))
+    lacking = max(kept - before, 0)
+    if has_consumption(mission):
+        return _LATE * lacking / PERCENT
+    return _LATE * lacking
 
 
 @inlined
@@ -527,7 +563,7 @@ def _end_slot(mission, chart, v, t):
         lacking = max(v.quota - v.counted, 0) / mission.communication_slots
         penalty = _DEPLETED + _SLOT_MISSED * lacking
         v.active = v.charging = 0
-    v.latch = next_latch(mission, v.latch, v.battery, v.quota, v.counted)
+    v.latch = next_latch(mission, v.latch, _percent_left(mission, v), v.quota, v.counted)
     return penalty
 
 
@@ -543,14 +579,27 @@ def _must_return(mission, rates, v, t, active):
     home = rates.chart.parking[rates.chart.nearest[v.y, v.x]]
     way = distance(rates.chart, v.x, v.y, home[0], home[1]) * v.slots_per_cell
     left = mission.max_slots - mission.slot - t
+    kept = v.slots_per_cell + 2 + _slots_for_detours(mission, v, active)
+    if has_consumption(mission):
+        spent = _battery_to_cell(mission, rates.chart, v, home[0], home[1])
+        spent += mission.flight_cost * kept * mission.dearest_slot
+        return way + kept > left or spent > v.battery
     if mission.flight_cost > 0:
-        left = min(left, v.battery + mission.flight_cost)
-    return way + v.slots_per_cell + 2 + _reserve_for_detours(mission, v, active) > left
+        left = min(left, v.battery)
+    return way + kept > left
 
 
 @inlined
-def _reserve_for_detours(mission, v, active):
-    """The margin of the return guard for the detours around teammates [%]."""
+def _battery_to_cell(mission, chart, v, x, y):
+    """The battery for the shortest way of a UAV to a cell, where slots have costs of their own."""
+    cells = distance(chart, v.x, v.y, x, y)
+    slots = v.slots_per_cell
+    return mission.flight_cost * battery_of_flight(mission, slots, x - v.x, y - v.y, cells)
+
+
+@inlined
+def _slots_for_detours(mission, v, active):
+    """The slots that the return guard keeps for the detours around teammates."""
     return (active - 1) * (MARGIN_PER_TEAMMATE * v.slots_per_cell + mission.wind_most)
 
 

@@ -28,7 +28,12 @@ SHEET: dict[str, Any] = {
     "age": {"measured": True},
     "data_sheet": {
         **{"endurance": "35 min", "cruise": "15 m/s", "charging": "40 min", "horizon": "2 h"},
-        **{"data_rate": "3 MB/h", "backlog": "2 MB", "wind": "4 m/s from SW"},
+        **{
+            "data_rate": "3 MB/h",
+            "backlog": "2 MB",
+            "wind": "4 m/s from SW",
+            "max_speed": "20 m/s",
+        },
         **{"bandwidth": "125 kHz", "snr": "12 dB at 2 km", "range": "2 km"},
     },
 }

@@ -5,6 +5,7 @@ import numpy as np
 from dess.base.kernels import kernel
 from dess.model.state import ACTION_NAMES, HOVER, STEP_X, STEP_Y, State, spaces_of
 from dess.physics.chart import is_open
+from dess.physics.consumption import PERCENT, has_consumption, slot_cost
 from dess.physics.wind import move_surcharge
 from dess.scenario.scenario import Scenario, ScenarioSpace
 
@@ -150,6 +151,15 @@ def _quota_share(u):
 
 
 @kernel
+def _surcharge(mission, u, action, x, y):
+    """What a move costs more than one percent a slot, 0 if it costs less [%]."""
+    if has_consumption(mission):
+        more = slot_cost(mission, u.slots_per_cell, action) - PERCENT
+        return max(u.slots_per_cell * more, 0) / PERCENT
+    return float(move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y))
+
+
+@kernel
 def _encode_beyond(has, mission, chart, uavs, i, sensors, out):
     """Write the components of UAV ``i`` in the order of ``_beyond_the_paper``."""
     can_be_grounded, pads_fail, nodes_fail, has_wind, has_age = has
@@ -174,7 +184,7 @@ def _encode_beyond(has, mission, chart, uavs, i, sensors, out):
             x = u.x + STEP_X[action]
             y = u.y + STEP_Y[action]
             if is_open(chart, x, y):
-                extra = move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
+                extra = _surcharge(mission, u, action, x, y)
                 out[at + action] = mission.flight_cost * extra / 100.0
         at += HOVER
     if has_age:

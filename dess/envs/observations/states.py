@@ -13,14 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.errors import InputError
-from dess.base.kernels import kernel
+from dess.base.kernels import inlined, kernel
 from dess.model.guard.battery import slots_needed
 from dess.model.guard.moves import guide
-from dess.model.guard.ways import battery_home
+from dess.model.guard.ways import battery_home, cells_home
 from dess.model.rules import legal_moves, may_act
 from dess.model.state import HOVER, State
 from dess.physics.chart import Chart, zones_of
-from dess.physics.wind import reach_of
+from dess.physics.consumption import PERCENT, has_consumption
+from dess.physics.ways_home import reach_of
 from dess.scenario.scenario import ScenarioSpace
 
 # Columns of ``CompactStates.missions``.
@@ -155,10 +156,24 @@ def _fill(
                 continue
             row[MUST_CHARGE] = charge[guided]
             battery = battery_home(mission, team, i, chart, None, u.x, u.y, home[guided], reach)
+            if has_consumption(mission):
+                cells = cells_home(mission, team, i, chart, None, u.x, u.y, home[guided])
+                battery = _observed_battery(battery, cells * u.slots_per_cell)
             row[HOME] = min(battery, _MOST)
             if may_act(u):
                 row[MASK] = safe[guided] if guarded else legal_moves(chart, u)
             guided += 1
+
+
+@inlined
+def _observed_battery(battery, slots):
+    """The battery for a way as it was in training [%]: no slot takes less than one percent.
+
+    Args:
+        battery: What the way takes [% / 1000].
+        slots: The slots that it takes.
+    """
+    return max((battery + PERCENT - 1) // PERCENT, slots)
 
 
 def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:

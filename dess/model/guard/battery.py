@@ -1,8 +1,15 @@
-"""Whether the battery of a UAV lasts until its quota is filled, and the margins that are kept."""
+"""Whether the battery of a UAV lasts until its quota is filled, and the margins that are kept.
+
+The guard counts batteries in percent; in missions whose slots have costs of their own
+(``dess.physics.consumption``), it counts them in thousandths of a percent. There the battery is no
+time any more, so that both must last: the battery for the cheapest way home, and the slots that are
+left for the shortest one. A slot of waiting or of a detour counts as the dearest one.
+"""
 
 import math
 
 from dess.base.kernels import inlined
+from dess.physics.consumption import has_consumption, thousandths_left
 from dess.physics.failures import working_pads
 from dess.physics.landing import flies, lands
 from dess.physics.radio import has_limit
@@ -92,26 +99,59 @@ def must_charge(mission, u, data):
         return False
     # A UAV that lives until the mission is truncated is not lost.
     needed = min(needed, mission.max_slots - mission.slot + 1)
-    return u.battery < mission.flight_cost * (needed + _most_wind(mission, u, needed))
+    return battery_left(mission, u) < mission.flight_cost * _most_battery(mission, u, needed)
 
 
 @inlined
 def will_charge(mission, u):
     """Whether a UAV in the air cannot fill its quota with its battery, or has to land."""
-    needs = u.battery < mission.flight_cost * slots_needed(mission, u)
+    least = dearest_slot(mission) * slots_needed(mission, u)
+    needs = battery_left(mission, u) < mission.flight_cost * least
     return flies(u) and (needs or lands(mission) or has_limit(mission))
 
 
 @inlined
-def slots_left(mission, u):
-    """The slots that UAV ``u`` may fly at most: as many as it has battery [%].
+def battery_left(mission, u):
+    """The battery of UAV ``u`` in the unit of the guard."""
+    if has_consumption(mission):
+        return thousandths_left(mission, u)
+    return u.battery
 
-    If missions end on the ground, no more than to the end of the mission.
+
+@inlined
+def dearest_slot(mission):
+    """The battery that a slot of waiting or of a detour counts."""
+    if has_consumption(mission):
+        return mission.dearest_slot
+    return 1
+
+
+@inlined
+def usable_battery(mission, u):
+    """The battery that UAV ``u`` may spend in the air at most.
+
+    Where a slot takes one percent, the battery is a time: if missions end on the ground, no more
+    than to the end of the mission. Elsewhere see ``late_slots``.
     """
     if not lands(mission):
-        return u.battery
+        return battery_left(mission, u)
     left = mission.max_slots - mission.slot
+    if has_consumption(mission):
+        most = left * mission.dearest_slot
+        return thousandths_left(mission, u) if mission.flight_cost > 0 else most
     return min(u.battery, left) if mission.flight_cost > 0 else left
+
+
+@inlined
+def late_slots(mission, slots):
+    """By how many slots a UAV comes too late that is on the ground in so many slots.
+
+    Only a mission that ends on the ground has such an end; where a slot takes one percent of the
+    battery, ``usable_battery`` has it.
+    """
+    if has_consumption(mission) and lands(mission):
+        return max(slots - (mission.max_slots - mission.slot), 0)
+    return 0
 
 
 @inlined
@@ -121,6 +161,14 @@ def _all_pads(mission):
     for zone in range(mission.zones):
         pads += working_pads(mission, zone)
     return pads
+
+
+@inlined
+def _most_battery(mission, u, slots):
+    """The battery that so many slots in the air take at most."""
+    if has_consumption(mission):
+        return slots * mission.dearest_slot
+    return slots + _most_wind(mission, u, slots)
 
 
 @for_sections
@@ -137,14 +185,25 @@ def ends_soon(mission, u):
 
 @inlined
 def lasts(mission, u):
-    """Whether the battery lasts to the end of the mission in any wind, so that only time counts."""
+    """Whether the battery lasts to the end of the mission in any wind, so that only time counts.
+
+    Where slots have costs of their own, time and battery are counted each by itself.
+    """
+    if has_consumption(mission):
+        return False
     left = mission.max_slots - mission.slot
     return ends_soon(mission, u) and u.battery > left * (1 + mission.wind_most)
 
 
 @inlined
 def margin(mission, u):
-    """The margin [%] on the way of UAV ``u`` to the zone for detours around teammates.
+    """The battery that UAV ``u`` keeps on its way to the zone for detours around teammates."""
+    return dearest_slot(mission) * margin_slots(mission, u)
+
+
+@inlined
+def margin_slots(mission, u):
+    """The slots that UAV ``u`` keeps for detours around teammates.
 
     A detour goes forth and back, so the wind costs the most in one direction only.
     """

@@ -5,17 +5,36 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel
-from dess.model.guard.battery import lasts, margin, must_charge, slots_left, will_charge
+from dess.model.guard.battery import (
+    dearest_slot,
+    lasts,
+    late_slots,
+    margin,
+    margin_slots,
+    must_charge,
+    usable_battery,
+    will_charge,
+)
 from dess.model.guard.parking import HOME, parking_cell, parking_memory, stays, write_home
 from dess.model.guard.queues import waits_in_zone
-from dess.model.guard.ways import battery_around, battery_home, is_late, is_parked
+from dess.model.guard.ways import (
+    battery_around,
+    battery_home,
+    battery_of_move,
+    cells_home,
+    is_late,
+    is_parked,
+)
 from dess.model.rules import data_left
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
 from dess.physics.charging import slots_to_charge
 from dess.physics.chart import Chart, distance, in_zone, is_open
+from dess.physics.consumption import has_consumption, slot_cost
 from dess.physics.landing import lands
-from dess.physics.wind import is_calm, move_surcharge, reach_of
+from dess.physics.ways_home import is_calm, reach_of
+
+_MOST_BATTERY = 2**40  # more than any way costs
 
 
 @inlined
@@ -125,13 +144,13 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     u = uavs[i]
     if charge and (u.pad_request >= 0 or (lands(mission) and is_parked(mission, u))):
         return 1 << HOVER  # it would lose its place in the queue, or on the ground
-    reserve = margin(mission, u) + home.wait if charge else 0
+    reserve = margin(mission, u) + dearest_slot(mission) * home.wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
     # that lead nearest to the parking cell, those after which it is reached if the margin and the
     # slots for a pad are spent, and those that lead to a cell that no teammate contests.
     clear = nearest = in_time = empty = 0
-    least = 1_000_000  # battery [%] that lacks on the way to the parking cell
-    fewest = 1_000_000  # battery [%] that a move and the way from there need
+    least = _MOST_BATTERY  # the battery that lacks on the way to the parking cell
+    fewest = _MOST_BATTERY  # the battery that a move and the way from there need
     levels = contests(mission, uavs, i)
     searches = charge and not is_calm(reach)
     if searches:
@@ -159,7 +178,8 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
                 fewest = min(fewest, needed)
                 kept = max(kept, _wait(mission, u, chart, action, x, y, home))
             # One slot is the charging slot itself; the battery must not be depleted before it.
-            late = max(needed + 1 + kept - slots_left(mission, u), 0)
+            late = max(needed + dearest_slot(mission) + kept - usable_battery(mission, u), 0)
+            late = max(late, _late_home(mission, uavs, i, chart, planned, action, x, y, home))
         bit = 1 << action
         if contested == 0:
             empty |= bit
@@ -195,6 +215,17 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
 
 
 @inlined
+def _late_home(mission, uavs, i, chart, planned, action, x, y, home):
+    """What lacks if an action brings a UAV home too late, as the battery of the slots that lack."""
+    if not has_consumption(mission):
+        return 0
+    u = uavs[i]
+    cells = cells_home(mission, uavs, i, chart, planned, x, y, home)
+    slots = cells * u.slots_per_cell + (1 if action == HOVER else u.slots_per_cell)
+    return dearest_slot(mission) * late_slots(mission, slots + 1 + margin_slots(mission, u))
+
+
+@inlined
 def _is_shut_out(mission, u, chart, home):
     """Whether UAV ``u`` can only wait until a teammate has charged that is parked on its way."""
     detour = home.cells - distance(chart, u.x, u.y, home.x, home.y)
@@ -203,24 +234,34 @@ def _is_shut_out(mission, u, chart, home):
 
 @inlined
 def _wait(mission, u, chart, action, x, y, home):
-    """The battery [%] that a UAV keeps in wind for its wait for a pad if it comes after an action.
+    """The battery that a UAV keeps in wind for its wait for a pad if it comes after an action.
 
     In still air, it may as well fly about until its turn comes. In wind, this costs more than the
     slots that it takes, and so does a detour of two cells around a parked teammate.
     """
     slots = 1 if action == HOVER else u.slots_per_cell
     arrives = slots + distance(chart, x, y, home.x, home.y) * u.slots_per_cell
-    return home.begins - arrives + 2 * mission.wind_most if home.begins > arrives else 0
+    if home.begins <= arrives:
+        return 0
+    if has_consumption(mission):
+        return (home.begins - arrives + 2) * mission.dearest_slot
+    return home.begins - arrives + 2 * mission.wind_most
 
 
 @inlined
 def _cost(mission, u, chart, action, x, y):
-    """The battery [%] for an action of a UAV that leads to a cell, in wind or at a low speed."""
+    """The battery for an action of a UAV that leads to a cell, where not every cell costs 1 %."""
     if action == HOVER:
-        return 0 if u.latch and in_zone(chart, x, y) else 1
+        if in_zone(chart, x, y) and u.latch:
+            return 0
+        if not has_consumption(mission):
+            return 1
+        if in_zone(chart, x, y) and lands(mission):
+            return 0
+        return slot_cost(mission, u.slots_per_cell, HOVER)
     if lasts(mission, u):
         return u.slots_per_cell
-    return u.slots_per_cell + move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
+    return battery_of_move(mission, u.slots_per_cell, action, x, y)
 
 
 class Guidance(NamedTuple):

@@ -5,14 +5,14 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel, large_kernel
-from dess.model.guard.battery import slots_left
+from dess.model.guard.battery import late_slots, usable_battery
 from dess.model.guard.queues import QUEUE, TURN, Plan, may_wait, plan_pads, waits_in_zone
 from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
 from dess.physics.chart import distance
 from dess.physics.failures import working_pads
 from dess.physics.landing import lands
 from dess.physics.section import for_sections
-from dess.physics.wind import is_calm
+from dess.physics.ways_home import is_calm
 from dess.scenario.fields import MOST_ZONES
 
 # What teammates do with a zone cell: nothing; one is on it that may leave it, as it is not parked;
@@ -218,7 +218,8 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     if free and path_length(mission, uavs, i, chart, None, u.x, u.y, x, y) == cells:
         return cell, cells
     cell, cells, spent = _best_cell(mission, uavs, i, zone, most, chart, memory, reach)
-    is_in_reach = cell >= 0 and (not lands(mission) or spent < slots_left(mission, u))
+    is_in_reach = cell >= 0 and (not lands(mission) or spent < usable_battery(mission, u))
+    is_in_reach = is_in_reach and late_slots(mission, cells * u.slots_per_cell + 1) == 0
     if not is_in_reach and (zone >= 0 or lands(mission)):
         cell, cells, spent = _best_cell(mission, uavs, i, -1, _OCCUPIED, chart, memory, reach)
     return cell, cells
@@ -239,7 +240,7 @@ def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
         reach: The table of ``reach_of``.
 
     Returns:
-        The number of the cell, -1 if there is none; the way to it [cells]; the battery [%] for it.
+        The number of the cell, -1 if there is none; the way to it [cells]; the battery for it.
     """
     u, best, best_zone, way, least = uavs[i], -1, -1, -1, -1
     for cell in range(len(chart.parking)):

@@ -26,11 +26,12 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel, large_kernel
-from dess.model.guard.battery import must_charge
+from dess.model.guard.battery import battery_left, dearest_slot, must_charge
 from dess.model.guard.ways import battery_of_way
 from dess.model.state import HOVER
 from dess.physics.charging import is_before, slots_to_charge
 from dess.physics.chart import distance
+from dess.physics.consumption import PERCENT, has_consumption, slot_cost
 from dess.physics.failures import working_pads
 from dess.physics.landing import lands
 from dess.scenario.fields import MOST_ZONES
@@ -49,7 +50,7 @@ _AS_ASKED, _URGENT_FIRST, _BY_DEADLINE = range(3)
 TURN = np.dtype(
     [
         ("zone", np.int64),  # the zone where it will charge, -1 if it need not
-        # The slots to the nearest cell of each zone, and the battery [%] that this takes.
+        # The slots to the nearest cell of each zone, and the battery that this takes.
         ("way", np.int64, MOST_ZONES),
         ("spent", np.int64, MOST_ZONES),
         ("asks", np.int64),  # when it can ask for a pad, before now if it has asked
@@ -160,9 +161,35 @@ def plan_pads(mission, uavs, i, data, chart, plan, reach):
     _serve(mission, uavs, zone, plan.queues[zone].order, plan)
     kept = plan.turns[i].deadline - _latest(mission, uavs, i, plan)
     # It can ask no earlier than at C_S.
-    kept = max(min(kept, mission.charge_start - 1), 0)
+    kept = max(min(kept, _slots_of_percent(mission, mission.charge_start) - 1), 0)
     gives_way = np.int64(_gives_way(mission, uavs, i, plan))
     return np.int64(kept), plan.turns[i].begins, gives_way
+
+
+@inlined
+def _slots_of(mission, battery):
+    """The slots that a battery lasts for a UAV that waits in the air."""
+    if has_consumption(mission):
+        return battery // mission.dearest_slot
+    return battery
+
+
+@inlined
+def _slots_of_percent(mission, percent):
+    """The slots that so many percent of a battery last for a UAV that waits in the air."""
+    if has_consumption(mission):
+        return PERCENT * percent // mission.dearest_slot
+    return percent
+
+
+@inlined
+def _slots_to_charge_start(mission, battery):
+    """The slots in which a UAV that hovers spends so much battery that it may charge."""
+    if has_consumption(mission):
+        more = max(battery - PERCENT * mission.charge_start, 0)
+        hovering = slot_cost(mission, 1, HOVER)
+        return (more + hovering - 1) // hovering
+    return max(battery - mission.charge_start, 0)
 
 
 @inlined
@@ -174,7 +201,8 @@ def _find_ways(mission, u, turn, chart, reach):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
         cells = distance(chart, u.x, u.y, x, y)
-        spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach) + u.slots_left
+        spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach)
+        spent += u.slots_left * dearest_slot(mission)
         slots = cells * u.slots_per_cell + u.slots_left
         least = turn.spent[zone]
         if least < 0 or spent < least or (spent == least and slots < turn.way[zone]):
@@ -230,14 +258,14 @@ def _price(mission, uavs, chart, zone, plan):
             continue
         count += 1
         way, spent = turn.way[zone], turn.spent[zone]
-        turn.deadline = u.battery - 1 - (spent - way)
+        turn.deadline = way + _slots_of(mission, battery_left(mission, u) - spent) - 1
         if u.pad_request >= 0:
             turn.asks = u.pad_request - mission.slot
             continue
         asked = False
         turn.asks = way
         if not u.latch:
-            turn.asks += max(u.battery - spent - mission.charge_start, 0)
+            turn.asks += _slots_to_charge_start(mission, battery_left(mission, u) - spent)
     plan.queues[zone].order = _AS_ASKED
     least = _serve(mission, uavs, zone, _AS_ASKED, plan)
     if asked or count < 2:
@@ -327,7 +355,9 @@ def _is_next(mission, uavs, j, other, order, time, plan):
 @inlined
 def _time_on_pad(mission, uavs, j, begins, plan):
     """The slots for which UAV ``j`` charges if it begins so many slots from now."""
-    empty = plan.turns[j].deadline + 1 - begins  # what is left of its battery then
+    empty = plan.turns[j].deadline + 1 - begins  # the slots that are left of its battery then
+    if has_consumption(mission):
+        empty = empty * mission.dearest_slot // PERCENT
     return _charging_time(mission, uavs[j], plan.turns[j].zone, max(empty, 0))
 
 

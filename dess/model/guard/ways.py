@@ -5,12 +5,14 @@ import heapq
 import numpy as np
 
 from dess.base.kernels import inlined, kernel, large_kernel
-from dess.model.guard.battery import ends_soon, lasts, slots_left
-from dess.model.state import STEP_X, STEP_Y
+from dess.model.guard.battery import dearest_slot, ends_soon, lasts, usable_battery
+from dess.model.state import EAST, NORTH, SOUTH, STEP_X, STEP_Y, WEST
 from dess.physics.charging import slots_to_charge
 from dess.physics.chart import distance, is_open, length_around
+from dess.physics.consumption import has_consumption, slot_cost
 from dess.physics.landing import lands
-from dess.physics.wind import FAR, move_surcharge
+from dess.physics.ways_home import FAR
+from dess.physics.wind import move_surcharge
 
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
 CELLS_PER_UAV = 4
@@ -102,7 +104,7 @@ def _closed_cells(mission, uavs, i, chart, planned, to_x, to_y):
 
 @inlined
 def battery_home(mission, uavs, i, chart, planned, x, y, home, reach):
-    """The battery [%] that UAV ``i`` needs from a cell to its parking cell.
+    """The battery that UAV ``i`` needs from a cell to its parking cell.
 
     Args:
         mission: ``MISSION`` record.
@@ -114,11 +116,16 @@ def battery_home(mission, uavs, i, chart, planned, x, y, home, reach):
         reach: The table of ``reach_of``. A detour around parked teammates is not in it; each of
             its cells may cost the most.
     """
-    if is_crowded(mission, chart, chart.zones[home.y, home.x]):
-        cells = path_length(mission, uavs, i, chart, planned, x, y, home.x, home.y)
-    else:
-        cells = path_length(mission, uavs, i, chart, None, x, y, home.x, home.y)
+    cells = cells_home(mission, uavs, i, chart, planned, x, y, home)
     return battery_of_way(mission, uavs[i], chart, x, y, home.x, home.y, cells, reach)
+
+
+@inlined
+def cells_home(mission, uavs, i, chart, planned, x, y, home):
+    """The cells that UAV ``i`` flies from a cell to its parking cell."""
+    if is_crowded(mission, chart, chart.zones[home.y, home.x]):
+        return path_length(mission, uavs, i, chart, planned, x, y, home.x, home.y)
+    return path_length(mission, uavs, i, chart, None, x, y, home.x, home.y)
 
 
 @large_kernel
@@ -131,12 +138,12 @@ def is_late(mission, uavs, i, chart, planned, home, kept, reach):
         return False
     u = uavs[i]
     spent = battery_home(mission, uavs, i, chart, planned, u.x, u.y, home, reach)
-    return spent + 1 + kept > slots_left(mission, u)
+    return spent + dearest_slot(mission) + kept > usable_battery(mission, u)
 
 
 @large_kernel
 def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
-    """The battery [%] that UAV ``i`` needs to its parking cell, as it is and not as it may be most.
+    """The battery that UAV ``i`` needs to its parking cell, as it is and not as it may be most.
 
     ``battery_home`` takes the detour of the shortest ways around closed cells, and the battery of
     the cheapest way, which may be another. By this, each cell of two may seem to be on the better
@@ -154,7 +161,8 @@ def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
     least = reach[chart.nearest[home.y, home.x], slots - 1].ravel()
     lacking = mission.charge_complete - mission.charge_start
     start = np.int64(y * width + x)
-    through = np.int64(least[start]) + slots_to_charge(mission, lacking)
+    waits = dearest_slot(mission) * slots_to_charge(mission, lacking)
+    through = np.int64(least[start]) + waits
     spent = np.full(chart.zones.size, FAR, np.int64)
     spent[closed] = -1
     spent[start] = 0
@@ -172,8 +180,7 @@ def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
             if not is_open(chart, next_x, next_y):
                 continue
             to = next_y * width + next_x
-            cost = move_surcharge(mission, STEP_X[action], STEP_Y[action], next_x, next_y)
-            cost += spent[cell] + slots
+            cost = spent[cell] + battery_of_move(mission, slots, action, next_x, next_y)
             if cost < spent[to]:
                 spent[to] = cost
                 left = np.int64(least[to])
@@ -182,13 +189,29 @@ def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
 
 
 @inlined
+def battery_of_move(mission, slots, action, x, y):
+    """The battery for a move of so many slots into a cell."""
+    if has_consumption(mission):
+        return slots * slot_cost(mission, slots, action)
+    return slots + move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
+
+
+@inlined
+def _dearest_move(mission, u):
+    """The battery that a move of UAV ``u`` takes at most."""
+    if has_consumption(mission):
+        return u.slots_per_cell * mission.dearest_slot
+    return u.slots_per_cell + mission.wind_most
+
+
+@inlined
 def battery_of_way(mission, u, chart, x, y, home_x, home_y, cells, reach):
-    """The battery [%] for a way home of so many cells, those of a detour included."""
+    """The battery for a way home of so many cells, those of a detour included."""
     if reach is None or len(reach) == 0:
         return cells
     if lasts(mission, u):
         return cells * u.slots_per_cell
-    dearest = u.slots_per_cell + mission.wind_most
+    dearest = _dearest_move(mission, u)
     if reach.size == 0:  # too many cells for a table
         return cells * dearest
     detour = cells - distance(chart, x, y, home_x, home_y)
@@ -198,7 +221,7 @@ def battery_of_way(mission, u, chart, x, y, home_x, home_y, cells, reach):
 
 @inlined
 def round_trip(mission, u, chart, x, y, home, reach):
-    """The battery [%] that UAV ``u`` needs to fly to a cell and from there to the zone.
+    """The battery that UAV ``u`` needs to fly to a cell and from there to the zone.
 
     Gusts on the way out are not considered; the safe moves are what keeps the zone in reach.
     """
@@ -211,7 +234,33 @@ def round_trip(mission, u, chart, x, y, home, reach):
     cells = distance(chart, u.x, u.y, x, y)
     if reach is None or len(reach) == 0:
         return cells + back
+    if has_consumption(mission):
+        return battery_of_flight(mission, u.slots_per_cell, x - u.x, y - u.y, cells) + back
     along_x = mission.wind_east if x > u.x else mission.wind_west
     along_y = mission.wind_south if y > u.y else mission.wind_north
     against = max(along_x * abs(x - u.x), 0.0) + max(along_y * abs(y - u.y), 0.0)
     return cells * u.slots_per_cell + int(against) + back
+
+
+@inlined
+def battery_of_flight(mission, slots, east, south, cells):
+    """The battery for a flight in missions whose slots have costs of their own.
+
+    Args:
+        mission: ``MISSION`` record.
+        slots: The slots that the UAV takes for a cell.
+        east, south: Where it leads to [cells].
+        cells: Its length, those of a detour included [cells]; these may cost the most.
+    """
+    along_x = slot_cost(mission, slots, EAST if east > 0 else WEST)
+    along_y = slot_cost(mission, slots, SOUTH if south > 0 else NORTH)
+    detour = (cells - abs(east) - abs(south)) * mission.dearest_slot
+    return slots * (abs(east) * along_x + abs(south) * along_y + detour)
+
+
+@inlined
+def slots_of_round_trip(mission, u, chart, x, y):
+    """The slots in which UAV ``u`` can fly to a cell, and from there to the nearest zone cell."""
+    near = chart.parking[chart.nearest[y, x]]
+    cells = distance(chart, u.x, u.y, x, y) + distance(chart, x, y, near[0], near[1])
+    return cells * u.slots_per_cell

@@ -12,7 +12,8 @@ from dess.model.guard import guard
 from dess.model.state import BATTERY, constants_of
 from dess.model.view import View
 from dess.physics.chart import parking_of
-from dess.physics.wind import Wind, reach_of, surcharges
+from dess.physics.ways_home import reach_of
+from dess.physics.wind import Wind, surcharges
 from dess.scenario.scenario import ScenarioSpace
 from tests.dess.model.flights import batteries, flown
 from tests.drawn import random_actions, reached, replications, seeds, spaces
@@ -95,6 +96,12 @@ class Guarded:
 WEATHER = st.just({}) | st.builds(
     lambda wind, slots: {"wind": wind.model_dump(), "fleet": [{"slots_per_cell": slots}]},
     *(winds, st.integers(1, 3)),
+)
+# Slots that cost less and more than one percent, by the direction.
+WEATHER |= st.builds(
+    lambda costs, slots: {"consumption": {"slots": costs}, "fleet": [{"slots_per_cell": slots}]},
+    st.lists(st.tuples(*[st.integers(300, 2500)] * 5), min_size=3, max_size=3),
+    st.integers(1, 3),
 )
 
 

@@ -7,19 +7,23 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli_w
+from hypothesis import given
+from hypothesis import strategies as st
 
 from dess import InputError, load_scenario, policies, simulate
 from dess.model.channel import world_of
 from dess.model.state import constants_of
-from dess.physics.wind import MOST, largest_wind, moves_in
+from dess.physics.rotary_wing import airspeed_along, largest_speed
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
 from tests.drawn import Script
 from tests.verification import closed_forms
 
+CALM = {"wind": None, "max_speed": None}
 SHEET = {
     **{"endurance": "35 min", "cruise": "15 m/s", "charging": "40 min", "data_rate": "3 MB/h"},
-    **{"bandwidth": "125 kHz", "snr": "12 dB at 2 km", "wind": "10 m/s from SW"},
+    **{"bandwidth": "125 kHz", "snr": "12 dB at 2 km", "wind": "8 m/s from SW"},
+    **{"max_speed": "23 m/s"},
 }
 
 
@@ -40,10 +44,11 @@ def test_the_list_of_an_engineer_is_recomputed_by_hand():
     # The rate at 2 km [data units per slot] is that of an SNR of 12 dB.
     rate = float(closed_forms.rate_at_snr(space, closed_forms.mean_snr(space, 2000.0)))
     assert 4 * rate == pytest.approx(math.log2(1 + 10**1.2))
-    # A wind of 10 m/s from the south-west: south and west are against it, at 45 degrees.
-    along = 10 / math.sqrt(2)
-    ground = math.sqrt(15**2 - along**2) - along
-    assert space.wind.moves == pytest.approx((0, 0, 15 / ground - 1, 15 / ground - 1))
+    # A wind of 8 m/s from the south-west: south and west are against it, at 45 degrees.
+    along = 8 / math.sqrt(2)
+    with_it, against = math.hypot(15 - along, along), math.hypot(15 + along, along)
+    shares = [_zeng(airspeed) / _zeng(15) for airspeed in (with_it, with_it, against, against, 8)]
+    assert space.consumption.slots[0] == tuple(math.ceil(1000 * share) for share in shares)
     assert space.landing and space.quota == 0
     assert space.flying_time == space.charge_complete == (100, 100)
 
@@ -188,9 +193,66 @@ def test_out_of_range_no_node_is_served_and_no_slot_counts():
     assert max(e.value for e in served) <= 0.5 / 4 + 1e-12
 
 
-def test_the_largest_wind_is_the_one_that_costs_the_most():
-    for direction in (0.0, 30.0, 45.0, 225.0, 300.0):
-        assert max(moves_in(largest_wind(direction, 15), direction, 15)) == pytest.approx(MOST)
+def _zeng(airspeed: float, drag: float = 5.48e-5) -> float:
+    """The power of the UAV in Zeng et al. (2019), eq. 12, in terms of that of hovering."""
+    tip, induced = 120, 4.03
+    inflow = math.sqrt(1 + airspeed**4 / (4 * induced**4)) - airspeed**2 / (2 * induced**2)
+    profile = 0.474 * (1 + 3 * airspeed**2 / tip**2)
+    return profile + 0.526 * math.sqrt(inflow) + drag * airspeed**3
+
+
+def test_hovering_costs_more_than_cruising_and_a_headwind_twice_as_much():
+    calm = _space({"wind": None})
+    assert calm.consumption.slots[0] == (1000, 1000, 1000, 1000, 1217)  # 1 / p(15) = 1.2164
+    windy = _space({"wind": "12 m/s from N", "max_speed": "30 m/s"})
+    assert windy.consumption.slots[0][0] == 2072  # the airspeed is 27 m/s
+    assert windy.consumption.slots[0][2] == math.ceil(1000 * _zeng(3) / _zeng(15))
+    with pytest.raises(InputError, match=r"wind: '12 m/s from N' .*allowed: 8 m/s from there"):
+        _space({"wind": "12 m/s from N"})
+
+
+def test_the_cost_of_hovering_is_that_of_the_hovering_time():
+    space = _space({"wind": None, "hover": "30 min"})
+    assert space.consumption.slots[0][4] == math.ceil(1000 * 35 / 30)
+    # Its drag is fitted, so that other airspeeds follow.
+    drag = (30 / 35 - _zeng(15, 0.0)) / 15**3
+    windy = _space({"wind": "5 m/s from N", "hover": "30 min"})
+    share = _zeng(20, drag) / _zeng(15, drag)
+    assert windy.consumption.slots[0][0] == math.ceil(1000 * share)
+    with pytest.raises(InputError, match=r"hover: '10 min' is too short.* and more, or a smaller"):
+        _space({"wind": None, "hover": "10 min"})
+
+
+def test_an_endurance_at_another_speed_is_converted():
+    space = _space({"wind": None, "endurance": "55 min at 8 m/s"})
+    assert space.units.slot == pytest.approx(33 * _zeng(8) / _zeng(15))
+    with_hover = _space({"wind": None, "endurance": "55 min at 8 m/s", "hover": "50 min"})
+    drag = (50 / 55 - _zeng(8, 0.0)) / 8**3
+    assert with_hover.units.slot == pytest.approx(33 * _zeng(8, drag) / _zeng(15, drag))
+    # A full battery hovers for its hovering time.
+    hovering = with_hover.units.slot * 100 / with_hover.consumption.slots[0][4] * 1000
+    assert hovering == pytest.approx(50 * 60, rel=2e-3)
+
+
+@given(st.floats(1, 40), st.floats(0, 40), st.floats(0, 360))
+def test_all_moves_can_be_flown_in_the_strongest_wind_and_not_in_a_stronger_one(
+    cruise, more, direction
+):
+    most = cruise + more
+    wind = largest_speed(cruise, direction, most)
+    courses = (0, 90, 180, 270)
+    fastest = max(airspeed_along(course, cruise, wind, direction) for course in courses)
+    assert fastest == pytest.approx(most)
+    if wind > 0.01:
+        assert largest_speed(wind, direction, most) == pytest.approx(cruise)
+
+
+def test_a_battery_flies_for_its_endurance_and_hovers_for_its_hovering_time():
+    """A hundred slots of cruising, and as much hovering as the sheet says, to a slot."""
+    space = _space({"wind": None, "hover": "30 min"}, uavs=1, landing=False, quota=10**6)
+    for route, slots in (("WE" * 300, 100), ("W" * 5 + "." * 300, 5 + 82)):
+        record = simulate(space, Script(route), 1)
+        assert record.uavs["slots_flying"][0] == slots
 
 
 def test_a_scenario_with_a_sheet_is_stored_and_changed_by_its_sheet():
@@ -199,7 +261,8 @@ def test_a_scenario_with_a_sheet_is_stored_and_changed_by_its_sheet():
     assert space.charge_complete == space.flying_time == (80, 80)
     assert space.initial_data[0] == pytest.approx(20e6 * 8 / (125e3 * 21))
     calm = ScenarioSpace.of(space, **{"data_sheet.wind": "0 m/s from N"})
-    assert calm.wind.moves == (0, 0, 0, 0) and (calm.quota, calm.landing) == (50, False)
+    assert calm.consumption.slots[0][:4] == (1000,) * 4
+    assert (calm.quota, calm.landing) == (50, False)
     assert not ScenarioSpace.of().units and "radio" not in ScenarioSpace.of().model_dump()
 
 
@@ -288,7 +351,16 @@ def test_a_quantity_of_another_library_is_refused_in_a_line(field):
         ({"endurance": None}, {}, "endurance: is missing; allowed: flying time"),
         ({"data_rate": None}, {}, "data_sheet.data_rate: is missing; allowed: new data"),
         ({"data_rate": ["3 MB/h"] * 2}, {}, "arrivals.rates: there are 2; allowed: 25"),
-        ({"wind": "14.5 m/s from SW"}, {}, "is too strong for 15 m/s; allowed: 14 m/s"),
+        (
+            {"wind": "14.5 m/s from SW"},
+            {},
+            "cannot be flown in at 15 m/s over ground, 23 m/s in the air; "
+            "allowed: 9.8 m/s from there at most, or a cruise of 10.33 m/s at most",
+        ),
+        ({"max_speed": None}, {}, "max_speed: is missing; allowed: largest speed through the air"),
+        ({"max_speed": "14 m/s"}, {}, "max_speed: '14 m/s' is less than the cruise 15 m/s"),
+        ({"endurance": "35 min at 8 km"}, {}, "'8 km' has a unit of another kind"),
+        ({}, {"wind": {"gusts": 1.0}}, "wind: is given beside data_sheet; allowed: one of both"),
         ({"wind": "14 m/s"}, {}, "is not a speed and where it comes from"),
         ({"horizon": "60 d"}, {}, "is 246,857 slots of 21 s; allowed: 24.31 d at most"),
         ({"charging": "10 s"}, {}, "is less than a slot of 21 s; allowed: 21 s or more"),
@@ -335,7 +407,7 @@ def test_a_quantity_of_another_library_is_refused_in_a_line(field):
             "range: '350 m' ends above the sea, 400 m below; allowed: above 400 m",
         ),
         # What follows is refused in the words of the sheet.
-        ({"cruise": "1000 km/s", "wind": None}, {}, "endurance '35 min', cruise '1000 km/s', cell"),
+        ({"cruise": "1000 km/s"} | CALM, {}, "endurance '35 min', cruise '1000 km/s', cell"),
         ({"data_rate": "3 TB/s"}, {}, "data_sheet: with data_rate '3 TB/s', bandwidth '125 kHz'"),
         ({"bandwidth": "1 Hz", "backlog": "90 TB"}, {}, "data_sheet: with backlog '90 TB', end"),
         ({}, {"cell_size": 315.0}, "cell_size: follows from the data sheet"),

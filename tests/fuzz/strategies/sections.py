@@ -20,7 +20,7 @@ PLAIN = (
     "failures={pad_rate=0.3, pad_repair=2}",
     "wind={strength=0.7, direction=225, gusts=0.3, seed=9}",
     "fleet=[{slots_per_cell=2, rate=0.5}, {flying_time=60, quota=9}]",
-    'data_sheet={endurance="35 min", cruise="15 m/s", charging="40 min", wind="4 m/s from SW"}',
+    'data_sheet={endurance="35 min", cruise="15 m/s", charging="40 min", wind="4 m/s from SW", max_speed="20 m/s"}',
     'data_sheet={bandwidth="125 kHz", snr="12 dB at 2 km", range="2 km", mtbf="100 h"}',
     'data_sheet.data_rate="3 MB/h"',
     "data_sheet.data_rate=20 kB/h",

@@ -14,7 +14,8 @@ ANSWERS = {
 OTHERS = {
     "range": "2 km",
     "horizon": "",
-    "wind": "10 m/s from SW",
+    "max_speed": "23 m/s",
+    "wind": "8 m/s from SW",
     "uavs": "3",
     "pads": "",
     "no_fly": "",
@@ -64,7 +65,9 @@ def test_what_is_missing_is_asked_a_question_a_line(dess, buoys, tmp_path, monke
         *OTHERS,
     } - {"cruise"}
     space = load_scenario(tmp_path / "my.toml")
-    assert space.radio.range == 2000 and space.wind.moves[3] > 1 and space.uavs == (3, 3)
+    assert (
+        space.radio.range == 2000 and space.consumption.slots[0][3] > 1000 and space.uavs == (3, 3)
+    )
 
 
 def test_rates_are_given_as_a_list(dess, buoys, tmp_path, refusal):
@@ -105,8 +108,8 @@ def test_a_wrong_answer_is_asked_again_at_once(dess, buoys, monkeypatch):
     monkeypatch.setattr("builtins.input", answer)
     sheet = {name: of for name, of in ANSWERS.items() if name != "base"}
     code, _, err = dess("scenarios", "new", "my.toml", *buoys, *_set(sheet))
-    assert code == 0 and asked[2:6] == ["wind", "wind", "base", "base"]
-    assert "is too strong for 15 m/s" in err
+    assert code == 0 and asked[3:7] == ["wind", "wind", "base", "base"]
+    assert "cannot be flown in at 15 m/s over ground" in err
     assert "base: '54.05, 8.18' is 5,911 km from the nearest node; allowed: longitude, then" in err
 
 

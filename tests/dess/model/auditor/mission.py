@@ -48,6 +48,9 @@ class _Auditor:
         shortest = 0 if self.c["quota"] else self.c["max_slots"]
         while self.fleet.active or self.log.slot < shortest:
             self._replay_slot()
+        if self.fleet.costs:
+            for i, u in enumerate(self.fleet.uavs):
+                self.fleet.take("remainder", self.log.slot, i, value=u.remainder)
         for i in range(len(self.fleet.uavs)):
             self.fleet.take("mission_end", self.log.slot, i)
         self.nodes.end()

@@ -14,7 +14,7 @@ HOVER = 4
 LARGEST_DEVIATE = 6.34  # of a gust, and of the shadowing, in standard deviations
 # Counters of a UAV, and the slots that its move takes after the present one.
 _ZEROS = ("communications", "slots_flying", "slots_charging", "slots_waiting", "slots_grounded")
-_ZEROS += ("collected", "reward", "slots_left", "charge_slots", "charged")
+_ZEROS += ("collected", "reward", "slots_left", "charge_slots", "charged", "remainder")
 
 
 class Uav(SimpleNamespace):
@@ -68,6 +68,7 @@ class Fleet:
         moves, pushes = wind.get("moves", (0.0,) * 4), (y, -x, -y, x)
         self.pushes = {s: a + b for s, a, b in zip(STEPS, moves, pushes, strict=False)}
         self.gusts = LARGEST_DEVIATE * wind["gusts"]
+        self.costs = constants.get("consumption", {}).get("slots", ())
         # The surcharges that have been seen: the field does not change in a mission.
         self.seen: dict[tuple[int, ...], int] = {}
 
@@ -92,6 +93,8 @@ class Fleet:
 
     def way_home(self, u: Uav) -> int:
         """The battery of the shortest way to a zone; the wind of cells not visited is not known."""
+        if self.costs:
+            return self._dear_way_home(u)
         cells = {cell for zone in self.zones for cell in zone}
         way, edge, seen = 0, {u.cell}, {u.cell}
         while not edge & cells:
@@ -100,9 +103,27 @@ class Fleet:
             seen |= edge
         return self.c["flight_cost"] * (way * u.slots_per_cell + u.slots_left)
 
+    def _dear_way_home(self, u: Uav) -> int:
+        """The battery [% / 1000] of the cheapest way, where slots have costs of their own."""
+        cells, ways = {cell for zone in self.zones for cell in zone}, {u.cell: 0}
+        costs = self.costs[u.slots_per_cell - 1]
+        changed = True
+        while changed:
+            changed = False
+            for (x, y), way in [*ways.items()]:
+                for (dx, dy), cost in zip(STEPS[:HOVER], costs, strict=False):
+                    to, further = (x + dx, y + dy), way + u.slots_per_cell * cost
+                    if to in self.open and further < ways.get(to, math.inf):
+                        ways[to], changed = further, True
+        step = STEPS.index((u.x - u.from_x, u.y - u.from_y))
+        left = u.slots_left * costs[step] if u.slots_left else 0
+        return self.c["flight_cost"] * (min(ways.get(cell, math.inf) for cell in cells) + left)
+
     def is_home(self, u: Uav) -> bool:
         """Whether a UAV has ended with the battery for its way home."""
         is_down = u.end in ("battery", "lost") or (u.grounded and self.zone_of(u) < 0)
+        if self.costs:
+            return not is_down and 1000 * u.battery - u.remainder >= self.way_home(u)
         return not is_down and u.battery >= self.way_home(u)
 
     def type_of(self, i: int) -> Mapping[str, Any]:
@@ -185,11 +206,21 @@ class Fleet:
             u.slots_waiting += u.waits
             if u.flies and not self.stands(u):
                 u.slots_flying += 1
+                if self.costs:
+                    self._spend_thousandths(u)
+                    continue
                 u.battery -= self.c["flight_cost"]
                 step = u.x - u.from_x, u.y - u.from_y
                 if step != (0, 0) and u.slots_left == u.slots_per_cell - 1 and u.battery > 0:
                     self._check_wind(u, step)
                     u.battery = u.logged_battery
+
+    def _spend_thousandths(self, u: Uav) -> None:
+        """Let a UAV lose what its slot costs; whole percents leave the battery."""
+        step = STEPS.index((u.x - u.from_x, u.y - u.from_y))
+        spent = u.remainder + self.c["flight_cost"] * self.costs[u.slots_per_cell - 1][step]
+        u.battery = max(u.battery - spent // 1000, 0)
+        u.remainder = spent % 1000
 
     def _check_wind(self, u: Uav, step: tuple[int, int]) -> None:
         """The wind may cost what the log has, and always the same."""

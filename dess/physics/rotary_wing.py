@@ -1,0 +1,85 @@
+"""The power of a rotary wing at an airspeed, and what wind it can fly in.
+
+    wing = RotaryWing.of(cruise=15.0)
+    wing.power(0.0) / wing.power(15.0)      # 1.216: what hovering costs, in terms of cruising
+
+The power is that of Zeng, Xu and Zhang, "Energy minimization for wireless communication with
+rotary-wing UAV", IEEE Trans. Wireless Commun. 18(4), 2019, eq. 12, as a share of the power that
+hovering takes in still air.
+"""
+
+import math
+from typing import NamedTuple
+
+from dess.base.elementary import cos, sin
+
+# Shares of the power of the blades' profile and of the induced power when hovering, and the drag of
+# the fuselage [(m/s)^-3] of the UAV in that paper.
+BLADES, INDUCED, DRAG = 0.474, 0.526, 5.48e-5
+TIP_SPEED, INDUCED_SPEED = 120.0, 4.03  # [m/s]
+
+# The courses of the moves north, east, south and west [degrees].
+COURSES = (0, 90, 180, 270)
+
+
+class RotaryWing(NamedTuple):
+    """A rotary wing.
+
+    Attributes:
+        tip_speed: The speed of the rotor's tips [m/s].
+        induced_speed: The mean speed of the air through the rotor when hovering [m/s].
+        drag: What the fuselage takes [(m/s)^-3].
+    """
+
+    tip_speed: float = TIP_SPEED
+    induced_speed: float = INDUCED_SPEED
+    drag: float = DRAG
+
+    def power(self, airspeed: float) -> float:
+        """The power at an airspeed [m/s], as a share of that of hovering in still air."""
+        return self.power_without_drag(airspeed) + self.drag * airspeed * airspeed * airspeed
+
+    def power_without_drag(self, airspeed: float) -> float:
+        """The power at an airspeed [m/s] without the drag of the fuselage."""
+        of_tips = (airspeed / self.tip_speed) * (airspeed / self.tip_speed)
+        # The difference of the paper's equation in a form that does not cancel at high speeds.
+        half = (airspeed / self.induced_speed) * (airspeed / self.induced_speed) / 2
+        of_inflow = 1 / (math.sqrt(1 + half * half) + half)
+        return BLADES * (1 + 3 * of_tips) + INDUCED * math.sqrt(of_inflow)
+
+    def with_power(self, airspeed: float, power: float) -> "RotaryWing":
+        """The same with the drag of which the power at an airspeed [m/s] follows."""
+        drag = (power - self.power_without_drag(airspeed)) / (airspeed * airspeed * airspeed)
+        return self._replace(drag=drag)
+
+
+def airspeed_along(course: float, speed: float, wind: float, direction: float) -> float:
+    """The airspeed [m/s] of a UAV that flies along a course at a ground speed.
+
+    Args:
+        course: The course [degrees from north, clockwise].
+        speed, wind: The ground speed and the wind [m/s].
+        direction: Where the wind comes from [degrees from north, clockwise].
+    """
+    against = cos(math.radians(direction - course))
+    across = sin(math.radians(direction - course))
+    ahead = speed + wind * against
+    beside = wind * across
+    return math.sqrt(ahead * ahead + beside * beside)
+
+
+def largest_speed(other: float, direction: float, most: float) -> float:
+    """The largest wind in which all four moves can be flown at a cruising speed, or vice versa.
+
+    The one that is looked for and the other one stand for each other in the condition: with k, the
+    larger of the sine and the cosine of the wind's direction, it is w^2 + v^2 + 2 v w k <= A^2.
+
+    Args:
+        other: The cruising speed, or the wind [m/s].
+        direction: Where the wind comes from [degrees].
+        most: The largest airspeed A [m/s].
+    """
+    angle = math.radians(direction)
+    along = max(abs(sin(angle)), abs(cos(angle)))
+    within = other * other * along * along + most * most - other * other
+    return math.sqrt(max(within, 0.0)) - other * along
