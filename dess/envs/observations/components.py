@@ -28,7 +28,7 @@ def component_names(scenario: Scenario | ScenarioSpace) -> list[str]:
     fewer UAVs than the largest fleet, the other rows are zeros.
 
     Scenarios beyond the paper have more components at the end: the share of the pads that are out
-    of order, the surcharge of each move by the wind divided by 100, and ages divided by
+    of order, what each move costs more than one percent a slot divided by 100, and ages divided by
     ``max_slots``.
     """
     space = spaces_of([scenario])[0]
@@ -46,7 +46,10 @@ def _beyond_the_paper(space: ScenarioSpace) -> list[list[str]]:
         (failures.uav_rate > 0, ["grounded", *mates]),
         (failures.pad_rate > 0, ["pads_out"]),
         (failures.node_rate > 0, [f"silent_{k}" for k in nodes]),
-        (space.wind.is_on, [f"wind_{name}" for name in ACTION_NAMES[:HOVER]]),
+        (
+            space.wind.is_on or space.consumption.is_on,
+            [f"wind_{name}" for name in ACTION_NAMES[:HOVER]],
+        ),
         (space.age.is_on, [f"age_{k}" for k in nodes]),
     ]
     for has_group, names in groups:

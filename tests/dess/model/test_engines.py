@@ -76,7 +76,7 @@ def test_both_engines_agree_where_everything_happens(sections):
             fleets.add(len(single.uavs))
             waited += int(single.uavs["slots_waiting"].sum())
     lands = space.landing
-    absent = {*PACKET_EVENTS, *(() if lands else ["landing"])}
+    absent = {*PACKET_EVENTS, "remainder", *(() if lands else ["landing"])}
     assert seen == {*EVENT_NAMES} - absent - ({*()} if sections else {*FAILURE_EVENTS})
     assert ends == {LANDED if lands else QUOTA, BATTERY, TRUNCATED}
     assert fleets == {1, 2, 3, 4, 5, 6}
