@@ -132,9 +132,10 @@ def cells_home(mission, uavs, i, chart, planned, x, y, home):
 def is_late(mission, uavs, i, chart, planned, home, kept, reach):
     """Whether the battery of UAV ``i`` is too low for its way home and the slots that it keeps.
 
-    In missions that end on the ground, no UAV is: there the time may lack, and not the battery.
+    In missions that end on the ground, no UAV is where a slot takes one percent: there the time may
+    lack, and not the battery.
     """
-    if lands(mission):
+    if lands(mission) and not has_consumption(mission):
         return False
     u = uavs[i]
     spent = battery_home(mission, uavs, i, chart, planned, u.x, u.y, home, reach)
