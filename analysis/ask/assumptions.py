@@ -8,6 +8,7 @@ from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
 from dess.analysis.sheet import unreachable_sentences
+from dess.physics.consumption import PERCENT
 from dess.scenario.data_sheet import LORA
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
@@ -74,11 +75,23 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
             f"{line[0].upper()}{line[1:]}."
             for line in unreachable_sentences(results.store.manifest.scenarios)
         ),
-        f"Wind: {given('wind', 'none')}, the same everywhere and always.",
+        f"Wind: {given('wind', 'none')}, the same everywhere and always. "
+        f"{_battery_of(space, varied)}",
         f"Failures: {failures}." if sheet.mtbf or "mtbf" in varied else "Failures: none.",
         f"A mission takes {given('horizon', printed(space.max_slots * units.slot, 's'))}; means "
         "are over random missions, with 95 % intervals.",
     ]
+
+
+def _battery_of(space: ScenarioSpace, varied: set[str]) -> str:
+    """What a slot takes of the battery, in a sentence."""
+    if varied & {"wind", "cruise", "endurance", "hover", "tip_speed", "induced_speed"}:
+        return "What a slot takes of the battery follows from the speed through the air."
+    *moves, hover = (cost / PERCENT for cost in space.consumption.slots[0])
+    span = f"{min(moves):g} %"
+    if min(moves) < max(moves):
+        span = f"{min(moves):g} to {max(moves):g} % by the direction"
+    return f"A slot of flight takes {span} of the battery, one of hovering {hover:g} %."
 
 
 def _rates_of(space: ScenarioSpace, varied: set[str]) -> str:

@@ -57,6 +57,8 @@ _ASSUMED = {
     "altitude": "10 m",
     "message": "1 kB",
     "free_space": "1 m",
+    "tip_speed": f"{TIP_SPEED:g} m/s",
+    "induced_speed": f"{INDUCED_SPEED:g} m/s",
 }
 
 LORA = "lora"
@@ -201,6 +203,12 @@ class DataSheet(Section):
     )
     mtbf: str | None = _quantity("s", "mean flying time of a UAV between failures", example="30 d")
     repair: str | None = _quantity("s", "mean time of a repair, or else it is lost", example="2 h")
+    pad_mtbf: str | None = _quantity(
+        "s", "mean time of a charging pad between failures", example="90 d"
+    )
+    pad_repair: str | None = _quantity(
+        "s", "mean time of the repair of a pad, or else it is lost", example="1 d"
+    )
 
     @classmethod
     def extra(cls, name: str) -> dict[str, Any]:
@@ -274,6 +282,8 @@ class DataSheet(Section):
                 needed = [*_NEEDED, *LINK_BUDGET]
             if self.repair:
                 needed.append("mtbf")
+            if self.pad_repair:
+                needed.append("pad_mtbf")
             if self.wind:
                 needed.append("max_speed")
             for name in needed:
@@ -315,9 +325,7 @@ class DataSheet(Section):
     @property
     def wing(self) -> RotaryWing:
         """The rotary wing of the UAVs, whose drag follows from the hovering time."""
-        wing = RotaryWing(
-            self.number("tip_speed", TIP_SPEED), self.number("induced_speed", INDUCED_SPEED)
-        )
+        wing = RotaryWing(self.number("tip_speed"), self.number("induced_speed"))
         if not self.hover:
             return wing
         endurance, speed = self._endurance_at or (self.number("endurance"), self.number("cruise"))
@@ -337,6 +345,11 @@ class DataSheet(Section):
         endurance, speed = self._endurance_at
         wing = self.wing
         return endurance * wing.power(speed) / wing.power(self.number("cruise"))
+
+    @property
+    def hovering_time(self) -> float:
+        """The hovering time of a full battery in still air [s]."""
+        return self.endurance_at_cruise * self.wing.power(self.number("cruise"))
 
     @property
     def _endurance_at(self) -> tuple[float, float] | None:
@@ -387,11 +400,14 @@ class DataSheet(Section):
             unused.add("modulation")
         if self.snr:
             unused.add("free_space")
-        return {
+        assumed = {
             name: value
             for name, value in _ASSUMED.items()
             if name not in unused and getattr(self, name) is None
         }
+        if not self.hover:
+            assumed["hover"] = printed(self.hovering_time, "s")
+        return assumed
 
     def fields(self) -> dict[str, Any]:
         """The fields of a scenario that follow, those of sections dotted.
@@ -426,6 +442,11 @@ class DataSheet(Section):
             following["failures.uav_repair"] = 0.0
             if self.repair:
                 following["failures.uav_repair"] = self._slots("repair", 1e6)
+        if self.pad_mtbf:
+            following["failures.pad_rate"] = 1 / self._slots("pad_mtbf")
+            following["failures.pad_repair"] = 0.0
+            if self.pad_repair:
+                following["failures.pad_repair"] = self._slots("pad_repair", 1e6)
         return following
 
     def origin(self, field: str) -> str:

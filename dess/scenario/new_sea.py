@@ -32,7 +32,7 @@ _BEYOND = {
 _NEEDED = ("endurance", "cruise", "charging", "data_rate", "bandwidth")
 _ASKED = ("range", "horizon", "max_speed", "wind")
 # What an answer needs beside it.
-_NEEDED_WITH = {"repair": "mtbf", "wind": "max_speed"}
+_NEEDED_WITH = {"repair": "mtbf", "pad_repair": "pad_mtbf", "wind": "max_speed"}
 # What stands for an answer that a sheet needs and that is not given yet.
 _UNANSWERED = {"bandwidth": "125 kHz", "snr": "12 dB at 2 km"}
 # A base is refused if it is so many times as far from the nodes as it is with its degrees swapped.
@@ -139,8 +139,10 @@ class NewScenario:
         if any(sheet.get(name) for name in LINK_BUDGET) and not answers.get("snr"):
             examples = {name: DataSheet.example(name)[0] for name in LINK_BUDGET}
             sheet = examples | {name: answer for name, answer in sheet.items() if name != "snr"}
-        if "repair" in sheet:
-            sheet.setdefault("mtbf", DataSheet.example("mtbf")[0])
+        for name in ("repair", "pad_repair"):
+            if name in sheet:
+                needed = _NEEDED_WITH[name]
+                sheet.setdefault(needed, DataSheet.example(needed)[0])
         if "max_speed" not in answers:  # until it is answered, no wind is known to be too strong
             sheet.pop("wind", None)
         cell = validated(DataSheet, sheet, "data_sheet").units.cell

@@ -33,7 +33,8 @@ def _space(sheet: dict[str, Any] | None = None, **values: Any) -> ScenarioSpace:
 
 
 def test_the_list_of_an_engineer_is_recomputed_by_hand():
-    space = _space({"range": "2 km", "horizon": "8 h", "max_rate": "6 bit/s/Hz", "mtbf": "30 d"})
+    failing = {"mtbf": "30 d", "pad_mtbf": "90 d", "pad_repair": "1 d"}
+    space = _space({"range": "2 km", "horizon": "8 h", "max_rate": "6 bit/s/Hz", **failing})
     slot = 35 * 60 / 100
     assert (space.units.slot, space.units.cell, space.units.data) == (21, 15 * 21, 125e3 * 21)
     assert str(space.units) == "a slot is 21 s, a cell 315 m, a data unit 328.1 kB"
@@ -41,6 +42,8 @@ def test_the_list_of_an_engineer_is_recomputed_by_hand():
     assert space.charge_rate == pytest.approx(100 * slot / (40 * 60)) == 0.875
     assert space.arrival_rate == pytest.approx(3e6 * 8 / 3600 / 125e3)
     assert space.failures.uav_rate == pytest.approx(slot / (30 * 86400))
+    assert space.failures.pad_rate == pytest.approx(slot / (90 * 86400))
+    assert space.failures.pad_repair == pytest.approx(86400 / slot)
     # The rate at 2 km [data units per slot] is that of an SNR of 12 dB.
     rate = float(closed_forms.rate_at_snr(space, closed_forms.mean_snr(space, 2000.0)))
     assert 4 * rate == pytest.approx(math.log2(1 + 10**1.2))
@@ -371,6 +374,7 @@ def test_a_quantity_of_another_library_is_refused_in_a_line(field):
         ),
         ({"tx_power": "20 dBm"}, {}, "snr: follows from tx_power"),
         ({"repair": "2 h"}, {}, "mtbf: is missing"),
+        ({"pad_repair": "2 h"}, {}, "pad_mtbf: is missing"),
         ({"reserve": "80 %"}, {}, "reserve: '80 %' is out of range; allowed: 0..60"),
         ({"reserve": "20 %"}, {"flying_time": 90}, "more than the reserve leaves; allowed: 80"),
         (
@@ -430,5 +434,5 @@ def test_the_bay_with_a_sheet_has_its_constants():
     bay = load_scenario("jade-bight")
     mission = constants_of(bay)[0]
     assert (mission["charge_rate"], mission["charge_slots"]) == (7, 8)
-    assert mission["max_rate"] == 6 and mission["range"] == 2000
+    assert mission["max_rate"] == 0 and mission["range"] == 2000
     assert len(bay.nodes) == 23 and len(bay.rectangles) == 2 and bay.names[0] == "Jade 1"

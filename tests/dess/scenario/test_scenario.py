@@ -45,7 +45,9 @@ def test_bays_have_land_and_invented_nodes_within_reach(name):
 
 
 def test_the_shipped_scenarios_are_the_papers_and_bays():
-    assert scenario_names() == sorted(["bay", "fig1", "fig4", "jade-bight", "paper", *BAYS])
+    assert scenario_names() == sorted(
+        ["bay", "fig1", "fig4", "jade-bight", "jade-lora", "paper", *BAYS]
+    )
     assert sum(len(load_scenario(name).zones) for name in BAYS) == 8
     paper, fig4 = load_scenario("paper"), load_scenario("fig4")
     assert paper == ScenarioSpace.of()  # Section VI-A, Table II and Table III are the defaults
