@@ -29,7 +29,7 @@ from dess.physics import streams
 from dess.physics.chart import Chart, distance, spread
 from dess.physics.consumption import has_consumption
 from dess.physics.landing import flies
-from dess.physics.ways_home import reach_of
+from dess.model.ways_home import reach_of
 
 # The numbers of the policies in compiled code.
 RANDOM, UNGUARDED, NEAREST, GREEDY, TOUR, AGE = range(6)

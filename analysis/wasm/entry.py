@@ -24,8 +24,8 @@ from dess.model.state import MISSION, SENSOR, UAV, Starts, State
 from dess.physics.chart import FAR, Chart, fill_ways
 from dess.physics.consumption import has_consumption, slot_cost
 from dess.physics.landing import is_over
-from dess.physics.ways_home import FAR as _FARTHEST
-from dess.physics.ways_home import relax
+from dess.model.ways_home import FAR as _FARTHEST
+from dess.model.ways_home import relax
 from dess.physics.wind import fill_surcharges
 from dess.policies.heuristics import UNGUARDED, choose_action, choose_at_random
 

@@ -35,7 +35,7 @@ from dess.model.state import (
 from dess.model.view import check_team
 from dess.physics.chart import neighbours_of
 from dess.physics.fleet import legs
-from dess.physics.ways_home import reach_of, ways_home
+from dess.model.ways_home import reach_of, ways_home
 from dess.policies.heuristics import KINDS, plan_circuit
 from dess.scenario.scenario import ScenarioSpace
 

@@ -26,7 +26,7 @@ from dess.model.state import (
     starts_of,
     state_of,
 )
-from dess.physics.ways_home import ways_home
+from dess.model.ways_home import ways_home
 from dess.scenario.scenario import AnyScenario
 
 # The terms of a reward, in the order of ``rules.reward_terms``.

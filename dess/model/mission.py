@@ -53,7 +53,7 @@ from dess.physics.charging import queue_key
 from dess.physics.chart import Chart
 from dess.physics.failures import strike_nodes, strike_pads, strike_uavs
 from dess.physics.landing import is_over
-from dess.physics.ways_home import ways_home
+from dess.model.ways_home import ways_home
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
 
 # Why a UAV is interrupted: while it waits in a queue, or while it is on a pad.

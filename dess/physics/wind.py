@@ -1,7 +1,7 @@
 """Wind: moves against it cost more battery, and so does the way to a parking cell.
 
 The wind in a cell is the mean wind plus a gust. Its components are pushes: what the battery loses
-when the UAV moves one cell against them [%]. ``dess.physics.ways_home`` has the cheapest ways.
+when the UAV moves one cell against them [%]. ``dess.model.ways_home`` has the cheapest ways.
 """
 
 import math

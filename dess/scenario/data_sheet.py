@@ -7,7 +7,7 @@
 A full battery is 100 slots of cruising in still air: a slot is the hundredth part of the endurance,
 a cell the way of a slot at cruising speed, and a data unit what the bandwidth carries in a slot at
 1 bit/s/Hz. The cruising speed is the ground speed, which autopilots hold in a mission; what a slot
-takes of the battery follows from the speed through the air (``dess.physics.rotary_wing``).
+takes of the battery follows from the speed through the air (``dess.scenario.rotary_wing``).
 """
 
 import math
@@ -23,7 +23,7 @@ from dess.base.elementary import log10
 from dess.base.errors import InputError, shown
 from dess.physics.consumption import MOST, PERCENT, SPEEDS, Costs
 from dess.physics.radio import MOST_STEPS
-from dess.physics.rotary_wing import (
+from dess.scenario.rotary_wing import (
     COURSES,
     INDUCED_SPEED,
     TIP_SPEED,

@@ -21,7 +21,7 @@ from dess.model.rules import legal_moves, may_act
 from dess.model.state import HOVER, State
 from dess.physics.chart import Chart, zones_of
 from dess.physics.consumption import PERCENT, has_consumption
-from dess.physics.ways_home import reach_of
+from dess.model.ways_home import reach_of
 from dess.scenario.scenario import ScenarioSpace
 
 # Columns of ``CompactStates.missions``.

@@ -32,7 +32,7 @@ from dess.physics.charging import slots_to_charge
 from dess.physics.chart import Chart, distance, in_zone, is_open
 from dess.physics.consumption import has_consumption, slot_cost
 from dess.physics.landing import lands
-from dess.physics.ways_home import is_calm, reach_of
+from dess.model.ways_home import is_calm, reach_of
 
 _MOST_BATTERY = 2**40  # more than any way costs
 

@@ -12,7 +12,7 @@ from dess.physics.chart import distance
 from dess.physics.failures import working_pads
 from dess.physics.landing import lands
 from dess.physics.section import for_sections
-from dess.physics.ways_home import is_calm
+from dess.model.ways_home import is_calm
 from dess.scenario.fields import MOST_ZONES
 
 # What teammates do with a zone cell: nothing; one is on it that may leave it, as it is not parked;

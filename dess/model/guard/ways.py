@@ -11,7 +11,7 @@ from dess.physics.charging import slots_to_charge
 from dess.physics.chart import distance, is_open, length_around
 from dess.physics.consumption import has_consumption, slot_cost
 from dess.physics.landing import lands
-from dess.physics.ways_home import FAR
+from dess.model.ways_home import FAR
 from dess.physics.wind import move_surcharge
 
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.

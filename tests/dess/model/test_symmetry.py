@@ -13,7 +13,7 @@ from dess.model.guard import guard
 from dess.model.rules import launch
 from dess.model.state import HOVER, State, starts_of, state_of
 from dess.model.view import View
-from dess.physics.ways_home import reach_of
+from dess.model.ways_home import reach_of
 from dess.policies.heuristics import AGE, GREEDY, NEAREST
 from dess.scenario.scenario import ScenarioSpace
 from tests import compiled

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from dess import InputError, load_scenario, policies, simulate
 from dess.model.channel import world_of
 from dess.model.state import constants_of
-from dess.physics.rotary_wing import airspeed_along, largest_speed
+from dess.scenario.rotary_wing import airspeed_along, largest_speed
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
 from tests.drawn import Script

@@ -11,7 +11,7 @@ from dess import load_scenario, policies
 from dess.model.batch import simulate_batch
 from dess.model.guard.queues import KEPT
 from dess.model.state import BATTERY
-from dess.physics.ways_home import reach_of
+from dess.model.ways_home import reach_of
 from tests import compiled
 from tests.dess.envs.episodes import placed
 

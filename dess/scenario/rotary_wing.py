@@ -1,4 +1,4 @@
-"""The power of a rotary wing at an airspeed, and what wind it can fly in.
+"""The power of a rotary wing at an airspeed, and the wind that it can fly in.
 
     wing = RotaryWing.of(cruise=15.0)
     wing.power(0.0) / wing.power(15.0)      # 1.216: what hovering costs, in terms of cruising
