@@ -9,8 +9,9 @@ from dess.analysis import numbers
 from dess.base.errors import listed
 from dess.model.channel import efficiency, mean_snr_at
 from dess.model.reach import Reach, reach_of_nodes
-from dess.model.state import constants_of
+from dess.model.state import ACTION_NAMES, constants_of
 from dess.physics.arrivals import MOST_MESSAGES
+from dess.physics.consumption import PERCENT
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
 
@@ -25,7 +26,8 @@ def sheet_facts(space: ScenarioSpace) -> dict[str, Any]:
         space: A scenario with a data sheet.
 
     Returns:
-        Slot, cell and data unit; the rates by distance, or the steps by SNR, each as a pair; the
+        Slot, cell and data unit; the battery that a slot of each move and of hovering takes [%];
+        the rates by distance, or the steps by SNR, each as a pair; the
         least and the largest number of messages that a node makes in a slot; how far a UAV can fly
         along a line and back; the names of the nodes that cannot be served, and the largest
         collection ratio without them; and what the sheet does not say.
@@ -37,6 +39,7 @@ def sheet_facts(space: ScenarioSpace) -> dict[str, Any]:
         "slot_s": units.slot,
         "cell_m": units.cell,
         "data_unit_bit": units.data,
+        "battery_per_slot": _battery_per_slot(space),
         "rates": _rates_by_distance(space),
         "steps": _steps_by_snr(space),
         "messages_per_slot": [min(space.message_rates), max(space.message_rates)],
@@ -53,6 +56,7 @@ def sheet_lines(space: ScenarioSpace) -> list[str]:
     """What follows from the data sheet of a scenario, a line for each."""
     facts = sheet_facts(space)
     lines = [
+        battery_sentence(space),
         _rates_in_words(facts),
         _messages_in_words(facts),
         f"a UAV flies up to {printed(facts['reach_m'], 'm')} along a line, and back",
@@ -62,6 +66,21 @@ def sheet_lines(space: ScenarioSpace) -> list[str]:
         named = ", ".join(f"{name} {value}" for name, value in facts["assumed"].items())
         lines.append(f"not in the sheet, and assumed: {named}")
     return lines
+
+
+def battery_sentence(space: ScenarioSpace) -> str:
+    """What a slot takes of the battery."""
+    *moves, hover = _battery_per_slot(space).values()
+    span = f"{min(moves):g} % of the battery"
+    if min(moves) < max(moves):
+        span = f"{min(moves):g} to {max(moves):g} % of the battery by its direction"
+    return f"a slot of flight takes {span}, one of hovering {hover:g} %"
+
+
+def _battery_per_slot(space: ScenarioSpace) -> dict[str, float]:
+    """The battery that a slot takes [%], by the action of a UAV that flies a cell per slot."""
+    costs = space.consumption.slots[0]
+    return {name: cost / PERCENT for name, cost in zip(ACTION_NAMES, costs, strict=True)}
 
 
 def reach_sentences(space: ScenarioSpace) -> list[str]:

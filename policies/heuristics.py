@@ -25,11 +25,11 @@ from dess.model.guard.ways import path_length, round_trip, slots_of_round_trip
 from dess.model.rules import data_left, legal_moves
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
+from dess.model.ways_home import reach_of
 from dess.physics import streams
 from dess.physics.chart import Chart, distance, spread
 from dess.physics.consumption import has_consumption
 from dess.physics.landing import flies
-from dess.model.ways_home import reach_of
 
 # The numbers of the policies in compiled code.
 RANDOM, UNGUARDED, NEAREST, GREEDY, TOUR, AGE = range(6)

@@ -7,8 +7,7 @@ from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.sheet import unreachable_sentences
-from dess.physics.consumption import PERCENT
+from dess.analysis.sheet import battery_sentence, unreachable_sentences
 from dess.scenario.data_sheet import LORA
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
@@ -87,11 +86,8 @@ def _battery_of(space: ScenarioSpace, varied: set[str]) -> str:
     """What a slot takes of the battery, in a sentence."""
     if varied & {"wind", "cruise", "endurance", "hover", "tip_speed", "induced_speed"}:
         return "What a slot takes of the battery follows from the speed through the air."
-    *moves, hover = (cost / PERCENT for cost in space.consumption.slots[0])
-    span = f"{min(moves):g} %"
-    if min(moves) < max(moves):
-        span = f"{min(moves):g} to {max(moves):g} % by the direction"
-    return f"A slot of flight takes {span} of the battery, one of hovering {hover:g} %."
+    sentence = battery_sentence(space)
+    return f"{sentence[0].upper()}{sentence[1:]}."
 
 
 def _rates_of(space: ScenarioSpace, varied: set[str]) -> str:

@@ -21,11 +21,11 @@ from dess.model.channel import BATCH, World
 from dess.model.guard.parking import parking_memory
 from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records, write_record
 from dess.model.state import MISSION, SENSOR, UAV, Starts, State
+from dess.model.ways_home import FAR as _FARTHEST
+from dess.model.ways_home import relax
 from dess.physics.chart import FAR, Chart, fill_ways
 from dess.physics.consumption import has_consumption, slot_cost
 from dess.physics.landing import is_over
-from dess.model.ways_home import FAR as _FARTHEST
-from dess.model.ways_home import relax
 from dess.physics.wind import fill_surcharges
 from dess.policies.heuristics import UNGUARDED, choose_action, choose_at_random
 

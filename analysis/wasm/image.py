@@ -33,9 +33,9 @@ from dess.model.state import (
     types_of,
 )
 from dess.model.view import check_team
+from dess.model.ways_home import reach_of, ways_home
 from dess.physics.chart import neighbours_of
 from dess.physics.fleet import legs
-from dess.model.ways_home import reach_of, ways_home
 from dess.policies.heuristics import KINDS, plan_circuit
 from dess.scenario.scenario import ScenarioSpace
 

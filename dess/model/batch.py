@@ -24,8 +24,8 @@ from dess.model.channel import empty_scratch, world_of
 from dess.model.record import Records, empty_records, write_record
 from dess.model.state import check_seed, spaces_of, starts_of, state_of, teeth_lengths
 from dess.model.view import decide, team_of
-from dess.physics.landing import is_over
 from dess.model.ways_home import ways_home
+from dess.physics.landing import is_over
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
 
 # Enough missions that the time spent in Python is a small part, few enough for the CPU's cache.

@@ -49,11 +49,11 @@ from dess.model.packets import Packets
 from dess.model.record import MissionRecord, empty_records, write_records
 from dess.model.state import LOST, check_seed, spaces_of, starts_of, state_of
 from dess.model.view import decide, team_of
+from dess.model.ways_home import ways_home
 from dess.physics.charging import queue_key
 from dess.physics.chart import Chart
 from dess.physics.failures import strike_nodes, strike_pads, strike_uavs
 from dess.physics.landing import is_over
-from dess.model.ways_home import ways_home
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
 
 # Why a UAV is interrupted: while it waits in a queue, or while it is on a pad.

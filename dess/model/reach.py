@@ -15,13 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.model.channel import mean_snr_at
-from dess.model.guard.battery import margin
+from dess.model.guard.battery import dearest_slot, margin
 from dess.model.state import constants_of, types_of
 from dess.physics import fleet, wind
 from dess.physics.chart import FAR, NO_FLY, parking_of, read_only, spread, zones_of
+from dess.physics.consumption import PERCENT
 from dess.scenario.scenario import ScenarioSpace
-
-PERCENT = 1000  # the thousandths of one percent, in which costs are counted
 
 _STEPS = ((0, -1), (1, 0), (0, 1), (-1, 0))  # of the moves north, east, south and west [cells]
 
@@ -87,6 +86,9 @@ def costs_of(space: ScenarioSpace, uav: int) -> Costs:
     slots = fleet.type_of(space.fleet, uav).slots_per_cell
     columns, rows = space.size
     moves = np.full((4, rows, columns), slots, np.int64)
+    if space.consumption.is_on:
+        *in_each_direction, hover = space.consumption.slots[slots - 1]
+        return Costs(moves * np.array(in_each_direction)[:, None, None], hover)
     if space.is_extended:
         moves += wind.surcharges(space.size, *(constants[name].item() for name in wind.FIELDS))
     return Costs(PERCENT * moves, PERCENT)
@@ -176,6 +178,8 @@ def _battery_of_guard(space: ScenarioSpace, uav: int, costs: Costs) -> int:
     mission = constants_of(space).view(np.recarray)[0]
     mission.active = space.uavs[1]
     u = types_of(space).view(np.recarray)[uav]
+    if space.consumption.is_on:
+        return int(margin(mission, u) + dearest_slot(mission))
     return PERCENT * int(margin(mission, u)) + costs.hover
 
 

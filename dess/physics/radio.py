@@ -62,7 +62,9 @@ class Radio(Section):
         1.0,
         ge=1e-6,
         le=1,
-        description="share of the time in which a node may send; rates are this share of theirs",
+        description=Description(
+            "share of the time in which a node may send", note="by which all rates are multiplied"
+        ),
     )
 
     @model_validator(mode="after")

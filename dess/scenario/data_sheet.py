@@ -23,6 +23,8 @@ from dess.base.elementary import log10
 from dess.base.errors import InputError, shown
 from dess.physics.consumption import MOST, PERCENT, SPEEDS, Costs
 from dess.physics.radio import MOST_STEPS
+from dess.physics.section import Section
+from dess.scenario.quantities import KINDS, exactly, form_of, measured, printed, refuse
 from dess.scenario.rotary_wing import (
     COURSES,
     INDUCED_SPEED,
@@ -31,8 +33,6 @@ from dess.scenario.rotary_wing import (
     airspeed_along,
     largest_speed,
 )
-from dess.physics.section import Section
-from dess.scenario.quantities import KINDS, exactly, form_of, measured, printed, refuse
 
 _NEEDED = ("endurance", "cruise", "charging", "bandwidth")
 LINK_BUDGET = ("tx_power", "noise_figure", "frequency")
@@ -553,7 +553,9 @@ class DataSheet(Section):
         least, most = _LORA_BANDWIDTHS
         if not least <= self.number("bandwidth") <= most:
             self._refuse("bandwidth", "is none of lora", "7.8 kHz..1.625 MHz")
-        return tuple((snr, factor * _LORA_CODING / 2**factor) for factor, snr in _LORA_SNR.items())
+        return tuple(
+            (snr, factor * _LORA_CODING / (1 << factor)) for factor, snr in _LORA_SNR.items()
+        )
 
     def _check_speeds(self) -> None:
         """Refuse a largest airspeed below the cruising speed, and a wind that it cannot fly in."""
@@ -569,9 +571,7 @@ class DataSheet(Section):
         strongest = _rounded_down(largest_speed(cruise, direction, most))
         if wind > strongest:
             fastest = _rounded_down(largest_speed(wind, direction, most))
-            problem = (
-                f"cannot be flown in at {self.cruise} over ground, {self.max_speed} in the air"
-            )
+            problem = f"is too strong for {self.cruise} over ground and {self.max_speed} in the air"
             allowed = f"{strongest:g} m/s from there at most"
             if fastest > 0:
                 allowed += f", or a cruise of {fastest:g} m/s at most"

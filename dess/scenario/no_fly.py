@@ -350,7 +350,7 @@ def _lie_in(rings: list[np.ndarray], spots: np.ndarray) -> np.ndarray:
         crosses = (y0 <= y) != (y1 <= y)
         shares = (y - y0[crosses]) / (y1 - y0)[crosses]
         crossings = x0[crosses] + shares * (x1 - x0)[crosses]
-        is_held[number] = (crossings < x).sum() % 2 == 1
+        is_held[number] = np.count_nonzero(crossings < x) % 2 == 1
     return is_held
 
 

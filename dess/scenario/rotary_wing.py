@@ -69,7 +69,7 @@ def airspeed_along(course: float, speed: float, wind: float, direction: float) -
 
 
 def largest_speed(other: float, direction: float, most: float) -> float:
-    """The largest wind in which all four moves can be flown at a cruising speed, or vice versa.
+    """The largest wind in which all four moves are possible at a cruising speed, or vice versa.
 
     The one that is looked for and the other one stand for each other in the condition: with k, the
     larger of the sine and the cosine of the wind's direction, it is w^2 + v^2 + 2 v w k <= A^2.

@@ -19,9 +19,9 @@ from dess.model.guard.moves import guide
 from dess.model.guard.ways import battery_home, cells_home
 from dess.model.rules import legal_moves, may_act
 from dess.model.state import HOVER, State
+from dess.model.ways_home import reach_of
 from dess.physics.chart import Chart, zones_of
 from dess.physics.consumption import PERCENT, has_consumption
-from dess.model.ways_home import reach_of
 from dess.scenario.scenario import ScenarioSpace
 
 # Columns of ``CompactStates.missions``.

@@ -28,11 +28,11 @@ from dess.model.guard.ways import (
 from dess.model.rules import data_left
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
+from dess.model.ways_home import is_calm, reach_of
 from dess.physics.charging import slots_to_charge
 from dess.physics.chart import Chart, distance, in_zone, is_open
 from dess.physics.consumption import has_consumption, slot_cost
 from dess.physics.landing import lands
-from dess.model.ways_home import is_calm, reach_of
 
 _MOST_BATTERY = 2**40  # more than any way costs
 

@@ -8,11 +8,11 @@ from dess.base.kernels import inlined, kernel, large_kernel
 from dess.model.guard.battery import late_slots, usable_battery
 from dess.model.guard.queues import QUEUE, TURN, Plan, may_wait, plan_pads, waits_in_zone
 from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
+from dess.model.ways_home import is_calm
 from dess.physics.chart import distance
 from dess.physics.failures import working_pads
 from dess.physics.landing import lands
 from dess.physics.section import for_sections
-from dess.model.ways_home import is_calm
 from dess.scenario.fields import MOST_ZONES
 
 # What teammates do with a zone cell: nothing; one is on it that may leave it, as it is not parked;

@@ -7,11 +7,11 @@ import numpy as np
 from dess.base.kernels import inlined, kernel, large_kernel
 from dess.model.guard.battery import dearest_slot, ends_soon, lasts, usable_battery
 from dess.model.state import EAST, NORTH, SOUTH, STEP_X, STEP_Y, WEST
+from dess.model.ways_home import FAR
 from dess.physics.charging import slots_to_charge
 from dess.physics.chart import distance, is_open, length_around
 from dess.physics.consumption import has_consumption, slot_cost
 from dess.physics.landing import lands
-from dess.model.ways_home import FAR
 from dess.physics.wind import move_surcharge
 
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.

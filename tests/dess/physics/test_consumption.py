@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from dess import InputError, policies, simulate
 from dess.model.state import LANDED, constants_of
-from dess.physics.chart import parking_of
 from dess.model.ways_home import FAR, reach_of, ways_home
+from dess.physics.chart import parking_of
 from dess.scenario.scenario import ScenarioSpace
 from tests.dess.model.flights import batteries, flown
 from tests.drawn import reached, spaces

@@ -11,8 +11,8 @@ from dess import simulate
 from dess.model.guard import guard
 from dess.model.state import BATTERY, constants_of
 from dess.model.view import View
-from dess.physics.chart import parking_of
 from dess.model.ways_home import reach_of
+from dess.physics.chart import parking_of
 from dess.physics.wind import Wind, surcharges
 from dess.scenario.scenario import ScenarioSpace
 from tests.dess.model.flights import batteries, flown

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from dess import InputError, load_scenario, policies, simulate
 from dess.model.channel import world_of
 from dess.model.state import constants_of
-from dess.scenario.rotary_wing import airspeed_along, largest_speed
 from dess.scenario.quantities import printed
+from dess.scenario.rotary_wing import airspeed_along, largest_speed
 from dess.scenario.scenario import ScenarioSpace
 from tests.drawn import Script
 from tests.verification import closed_forms
@@ -357,7 +357,7 @@ def test_a_quantity_of_another_library_is_refused_in_a_line(field):
         (
             {"wind": "14.5 m/s from SW"},
             {},
-            "cannot be flown in at 15 m/s over ground, 23 m/s in the air; "
+            "is too strong for 15 m/s over ground and 23 m/s in the air; "
             "allowed: 9.8 m/s from there at most, or a cruise of 10.33 m/s at most",
         ),
         ({"max_speed": None}, {}, "max_speed: is missing; allowed: largest speed through the air"),

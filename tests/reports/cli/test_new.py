@@ -109,7 +109,7 @@ def test_a_wrong_answer_is_asked_again_at_once(dess, buoys, monkeypatch):
     sheet = {name: of for name, of in ANSWERS.items() if name != "base"}
     code, _, err = dess("scenarios", "new", "my.toml", *buoys, *_set(sheet))
     assert code == 0 and asked[3:7] == ["wind", "wind", "base", "base"]
-    assert "cannot be flown in at 15 m/s over ground" in err
+    assert "is too strong for 15 m/s over ground" in err
     assert "base: '54.05, 8.18' is 5,911 km from the nearest node; allowed: longitude, then" in err
 
 
