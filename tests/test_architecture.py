@@ -19,8 +19,15 @@ FLOORS = ("dess", "policies", "analysis", "reports")  # from the ground up
 ROOMS = {
     "dess": (
         *("base", "physics", "scenario"),
-        *("model.state", "model.channel", "model.rules", "model.events", "model.record"),
-        *("model.packets", "model.view", "model.guard", "model.reach", "model.batch"),
+        *("model.state", "model.ways_home", "model.channel", "model.rules", "model.events"),
+        *(
+            "model.record",
+            "model.packets",
+            "model.view",
+            "model.guard",
+            "model.reach",
+            "model.batch",
+        ),
         "model.mission",
         *("envs.observations", "envs", "envs.integrations"),
     ),
