@@ -363,7 +363,12 @@ def list_departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) ->
     lines = []
     spaces = [*spaces]
     present = field_ranges(spaces)
-    has_steps = any(space.radio.steps for space in spaces)
+    # No policy that is shipped was trained on these.
+    conditions = []
+    if any(space.radio.steps for space in spaces):
+        conditions.append("a rate in steps (trained on eq. 9)")
+    if any(space.consumption.is_on for space in spaces):
+        conditions.append("slots that do not all take 1 % of the battery (trained on 1 %)")
     for name, folder in trained.items():
         with suppress(InputError):  # whoever loads it says what is wrong
             beyond = [
@@ -371,8 +376,7 @@ def list_departures(policies: Iterable[str], spaces: Iterable[ScenarioSpace]) ->
                 for field, (low, high) in read_description(folder).ranges.items()
                 if field in present and not low <= present[field][0] <= present[field][1] <= high
             ]
-            if has_steps:  # no policy that is shipped was trained on them
-                beyond.append("a rate in steps (trained on eq. 9)")
+            beyond += conditions
             if beyond:
                 lines.append(f"{name} acts outside of its training: {listed(beyond)}")
     return lines
