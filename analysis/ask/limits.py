@@ -224,7 +224,7 @@ def find_limits(
     limits: tuple[Limit, ...] = ()
     if not broken:
         limits = tuple(sorted(_search_limits(fleet), key=lambda limit: limit.harder or math.inf))
-    has_wind = getattr(fleet.space.data_sheet, "max_speed", None) is not None
+    has_wind = fleet.space.data_sheet.max_speed is not None
     document = Limits(missions=fleet.missions, limits=limits, has_wind=has_wind, broken=broken)
     write_file(path, document.model_dump_json(indent=1) + "\n")
 
@@ -345,7 +345,7 @@ def _conditions_of(fleet: _Fleet) -> Iterator[_Condition]:
             return [times(rate_of_node, factor) for rate_of_node in rate]
 
         yield _Condition("data_sheet.data_rate", rate, 1.0, Bisection(1.0, MOST_DATA), write_rate)
-    if getattr(sheet, "max_speed", None):
+    if sheet.max_speed:
         yield _wind_of(fleet)
     base = 0.0
     if sheet.mtbf:

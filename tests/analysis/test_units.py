@@ -272,12 +272,13 @@ def test_a_bisection_says_what_is_borne_to_the_end_and_what_is_not_borne_at_all(
     assert calm.low <= 3.0 < calm.high <= calm.low / 0.95
 
 
-def test_the_limits_of_the_fleet_are_where_its_missions_break_a_requirement(searched):
+def test_the_limits_of_the_fleet_are_where_its_missions_break_a_requirement(searched, monkeypatch):
     assert limits.limit_sentences(searched) == []
     folder = searched.store.folder.parents[1]
     limits.find_limits(searched, str(folder / "small.toml"), missions=8)
     known = limits.limits_of(searched)
-    assert {limit.field for limit in known.limits} == {"data_sheet.data_rate", "data_sheet.mtbf"}
+    fields = {limit.field for limit in known.limits}
+    assert fields == {"data_sheet.data_rate", "data_sheet.mtbf", "data_sheet.wind"}
     best = search_of(searched).best
     point = best.points[-1]
     checks = searched.checks[searched.checks["point"] == point]
@@ -298,7 +299,10 @@ def test_the_limits_of_the_fleet_are_where_its_missions_break_a_requirement(sear
             assert requirement.margin(checks[requirement.column].mean() + change) >= 0
     first, *_, last = limits.limit_sentences(searched)
     assert first.startswith("What breaks it first is ")
-    assert last == "Wind was not asked: the sheet has no max_speed."
+    assert not last.startswith("Wind was not asked")
+    without_wind = known.model_copy(update={"has_wind": False})
+    monkeypatch.setattr(limits, "limits_of", lambda _: without_wind)
+    assert limits.limit_sentences(searched)[-1] == "Wind was not asked: the sheet has no max_speed."
 
 
 def test_the_risk_is_told_of_the_missions_of_the_check(searched):

@@ -1,13 +1,14 @@
 """Exact checks: data and batteries balance, and logs add up to records."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from dess.analysis.results import event_log
 from dess.analysis.results.tables import Results
-from dess.model.state import EAST, NORTH, SOUTH, WEST
+from dess.model.state import EAST, HOVER, NORTH, SOUTH, WEST
 from dess.physics.fleet import type_of
 from dess.physics.wind import surcharges
 from dess.scenario.fields import SAMPLED
@@ -102,7 +103,7 @@ def battery_errors(log: Log) -> np.ndarray:
     uavs = table.groupby("uav")
     charging = table["charging"]
     before = uavs["battery"].shift().fillna(table["uav"].map(_first_battery(s)))
-    flown = (before - s.flight_cost * (1 + _wind_surcharges(s, table))).clip(lower=0)
+    flown = (before - s.flight_cost * _costs(s, table)).clip(lower=0)
     flown = flown.where(~table["grounded"], before)
     right = (table["battery"] == flown).where(~charging, _charges_rightly(log, before))
     right &= ~charging | ((_zone_of(s, table) >= 0) & ~table["moved"])
@@ -115,6 +116,23 @@ def battery_errors(log: Log) -> np.ndarray:
     failures = log.events.loc[log.events["event"] == "pad_failure", "time"]
     right &= ~ends | (table["battery"] == s.charge_complete) | (table["slot"] + 1).isin(failures)
     return (~right).to_numpy()
+
+
+def _costs(scenario: Scenario, table: pd.DataFrame) -> Any:
+    """(N,) the battery [%] that each UAV slot in the air takes."""
+    if not scenario.consumption.is_on:
+        return 1 + _wind_surcharges(scenario, table)
+    costs = np.array(scenario.consumption.slots)
+    spent = np.zeros(len(table), np.int64)
+    for uav, rows in table.groupby("uav"):
+        slots = type_of(scenario.fleet, int(str(uav))).slots_per_cell
+        action = _actions(rows).where(rows["moved"])
+        if slots > 1:
+            action = action.ffill(limit=slots - 1)
+        taken = costs[slots - 1, action.fillna(HOVER).astype(int)]
+        total = np.cumsum(np.where(rows["charging"] | rows["grounded"], 0, taken))
+        spent[rows.index] = np.diff(total // 1000, prepend=0)  # whole percents leave the battery
+    return spent
 
 
 def _zone_of(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
@@ -134,10 +152,15 @@ def _wind_surcharges(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
     field = surcharges(scenario.size, *wind.pushes(), wind.gusts, wind.seed)
     x = table["x"].to_numpy()
     y = table["y"].to_numpy()
-    step_x = x - table["from_x"]
-    step_y = y - table["from_y"]
+    return np.where(table["moved"], field[_actions(table), y, x], 0)
+
+
+def _actions(table: pd.DataFrame) -> pd.Series:
+    """(N,) the moves that lead to the cells of UAV slots; of those without one, any."""
+    step_x = table["x"] - table["from_x"]
+    step_y = table["y"] - table["from_y"]
     action = np.select([step_y < 0, step_x > 0, step_y > 0], [NORTH, EAST, SOUTH], WEST)
-    return np.where(table["moved"], field[action, y, x], 0)
+    return pd.Series(action, table.index)
 
 
 def _charges_rightly(log: Log, before: pd.Series) -> pd.Series:
