@@ -126,8 +126,8 @@ def _costs(scenario: Scenario, table: pd.DataFrame) -> Any:
     spent = np.zeros(len(table), np.int64)
     for uav, rows in table.groupby("uav"):
         slots = type_of(scenario.fleet, int(str(uav))).slots_per_cell
-        action = _actions(rows).where(rows["moved"])
-        if slots > 1:
+        action = _actions(rows).where(rows["moved"]).mask(rows["grounded"], HOVER)
+        if slots > 1:  # a failure ends a move
             action = action.ffill(limit=slots - 1)
         taken = costs[slots - 1, action.fillna(HOVER).astype(int)]
         total = np.cumsum(np.where(rows["charging"] | rows["grounded"], 0, taken))
