@@ -67,7 +67,7 @@ class Limits(Document):
 
     Attributes:
         missions: The number of missions of the check on which they were found.
-        limits: The limits, that which is nearest to the present value first.
+        limits: The limits, that which breaks something nearest to the present value first.
         has_wind: Whether the wind was asked about.
         broken: The metric whose requirement the fleet breaks in its check, so that no limits were
             sought; empty if it keeps all.
@@ -223,10 +223,15 @@ def find_limits(
     broken = fleet.find_broken(fleet.checks)
     limits: tuple[Limit, ...] = ()
     if not broken:
-        limits = tuple(sorted(_search_limits(fleet), key=lambda limit: limit.harder or math.inf))
+        limits = tuple(sorted(_search_limits(fleet), key=_order_of))
     has_wind = fleet.space.data_sheet.max_speed is not None
     document = Limits(missions=fleet.missions, limits=limits, has_wind=has_wind, broken=broken)
     write_file(path, document.model_dump_json(indent=1) + "\n")
+
+
+def _order_of(limit: Limit) -> tuple[bool, float]:
+    """What limits are sorted by: first those that break something, the nearest one first."""
+    return limit.broken == "", limit.harder or math.inf
 
 
 def _search_limits(fleet: "_Fleet") -> list[Limit]:
@@ -357,7 +362,7 @@ def _conditions_of(fleet: _Fleet) -> Iterator[_Condition]:
 
 def _write_failures(per_hour: float) -> str:
     """A rate of failures as the mean time between them."""
-    return f"{1 / per_hour:.3g} h"
+    return f"{float(f'{1 / per_hour:.3g}'):g} h"
 
 
 def _wind_of(fleet: _Fleet) -> _Condition:
@@ -405,10 +410,12 @@ def limit_sentences(results: Results) -> list[str]:
         return [f"In its check, the {name} breaks its requirement, so that no limits were sought."]
     first, *others = document.limits
     missions = numbers.format_count(document.missions, "mission")
-    lines = [
-        f"What breaks it first is {_NAMES[first.field]}: {_limit_in_words(first)}. It was found by "
-        f"bisection to 5 % on {missions} of the check."
-    ]
+    method = f"Limits are found by bisection to 5 % on {missions} of the check."
+    if first.broken:
+        start = f"What breaks it first is {_NAMES[first.field]}"
+    else:
+        start = f"Nothing that was tried breaks it. {_NAMES[first.field].capitalize()}"
+    lines = [f"{start}: {_limit_in_words(first)}. {method}"]
     lines += [f"{_NAMES[limit.field].capitalize()}: {_limit_in_words(limit)}." for limit in others]
     if not document.has_wind:
         lines.append("Wind was not asked: the sheet has no max_speed.")

@@ -305,6 +305,44 @@ def test_the_limits_of_the_fleet_are_where_its_missions_break_a_requirement(sear
     assert limits.limit_sentences(searched)[-1] == "Wind was not asked: the sheet has no max_speed."
 
 
+def limit(field, present, last, harder, broken):
+    field = f"data_sheet.{field}"
+    return limits.Limit(field=field, present=present, last=last, harder=harder, broken=broken)
+
+
+DATA = limit("data_rate", "3 MB/h", "24 MB/h", 8.0, "")
+WIND = limit("wind", "8 m/s from SW", "9.79 m/s from SW", 1.22, limits.SHEET)
+FAILURES = limit("mtbf", "", "", 0.0, "success")
+
+
+@pytest.mark.parametrize(("found", "start", "end"), [
+    (
+        (WIND, FAILURES, DATA),
+        "What breaks it first is the wind: up to 9.79 m/s from SW (8 m/s from SW is assumed); the "
+        "data sheet allows no more. Limits are found by bisection to 5 % on 30 missions of the",
+        "The data: up to 24 MB/h (3 MB/h is assumed); no more was tried.",
+    ),
+    (
+        (DATA,),
+        "Nothing that was tried breaks it. The data: up to 24 MB/h (3 MB/h is assumed); no more",
+        "Wind was not asked: the sheet has no max_speed.",
+    ),
+    (
+        (FAILURES,),
+        "What breaks it first is failures: not even one every 1000 h of a UAV's flying (none is "
+        "assumed); beyond it, the success breaks its requirement.",
+        "Wind was not asked: the sheet has no max_speed.",
+    ),
+])  # fmt: skip
+def test_limits_are_told_in_sentences(found, start, end, monkeypatch):
+    document = limits.Limits(missions=30, limits=found, has_wind=WIND in found)
+    monkeypatch.setattr(limits, "limits_of", lambda results: document)
+    first, *_, last = limits.limit_sentences(None)
+    assert first.startswith(start)
+    assert last == end
+    assert [*found] == sorted([*found][::-1], key=limits._order_of)
+
+
 def test_the_risk_is_told_of_the_missions_of_the_check(searched):
     best = search_of(searched).best
     checks = searched.checks[searched.checks["point"] == best.points[0]]
