@@ -251,6 +251,8 @@ def field_in_words(space: ScenarioSpace, field: str) -> str:
         return numbers.format_truth(value)
     if isinstance(value, float):
         return f"{value:g}"
+    if value is None:
+        return "none"
     return str(value).strip("()")
 
 
