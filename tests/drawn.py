@@ -220,6 +220,13 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
     return draw(spaces(**values))
 
 
+_winds_in_units = st.builds(
+    lambda speed, direction: f"{speed} m/s from {direction} deg",
+    st.integers(0, 8),
+    st.integers(0, 360),
+)
+
+
 @st.composite
 def sheet_spaces(draw: st.DrawFn) -> ScenarioSpace:
     """Spaces with a data sheet: rates in steps or not, few large messages or many small ones."""
@@ -237,6 +244,10 @@ def sheet_spaces(draw: st.DrawFn) -> ScenarioSpace:
     sheet = {
         "endurance": f"{minutes} min",
         "cruise": f"{draw(st.integers(4, 20))} m/s",
+        "max_speed": "30 m/s",  # at 20 m/s over ground, 10 m/s of wind from anywhere
+        "wind": draw(st.none() | _winds_in_units),
+        "hover": draw(st.sampled_from([None, f"{minutes} min"])),
+        "induced_speed": "8 m/s",
         "charging": f"{draw(st.integers(5, 90))} min",
         "horizon": f"{minutes * 60 * draw(st.integers(20, 120)) / 100} s",
         "data_rate": draw(st.sampled_from(["0 B/h", "20 kB/h", "3 MB/h", "90 MB/h"])),
