@@ -27,7 +27,7 @@ def sheet_facts(space: ScenarioSpace) -> dict[str, Any]:
 
     Returns:
         Slot, cell and data unit; the battery that a slot of each move and of hovering takes [%];
-        the rates by distance, or the steps by SNR, each as a pair; the
+        the rates by distance and the steps by SNR, each as a pair; the
         least and the largest number of messages that a node makes in a slot; how far a UAV can fly
         along a line and back; the names of the nodes that cannot be served, and the largest
         collection ratio without them; and what the sheet does not say.
@@ -134,11 +134,9 @@ def _titles(space: ScenarioSpace, nodes: tuple[int, ...]) -> list[str]:
 
 
 def _rates_by_distance(space: ScenarioSpace) -> list[tuple[float, float]]:
-    """The rate [bit/s] at two distances through the air [m]; none if it has steps."""
+    """The rate [bit/s] of the mean SNR at two distances through the air [m]."""
     units = space.units
     assert units
-    if space.radio.steps:
-        return []
     far = space.radio.range or FAR_CELLS * units.cell
     mission = constants_of(space).view(np.recarray)[0]
     rates = []
@@ -163,7 +161,7 @@ def _bits_per_second(space: ScenarioSpace) -> float:
 
 
 def _rates_in_words(facts: dict[str, Any]) -> str:
-    if facts["rates"]:
+    if not facts["steps"]:
         rates = [
             f"{printed(rate, 'bit/s')} at {printed(distance, 'm')}"
             for distance, rate in facts["rates"]
