@@ -193,6 +193,7 @@ class _Run:
         """
         failures: dict[Path, Failure] = {}
         needs = [(kind, sum(map(len, parts)), [*self._jobs(kind, parts)]) for kind, parts in works]
+        self.store.check_files(job.chunk for _, _, jobs in needs for job in jobs)
         for kind, needed, jobs in needs:
             if needed:
                 self._begin(needed, needed - sum(job.missions for job in jobs), kind.work)

@@ -110,6 +110,7 @@ class Store:
         self.manifest = manifest
         self._lock = ExitStack()  # what holds it
         self.damaged: list[Path] = []
+        self._no_files: list[Path] = []  # what has the name of a file of missions and is none
         self._clear()
 
     def _clear(self) -> None:
@@ -197,7 +198,7 @@ class Store:
         """Write the manifest, remove temporary files of a killed run, and scan the folder.
 
         Raises:
-            InputError: If something else is in the place of an event log of the study.
+            InputError: If something else is in the place of a file of the study.
         """
         write_file(self.folder / chunks.MANIFEST, self.manifest.text)
         places = [self.folder / name for name in chunks.FOLDERS]
@@ -206,14 +207,37 @@ class Store:
         places += [self.folder, *paths_in(self.folder, "*/policy=*")]
         for path in (path for place in places for path in paths_in(place, ".*.tmp")):
             delete(path)
-        keys = {cell.key for cells in self.manifest.cells for cell in cells}
-        for path in paths_in(self.folder, "events/policy=*/*.parquet"):
-            is_log = parquet.NAME.fullmatch(path.name) and path.name.partition("-")[0] in keys
-            if is_log and not path.is_symlink():
-                check_place(path)  # a run would find out only when its missions are done
+        self._check_files()
         self._scan()
         while self.damaged:
             delete(self.damaged.pop())
+
+    def _check_files(self) -> None:
+        """Note what is no file and has the name of one; refuse it in the place of an event log.
+
+        A run would find out only when its missions are done. What has only the name of a file of
+        other missions is left alone.
+        """
+        keys = {cell.key for cells in self.manifest.cells for cell in cells}
+        patterns = ("*/policy=*/*.parquet", f"{chunks.BOUNDS}/*.parquet")
+        for path in (path for pattern in patterns for path in paths_in(self.folder, pattern)):
+            if not parquet.NAME.fullmatch(path.name) or path.is_symlink() or path.is_file():
+                continue
+            self._no_files.append(path)
+            if path.parent.parent.name == "events" and path.name.partition("-")[0] in keys:
+                check_place(path)
+
+    def check_files(self, of_run: Iterable[chunks.Chunk]) -> None:
+        """Refuse what is no file in the place of a file of chunks that are to be simulated.
+
+        Raises:
+            InputError: If there is something else, such as a folder.
+        """
+        if self._no_files:
+            names = {chunk.name for chunk in of_run}
+            for path in self._no_files:
+                if parquet.content_hash(path) in names:
+                    check_place(path)
 
     def _scan(self) -> None:
         """Find out what is present, and which files are damaged."""

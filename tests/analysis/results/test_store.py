@@ -206,11 +206,14 @@ def test_foreign_files_stay(out, tmp_path):
     assert not [*out.rglob("*.tmp")]
 
 
-def test_what_is_in_the_place_of_a_file_is_refused_before_missions_are_simulated(out, tmp_path):
+@pytest.mark.parametrize("kind", ["uavs", "events"])
+def test_what_is_in_the_place_of_a_file_is_refused_before_missions_are_simulated(
+    kind, out, tmp_path
+):
     next((out / "missions").rglob("*.parquet")).unlink()
-    log = next((out / "events").rglob("*.parquet"))
-    log.unlink()
-    log.mkdir()
+    file = next((out / kind).rglob("*.parquet"))
+    file.unlink()
+    file.mkdir()
     before = files_of(out)
     with pytest.raises(InputError, match="is a folder; allowed: a file"):
         run_study(small_study(tmp_path, logged=1), out)
