@@ -213,10 +213,11 @@ class Store:
             delete(self.damaged.pop())
 
     def _check_files(self) -> None:
-        """Note what is no file and has the name of one; refuse it in the place of an event log.
+        """Note what is no file and has the name of one; refuse it where a file has to be.
 
-        A run would find out only when its missions are done. What has only the name of a file of
-        other missions is left alone.
+        That is in the place of an event log, and beside the other file of the same missions. A run
+        would find out only when its missions are done. What has only the name of a file of other
+        missions is left alone.
         """
         keys = {cell.key for cells in self.manifest.cells for cell in cells}
         patterns = ("*/policy=*/*.parquet", f"{chunks.BOUNDS}/*.parquet")
@@ -224,7 +225,9 @@ class Store:
             if not parquet.NAME.fullmatch(path.name) or path.is_symlink() or path.is_file():
                 continue
             self._no_files.append(path)
-            if path.parent.parent.name == "events" and path.name.partition("-")[0] in keys:
+            is_log = path.parent.parent.name == "events" and path.name.partition("-")[0] in keys
+            same = f"*/{path.parent.name}/{parquet.content_hash(path)}-*.parquet"
+            if is_log or any(other.is_file() for other in paths_in(self.folder, same)):
                 check_place(path)
 
     def check_files(self, of_run: Iterable[chunks.Chunk]) -> None:
