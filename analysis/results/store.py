@@ -227,7 +227,8 @@ class Store:
             self._no_files.append(path)
             is_log = path.parent.parent.name == "events" and path.name.partition("-")[0] in keys
             same = f"*/{path.parent.name}/{parquet.content_hash(path)}-*.parquet"
-            if is_log or any(other.is_file() for other in paths_in(self.folder, same)):
+            others = [other for other in paths_in(self.folder, same) if not other.is_symlink()]
+            if is_log or any(other.is_file() for other in others):
                 check_place(path)
 
     def check_files(self, of_run: Iterable[chunks.Chunk]) -> None:
