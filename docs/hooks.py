@@ -8,23 +8,27 @@
 - The reports that ``nox -s reports`` has rendered lie in the site as well; it builds without them.
 """
 
+from __future__ import annotations
+
 import json
 import os
 import re
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer.main
-from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.structure.files import File, Files, InclusionLevel
-from mkdocs.structure.pages import Page
 from typer.cli import get_docs_for_click
 
 import dess
 from dess.analysis.names import declared_fields
 from dess.reports.cli.commands import app
+
+if TYPE_CHECKING:  # the tests import this module without MkDocs
+    from mkdocs.config.defaults import MkDocsConfig
+    from mkdocs.structure.files import Files
+    from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parents[1]
 LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)")
@@ -151,6 +155,8 @@ def shown(path: str) -> str:
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add a page for every file outside of ``docs/`` that a page links to, and the reports."""
+    from mkdocs.structure.files import File, InclusionLevel
+
     pending = [f"docs/{file.src_uri}" for file in files.documentation_pages()]
     seen = set(pending)
     while pending:
