@@ -1,6 +1,7 @@
 """What handlers of signals share: which signals end a command, and where they must wait."""
 
 import signal
+import threading
 from types import FrameType
 
 # The signals that end a command; Windows has no SIGHUP.
@@ -12,6 +13,14 @@ SOON = 0.01  # seconds until an interrupt that had to wait is raised
 # Modules of Python that compiled code and its compiler call, and that share objects with them: an
 # exception in one of them may crash the process.
 _FRAGILE = ("numba.core.serialize", "llvmlite.binding")
+
+
+def send_to_main_thread(number: int) -> None:
+    """Send a signal from any thread so that it ends what the main thread waits for."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident, number)
+    else:  # Windows
+        signal.raise_signal(number)
 
 
 def is_fragile(frame: FrameType | None) -> bool:

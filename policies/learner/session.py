@@ -24,7 +24,7 @@ from dess.base.files.memory import check_memory
 from dess.base.files.reading import paths_in
 from dess.base.files.tables import write_table
 from dess.base.files.writing import check_folder, locked, writable
-from dess.base.signals import ENDING, SOON, is_fragile
+from dess.base.signals import ENDING, SOON, is_fragile, send_to_main_thread
 from dess.envs.observations.observer import encoder_of
 from dess.model.batch import BATCH_SIZE
 from dess.model.record import MISSION_RECORD
@@ -302,7 +302,7 @@ def _watch_for_signal() -> Iterator[Callable[[], bool]]:
     again: list[threading.Timer] = []
 
     def send_again(number: int, seconds: float) -> None:
-        timer = threading.Timer(seconds, signal.raise_signal, [number])
+        timer = threading.Timer(seconds, send_to_main_thread, [number])
         timer.daemon = True
         timer.start()
         again.append(timer)

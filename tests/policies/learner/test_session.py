@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -172,17 +173,23 @@ def test_a_second_signal_waits_while_compiled_code_calls_python(tmp_path, monkey
             _twice()
             return "object"
 
-    unpickled = []
+    unpickled: list[str] = []
+    waits: list[float] = []
 
     def call():
         with monkeypatch.context() as patches:
             patches.setattr(serialize, "_unpickled_memo", Signalling())
             unpickled.append(serialize._numba_unpickle(0, b"", b""))  # as what boxes an array does
-        threading.Event().wait(60)
+        begin = time.monotonic()
+        try:
+            threading.Event().wait(60)
+        finally:
+            waits.append(time.monotonic() - begin)
 
     with pytest.raises(KeyboardInterrupt):
         train(SHORT, tmp_path, progress=_at(7, call))
     assert unpickled == ["object"]
+    assert len(waits) == 1 and waits[0] < 60, "the signal did not end the wait"
 
 
 def test_it_is_saved_every_now_and_then(whole, tmp_path, monkeypatch):
