@@ -7,6 +7,7 @@ from dess.model import rules
 from dess.model.channel import empty_scratch
 from dess.model.guard import battery, moves, parking, queues, ways
 from dess.model.state import SENSOR, STEP_X, STEP_Y
+from dess.model.ways_home import reach_of
 from dess.physics.chart import FAR, distance, is_open
 from dess.policies import heuristics
 
@@ -69,21 +70,23 @@ def distances(chart, x, y, to):
     return found
 
 
-def parking_cell(mission, uavs, i, chart, reach=None, data=1e6):
+def parking_cell(mission, uavs, i, chart, data=1e6):
     # Called by Python, and not compiled into a function of its own, which would take seconds.
+    reach = reach_of(np.array([mission]), chart)
     memory = parking.parking_memory(chart, len(uavs))
     return parking.parking_cell(mission, uavs, i, data, chart, memory, reach)
 
 
-def plan_of_pads(mission, uavs, i, chart, reach=None, data=1e6):
+def plan_of_pads(mission, uavs, i, chart, data=1e6):
     """The plan, and what UAV ``i`` must keep for waits, when it charges, and if it gives way."""
+    reach = reach_of(np.array([mission]), chart)
     plan = queues.plan_memory(len(uavs))
     return plan, queues.plan_pads(mission, uavs, i, data, chart, plan, reach)
 
 
 def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):
     """The node that a heuristic chooses."""
-    home = parking_cell(mission, uavs, i, chart, reach, residual.sum())
+    home = parking_cell(mission, uavs, i, chart, residual.sum())
     return _goal(kind, mission, uavs, i, residual, sensors, nodes, chart, home, reach)
 
 

@@ -37,9 +37,10 @@ QUICK = (
 # seldom both compile the same.
 COMPILING = ("reports/cli/study/test_diff.py", "analysis/bound/test_optimum.py")
 COMPILING += ("reports/cli/test_evaluate.py", "policies/learner/test_policy.py")
-# Between them some that compile nothing, until what the planner needs of others is compiled.
-COMPILING += ("dess/envs/observations/test_states.py", "analysis/test_coverage.py")
-COMPILING += ("reports/pages/test_render.py", "policies/planner/test_policy.py")
+# Between them some that compile little, until what the next ones need of others is compiled.
+COMPILING += ("policies/learner/test_session.py", "analysis/execution", "analysis/test_coverage.py")
+COMPILING += ("dess/envs/observations/test_states.py", "reports/pages/test_render.py")
+COMPILING += ("policies/planner/test_policy.py",)
 # Files that take longest; they come next, so that workers end together.
 LONGEST = ("reports", "analysis/execution", "fuzz", "test_architecture.py", "test_docs.py")
 LONGEST += ("test_extras.py",)

@@ -87,10 +87,8 @@ def _turned(turn: Turn, team: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _homes(sea: Sea) -> list[tuple[int, ...]]:
     """The cell where each UAV will charge, the way there, and what else the guard counts on."""
     mission, team, chart = sea.state.missions[0], sea.state.uavs[0], sea.space.chart
-    reach, data = reach_of(sea.state.missions, chart), sea.state.residual[0].sum()
-    return [
-        tuple(compiled.parking_cell(mission, team, i, chart, reach, data)) for i in sea.view.uav
-    ]
+    data = sea.state.residual[0].sum()
+    return [tuple(compiled.parking_cell(mission, team, i, chart, data)) for i in sea.view.uav]
 
 
 def _decides_alike(plain: Sea, turned: Sea, turn: Turn) -> bool:

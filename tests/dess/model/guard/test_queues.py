@@ -11,7 +11,6 @@ from dess import load_scenario, policies
 from dess.model.batch import simulate_batch
 from dess.model.guard.queues import KEPT
 from dess.model.state import BATTERY
-from dess.model.ways_home import reach_of
 from tests import compiled
 from tests.dess.envs.episodes import placed
 
@@ -34,7 +33,7 @@ def _plan(uavs: list[dict[str, Any]], i: int = 0, **scenario: Any) -> Any:
     state, chart = placed(uavs, **STRIP | scenario)
     state.missions["slot"] = SLOT
     mission, team = state.missions[0], state.uavs[0]
-    return compiled.plan_of_pads(mission, team, i, chart, reach_of(state.missions, chart))
+    return compiled.plan_of_pads(mission, team, i, chart)
 
 
 CHARGING = {"pad_request": 5, "charging": True, "charge_slots": 3, "latch": True}
