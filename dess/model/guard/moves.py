@@ -202,6 +202,8 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     if nearest & empty and least == 0 and u.overruled:
         return nearest & empty
     if nearest & clear and (least > 0 or u.overruled):
+        if least > 0 and has_consumption(mission):
+            return _nearer_to_zone(chart, u, nearest & clear)
         return nearest & clear
     if least > 0 and clear & in_time:
         # these slots are there to wait or step aside until the teammate has passed
@@ -223,6 +225,28 @@ def _late_home(mission, uavs, i, chart, planned, action, x, y, home):
     cells = cells_home(mission, uavs, i, chart, planned, x, y, home)
     slots = cells * u.slots_per_cell + (1 if action == HOVER else u.slots_per_cell)
     return dearest_slot(mission) * late_slots(mission, slots + 1 + margin_slots(mission, u))
+
+
+@inlined
+def _nearer_to_zone(chart, u, actions):
+    """Those of some actions that lead UAV ``u`` nearer to a charging zone; all if none does.
+
+    Two parking cells may be equally far, and a UAV that is late must not change between them.
+    """
+    nearer = 0
+    cells = _cells_to_zone(chart, u.x, u.y)
+    for action in range(5):
+        x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
+        if actions >> action & 1 and _cells_to_zone(chart, x, y) < cells:
+            nearer |= 1 << action
+    return nearer or actions
+
+
+@inlined
+def _cells_to_zone(chart, x, y):
+    """The cells on the way from a cell to the nearest cell of a charging zone."""
+    number = chart.nearest[y, x]
+    return distance(chart, x, y, chart.parking[number, 0], chart.parking[number, 1])
 
 
 @inlined
