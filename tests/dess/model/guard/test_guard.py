@@ -28,6 +28,11 @@ def _mask(*uavs: dict[str, Any], **scenario: Any) -> np.ndarray:
     return guard(View(state, world, *rows))
 
 
+SHEET = {
+    **{"endurance": "26 min", "charging": "53 min", "cruise": "13.5 m/s", "max_speed": "24 m/s"},
+    **{"data_rate": "2 MB/h", "bandwidth": "125 kHz", "snr": "22 dB at 1 km"},
+    **{"wind": "4 m/s from 180 deg", "horizon": "2 h"},
+}
 WALL = [[24, y] for y in range(12)]  # from the northern edge, between the UAV and the zone
 FAR: dict[str, Any] = {"x": 20, "y": 10}
 WAITING = {"x": 27, "y": 4, "battery": 20, "latch": True, "pad_request": 3}
@@ -55,6 +60,17 @@ WAITING = {"x": 27, "y": 4, "battery": 20, "latch": True, "pad_request": 3}
 )
 def test_the_moves_that_are_left_to_a_uav(uavs, no_fly, moves):
     assert np.nonzero(_mask(*uavs, no_fly=no_fly)[0])[0].tolist() == moves
+
+
+def test_a_late_uav_does_not_fly_along_a_zone():
+    # North and east lead to its parking cell (13, 3) alike. East of it, it might be told (12, 3)
+    # once the teammate has left, and west of that (13, 3) again.
+    parked = {"x": 12, "y": 3, "latch": True, "battery": 20}
+    mask = _mask(
+        {"x": 12, "y": 8, "battery": 3}, parked,
+        grid=22, zone=[12, 1, 2, 3], pads=2, nodes=[[3, 14]], data_sheet=SHEET,
+    )  # fmt: skip
+    assert np.nonzero(mask[0])[0].tolist() == [NORTH]
 
 
 def test_the_guard_closes_in_little_by_little_and_never_before_it_must():
