@@ -17,8 +17,9 @@ _FRAGILE = ("numba.core.serialize", "llvmlite.binding")
 
 def send_to_main_thread(number: int) -> None:
     """Send a signal from any thread so that it ends what the main thread waits for."""
-    if hasattr(signal, "pthread_kill"):
-        signal.pthread_kill(threading.main_thread().ident, number)
+    thread = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and thread:
+        signal.pthread_kill(thread, number)
     else:  # Windows
         signal.raise_signal(number)
 
