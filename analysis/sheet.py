@@ -30,12 +30,13 @@ def sheet_facts(space: ScenarioSpace) -> dict[str, Any]:
         the rates by distance and the steps by SNR, each as a pair; the
         least and the largest number of messages that a node makes in a slot; how far a UAV can fly
         along a line and back; the names of the nodes that cannot be served, and the largest
-        collection ratio without them; and what the sheet does not say.
+        collection ratio without them; what the sheet does not say; and with types of UAVs, what
+        follows for each.
     """
     units = space.units
     assert units
     reach = reach_of_nodes(space)
-    return {
+    facts = {
         "slot_s": units.slot,
         "cell_m": units.cell,
         "data_unit_bit": units.data,
@@ -50,6 +51,9 @@ def sheet_facts(space: ScenarioSpace) -> dict[str, Any]:
         "largest_ratio": reach.largest_ratio,
         "assumed": space.data_sheet.assumed,
     }
+    if space.fleet:
+        facts["types"] = _facts_of_types(space)
+    return facts
 
 
 def sheet_lines(space: ScenarioSpace) -> list[str]:
@@ -57,6 +61,7 @@ def sheet_lines(space: ScenarioSpace) -> list[str]:
     facts = sheet_facts(space)
     lines = [
         battery_sentence(space),
+        *type_sentences(space),
         _rates_in_words(facts),
         _messages_in_words(facts),
         f"a UAV flies up to {printed(facts['reach_m'], 'm')} along a line, and back",
@@ -70,17 +75,47 @@ def sheet_lines(space: ScenarioSpace) -> list[str]:
 
 def battery_sentence(space: ScenarioSpace) -> str:
     """What a slot takes of the battery."""
-    *moves, hover = _battery_per_slot(space).values()
+    return f"a slot of flight takes {_spans_in_words(_battery_per_slot(space))}"
+
+
+def _spans_in_words(battery_per_slot: dict[str, float]) -> str:
+    *moves, hover = battery_per_slot.values()
     span = f"{min(moves):g} % of the battery"
     if min(moves) < max(moves):
         span = f"{min(moves):g} to {max(moves):g} % of the battery by its direction"
-    return f"a slot of flight takes {span}, one of hovering {hover:g} %"
+    return f"{span}, one of hovering {hover:g} %"
 
 
-def _battery_per_slot(space: ScenarioSpace) -> dict[str, float]:
-    """The battery that a slot takes [%], by the action of a UAV that flies a cell per slot."""
-    costs = space.consumption.slots[0]
+def _battery_per_slot(space: ScenarioSpace, slots_per_cell: int = 1) -> dict[str, float]:
+    """The battery that a slot takes [%], by the action of a UAV of a speed."""
+    costs = space.consumption.slots[slots_per_cell - 1]
     return {name: cost / PERCENT for name, cost in zip(ACTION_NAMES, costs, strict=True)}
+
+
+def _facts_of_types(space: ScenarioSpace) -> list[dict[str, Any]]:
+    """What follows for each type of UAVs: battery, charging, speed, and what a slot takes."""
+    return [
+        {
+            "battery": space.data_sheet.battery_of_type(kind),
+            "charge_rate": float(space.data_sheet.charge_rate_of_type(kind)),
+            "slots_per_cell": kind.slots_per_cell,
+            "battery_per_slot": _battery_per_slot(space, kind.slots_per_cell),
+        }
+        for kind in space.fleet
+    ]
+
+
+def type_sentences(space: ScenarioSpace) -> list[str]:
+    """What follows for each type of UAVs with a data sheet; none without types."""
+    sentences = []
+    for number, facts in enumerate(_facts_of_types(space), 1):
+        slots = numbers.format_count(facts["slots_per_cell"], "slot")
+        sentences.append(
+            f"type {number} of the UAVs: it has {facts['battery']} % of a full battery above the "
+            f"reserve, a slot of charging adds {facts['charge_rate']:.4g} %, a cell takes {slots}; "
+            f"a slot of flight takes {_spans_in_words(facts['battery_per_slot'])}"
+        )
+    return sentences
 
 
 def reach_sentences(space: ScenarioSpace) -> list[str]:

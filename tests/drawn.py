@@ -231,6 +231,7 @@ _winds_in_units = st.builds(
 def sheet_spaces(draw: st.DrawFn) -> ScenarioSpace:
     """Spaces with a data sheet: rates in steps or not, few large messages or many small ones."""
     minutes = draw(st.integers(10, 60))
+    speed = draw(st.integers(4, 20))
     radio: dict[str, Any] = draw(
         st.sampled_from(
             [
@@ -243,12 +244,13 @@ def sheet_spaces(draw: st.DrawFn) -> ScenarioSpace:
     )
     sheet = {
         "endurance": f"{minutes} min",
-        "cruise": f"{draw(st.integers(4, 20))} m/s",
+        "cruise": f"{speed} m/s",
         "max_speed": "30 m/s",  # at 20 m/s over ground, 10 m/s of wind from anywhere
         "wind": draw(st.none() | _winds_in_units),
         "hover": draw(st.sampled_from([None, f"{minutes} min"])),
         "induced_speed": "8 m/s",
         "charging": f"{draw(st.integers(5, 90))} min",
+        "reserve": draw(st.sampled_from([None, "10 %"])),
         "horizon": f"{minutes * 60 * draw(st.integers(20, 120)) / 100} s",
         "data_rate": draw(st.sampled_from(["0 B/h", "20 kB/h", "3 MB/h", "90 MB/h"])),
         "message": draw(st.sampled_from(["100 B", "1 kB", "2 MB"])),
@@ -259,9 +261,31 @@ def sheet_spaces(draw: st.DrawFn) -> ScenarioSpace:
     }
     sea = draw(seas(**PLAIN_SEA))
     spots = sea["zone"][2] * sea["zone"][3]
-    uavs = draw(_ranges(1, min(4, spots)))
-    age = {"measured": True}
-    return ScenarioSpace.of(**sea, uavs=uavs, pads=1, age=age, data_sheet=sheet | radio)
+    values = {
+        **sea,
+        "uavs": draw(_ranges(1, min(4, spots))),
+        "pads": 1,
+        "age": {"measured": True},
+        "fleet": draw(st.lists(_types_in_units(minutes, speed), max_size=3)),
+        "charge_start": 10,
+        "charge_complete": draw(st.sampled_from([(70, 80), 90])),
+        "data_sheet": sheet | radio,
+    }
+    return ScenarioSpace.of(**values)
+
+
+def _types_in_units(minutes: int, speed: int) -> st.SearchStrategy[dict[str, Any]]:
+    """Types of UAVs beside a data sheet with this endurance [min] and this speed [m/s]."""
+    shares = st.integers(30, 100).map(lambda percent: minutes * percent / 100)
+    return st.fixed_dictionaries(
+        {},
+        optional={
+            "endurance": shares.map(lambda time: f"{time} min"),
+            "charging": st.integers(5, 90).map(lambda time: f"{time} min"),
+            "cruise": st.integers(1, 4).map(lambda slots: f"{speed / slots:.4f} m/s"),
+            "rate": _numbers(0.1, 10.0),
+        },
+    )
 
 
 @st.composite

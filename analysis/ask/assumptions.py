@@ -7,7 +7,8 @@ from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.sheet import battery_sentence, unreachable_sentences
+from dess.analysis.sheet import battery_sentence, type_sentences, unreachable_sentences
+from dess.physics.fleet import IN_UNITS
 from dess.scenario.data_sheet import LORA
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
@@ -76,6 +77,7 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
         ),
         f"Wind: {given('wind', 'none')}, the same everywhere and always. "
         f"{_battery_of(space, varied)}",
+        *_types_of(space, varied),
         f"Failures: {failures}." if sheet.mtbf or "mtbf" in varied else "Failures: none.",
         f"A mission takes {given('horizon', printed(space.max_slots * units.slot, 's'))}; means "
         "are over random missions, with 95 % intervals.",
@@ -88,6 +90,13 @@ def _battery_of(space: ScenarioSpace, varied: set[str]) -> str:
         return "What a slot takes of the battery follows from the speed through the air."
     sentence = battery_sentence(space)
     return f"{sentence[0].upper()}{sentence[1:]}."
+
+
+def _types_of(space: ScenarioSpace, varied: set[str]) -> list[str]:
+    """What follows for each type of UAVs, a sentence for each, unless the types vary."""
+    if varied & {*IN_UNITS, "wind", "hover", "reserve", "tip_speed", "induced_speed", "fleet"}:
+        return []
+    return [f"{line[0].upper()}{line[1:]}." for line in type_sentences(space)]
 
 
 def _rates_of(space: ScenarioSpace, varied: set[str]) -> str:

@@ -170,7 +170,9 @@ def _slots_of_trips(space: ScenarioSpace, uav: int) -> np.ndarray:
 
 def _full_battery(space: ScenarioSpace, uav: int) -> int:
     """The battery of a charged UAV [%]."""
-    return fleet.type_of(space.fleet, uav).flying_time or max(space.charge_complete)
+    kind = fleet.type_of(space.fleet, uav)
+    full = kind.flying_time or max(space.charge_complete)
+    return min(full, space.battery_of_type(kind) or full)
 
 
 def _battery_of_guard(space: ScenarioSpace, uav: int, costs: Costs) -> int:

@@ -34,7 +34,7 @@ from dess.model.state import (
 )
 from dess.physics import age, fleet, streams, wind
 from dess.physics.arrivals import draw_messages, has_messages
-from dess.physics.charging import gain, is_before, share_power
+from dess.physics.charging import charge_limit, gain, is_before, limit_battery, share_power
 from dess.physics.chart import is_open
 from dess.physics.consumption import has_consumption, spend_slot
 from dess.physics.failures import strike_if_on, take_pad, working_pads
@@ -86,6 +86,7 @@ def _launch_uavs(mission, types, uavs):
             continue
         if u.battery == 0:
             u.battery = mission.flying_time
+        limit_battery(mission, u)
         cell = _start_cell(mission, i)
         u.x = mission.zone_x + cell % mission.zone_width
         u.y = mission.zone_y + cell // mission.zone_width
@@ -117,7 +118,8 @@ def _start_place(mission, i):
 @inlined
 def _update_latch(mission, u):
     """Set or clear the charging latch iota (eq. 3) by the battery at the start of a slot."""
-    u.latch = next_latch(mission, u.latch, u.battery, u.quota, u.communications)
+    complete = charge_limit(mission, u)
+    u.latch = next_latch(mission, u.latch, complete, u.battery, u.quota, u.communications)
 
 
 @inlined
@@ -270,8 +272,8 @@ def spend(mission, uavs):
         if u.charging:
             u.charge_slots += 1
             if not limited:
-                added = gain(mission, u.charge_slots)
-                added = min(added, mission.charge_complete - u.battery)
+                added = gain(mission, u, u.charge_slots)
+                added = min(added, charge_limit(mission, u) - u.battery)
                 u.battery += added
                 u.charged += added
             u.slots_charging += 1
@@ -438,7 +440,7 @@ def settle(mission, uavs):
         if u.end != ACTIVE:
             u.active = False
             mission.active -= 1
-        if u.battery >= mission.charge_complete or not u.active:
+        if u.battery >= charge_limit(mission, u) or not u.active:
             u.charging = False
             u.pad_request = -1
         _update_latch(mission, u)

@@ -128,8 +128,13 @@ UAV = np.dtype(
         # ``latch`` is the charging latch iota; who is ``charging`` holds a pad, and who is
         # ``grounded`` is under repair.
         *fields(np.bool_, "active latch charging grounded overruled"),
+        # The battery [%] at which it is charged, 0 for that of the mission.
+        ("charge_complete", np.int8),
         # What it has spent of the next percent of its battery [% / 1000], where slots have costs.
         ("remainder", np.int16),
+        # A charging slot gains ``charge_rate / rate_slots`` percent, in lowest terms; 0 for what it
+        # gains in the mission.
+        *fields(np.int64, "charge_rate rate_slots"),
         ("rate", np.float64),  # factor of the rate at which it collects data
         # Data and SNR [dB] of the present communication slot, data of the mission, rewards of the
         # present slot and of the mission.
@@ -248,6 +253,9 @@ def types_of(scenario: ScenarioSpace, uavs: int | None = None) -> np.ndarray:
         kind = fleet.type_of(scenario.fleet, i)
         record["battery"], record["slots_per_cell"] = kind.flying_time or 0, kind.slots_per_cell
         record["quota"], record["rate"] = kind.quota or scenario.quota, kind.rate
+        record["charge_complete"] = scenario.battery_of_type(kind) or 0
+        if rate := scenario.charge_fraction_of_type(kind):
+            record["charge_rate"], record["rate_slots"] = rate.numerator, rate.denominator
     records["action"] = records["executed"] = HOVER
     for name in ("x", "y", "from_x", "from_y", "pad_request", "pad", "served", "overruled_by"):
         records[name] = -1

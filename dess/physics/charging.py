@@ -110,36 +110,94 @@ def _is_fractional(mission):
     return mission.charge_slots > 1
 
 
+@for_sections
+def own_limit(mission, u):
+    """The battery [%] at which a UAV is charged if its type has one of its own, or 0."""
+    return np.int64(u.charge_complete)
+
+
 @inlined
-def charged_after(mission, k):
+def charge_limit(mission, u):
+    """The battery [%] at which a UAV is charged: that of its type, or C_C of the mission."""
+    limit = own_limit(mission, u)
+    if limit > 0:
+        return limit
+    return mission.charge_complete
+
+
+@for_sections
+def limit_battery(mission, u):
+    """Let the battery of a UAV be no more than its type holds, and charge to no more than C_C."""
+    if u.charge_complete > 0:
+        u.battery = min(u.battery, u.charge_complete)
+        u.charge_complete = min(u.charge_complete, mission.charge_complete)
+
+
+@for_sections
+def _has_own_rate(mission, u):
+    """Whether the type of a UAV has a rate of charging of its own."""
+    return u.charge_rate > 0
+
+
+@inlined
+def charged_after(mission, u, k):
     """The battery [%] that the first ``k`` slots of a charge add: ``floor(k g)`` at a rate g.
 
-    The rate is a fraction of integers, so it is exact.
+    The rate, that of the UAV's type or of the mission, is a fraction of integers, so it is exact.
     """
+    if _has_own_rate(mission, u):
+        return k * u.charge_rate // u.rate_slots
     if _is_fractional(mission):
         return k * mission.charge_rate // mission.charge_slots
     return k * mission.charge_rate
 
 
 @inlined
-def gain(mission, k):
-    """The battery [%] that slot ``k`` = 1, 2, ... of a charge adds."""
-    return charged_after(mission, k) - charged_after(mission, k - 1)
+def gain(mission, u, k):
+    """The battery [%] that slot ``k`` = 1, 2, ... of a charge of a UAV adds."""
+    return charged_after(mission, u, k) - charged_after(mission, u, k - 1)
 
 
 @inlined
-def slots_to_charge(mission, lacking, begun=0):
+def slots_to_charge(mission, u, lacking, begun=0):
     """The least number of further slots in which a charge adds so much battery [%].
 
     Args:
         mission: ``MISSION`` record.
+        u: The UAV that is charged: a record with the rate of its type.
         lacking: What is to be added [%].
         begun: The slots of the charge until now; 0 for one that begins.
     """
+    if _has_own_rate(mission, u):
+        added = charged_after(mission, u, begun) + lacking
+        return -(-added * u.rate_slots // u.charge_rate) - begun
     if _is_fractional(mission):
-        added = charged_after(mission, begun) + lacking
+        added = charged_after(mission, u, begun) + lacking
         return -(-added * mission.charge_slots // mission.charge_rate) - begun
     return (lacking + mission.charge_rate - 1) // mission.charge_rate
+
+
+@inlined
+def longest_charge(mission, uavs):
+    """The slots in which any UAV of a mission is charged from C_S on."""
+    if not _has_types(mission):
+        return slots_to_charge(mission, uavs[0], mission.charge_complete - mission.charge_start)
+    return _longest_charge_of_types(mission, uavs)
+
+
+@for_sections
+def _has_types(mission):
+    """Whether the types of UAVs may have batteries and rates of their own."""
+    return True
+
+
+@for_sections
+def _longest_charge_of_types(mission, uavs):
+    longest = np.int64(0)
+    for i in range(mission.uavs):
+        lacking = charge_limit(mission, uavs[i]) - mission.charge_start
+        longest = max(longest, slots_to_charge(mission, uavs[i], lacking))
+    return longest
 
 
 @for_sections
@@ -155,7 +213,7 @@ def share_power(mission, uavs):
 def _share_power(mission, uavs, zone):
     """Charge the UAVs on the pads of a zone with its limited power, one after the other.
 
-    Each takes what it can take (``charge_rate``, up to ``charge_complete``) of what is left.
+    Each takes what it can take (``gain``, up to ``charge_limit``) of what is left.
     """
     left = mission.power
     charged = np.zeros(len(uavs), np.bool_)
@@ -168,7 +226,8 @@ def _share_power(mission, uavs, zone):
         if first < 0:
             return
         u = uavs[first]
-        added = min(gain(mission, u.charge_slots + 1), mission.charge_complete - u.battery, left)
+        lacking = charge_limit(mission, u) - u.battery
+        added = min(gain(mission, u, u.charge_slots + 1), lacking, left)
         u.battery += added
         u.charged += added
         left -= added

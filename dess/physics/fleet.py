@@ -8,11 +8,14 @@ from collections.abc import Sequence
 from math import lcm
 from typing import Any
 
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from dess.base.descriptions import Description
 from dess.base.kernels import inlined
 from dess.physics.section import Integer, Number, Section
+
+# What a type may give in units beside a data sheet (``dess.scenario.data_sheet``).
+IN_UNITS = ("endurance", "charging", "cruise")
 
 
 class UavType(Section):
@@ -40,6 +43,33 @@ class UavType(Section):
     rate: Number = Field(
         1.0, ge=0.001, le=1000, description="factor of the rate at which the UAV collects data"
     )
+    endurance: str | None = Field(
+        None,
+        description="flying time of a full battery in still air, that of the data sheet at most",
+        examples=["20 min"],
+    )
+    charging: str | None = Field(
+        None, description="time to charge its battery from empty to full", examples=["25 min"]
+    )
+    cruise: str | None = Field(
+        None,
+        description=Description(
+            "cruising speed over ground",
+            form="that of the data sheet, or a half, a third, ... of it",
+        ),
+        examples=["7.5 m/s"],
+    )
+
+    @model_serializer(mode="wrap")
+    def _without_units_that_are_not_given(
+        self, handler: SerializerFunctionWrapHandler
+    ) -> dict[str, Any]:
+        """Leave out the fields in units that are not given, and what follows from the others."""
+        values = handler(self)
+        off = {name for name in IN_UNITS if getattr(self, name) is None}
+        if self.cruise is not None:
+            off.add("slots_per_cell")
+        return {name: value for name, value in values.items() if name not in off}
 
 
 Fleet = Sequence[UavType]

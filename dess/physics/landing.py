@@ -54,7 +54,7 @@ def has_finished(mission, slots, is_on_ground, quota, communications):
 
 
 @inlined
-def next_latch(mission, latch, battery, quota, communications):
+def next_latch(mission, latch, complete, battery, quota, communications):
     """The charging latch iota (eq. 3) by the battery at the start of a slot.
 
     In missions that end on the ground, every UAV may charge that is not charged and has not filled
@@ -63,13 +63,14 @@ def next_latch(mission, latch, battery, quota, communications):
     Args:
         mission: ``MISSION`` record.
         latch: The latch in the slot before.
+        complete: The battery at which the UAV is charged [%].
         battery: The battery [%].
         quota: The quota of the UAV [communication slots].
         communications: The communication slots that it has filled.
     """
     if lands(mission):
-        return battery < mission.charge_complete and not has_filled(quota, communications)
-    if battery >= mission.charge_complete:
+        return battery < complete and not has_filled(quota, communications)
+    if battery >= complete:
         return False
     return battery <= mission.charge_start or latch != 0
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from dess.base.errors import InputError, listed
+from dess.base.errors import InputError, listed, shown
 from dess.physics.age import MOST_TEETH
 from dess.physics.arrivals import MOST as MOST_RATE
 from dess.physics.arrivals import MOST_MESSAGES
@@ -13,7 +13,7 @@ from dess.physics.chart import FAR, MOST_CHARTED, NO_FLY, Cell, parking_of, spre
 from dess.physics.consumption import MOST as MOST_COST
 from dess.physics.consumption import PERCENT
 from dess.physics.failures import MOST_PADS
-from dess.physics.fleet import legs, places_per_slot, slowest
+from dess.physics.fleet import IN_UNITS, legs, places_per_slot, slowest
 from dess.scenario.data_sheet import DataSheet
 from dess.scenario.fields import MOST_DATA, Fields
 
@@ -190,6 +190,7 @@ def _unfit(c: Fields) -> Iterator[InputError]:
 
 def _unfit_to_fly(c: Fields) -> Iterator[InputError]:
     """What slots take of the battery fits to the wind and to the speeds of the fleet."""
+    yield from _unfit_types(c)
     if not c.consumption.is_on:
         return
     if c.wind.is_on:
@@ -205,3 +206,19 @@ def _unfit_to_fly(c: Fields) -> Iterator[InputError]:
     if highest > MOST_COST:
         problem = f"a slot takes {highest / PERCENT:.1f} %"
         yield InputError("consumption.slots", problem, f"{MOST_COST // PERCENT} % at most")
+
+
+def _unfit_types(c: Fields) -> Iterator[InputError]:
+    """Types of UAVs have units beside a data sheet alone, and batteries that charging fits to."""
+    for number, kind in enumerate(c.fleet):
+        in_units = [name for name in IN_UNITS if getattr(kind, name) is not None]
+        if in_units and not c.data_sheet.is_on:
+            allowed = "a data_sheet, or flying_time and slots_per_cell in place of units"
+            yield InputError(f"fleet.{number}.{in_units[0]}", "needs a data sheet", allowed)
+            return
+        full = c.battery_of_type(kind)
+        start = np.max(c.value("charge_start"))
+        if full is not None and full <= start:
+            problem = f"{shown(kind.endurance)} is {full} % of a battery, less the reserve"
+            allowed = f"more than charge_start, {start} %"
+            yield InputError(f"fleet.{number}.endurance", problem, allowed)

@@ -22,6 +22,7 @@ from dess.base.descriptions import Description, description_of
 from dess.base.elementary import log10
 from dess.base.errors import InputError, shown
 from dess.physics.consumption import MOST, PERCENT, SPEEDS, Costs
+from dess.physics.fleet import IN_UNITS, UavType
 from dess.physics.radio import MOST_STEPS
 from dess.physics.section import Section
 from dess.scenario.quantities import KINDS, exactly, form_of, measured, printed, refuse
@@ -70,6 +71,13 @@ _LORA_CODING = 4 / 5
 
 # A step of a rate: from which SNR on it is which, and the limits of both.
 _STEP = (("dB", (-200, 200)), ("bit/s", (1e-6, 1e15)))
+
+_MOST_CHARGING = 10_000  # the slots in which an empty battery is charged
+_NEGLIGIBLE = Fraction(1, 10**11)  # the error of an endurance that is computed
+
+# The cruising speed of a type goes a whole number of times into that of the sheet, but for a share
+# of so much: so a third of 10 m/s can be typed.
+_ROUNDED = Fraction(1, 1000)
 
 # The fields that a scenario with a sheet may set otherwise.
 OPEN = ("flying_time", "charge_start", "charge_complete", "landing", "quota")
@@ -316,11 +324,101 @@ class DataSheet(Section):
     @property
     def charge_rate(self) -> Fraction:
         """The battery that a charging slot adds [%], exactly as the times were typed."""
-        endurance, charging = self.endurance, self.charging
-        assert endurance and charging
+        assert self.charging
+        return self._exact_endurance / exactly(self.charging, "s")[0]
+
+    @property
+    def _exact_endurance(self) -> Fraction:
+        """``endurance_at_cruise``, exactly as it was typed if it is given for the cruise."""
+        assert self.endurance
         if self._endurance_at:
-            return Fraction(self.endurance_at_cruise) / exactly(charging, "s")[0]
-        return exactly(endurance, "s")[0] / exactly(charging, "s")[0]
+            return Fraction(self.endurance_at_cruise)
+        return exactly(self.endurance, "s")[0]
+
+    def type_in_slots(self, table: dict[str, Any]) -> dict[str, Any]:
+        """What follows from the fields of a type of UAVs that are in units.
+
+        Args:
+            table: The fields of the type as they were given; those of other types than text are
+                refused where the table is validated.
+
+        Returns:
+            The other fields of the type that follow.
+
+        Raises:
+            InputError: If a field is no quantity of its kind, if the type is longer in the air or
+                faster than the sheet, or if what follows is given as well.
+        """
+        quantities = {name: table[name] for name in IN_UNITS if table.get(name) is not None}
+        for name, value in quantities.items():
+            try:
+                self.check(name, value)
+            except InputError as error:
+                raise error.within(name) from None
+        if not all(isinstance(value, str) for value in quantities.values()):
+            return {}
+        for name, other in (("flying_time", "endurance"), ("slots_per_cell", "cruise")):
+            if other in quantities and table.get(name) is not None:
+                raise InputError(name, f"is given beside {other}", "one of both")
+        kind = UavType.model_validate(quantities)
+        self.battery_of_type(kind)
+        if kind.charging:
+            self._slots_of("charging", kind.charging, _MOST_CHARGING)
+        if kind.cruise:
+            return {"slots_per_cell": self._slots_per_cell_of(kind)}
+        return {}
+
+    def battery_of_type(self, kind: UavType) -> int:
+        """The battery of a type of UAVs when it is full, less the reserve [%]."""
+        share = Fraction(1)
+        if kind.endurance:
+            share = self._endurance_of_type(kind) / self._exact_endurance
+            if share > 1 + _NEGLIGIBLE:
+                problem = f"{shown(kind.endurance)} is longer than that of the data sheet"
+                raise InputError("endurance", problem, f"{self.endurance} at most")
+        return math.floor(100 * (share + _NEGLIGIBLE)) - self._reserved
+
+    def charge_rate_of_type(self, kind: UavType) -> Fraction:
+        """The battery that a charging slot adds to a type of UAVs [%], exactly as it was typed."""
+        if not kind.charging:
+            return self.charge_rate
+        return self._exact_endurance / exactly(kind.charging, "s")[0]
+
+    def _endurance_of_type(self, kind: UavType) -> Fraction:
+        """The flying time of a type of UAVs at its cruising speed in still air [s]."""
+        assert kind.endurance
+        if " at " not in kind.endurance:
+            return exactly(kind.endurance, "s")[0]
+        endurance, speed = measured(kind.endurance, _AT_SPEED)
+        cruise = self.number("cruise") / self._slots_per_cell_of(kind)
+        return Fraction(endurance * self.wing.power(speed) / self.wing.power(cruise))
+
+    def _slots_per_cell_of(self, kind: UavType) -> int:
+        """The slots that a type of UAVs takes for a cell."""
+        if not kind.cruise:
+            return kind.slots_per_cell
+        assert self.cruise
+        fastest = exactly(self.cruise, "m/s")[0]
+        ratio = fastest / exactly(kind.cruise, "m/s")[0]
+        slots = round(ratio)
+        if ratio < 1 - _ROUNDED:
+            problem = f"{shown(kind.cruise)} is faster than that of the data sheet"
+            raise InputError("cruise", problem, f"{self.cruise} at most")
+        if ratio > SPEEDS * (1 + _ROUNDED):
+            problem = f"{shown(kind.cruise)} is less than an eighth of {self.cruise}"
+            raise InputError("cruise", problem, f"{float(fastest / SPEEDS):.4g} m/s or more")
+        if abs(ratio - slots) > slots * _ROUNDED:
+            nearest = [
+                f"{float(fastest / n):.4g} m/s" for n in (math.floor(ratio), math.ceil(ratio))
+            ]
+            problem = f"{shown(kind.cruise)} does not go into {self.cruise} a whole number of times"
+            raise InputError("cruise", problem, " or ".join(nearest))
+        return slots
+
+    @property
+    def _reserved(self) -> int:
+        """The battery that is never used [%]."""
+        return math.ceil(self.number("reserve") - 1e-9)
 
     @property
     def wing(self) -> RotaryWing:
@@ -415,8 +513,8 @@ class DataSheet(Section):
         Raises:
             InputError: If slots and cells are too coarse or too fine for the sheet.
         """
-        full = 100 - math.ceil(self.number("reserve") - 1e-9)
-        self._slots("charging", 10_000)
+        full = 100 - self._reserved
+        self._slots("charging", _MOST_CHARGING)
         gain = self.charge_rate
         following: dict[str, Any] = {
             "cell_size": self.units.cell,
@@ -460,14 +558,19 @@ class DataSheet(Section):
 
     def _slots(self, name: str, most: float = 1e12) -> float:
         """A time in slots, of which there are at least one and no more than ``most``."""
+        return self._slots_of(name, getattr(self, name), most)
+
+    def _slots_of(self, name: str, time: str, most: float) -> float:
+        """The same of a time that is not that of the sheet; ``name`` is its field."""
         slot = self.units.slot
-        slots = self.number(name) / slot
+        slots = measured(time, "s")[0] / slot
         least = printed(slot, "s")
         if slots < 1:
-            self._refuse(name, f"is less than a slot of {least}", f"{least} or more")
+            problem = f"{shown(time)} is less than a slot of {least}"
+            raise InputError(name, problem, f"{least} or more")
         if slots > most:
-            problem = f"is {slots:,.0f} slots of {least}"
-            self._refuse(name, problem, f"{printed(most * slot, 's')} at most")
+            problem = f"{shown(time)} is {slots:,.0f} slots of {least}"
+            raise InputError(name, problem, f"{printed(most * slot, 's')} at most")
         return slots
 
     def _data(self) -> dict[str, Any]:

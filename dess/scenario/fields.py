@@ -332,6 +332,18 @@ class Fields(Strict):
             return charge_fraction(sheet.charge_rate)
         return charge_fraction(Fraction(str(self.charge_rate)))
 
+    def battery_of_type(self, kind: UavType) -> int | None:
+        """The full battery of a type of UAVs [%]; None if it is that of the others."""
+        if kind.endurance is None:
+            return None
+        return self.data_sheet.battery_of_type(kind)
+
+    def charge_fraction_of_type(self, kind: UavType) -> Fraction | None:
+        """What a type of UAVs gains in a charging slot [%]; None if it is what the others gain."""
+        if kind.charging is None:
+            return None
+        return charge_fraction(self.data_sheet.charge_rate_of_type(kind))
+
     @property
     def is_extended(self) -> bool:
         """Whether the scenario goes beyond the paper, so that records have ``OPERATIONS``."""

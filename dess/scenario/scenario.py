@@ -26,7 +26,8 @@ from pydantic import (
 from dess.base.descriptions import Description
 from dess.base.errors import InputError, check_type, form_of, shown, unknown_name, validated
 from dess.base.files.reading import Shipped, parse_toml
-from dess.physics.section import Integer, Section
+from dess.physics.fleet import UavType
+from dess.physics.section import Integer, Section, tuples
 from dess.scenario.consistency import problems
 from dess.scenario.data_sheet import OPEN, DataSheet
 from dess.scenario.families import FAMILIES, is_generated, sea_of
@@ -85,6 +86,8 @@ class Constants(Fields):
             raise InputError(name, "follows from the data sheet", "without this field")
         for name, value in following.items():
             _check_following(data_sheet, name, value)
+        if "fleet" in values:
+            values["fleet"] = _types_in_slots(data_sheet, values["fleet"])
         return merged(following, values)
 
     @model_serializer(mode="wrap")
@@ -366,6 +369,29 @@ def _read(name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
     if is_generated(name):
         return f"scenario {name}", sea_of(name)
     return _SCENARIOS.load(name_or_path, others=scenario_families())
+
+
+def _types_in_slots(sheet: DataSheet, types: Any) -> Any:
+    """The types of UAVs with what follows from their fields in units.
+
+    What is no table of fields of a type is left as it is; it is refused where it is validated.
+    """
+    types = tuples(types)
+    if not isinstance(types, tuple):
+        return types
+    following = []
+    for number, kind in enumerate(types):
+        table = kind
+        if isinstance(kind, UavType):
+            table = kind.model_dump()
+        if isinstance(table, dict):
+            try:
+                table = table | sheet.type_in_slots(table)
+            except InputError as error:
+                where = f"fleet.{number}.{error.where}"
+                raise InputError(where, error.problem, error.allowed) from None
+        following.append(table)
+    return tuple(following)
 
 
 # How what follows from a data sheet is checked, where another field has the same limits.

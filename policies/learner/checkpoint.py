@@ -314,6 +314,9 @@ def _check_state(state: State, space: ScenarioSpace) -> None:
         "zone": (-2, len(space.rectangles) - 1),
         "served": (-1, len(space.nodes) - 1),
     }
+    for name in ("charge_rate", "rate_slots"):  # a divisor
+        if (uavs[name] != kinds[name]).any():
+            raise ValueError(f"uavs: {name} is not that of the scenario")
     allowed: list[tuple[np.ndarray, dict[str, tuple[int, Any]]]] = [
         (missions, {"uavs": (1, fleet), "slot": (0, slots)}),
         (uavs, of_uavs | truths),

@@ -30,7 +30,7 @@ from dess.model.guard.battery import (
 )
 from dess.model.guard.ways import battery_of_flight
 from dess.model.state import HOVER, STEP_X, STEP_Y, fields
-from dess.physics.charging import gain
+from dess.physics.charging import charge_limit, gain
 from dess.physics.chart import distance, in_zone, is_open
 from dess.physics.consumption import PERCENT, has_consumption, slot_cost
 from dess.physics.failures import working_pads
@@ -132,7 +132,7 @@ CRAFT = np.dtype(
         # Of the plan: its waypoints, and the last one to charge at, -1 without one.
         *fields(np.int64, "waypoints last_charge"),
         # Constants.
-        *fields(np.int64, "quota slots_per_cell"),
+        *fields(np.int64, "quota slots_per_cell charge_complete charge_rate rate_slots"),
         ("rate", np.float64),
     ]
 )
@@ -202,6 +202,9 @@ def begin_flight(mission, uavs, residual, flight):
         v.action = u.executed
         v.quota, v.slots_per_cell, v.rate = u.quota, u.slots_per_cell, u.rate
         v.charge_slots = u.charge_slots
+        v.charge_complete = u.charge_complete
+        v.charge_rate = u.charge_rate
+        v.rate_slots = u.rate_slots
     wait = _slots_until_data(mission)
     for k in range(mission.nodes):
         node = flight.sea[0, k]
@@ -530,7 +533,7 @@ def _charge_for_slot(mission, v):
     """Let a UAV charge for a slot."""
     v.charge_slots += 1
     before = _percent_left(mission, v)
-    after = min(before + gain(mission, v.charge_slots), mission.charge_complete)
+    after = min(before + gain(mission, v, v.charge_slots), charge_limit(mission, v))
     if has_consumption(mission):
         v.battery += PERCENT * (after - before)
     else:
@@ -563,7 +566,8 @@ def _end_slot(mission, chart, v, t):
         lacking = max(v.quota - v.counted, 0) / mission.communication_slots
         penalty = _DEPLETED + _SLOT_MISSED * lacking
         v.active = v.charging = 0
-    v.latch = next_latch(mission, v.latch, _percent_left(mission, v), v.quota, v.counted)
+    complete = charge_limit(mission, v)
+    v.latch = next_latch(mission, v.latch, complete, _percent_left(mission, v), v.quota, v.counted)
     return penalty
 
 

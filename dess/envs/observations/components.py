@@ -4,6 +4,7 @@ import numpy as np
 
 from dess.base.kernels import kernel
 from dess.model.state import ACTION_NAMES, HOVER, STEP_X, STEP_Y, State, spaces_of
+from dess.physics.charging import charge_limit
 from dess.physics.chart import is_open
 from dess.physics.consumption import PERCENT, has_consumption, slot_cost
 from dess.physics.wind import move_surcharge
@@ -126,7 +127,7 @@ def _encode_uav(mission, chart, uavs, i, residual, out):
     out[8] = (home[0] - u.x) * column
     out[9] = (home[1] - u.y) * row
     out[10] = mission.charge_start / 100.0
-    out[11] = mission.charge_complete / 100.0
+    out[11] = charge_limit(mission, u) / 100.0
     out[12] = mission.slot / mission.max_slots
     at = 13
     full = mission.initial_high if mission.initial_high > 0.0 else 1.0

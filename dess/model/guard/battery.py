@@ -9,6 +9,7 @@ left for the shortest one. A slot of waiting or of a detour counts as the deares
 import math
 
 from dess.base.kernels import inlined
+from dess.physics.charging import own_limit
 from dess.physics.consumption import has_consumption, thousandths_left
 from dess.physics.failures import working_pads
 from dess.physics.landing import flies, lands
@@ -181,6 +182,21 @@ def _most_wind(mission, u, slots):
 def ends_soon(mission, u):
     """Whether UAV ``u`` does not leave a zone any more, as it has to be on the ground soon."""
     return lands(mission) and u.quota == 0 and mission.max_slots - mission.slot <= LAST_SLOTS
+
+
+@for_sections
+def cannot_leave(mission, u):
+    """Whether a UAV on the ground could not leave its zone and keep its margins.
+
+    Only types of UAVs that are slow or have small batteries can be in this state when they are
+    fully charged: they stay where they stand.
+    """
+    if not has_consumption(mission) or mission.flight_cost == 0:
+        return False
+    if own_limit(mission, u) == 0 and u.slots_per_cell == 1:
+        return False
+    slots = margin_slots(mission, u) + 2 * u.slots_per_cell + 1
+    return battery_left(mission, u) <= dearest_slot(mission) * slots
 
 
 @inlined

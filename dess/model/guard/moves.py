@@ -29,7 +29,7 @@ from dess.model.rules import data_left
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
 from dess.model.ways_home import is_calm, reach_of
-from dess.physics.charging import slots_to_charge
+from dess.physics.charging import longest_charge
 from dess.physics.chart import Chart, distance, in_zone, is_open
 from dess.physics.consumption import has_consumption, slot_cost
 from dess.physics.landing import lands
@@ -173,7 +173,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
             kept = reserve
             if not is_calm(reach) and home.cells > 0:
                 # The cheapest way may lead through a parked teammate; a move must do as well.
-                if action == HOVER and not _is_shut_out(mission, u, chart, home):
+                if action == HOVER and not _is_shut_out(mission, uavs, u, chart, home):
                     needed = max(needed, fewest + 1)
                 fewest = min(fewest, needed)
                 kept = max(kept, _wait(mission, u, chart, action, x, y, home))
@@ -250,10 +250,10 @@ def _cells_to_zone(chart, x, y):
 
 
 @inlined
-def _is_shut_out(mission, u, chart, home):
+def _is_shut_out(mission, uavs, u, chart, home):
     """Whether UAV ``u`` can only wait until a teammate has charged that is parked on its way."""
     detour = home.cells - distance(chart, u.x, u.y, home.x, home.y)
-    return detour >= slots_to_charge(mission, mission.charge_complete - mission.charge_start)
+    return detour >= longest_charge(mission, uavs)
 
 
 @inlined

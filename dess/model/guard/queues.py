@@ -29,7 +29,7 @@ from dess.base.kernels import inlined, kernel, large_kernel
 from dess.model.guard.battery import battery_left, dearest_slot, must_charge
 from dess.model.guard.ways import battery_of_way
 from dess.model.state import HOVER
-from dess.physics.charging import is_before, slots_to_charge
+from dess.physics.charging import charge_limit, is_before, slots_to_charge
 from dess.physics.chart import distance
 from dess.physics.consumption import PERCENT, has_consumption, slot_cost
 from dess.physics.failures import working_pads
@@ -364,8 +364,8 @@ def _time_on_pad(mission, uavs, j, begins, plan):
 @inlined
 def _charging_time(mission, u, zone, battery):
     """The slots for which a UAV charges, or goes on charging, from a battery [%]."""
-    lacking = mission.charge_complete - battery
-    slots = slots_to_charge(mission, lacking, u.charge_slots if u.charging else 0)
+    lacking = charge_limit(mission, u) - battery
+    slots = slots_to_charge(mission, u, lacking, u.charge_slots if u.charging else 0)
     if mission.power > 0:
         share = max(mission.power // max(working_pads(mission, zone), 1), 1)
         slots = max(slots, (lacking + share - 1) // share)

@@ -5,10 +5,16 @@ import heapq
 import numpy as np
 
 from dess.base.kernels import inlined, kernel, large_kernel
-from dess.model.guard.battery import dearest_slot, ends_soon, lasts, usable_battery
+from dess.model.guard.battery import (
+    cannot_leave,
+    dearest_slot,
+    ends_soon,
+    lasts,
+    usable_battery,
+)
 from dess.model.state import EAST, NORTH, SOUTH, STEP_X, STEP_Y, WEST
 from dess.model.ways_home import FAR
-from dess.physics.charging import slots_to_charge
+from dess.physics.charging import longest_charge
 from dess.physics.chart import distance, is_open, length_around
 from dess.physics.consumption import has_consumption, slot_cost
 from dess.physics.landing import lands
@@ -22,12 +28,13 @@ CELLS_PER_UAV = 4
 def is_parked(mission, u):
     """Whether a UAV blocks its cell: it charges or is about to charge, or is grounded.
 
-    Shortly before the end of a mission that ends on the ground, it stands on the ground, too.
+    In missions that end on the ground, it also stands there shortly before the end, and if it could
+    not leave the zone (``cannot_leave``).
     """
     stays = u.latch
     if lands(mission):  # there the latch is set whenever a UAV may charge
         stays = u.charging or u.pad_request >= 0 or u.battery <= mission.charge_start
-        stays = stays or ends_soon(mission, u)
+        stays = stays or ends_soon(mission, u) or cannot_leave(mission, u)
     return u.active and (u.grounded or (stays and u.zone >= 0))
 
 
@@ -84,9 +91,8 @@ def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     around = length_around(zones, ways, rows, closed, x, y, to_x, to_y)
     if ends_soon(mission, uavs[i]):
         return around
-    lacking = mission.charge_complete - mission.charge_start
     through = distance(chart, x, y, to_x, to_y)
-    return min(around, through + slots_to_charge(mission, lacking))
+    return min(around, through + longest_charge(mission, uavs))
 
 
 @kernel
@@ -160,9 +166,8 @@ def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
         closed = _closed_cells(mission, uavs, i, chart, None, home.x, home.y)
     width, slots = chart.zones.shape[1], uavs[i].slots_per_cell
     least = reach[chart.nearest[home.y, home.x], slots - 1].ravel()
-    lacking = mission.charge_complete - mission.charge_start
     start = np.int64(y * width + x)
-    waits = dearest_slot(mission) * slots_to_charge(mission, lacking)
+    waits = dearest_slot(mission) * longest_charge(mission, uavs)
     through = np.int64(least[start]) + waits
     spent = np.full(chart.zones.size, FAR, np.int64)
     spent[closed] = -1

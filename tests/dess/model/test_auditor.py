@@ -1,5 +1,6 @@
 """An event log tells the whole mission: an auditor that knows only the page can replay it."""
 
+from fractions import Fraction
 from math import isnan
 from typing import Any
 
@@ -8,7 +9,9 @@ from hypothesis import given
 
 from dess.model.mission import simulate
 from dess.model.record import MISSION_RECORD, measures_of
+from dess.physics.fleet import UavType
 from dess.physics.section import Section
+from dess.scenario.data_sheet import DataSheet
 from dess.scenario.scenario import ScenarioSpace
 from tests.dess.model.auditor import audit
 from tests.drawn import (
@@ -34,7 +37,25 @@ def constants_of(space: ScenarioSpace) -> dict[str, Any]:
             value = getattr(space, name)
             constants[name] = value.model_dump() if isinstance(value, Section) else value
         constants["charge_rate"] = space.charge_fraction  # exactly, as the times were typed
+        constants["fleet"] = [_type_in_slots(kind, space.data_sheet) for kind in space.fleet]
     return constants
+
+
+def _type_in_slots(kind: UavType, sheet: DataSheet) -> dict[str, Any]:
+    """A type of UAVs in percent and slots, computed from its times in minutes and its speed."""
+    fields = kind.model_dump()
+    if kind.endurance:
+        full = 100 * _number(kind.endurance) / _number(sheet.endurance)
+        fields["full"] = int(full - _number(sheet.reserve or "0 %"))
+    if kind.charging:
+        fields["charge_rate"] = _number(sheet.endurance) / _number(kind.charging)
+    if kind.cruise:
+        fields["slots_per_cell"] = round(_number(sheet.cruise) / _number(kind.cruise))
+    return fields
+
+
+def _number(quantity: str | None) -> Fraction:
+    return Fraction((quantity or "").split()[0])
 
 
 @given(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dess import ScenarioSpace, simulate
 from dess.base.kernels import kernel
-from dess.model.state import constants_of
+from dess.model.state import constants_of, types_of
 from dess.physics.charging import charged_after, gain, slots_to_charge
 from tests.drawn import Script
 
@@ -21,18 +21,18 @@ MINUTES = st.integers(100, 9999).map(lambda hundredths: f"{hundredths / 100:.2f}
 
 
 @kernel
-def _charged(missions, slots):
+def _charged(missions, uavs, slots):
     """What the first slots of a charge add together, and each of them."""
     together, each = np.empty(slots, np.int64), np.empty(slots, np.int64)
     for k in range(slots):
-        together[k] = charged_after(missions[0], k + 1)
-        each[k] = gain(missions[0], k + 1)
+        together[k] = charged_after(missions[0], uavs[0], k + 1)
+        each[k] = gain(missions[0], uavs[0], k + 1)
     return together, each
 
 
 @kernel
-def _slots_to_charge(missions, lacking, begun):
-    return slots_to_charge(missions[0], lacking, begun)
+def _slots_to_charge(missions, uavs, lacking, begun):
+    return slots_to_charge(missions[0], uavs[0], lacking, begun)
 
 
 def _space(**values: Any) -> ScenarioSpace:
@@ -42,14 +42,14 @@ def _space(**values: Any) -> ScenarioSpace:
 
 def _assert_exact(space: ScenarioSpace, rate: Fraction, slots: int) -> None:
     """Assert that k slots of a charge add ``floor(k g)``, and how many a charge takes."""
-    missions = constants_of(space)
-    together, each = _charged(missions, slots)
+    missions, uavs = constants_of(space), types_of(space)
+    together, each = _charged(missions, uavs, slots)
     assert together.tolist() == [int(k * rate) for k in range(1, slots + 1)]
     assert each.cumsum().tolist() == together.tolist()
     for lacking, begun in ((1, 0), (63, 0), (70, 7), (100, 3)):
         added = int(begun * rate) + lacking
         wanted = next(n for n in range(10**6) if int((begun + n) * rate) >= added)
-        assert _slots_to_charge(missions, lacking, begun) == wanted
+        assert _slots_to_charge(missions, uavs, lacking, begun) == wanted
 
 
 @given(MINUTES, MINUTES)

@@ -104,7 +104,7 @@ class _Auditor:
         u.reward += c["reward_quota"] * (u.end in FILLED)
         u.reward += c["reward_depleted"] * (u.end == "battery")
         u.reward += c.get("age", {}).get("reward", 0.0) * self.nodes.ages.mean_at(slot)
-        if charged and (u.battery >= self.pads.complete or u.end):
+        if charged and (u.battery >= self.pads.limit_of(u) or u.end):
             u.charging, u.requested = False, -1
             self.fleet.take("charge_end", slot, i)
         if u.end == "quota":

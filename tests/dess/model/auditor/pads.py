@@ -32,6 +32,10 @@ class Pads:
         self.requests = 0
         self.complete = self.start = 0  # C_C and C_S of the mission
 
+    def limit_of(self, u: Uav) -> int:
+        """The battery at which a charge of a UAV ends."""
+        return min(self.complete, u.full or self.complete)
+
     def replay(self) -> None:
         """Ask for pads and give them back, then grant those that are free."""
         for i, u in enumerate(self.fleet.uavs):
@@ -74,10 +78,11 @@ class Pads:
         for zone in range(len(self.zones)):
             left = self.power or math.inf
             for i in self._in_order(zone, "charging"):
-                u, rate = self.fleet.uavs[i], Fraction(str(self.c["charge_rate"]))
+                u = self.fleet.uavs[i]
+                rate = Fraction(str(u.charge_rate or self.c["charge_rate"]))
                 u.charge_slots += 1
                 added = math.floor(u.charge_slots * rate) - math.floor((u.charge_slots - 1) * rate)
-                gain = min(added, self.complete - u.battery, left)
+                gain = min(added, self.limit_of(u) - u.battery, left)
                 u.battery += gain
                 u.charged += gain
                 left -= gain
@@ -86,9 +91,9 @@ class Pads:
     def update_latch(self, u: Uav) -> None:
         """Judge the latch of a UAV at the start of a slot."""
         if self.c.get("landing"):
-            u.latch = u.battery < self.complete and not u.has_filled
+            u.latch = u.battery < self.limit_of(u) and not u.has_filled
             return
         if u.battery <= self.start:
             u.latch = True
-        if u.battery >= self.complete:
+        if u.battery >= self.limit_of(u):
             u.latch = False

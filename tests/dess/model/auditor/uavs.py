@@ -137,6 +137,8 @@ class Fleet:
             i = len(self.uavs)
             known = {name: self.type_of(i)[name] for name in ("slots_per_cell", "rate")}
             known["quota"] = self.type_of(i)["quota"] or self.c["quota"]
+            # A full battery, and what a charging slot adds; None for those of the mission.
+            known |= {name: self.type_of(i).get(name) for name in ("full", "charge_rate")}
             x, y = int(row.x), int(row.y)
             self.uavs.append(Uav(x=x, y=y, from_x=x, from_y=y, battery=row.battery, **known))
             self.take("mission_start", 0.0, i)
@@ -148,6 +150,8 @@ class Fleet:
         """Check the batteries at the start."""
         for i, u in enumerate(self.uavs):
             full = self.type_of(i)["flying_time"] or flying_time
+            if u.full:
+                full = min(full, u.full)
             self.log.require(u.battery == full, "a battery is not full")
 
     # --- moves ---
