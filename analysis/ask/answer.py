@@ -12,7 +12,7 @@ from dess import InputError
 from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet import verdicts
 from dess.analysis.answers.fleet.cheapest import search_of
-from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings
+from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings, prices_in_words
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import (
     best_settings_sentences,
@@ -144,7 +144,7 @@ class Answer:
         ranked = rank_settings(self.results, ranking)
         lines = best_settings_sentences(self.results, ranked, ranking)
         if self.question.study.costs:
-            lines.append(self.results.prices.in_words)
+            lines.append(prices_in_words(self.results))
         return [*lines, *self._unreachable()]
 
     def _unreachable(self) -> list[str]:

@@ -292,7 +292,8 @@ def _cheapest_rule(
     spaces = study.scenarios
     most_uavs = max(space.uavs[1] for space in spaces)
     most_pads = max(space.charging_pads for space in spaces)
-    fleet = prices.purchase_of(most_uavs, most_pads)
+    price_of_uavs = max(prices.price_of_uavs(space, most_uavs) for space in spaces)
+    fleet = prices.purchase_of(price_of_uavs, most_pads)
     worn = prices.pack / prices.pack_cycles
     running = prices.paid_missions * (prices.charge + prices.hour + prices.lost_uav + worn)
     if not fleet and not running:

@@ -1,7 +1,7 @@
 """What a fleet costs: the prices of a study, and the cost of its missions by what is paid for."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -11,6 +11,7 @@ from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.study.stopping import MOST, Line, StrictTable
 from dess.model.state import types_of
+from dess.physics.fleet import type_of
 from dess.physics.section import Integer, Number
 from dess.scenario.scenario import ScenarioSpace
 
@@ -144,9 +145,15 @@ class Costs(StrictTable):
     @property
     def in_words(self) -> str:
         """The prices, the missions that are paid for, and what has no price."""
-        paid = []
+        return self._words_with([], ())
+
+    def _words_with(self, of_types: Sequence[str], unused: Collection[str]) -> str:
+        """The same with the prices of types of UAVs, and without those that no scenario uses."""
+        paid = [*of_types]
         free = []
         for price, thing in _PAID_FOR.items():
+            if price in unused:
+                continue
             value = getattr(self, price)
             is_of_a_year = price in _OF_A_YEAR
             if value:
@@ -175,12 +182,44 @@ class Costs(StrictTable):
             text += f" A pack is worn after {self.pack_cycles:g} full charges."
         return text
 
-    def purchase_of(self, uavs: Any, pads: Any) -> Any:
+    def words_on(self, spaces: Sequence[ScenarioSpace]) -> str:
+        """The prices in words, with those of the types of UAVs of a study.
+
+        Args:
+            spaces: The scenario of every design point.
+        """
+        of_types = {
+            f"{numbers.format_money(kind.price, self.currency)} for a UAV of type {number}": None
+            for space in spaces
+            for number, kind in enumerate(space.fleet, 1)
+            if kind.price is not None
+        }
+        unused: tuple[str, ...] = ()
+        if all(_prices_all_uavs(space) for space in spaces):
+            unused = ("uav",)
+        return self._words_with([*of_types], unused)
+
+    def price_of_uavs(self, space: ScenarioSpace, uavs: int) -> float:
+        """What the first UAVs of a scenario cost; the price of a type replaces ``uav``."""
+        if not has_priced_types(space):
+            return self.uav * uavs
+        return sum(self.prices_of_uavs(space, uavs))
+
+    def prices_of_uavs(self, space: ScenarioSpace, uavs: int) -> list[float]:
+        """What each of the first UAVs of a scenario costs."""
+        prices = [type_of(space.fleet, uav).price for uav in range(uavs)]
+        return [self.uav if price is None else price for price in prices]
+
+    def purchase_of(self, price_of_uavs: Any, pads: Any) -> Any:
         """What UAVs and pads cost: once, or in each of the years over which they are paid off.
 
         The amount of a year is an annuity, ``P r (1 + r)^n / ((1 + r)^n - 1)``.
+
+        Args:
+            price_of_uavs: The price of all UAVs together.
+            pads: The number of pads.
         """
-        price = self.uav * uavs + self.pad * pads
+        price = price_of_uavs + self.pad * pads
         if self.years is None:
             return price
         if self.interest == 0:
@@ -218,7 +257,8 @@ class Costs(StrictTable):
         lost = self._sum_of(uavs, "down", mission, len(fleet), self.lost_uav)
         seconds = [space.units.slot if space.units else self.slot_seconds or 0 for space in spaces]
         hours = np.asarray(missions["slots"]) * np.array(seconds)[points] / 3600
-        amounts = {PURCHASE: self.purchase_of(fleet, pads[points])}
+        of_uavs = self._prices_of_fleets(spaces, points, fleet)
+        amounts = {PURCHASE: self.purchase_of(of_uavs, pads[points])}
         if self.years is not None:
             if price_of_battery:  # the recharge after the mission is paid for, too
                 charged = spent_battery(spaces, missions, uavs)
@@ -229,6 +269,18 @@ class Costs(StrictTable):
             "hours": self.paid_missions * self.hour * hours,
             "losses": self.paid_missions * self.lost_uav * lost,
         }
+
+    def _prices_of_fleets(
+        self, spaces: Sequence[ScenarioSpace], points: np.ndarray, fleet: np.ndarray
+    ) -> np.ndarray:
+        """(n,) what the UAVs of every mission cost together."""
+        prices = self.uav * fleet
+        for point, space in enumerate(spaces):
+            if has_priced_types(space):
+                totals = [self.price_of_uavs(space, uavs) for uavs in range(space.uavs[1] + 1)]
+                at_point = points == point
+                prices[at_point] = np.array(totals)[fleet[at_point]]
+        return prices
 
     @staticmethod
     def _sum_of(
@@ -244,6 +296,16 @@ class Costs(StrictTable):
                 "results of this version, in another results folder",
             )
         return np.bincount(mission, np.asarray(uavs[field]), missions)
+
+
+def has_priced_types(space: ScenarioSpace) -> bool:
+    """Whether a type of UAVs of a scenario has a price of its own."""
+    return any(kind.price is not None for kind in space.fleet)
+
+
+def _prices_all_uavs(space: ScenarioSpace) -> bool:
+    """Whether all types of UAVs of a scenario have prices of their own."""
+    return has_priced_types(space) and all(kind.price is not None for kind in space.fleet)
 
 
 def spent_battery(
@@ -262,9 +324,12 @@ def spent_battery(
     mission = np.repeat(np.arange(len(fleet)), fleet)
     number = np.arange(len(mission)) - np.repeat(np.cumsum(fleet) - fleet, fleet)
     most = max(space.uavs[1] for space in spaces)
-    batteries = np.stack([types_of(space, most)["battery"] for space in spaces])
-    start = batteries[np.asarray(missions["point"])[mission], number]
-    start = np.where(start > 0, start, np.asarray(missions["flying_time"])[mission])
+    types = np.stack([types_of(space, most) for space in spaces])
+    types = types[np.asarray(missions["point"])[mission], number]
+    drawn = np.asarray(missions["flying_time"])[mission]
+    start = np.where(types["battery"] > 0, types["battery"], drawn)
+    limit = types["charge_complete"].astype(np.int64)
+    start = np.where(limit > 0, np.minimum(start, limit), start)
     spent = start + np.asarray(uavs["charged"]) - np.asarray(uavs["battery"])
     return np.bincount(mission, spent, len(fleet))
 

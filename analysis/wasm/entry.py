@@ -79,6 +79,7 @@ ARRAYS: dict[str, tuple[Any, int]] = {
     "uav_records": (UAV_RECORD, 2),
     "operations": (OPERATIONS, 1),
     "prices": (_F8, 1),
+    "uav_prices": (_F8, 1),  # (I,) of UAVs whose types have prices, nan for those of ``prices``
     "factors": (_F8, 1),  # of the metrics, where their unit is that of a data sheet
     "values": (_F8, 2),  # (B, METRICS)
     "baseline": (_F8, 2),  # (B, METRICS) values of other missions with the same replications
@@ -300,6 +301,7 @@ def measure(table, count):
     values = _array2(table, _AT.values, _F8)
     factors = _array1(table, _AT.factors, _F8)
     prices = _array1(table, _AT.prices, _F8)
+    uav_prices = _array1(table, _AT.uav_prices, _F8)
     for row in range(count):
         record = missions[row]
         values[row, 0] = record.success
@@ -311,13 +313,13 @@ def measure(table, count):
             values[row, column] = operations[row, column - _MEASURED]
         values[row, _COST] = np.nan
         if len(prices) > 0:
-            values[row, _COST] = _cost(prices, mission.pads, record, uavs[row])
+            values[row, _COST] = _cost(prices, uav_prices, mission.pads, record, uavs[row])
         for column in range(values.shape[1]):
             values[row, column] *= factors[column]
 
 
 @kernel
-def _cost(prices, pads, record, uavs):
+def _cost(prices, uav_prices, pads, record, uavs):
     """The cost of a mission, summed up from the parts of ``dess.analysis.study.prices``."""
     uav = prices[0]
     pad = prices[1]
@@ -330,7 +332,12 @@ def _cost(prices, pads, record, uavs):
     for i in range(record.uavs):
         charged += uavs[i].charged
         lost += uavs[i].down
-    purchase = uav * record.uavs + pad * pads
+    price_of_uavs = uav * record.uavs
+    if len(uav_prices) > 0:
+        price_of_uavs = 0.0
+        for i in range(record.uavs):
+            price_of_uavs += uav if np.isnan(uav_prices[i]) else uav_prices[i]
+    purchase = price_of_uavs + pad * pads
     charging = missions * charge * charged / 100
     hours = missions * hour * (record.slots * seconds / 3600)
     return purchase + charging + hours + missions * lost_uav * lost

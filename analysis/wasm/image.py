@@ -20,7 +20,7 @@ import numpy as np
 from dess.analysis.metrics import metric_for_length, metric_of, size_of
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.sequences import SEQUENCE
-from dess.analysis.study.prices import Costs
+from dess.analysis.study.prices import Costs, has_priced_types
 from dess.analysis.wasm.entry import ARRAYS, METRICS, PRICES, TOTALS
 from dess.base.errors import InputError
 from dess.model.channel import empty_scratch, make_world
@@ -35,7 +35,7 @@ from dess.model.state import (
 from dess.model.view import check_team
 from dess.model.ways_home import reach_of, ways_home
 from dess.physics.chart import neighbours_of
-from dess.physics.fleet import legs
+from dess.physics.fleet import legs, type_of
 from dess.policies.heuristics import KINDS, plan_circuit
 from dess.scenario.scenario import ScenarioSpace
 
@@ -254,6 +254,7 @@ def _arrays_of(
         "uav_records": records.uavs,
         "operations": records.operations,
         "prices": _prices_of(space, costs),
+        "uav_prices": _prices_of_types(space, fleet),
         "factors": _factors_of(space),
         "values": np.zeros((missions, len(METRICS))),
         "baseline": np.zeros((missions, len(METRICS))),
@@ -301,6 +302,14 @@ def _prices_of(space: ScenarioSpace, costs: Costs | None) -> np.ndarray:
         seconds = space.units.slot
     values = costs.model_dump() | {"seconds": seconds}
     return np.array([values[name] for name in PRICES], np.float64)
+
+
+def _prices_of_types(space: ScenarioSpace, fleet: int) -> np.ndarray:
+    """(I,) the prices of UAVs whose types have their own, nan for the others; (0,) without any."""
+    if not has_priced_types(space):
+        return np.zeros(0)
+    prices = [type_of(space.fleet, uav).price for uav in range(fleet)]
+    return np.array([np.nan if price is None else price for price in prices])
 
 
 def _factors_of(space: ScenarioSpace) -> np.ndarray:

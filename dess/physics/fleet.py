@@ -60,13 +60,20 @@ class UavType(Section):
         examples=["7.5 m/s"],
     )
 
+    price: Number | None = Field(
+        None,
+        ge=0,
+        le=10**12,
+        description=Description(
+            "price of a UAV of this type", note="without it, that of the question: uav"
+        ),
+    )
+
     @model_serializer(mode="wrap")
-    def _without_units_that_are_not_given(
-        self, handler: SerializerFunctionWrapHandler
-    ) -> dict[str, Any]:
-        """Leave out the fields in units that are not given, and what follows from the others."""
+    def _without_what_is_not_given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out price and units that are not given, and what follows from the others."""
         values = handler(self)
-        off = {name for name in IN_UNITS if getattr(self, name) is None}
+        off = {name for name in (*IN_UNITS, "price") if getattr(self, name) is None}
         if self.cruise is not None:
             off.add("slots_per_cell")
         return {name: value for name, value in values.items() if name not in off}

@@ -28,7 +28,7 @@ from dess.analysis import distribution, load_results, tables
 from dess.analysis.answers import summary
 from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.cheapest import search_of
-from dess.analysis.answers.fleet.costs import cost_front_table, cost_parts_table
+from dess.analysis.answers.fleet.costs import cost_front_table, cost_parts_table, prices_in_words
 from dess.analysis.answers.fleet.figures import draw_cost_fronts
 from dess.analysis.answers.main_effects import draw_one_at_a_time
 from dess.analysis.answers.main_figure import draw_main_figure
@@ -173,7 +173,7 @@ html.show_parts(cost_parts_table(study))
 
 # %% tags=["if-costs"]
 html.show_parts(
-    html.write_markdown("{prices}", prices=study.prices.in_words),
+    html.write_markdown("{prices}", prices=prices_in_words(study)),
     draw_cost_fronts(study),
     cost_front_table(study),
     cost_parts_table(study),

@@ -12,6 +12,7 @@ from IPython.display import HTML, Markdown
 from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.answers.fleet.cheapest import search_of
+from dess.analysis.answers.fleet.costs import prices_in_words
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.missions import map_caption, typical_replication
 from dess.analysis.answers.settings.baseline import check_baseline
@@ -164,7 +165,7 @@ def list_commands(results: Results, missions: pd.DataFrame) -> html.Marked:
 def list_reasons(results: Results) -> html.Marked:
     """The prices, how sure the answer of a search is, the other answers, and the guarantee."""
     search = search_of(results)
-    lines = [f"- {text}" for text in (results.prices.in_words, *search.reason_sentences())]
+    lines = [f"- {text}" for text in (prices_in_words(results), *search.reason_sentences())]
     sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(search.guarantee_sentences()))
     return html.escape_sentences("\n".join(lines) + f"\n\n{sure}")
 

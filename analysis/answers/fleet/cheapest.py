@@ -21,6 +21,7 @@ from dess.analysis import numbers
 from dess.analysis.answers.fleet.costs import (
     cost_parts_in_words,
     mean_cost_parts,
+    prices_in_words,
 )
 from dess.analysis.answers.fleet.requirements import (
     Requirement,
@@ -55,6 +56,7 @@ from dess.analysis.metrics import COST, HOME, SUCCESS, Metric, metric_of
 from dess.analysis.names import DECISIONS
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.study.cheapest import Answer, Cheapest, CheapestChoice
+from dess.analysis.study.prices import has_priced_types
 from dess.scenario.fields import ZONE_PADS
 
 _WHY_NOT = {
@@ -421,7 +423,7 @@ class FleetSearch:
 
     def sentences(self) -> list[str]:
         """The answer, what is paid for, how sure it is, and the other answers."""
-        return [self.sentence(), self.results.prices.in_words, *self.reason_sentences()]
+        return [self.sentence(), prices_in_words(self.results), *self.reason_sentences()]
 
     def guarantee_sentences(self) -> list[str]:
         """What is guaranteed about the selected fleets of every policy; none without a search."""
@@ -504,13 +506,16 @@ def _ends_of_values(results: Results, point: int) -> dict[str, str]:
     table = values_of_points(results)
     space = results.scenario(point)
     prices = results.prices
-    price_of = {"uavs": prices.uav, "pads": prices.pad, ZONE_PADS: prices.pad * len(space.zones)}
+    cheapest_uav = min(prices.prices_of_uavs(space, max(len(space.fleet), 1)))
+    price_of = {"uavs": cheapest_uav, "pads": prices.pad, ZONE_PADS: prices.pad * len(space.zones)}
     price_of = {field: price for field, price in price_of.items() if field in table}
     spent = {
         field: price * (table[field][point] - 1)
         for field, price in price_of.items()
         if is_numeric_dtype(table[field])
     }
+    if "uavs" in spent and has_priced_types(space):
+        spent["uavs"] = prices.price_of_uavs(space, space.uavs[1]) - cheapest_uav
 
     def may_be_cheaper(field: str, end: str) -> bool:
         if end == "least" or not price_of.get(field):

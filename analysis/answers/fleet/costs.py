@@ -1,7 +1,7 @@
 """What fleets cost: their purchase, their missions, and the Pareto front of cost and a metric.
 
     results = load_results("results/fleets")  # of a study with a table [costs]
-    results.prices.in_words  # what is paid for
+    prices_in_words(results)  # what is paid for
     cost_front(results, "success")  # cost and success, with the probability of being on the front
 
 A setting is a policy at a design point, which is a fleet under a condition. Fleets are compared
@@ -68,6 +68,11 @@ def priced_settings(results: Results) -> pd.DataFrame:
     table.insert(1, "fleet", [words[point] for point in table["point"]])
     order = {"kind": "stable", "key": lambda texts: texts.map(of_points.index)}
     return table.sort_values("condition", ignore_index=True, **order)
+
+
+def prices_in_words(results: Results) -> str:
+    """What is paid for, and what for nothing."""
+    return results.prices.words_on(results.store.manifest.scenarios)
 
 
 @compute_once

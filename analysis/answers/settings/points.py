@@ -15,6 +15,7 @@ from dess.analysis import numbers
 from dess.analysis.metrics import METRICS
 from dess.analysis.names import DECISIONS, field_named, single_value
 from dess.analysis.results.tables import Results, compute_once
+from dess.analysis.study.prices import has_priced_types
 from dess.analysis.tables import INTERVALS
 from dess.scenario.fields import ZONE_PADS
 
@@ -80,7 +81,8 @@ def fleets_in_words(results: Results) -> list[str]:
     for point, others in enumerate(_fields_in_words(results, True)):
         space = results.scenario(point)
         words = []
-        if prices.uav or prices.lost_uav or "uavs" in table:
+        has_price = prices.uav or prices.lost_uav or has_priced_types(space)
+        if has_price or "uavs" in table:
             words.append(field_named("uavs").words(single_value([*space.uavs])))
         if prices.pad or {"pads", ZONE_PADS} & {*table}:
             for zone, pads in enumerate(space.zone_pads, 1):

@@ -11,7 +11,7 @@ from dess import InputError
 from dess.analysis import load_study
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.study.cheapest import Cheapest, MeanTest, Setting, _Search
-from dess.analysis.study.prices import PARTS, Costs, stranded_uavs
+from dess.analysis.study.prices import PARTS, Costs, spent_battery, stranded_uavs
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 from tests.analysis.study.test_selection import check_that_interruptions_leave_no_trace
 
@@ -63,10 +63,36 @@ def test_the_cost_of_a_year_by_hand():
     assert prices.of_lost(2) == 250 * 50 * 2
 
 
+def test_the_price_of_a_type_replaces_that_of_a_uav():
+    """UAV 0 and 2 of type 1 cost 300 each, UAV 1 of type 2 what the study says."""
+    types = [{"price": 300.0}, {}]
+    spaces = [space(uavs=[1, 3], fleet=types), space(uavs=3, pads=1)]
+    missions = {"point": [0, 0, 1], "uavs": [3, 1, 3], "slots": [9] * 3, "flying_time": [80] * 3}
+    prices = Costs(uav=100, pad=10, years=2, days=1)
+    parts = prices.parts(spaces, missions, {})
+    pads = 10 * spaces[0].charging_pads
+    assert parts["purchase"].tolist() == [(700 + pads) / 2, (300 + pads) / 2, (300 + 10) / 2]
+    assert prices.words_on(spaces).startswith("Prices: 300 EUR for a UAV of type 1, 100 EUR for a")
+    free = Costs(pad=10).words_on([space(uavs=1, fleet=[{"price": 300.0}])])
+    assert free.startswith("Prices: 300 EUR for a UAV of type 1 and 10.00 EUR for a charging pad.")
+    assert " for a UAV," not in free
+
+
+def test_the_battery_that_a_small_type_has_spent_counts_from_its_own():
+    sheet = {
+        **{"endurance": "40 min", "cruise": "15 m/s", "charging": "55 min", "horizon": "2 h"},
+        **{"data_rate": "3 MB/h", "bandwidth": "125 kHz", "snr": "12 dB at 2 km"},
+    }
+    spaces = [ScenarioSpace.of(uavs=2, fleet=[{"endurance": "20 min"}, {}], data_sheet=sheet)]
+    missions = {"point": [0], "uavs": [2], "flying_time": [100]}
+    uavs = {"charged": [20, 0], "battery": [45, 30]}
+    assert spent_battery(spaces, missions, uavs).tolist() == [50 + 20 - 45 + 100 - 30]
+
+
 def test_without_interest_a_price_is_paid_in_equal_parts():
     free, cheap = (Costs(uav=300, years=3, days=1, interest=r) for r in (0, 1e-12))
-    assert free.purchase_of(2, 0) == 200
-    assert cheap.purchase_of(2, 0) == pytest.approx(200, rel=1e-11)
+    assert free.purchase_of(600, 0) == 200
+    assert cheap.purchase_of(600, 0) == pytest.approx(200, rel=1e-11)
 
 
 def test_a_year_and_a_number_of_missions_exclude_each_other():

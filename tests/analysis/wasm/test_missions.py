@@ -123,8 +123,9 @@ def test_missions_leave_no_memory_behind():
     assert engine.memory_size() == size
 
 
-def test_metrics_costs_and_sums_are_those_of_the_records():
-    space = load_scenario("paper", **FAILURES)
+@pytest.mark.parametrize("fleet", [[], [{"price": 1234.5}, {}]])
+def test_metrics_costs_and_sums_are_those_of_the_records(fleet):
+    space = load_scenario("paper", **FAILURES, fleet=fleet)
     costs = Costs(uav=1000.0, pad=300.0, charge=0.4, hour=7.0, lost_uav=900.0, missions=3,
                   slot_seconds=12.0)  # fmt: skip
     engine = Engine(image.make_image(space, ["greedy"], 7, 30, costs=costs))

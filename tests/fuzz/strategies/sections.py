@@ -21,6 +21,7 @@ PLAIN = (
     "wind={strength=0.7, direction=225, gusts=0.3, seed=9}",
     "fleet=[{slots_per_cell=2, rate=0.5}, {flying_time=60, quota=9}]",
     'data_sheet={endurance="35 min", cruise="15 m/s", charging="40 min"}',
+    'fleet=[{endurance="20 min", charging="25 min", price=9000}, {cruise="5 m/s"}]',
     'data_sheet={wind="4 m/s from SW", max_speed="20 m/s"}',
     'data_sheet={bandwidth="125 kHz", snr="12 dB at 2 km", range="2 km", mtbf="100 h"}',
     'data_sheet.data_rate="3 MB/h"',
