@@ -21,7 +21,9 @@ def main() -> int:
     # The products of learned policies are small: threads of NumPy would only wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Found by its name: this floor must not import the floors above it.
-    return import_module("dess.reports.cli").main()
+    code = import_module("dess.reports.cli").main()
+    gc.freeze()  # at its end, Python would search all that was imported for most of a second
+    return int(code)
 
 
 if __name__ == "__main__":
