@@ -51,7 +51,8 @@ class LearnedPolicy:
         self.guarded = guarded
         self.layout = layout
         self._network, self._exact = (network(weights, t) for t in (np.float32, np.float64))
-        self._last: tuple[World | None, bytes, Any] = None, b"", observation
+        self._world: World | None = None  # that of the last missions
+        self._encoders: dict[bytes, Any] = {}  # of its seas, by what an encoder reads of them
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view.
@@ -83,25 +84,26 @@ class LearnedPolicy:
     def _rows_by_sea(self, view: View) -> Iterator[tuple[np.ndarray, Any]]:
         """The rows of a view sea by sea, with the encoder of the sea."""
         if self.layout is not None:
-            if self._last[0] is not view.world:
+            if self._world is not view.world:
                 self._require_layout(view, self.layout)
-                self._last = view.world, b"", self.observation
+                self._world = view.world
             yield np.arange(len(view)), self.observation
             return
         kinds = sea_kinds(view.state.missions)[view.mission]
-        for kind in np.unique(kinds):
+        for kind in np.unique(kinds) if kinds.any() else kinds[:1]:
             of_kind = np.flatnonzero(kinds == kind)
             mission = view.state.missions[view.mission[of_kind[0]]]
             yield of_kind, self._encoder_of_sea(mission, view.world)
 
     def _encoder_of_sea(self, mission: np.void, world: World) -> Any:
-        """The encoder of the sea of a mission; the last one is kept for the next slot."""
-        last_world, last_constants, encoder = self._last
+        """The encoder of the sea of a mission; those of a world are kept for the next slots."""
+        if self._world is not world:
+            self._world = world
+            self._encoders = {}
         constants = sea_constants(mission)
-        if last_world is not world or last_constants != constants:
-            encoder = self.observation(sea_of(mission, world))
-            self._last = world, constants, encoder
-        return encoder
+        if constants not in self._encoders:
+            self._encoders[constants] = self.observation(sea_of(mission, world))
+        return self._encoders[constants]
 
     def _require_layout(self, view: View, layout: Layout) -> None:
         learned = (layout.grid, *layout.zone)

@@ -107,10 +107,15 @@ def sea_constants(mission: Any) -> bytes:
 
 def sea_kinds(missions: np.ndarray) -> np.ndarray:
     """(B,) numbers that are equal for missions of a batch on the same sea."""
-    fields = [missions[name].reshape(len(missions), -1) for name in _FIELDS]
-    if all((field == field[:1]).all() for field in fields):
-        return np.zeros(len(missions), np.int64)
-    return np.unique(np.concatenate(fields, 1), axis=0, return_inverse=True)[1].ravel()
+    kinds = np.zeros(len(missions), np.int64)
+    for name in _FIELDS:
+        field = missions[name].reshape(len(missions), -1)
+        if (field == field[0]).all():  # the usual case, and quick
+            continue
+        for values in field.T:
+            numbers = np.unique(values, return_inverse=True)[1]
+            kinds = np.unique(kinds * len(missions) + numbers, return_inverse=True)[1]
+    return kinds
 
 
 class _Tables(NamedTuple):
