@@ -36,8 +36,13 @@ def plain(value: Any) -> Any:
         return value
 
 
+_SIMPLE = {bool, int, float, str, type(None)}
+
+
 def tuples(value: Any) -> Any:
     """Convert the lists that TOML gives to tuples, nested ones and those of tables included."""
+    if type(value) in _SIMPLE:  # nearly all, of a sea with many no-fly cells
+        return value
     value = plain(value)
     if isinstance(value, dict):
         return {key: tuples(item) for key, item in value.items()}
