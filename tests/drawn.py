@@ -217,7 +217,21 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
     if max(slots, default=1) == 1 and is_calm:
         # For seas with islands, guard and heuristics would be compiled once more.
         values = PLAIN_SEA | values
-    return draw(spaces(**values))
+    space = draw(spaces(**values))
+    if values["failures"] and draw(st.booleans()):
+        return ScenarioSpace.of(space, **draw(_failures_of_zones(len(space.rectangles))))
+    return space
+
+
+@st.composite
+def _failures_of_zones(draw: st.DrawFn, zones: int) -> dict[str, Any]:
+    """Failures of pads that differ from zone to zone."""
+    rates = st.lists(st.sampled_from([0.0, 0.2, 1.0]), min_size=zones, max_size=zones)
+    repairs = st.lists(st.sampled_from([0.0, 1.0, 6.0]), min_size=zones, max_size=zones)
+    return {
+        **{"failures.pad_rate": 0.0, "failures.pad_rates": draw(rates)},
+        **{"failures.pad_repair": 0.0, "failures.pad_repairs": draw(repairs)},
+    }
 
 
 _winds_in_units = st.builds(

@@ -60,7 +60,9 @@ MISSION = np.dtype(
         ("has_failures", np.int64),
         *fields(np.float64, "uav_rate uav_repair"),
         ("uav_data_lost", np.int64),
-        *fields(np.float64, "pad_rate pad_repair node_rate node_repair"),
+        *fields(np.float64, "pad_rate pad_repair node_rate node_repair"),  # of pads the largest
+        ("zone_pad_rate", np.float64, MOST_ZONES),
+        ("zone_pad_repair", np.float64, MOST_ZONES),
         ("node_data_lost", np.int64),
         # Channel; the length of a communication slot is the part of it that the duty cycle leaves.
         *fields(np.float64, "communication_slot_length shadowing_deviation"),
@@ -234,7 +236,10 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
     mission = np.zeros(1, MISSION)
     for name in set(values).intersection(MISSION.names or ()):
         mission[name] = values[name]
-    mission["zone_pads"][0, : len(scenario.zone_pads)] = scenario.zone_pads
+    zones = len(scenario.zone_pads)
+    mission["zone_pads"][0, :zones] = scenario.zone_pads
+    for name, of_zones in scenario.failures.zone_constants(zones).items():
+        mission[name][0, :zones] = of_zones
     return mission if scenario.is_extended else mission.view(PLAIN_MISSION)
 
 

@@ -1,16 +1,20 @@
 """Failures at random times: UAVs that are lost or grounded, pads out of order, silent nodes."""
 
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from dess.base.descriptions import Description
+from dess.base.errors import InputError
 from dess.base.kernels import inlined, kernel
 from dess.physics import streams
 from dess.physics.landing import is_over, stands
 from dess.physics.section import Probability, Section, Slots, for_sections
 
 MOST_PADS = 64  # charging pads that can fail: as many as the largest fleet has UAVs
+
+# What pads have for each zone, and what it replaces.
+_OF_ZONES = {"pad_rates": "pad_rate", "pad_repairs": "pad_repair"}
 
 
 class Failures(Section):
@@ -41,6 +45,12 @@ class Failures(Section):
             form="at least 1, or 0 if it never does",
         ),
     )
+    pad_rates: tuple[Probability, ...] = Field(
+        (), description=Description("the same for the pads of each zone, in place of pad_rate")
+    )
+    pad_repairs: tuple[Slots, ...] = Field(
+        (), description=Description("the same for the pads of each zone, in place of pad_repair")
+    )
     node_rate: Probability = Field(
         0.0, description="probability that a node falls silent in a mission slot"
     )
@@ -56,16 +66,55 @@ class Failures(Section):
         "kept", description="whether the data of a node are kept while it is silent"
     )
 
+    @model_validator(mode="after")
+    def _are_for_all_zones_or_for_each(self) -> Self:
+        for for_each, for_all in _OF_ZONES.items():
+            if getattr(self, for_each) and getattr(self, for_all):
+                raise InputError(for_each, f"is given beside {for_all}", "one of both")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_zones(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out the fields for each zone where they are not given."""
+        values = handler(self)
+        off = {name for name in _OF_ZONES if not getattr(self, name)}
+        return {name: value for name, value in values.items() if name not in off}
+
+    @property
+    def largest_pad_rate(self) -> float:
+        """The failure rate of the pads of the zone where it is largest; 0 if no pad fails."""
+        return max(self.pad_rates, default=self.pad_rate)
+
+    def zone_constants(self, zones: int) -> dict[str, list[float]]:
+        """The fields of ``MISSION`` that the section sets for each of so many zones."""
+        repairs = self.pad_repairs or (self.pad_repair,) * zones
+        return {
+            "zone_pad_rate": [*(self.pad_rates or (self.pad_rate,) * zones)],
+            "zone_pad_repair": [_chance_of(mean) for mean in repairs],
+        }
+
     def constants(self) -> dict[str, Any]:
-        """The fields of ``MISSION`` that the section sets; repairs as probabilities per slot."""
+        """The fields of ``MISSION`` that the section sets; repairs as probabilities per slot.
+
+        Those of pads are the largest of all zones.
+        """
         repairs = {name: mean for name, mean in self if name.endswith("_repair")}
         return {
             **dict(self),
-            **{name: 1 / mean if mean else 0.0 for name, mean in repairs.items()},
+            **{name: _chance_of(mean) for name, mean in repairs.items()},
+            "pad_rate": self.largest_pad_rate,
+            "pad_repair": max(map(_chance_of, self.pad_repairs or (self.pad_repair,))),
             "has_failures": self.is_on,
             "uav_data_lost": self.uav_data == "lost",
             "node_data_lost": self.node_data == "lost",
         }
+
+
+def _chance_of(mean: float) -> float:
+    """The probability per slot of what takes so many slots on average; 0 if it never happens."""
+    if mean:
+        return 1 / mean
+    return 0.0
 
 
 @for_sections
@@ -94,8 +143,11 @@ def strike_uavs(mission, uavs, lost):
 def strike_pads(mission, uavs):
     """Let pads fail and be repaired."""
     if mission.pad_rate > 0.0:
-        for j in range(mission.pads):
-            _strike_pad(mission, uavs, j)
+        j = 0
+        for zone in range(mission.zones):
+            for _ in range(mission.zone_pads[zone]):
+                _strike_pad(mission, uavs, zone, j)
+                j += 1
 
 
 @kernel
@@ -150,10 +202,10 @@ def _strike_uav(mission, u, i, lost):
 
 
 @inlined
-def _strike_pad(mission, uavs, j):
+def _strike_pad(mission, uavs, zone, j):
     """A UAV whose pad fails has to ask again, but it keeps the time of its request."""
     out = mission.pads_out[j]
-    probability = mission.pad_repair if out else mission.pad_rate
+    probability = mission.zone_pad_repair[zone] if out else mission.zone_pad_rate[zone]
     if not _happens(mission, streams.PAD_FAILURE, j, probability):
         return
     mission.pads_out[j] = 1 - out

@@ -177,7 +177,15 @@ def _unfit(c: Fields) -> Iterator[InputError]:
     if 0 < c.radio.range <= c.altitude:
         problem = f"{c.radio.range:g} m is too short"
         yield InputError("radio.range", problem, f"above {c.altitude:g} m")
-    if c.failures.pad_rate > 0 and c.charging_pads > MOST_PADS:
+    zones = len(c.rectangles)
+    for name, field in (("pad_rates", "pad_mtbf"), ("pad_repairs", "pad_repair")):
+        number = len(getattr(c.failures, name))
+        if number not in (0, zones):
+            where = f"failures.{name}"
+            if c.data_sheet.is_on:
+                where = f"data_sheet.{field}"
+            yield InputError(where, f"there are {number}", f"{zones}, one for each zone")
+    if c.failures.largest_pad_rate > 0 and c.charging_pads > MOST_PADS:
         problem = f"{c.charging_pads} are too many to fail"
         yield InputError("pads", problem, f"{MOST_PADS} at most")
     if not 0 <= low <= high <= MOST_DATA:

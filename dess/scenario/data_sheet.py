@@ -72,6 +72,7 @@ _LORA_CODING = 4 / 5
 # A step of a rate: from which SNR on it is which, and the limits of both.
 _STEP = (("dB", (-200, 200)), ("bit/s", (1e-6, 1e15)))
 
+_MOST_TIME, _MOST_REPAIR = 1e12, 1e6  # the longest times, and the longest repairs [slots]
 _MOST_CHARGING = 10_000  # the slots in which an empty battery is charged
 _NEGLIGIBLE = Fraction(1, 10**11)  # the error of an endurance that is computed
 
@@ -211,11 +212,21 @@ class DataSheet(Section):
     )
     mtbf: str | None = _quantity("s", "mean flying time of a UAV between failures", example="30 d")
     repair: str | None = _quantity("s", "mean time of a repair, or else it is lost", example="2 h")
-    pad_mtbf: str | None = _quantity(
-        "s", "mean time of a charging pad between failures", example="90 d"
+    pad_mtbf: str | tuple[str, ...] | None = _quantity(
+        "s",
+        Description(
+            "mean time of a charging pad between failures",
+            form="one for all, or a list for each zone",
+        ),
+        example="90 d",
     )
-    pad_repair: str | None = _quantity(
-        "s", "mean time of the repair of a pad, or else it is lost", example="1 d"
+    pad_repair: str | tuple[str, ...] | None = _quantity(
+        "s",
+        Description(
+            "mean time of the repair of a pad, or else it is lost",
+            form="one for all, or a list for each zone",
+        ),
+        example="1 d",
     )
 
     @classmethod
@@ -539,12 +550,24 @@ class DataSheet(Section):
             following["failures.uav_rate"] = 1 / self._slots("mtbf")
             following["failures.uav_repair"] = 0.0
             if self.repair:
-                following["failures.uav_repair"] = self._slots("repair", 1e6)
+                following["failures.uav_repair"] = self._slots("repair", _MOST_REPAIR)
         if self.pad_mtbf:
+            following |= self._pad_failures()
+        return following
+
+    def _pad_failures(self) -> dict[str, Any]:
+        """How often pads fail, and how long they are repaired: for all zones, or for each."""
+        following: dict[str, Any] = {"failures.pad_rate": 0.0, "failures.pad_repair": 0.0}
+        if isinstance(self.pad_mtbf, str):
             following["failures.pad_rate"] = 1 / self._slots("pad_mtbf")
-            following["failures.pad_repair"] = 0.0
-            if self.pad_repair:
-                following["failures.pad_repair"] = self._slots("pad_repair", 1e6)
+        else:
+            means = [self._slots_of("pad_mtbf", time, _MOST_TIME) for time in self.pad_mtbf or ()]
+            following["failures.pad_rates"] = tuple(1 / mean for mean in means)
+        if isinstance(self.pad_repair, str):
+            following["failures.pad_repair"] = self._slots("pad_repair", _MOST_REPAIR)
+        elif self.pad_repair:
+            means = [self._slots_of("pad_repair", time, _MOST_REPAIR) for time in self.pad_repair]
+            following["failures.pad_repairs"] = tuple(means)
         return following
 
     def origin(self, field: str) -> str:
@@ -556,7 +579,7 @@ class DataSheet(Section):
     def _refuse(self, name: str, problem: str, allowed: str) -> NoReturn:
         raise InputError(name, f"{shown(getattr(self, name))} {problem}", allowed)
 
-    def _slots(self, name: str, most: float = 1e12) -> float:
+    def _slots(self, name: str, most: float = _MOST_TIME) -> float:
         """A time in slots, of which there are at least one and no more than ``most``."""
         return self._slots_of(name, getattr(self, name), most)
 

@@ -421,8 +421,14 @@ class Fields(Strict):
         ]
 
 
-# What all nodes have in common, and what each has in its place: who sets the first means all.
-_EACH = {"arrival_rate": "arrivals.rates", "initial_data": "arrivals.initial"}
+# What all nodes or zones have in common, and what each has in its place: who sets the first means
+# all.
+_EACH = {
+    "arrival_rate": "arrivals.rates",
+    "initial_data": "arrivals.initial",
+    "failures.pad_rate": "failures.pad_rates",
+    "failures.pad_repair": "failures.pad_repairs",
+}
 
 
 def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:

@@ -45,7 +45,7 @@ def _beyond_the_paper(space: ScenarioSpace) -> list[list[str]]:
     mates = [f"mate_{j}_grounded" for j in range(1, space.uavs[1])]
     groups = [
         (failures.uav_rate > 0, ["grounded", *mates]),
-        (failures.pad_rate > 0, ["pads_out"]),
+        (failures.largest_pad_rate > 0, ["pads_out"]),
         (failures.node_rate > 0, [f"silent_{k}" for k in nodes]),
         (
             space.wind.is_on or space.consumption.is_on,

@@ -263,5 +263,5 @@ def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
 @for_sections
 def _is_given_up(mission, zone):
     """Whether no pad of one of several zones will ever work again."""
-    never = mission.zones > 1 and mission.pad_rate > 0.0 and mission.pad_repair == 0.0
-    return never and working_pads(mission, zone) == 0
+    never = mission.pad_rate > 0.0 and mission.zone_pad_repair[zone] == 0.0
+    return mission.zones > 1 and never and working_pads(mission, zone) == 0

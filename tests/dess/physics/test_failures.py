@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from dess import InputError
 from dess.model.mission import simulate
 from dess.model.state import BATTERY, QUOTA, TRUNCATED, constants_of, state_of
 from dess.model.view import View
@@ -62,6 +63,47 @@ CASES = {
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_failures_worked_by_hand(case):
     check(case)
+
+
+def test_the_pads_of_each_zone_have_their_own_times():
+    """Two pads of the first zone fail in each slot and are repaired in the next, those of the
+    second fail once and for all, and that of the third never does."""
+    zones = [{"cells": [0, 4, 2, 1], "pads": 2}, {"cells": [4, 4, 1, 1]}]
+    of_zones = {"pad_rates": [1.0, 1.0, 0.0], "pad_repairs": [1.0, 0.0, 0.0]}
+    sea = {"grid": 5, "zone": [0, 0, 2, 1], "nodes": [[2, 2]], "uavs": 1, "zones": zones}
+    space = ScenarioSpace.of(**sea, failures=of_zones, max_slots=4)
+    record = simulate(space, Commuter(), 1, 0, events=True)
+    log = record.events.columns()
+    pads = {
+        event: [(t, int(pad)) for e, t, pad in _rows(log) if e == event]
+        for event in ("pad_failure", "pad_repair")
+    }
+    assert pads == {
+        "pad_failure": [(1, 0), (1, 1), (1, 2), (1, 3), (3, 0), (3, 1)],
+        "pad_repair": [(2, 0), (2, 1), (4, 0), (4, 1)],
+    }
+    # One value is that of all zones, and whoever sets it means all.
+    both = ScenarioSpace.of(space, **{"failures.pad_rate": 0.25})
+    assert both.failures.pad_rates == () and constants_of(both)["zone_pad_rate"][0, 2] == 0.25
+    assert "pad_rates" not in ScenarioSpace.of(failures={"pad_rate": 0.1}).model_dump()["failures"]
+
+
+def _rows(log: Any) -> Any:
+    return zip(log["event"], log["time"], log["value"], strict=True)
+
+
+@pytest.mark.parametrize(
+    ("failures", "message"),
+    [
+        ({"pad_rates": [0.1, 0.2]}, "failures.pad_rates: there are 2; allowed: 1, one for each"),
+        ({"pad_repairs": [9.0] * 3}, "failures.pad_repairs: there are 3; allowed: 1, one for"),
+        ({"pad_rate": 0.1, "pad_rates": [0.2]}, "pad_rates: is given beside pad_rate; allowed"),
+    ],
+)
+def test_failures_of_zones_fit_to_the_zones(failures, message):
+    with pytest.raises(InputError) as raised:
+        ScenarioSpace.of(failures=failures)
+    assert message in str(raised.value)
 
 
 class Informed(Commuter):

@@ -56,6 +56,20 @@ def test_the_list_of_an_engineer_is_recomputed_by_hand():
     assert space.flying_time == space.charge_complete == (100, 100)
 
 
+def test_pads_of_all_zones_or_of_each_fail():
+    zones = [{"cells": [0, 0, 1, 1]}]
+    by_zone = {"pad_mtbf": ["90 d", "7 d"], "pad_repair": ["1 d", "42 s"]}
+    failures = _space(by_zone, zones=zones).failures
+    assert failures.pad_rates == pytest.approx((21 / (90 * 86400), 21 / (7 * 86400)))
+    assert failures.pad_repairs == pytest.approx((86400 / 21, 2))
+    mixed = _space({"pad_mtbf": ["90 d", "7 d"], "pad_repair": "42 s"}, zones=zones)
+    assert mixed.failures.pad_repair == 2 and not mixed.failures.pad_repairs
+    assert ScenarioSpace.of(mixed) == mixed
+    equal = ScenarioSpace.of(mixed, **{"data_sheet.pad_mtbf": "7 d"})
+    assert equal.failures.pad_rate == pytest.approx(21 / (7 * 86400))
+    assert not equal.failures.pad_rates
+
+
 def test_a_link_budget_gives_the_snr_of_friis_equation():
     budget = {"snr": None, "tx_power": "100 mW", "noise_figure": "6 dB", "frequency": "868 MHz"}
     space = _space(budget | {"free_space": "100 m"})
@@ -375,6 +389,13 @@ def test_a_quantity_of_another_library_is_refused_in_a_line(field):
         ({"tx_power": "20 dBm"}, {}, "snr: follows from tx_power"),
         ({"repair": "2 h"}, {}, "mtbf: is missing"),
         ({"pad_repair": "2 h"}, {}, "pad_mtbf: is missing"),
+        (
+            {"pad_mtbf": ["90 d", "7 d"]},
+            {},
+            "data_sheet.pad_mtbf: there are 2; allowed: 1, one for each zone",
+        ),
+        ({"pad_mtbf": ["90 d", "7"]}, {}, "pad_mtbf: '7' has no unit"),
+        ({"pad_mtbf": "90 d", "pad_repair": ["1 d", "2 s"]}, {}, "'2 s' is less than a slot of"),
         ({"reserve": "80 %"}, {}, "reserve: '80 %' is out of range; allowed: 0..60"),
         ({"reserve": "20 %"}, {"flying_time": 90}, "more than the reserve leaves; allowed: 80"),
         (

@@ -34,9 +34,11 @@ class Failures:
                 for number in [*packets.waiting[k]]:
                     self.nodes.lost += packets.lose(number, self.log.slot)
 
-    def _happens(self, kind: str, is_out: bool, **index: int) -> bool:
+    def _happens(self, kind: str, is_out: bool, zone: int = 0, **index: int) -> bool:
         """Whether the log says that something fails, or is repaired if it is out of order."""
         mean, rate = self.section[f"{kind}_repair"], self.section[f"{kind}_rate"]
+        mean = [*self.section.get(f"{kind}_repairs", ()), *[mean] * 8][zone]
+        rate = [*self.section.get(f"{kind}_rates", ()), *[rate] * 8][zone]
         chance = (1 / mean if mean else 0.0) if is_out else rate
         event = f"{kind}_repair" if is_out else f"{kind}_failure"
         happens = self.log.next_is(self.log.slot, event, **index)
@@ -68,7 +70,8 @@ class Failures:
     def _replay_pad(self, pad: int) -> list[int]:
         """Replay a pad; return the UAV whose pad has failed."""
         is_out = pad in self.pads.out
-        if not self._happens("pad", is_out, value=pad):
+        zone = next(zone for zone, pads in enumerate(self.pads.zones) if pad in pads)
+        if not self._happens("pad", is_out, zone, value=pad):
             return []
         self.log.take("pad_repair" if is_out else "pad_failure", self.log.slot, value=pad)
         self.pads.out ^= {pad}
