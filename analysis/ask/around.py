@@ -22,7 +22,7 @@ from dess.analysis.answers.fleet.requirements import (
     least_spare,
     requirements_of,
 )
-from dess.analysis.answers.settings.points import fleets_in_words
+from dess.analysis.answers.settings.points import fleets_in_words, pads_in_words
 from dess.analysis.ask.question import FIRST, LONGEST, Question
 from dess.analysis.metrics import COST, metric_of
 from dess.analysis.names import field_named
@@ -30,7 +30,7 @@ from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.tables import Results, load_results
 from dess.analysis.stats.differences import compare
 from dess.analysis.study.study import study_from
-from dess.analysis.tables import INTERVALS, Table, format_counts
+from dess.analysis.tables import INTERVALS, Table
 from dess.policies.registry import is_path
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 
@@ -112,10 +112,9 @@ def table_around(results: Results) -> Table:
     requirements = requirements_of(results)
     start, *rows = [point.values for point in changed_results.store.manifest.points]
     changes = [{f: v for f, v in row.items() if v != start.get(f)} for row in rows]
-    words = ["the fleet: " + fleets_in_words(changed_results)[0], *map(_in_words, changes)]
-    refused = [
-        change for change in _changed_fields(changed_results.scenario(0)) if change not in changes
-    ]
+    space = changed_results.scenario(0)
+    words = ["the fleet", *(_in_words(space, change) for change in changes)]
+    refused = [change for change in _changed_fields(space) if change not in changes]
     data = priced_settings(changed_results)
     data = data.assign(
         change=[words[point] for point in data["point"]],
@@ -135,13 +134,15 @@ def table_around(results: Results) -> Table:
         place = cells.columns.get_loc(metric.name) + 1
         cells.insert(place, f"Change of {metric.within}", ["", *changes_in_words])
     cells.insert(1, "Requirements", data["verdict"].astype(str))
-    cells["Missions"] = format_counts(data["n"])
+    fleet = fleets_in_words(changed_results)[0]
     caption = (
-        "The fleet, and one more of it: means, and changes on the same missions, with "
-        f"{INTERVALS}; requirements are met or missed if whole intervals say so, otherwise open"
+        f"The fleet of {fleet}, and one more of it: means, and changes on the same "
+        f"{data['n'][0]:,} missions, with {INTERVALS}; requirements are met or missed if whole "
+        "intervals say so, otherwise open"
     )
     if refused:
-        caption += f". Cannot be simulated here: {'; '.join(map(_in_words, refused))}"
+        refused_in_words = [_in_words(space, change) for change in refused]
+        caption += f". Cannot be simulated here: {'; '.join(refused_in_words)}"
     return Table(cells, caption, data)
 
 
@@ -178,6 +179,8 @@ def _verdict_on_row(row: pd.Series, requirements: Sequence[Requirement]) -> Verd
     return Verdict.of_all(verdicts)
 
 
-def _in_words(change: dict[str, Any]) -> str:
+def _in_words(space: ScenarioSpace, change: dict[str, Any]) -> str:
     ((field, value),) = change.items()
+    if field == "pads":
+        return pads_in_words(space, 1, value)
     return field_named(field).words(value)

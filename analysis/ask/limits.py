@@ -439,7 +439,7 @@ def _limit_in_words(limit: Limit) -> str:
     else:
         assumed = "none is assumed"
     if limit.broken == SHEET:
-        end = "the data sheet allows no more"
+        end = "in more wind, the UAVs of the data sheet cannot fly"
     elif limit.broken:
         end = f"beyond it, the {metric_of(limit.broken).within} breaks its requirement"
     else:

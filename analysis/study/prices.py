@@ -210,6 +210,10 @@ class Costs(StrictTable):
         prices = [type_of(space.fleet, uav).price for uav in range(uavs)]
         return [self.uav if price is None else price for price in prices]
 
+    def price_of_fleet(self, space: ScenarioSpace) -> float:
+        """What the largest fleet of a scenario and its pads cost when they are bought."""
+        return self.price_of_uavs(space, space.uavs[1]) + self.pad * space.charging_pads
+
     def purchase_of(self, price_of_uavs: Any, pads: Any) -> Any:
         """What UAVs and pads cost: once, or in each of the years over which they are paid off.
 

@@ -224,7 +224,8 @@ def test_the_fleet_is_asked_about_with_one_more(searched):
     assert around.is_known(searched)
     cells, caption, data = around.table_around(searched)
     assert "Cannot be simulated" not in caption
-    assert cells["What if"][0].startswith("the fleet: ")
+    assert cells["What if"][0] == "the fleet"
+    assert caption.startswith("The fleet of 1 UAV")
     for row in data.itertuples():
         is_met = row.success_low >= 0.6 and row.collection_ratio_low >= 0.3
         assert (row.verdict == "met") == (is_met and row.age_h_high <= 50 / 60)
@@ -318,8 +319,9 @@ FAILURES = limit("mtbf", "", "", 0.0, "success")
 @pytest.mark.parametrize(("found", "start", "end"), [
     (
         (WIND, FAILURES, DATA),
-        "What breaks it first is the wind: up to 9.79 m/s from SW (8 m/s from SW is assumed); the "
-        "data sheet allows no more. Limits are found by bisection to 5 % on 30 missions of the",
+        "What breaks it first is the wind: up to 9.79 m/s from SW (8 m/s from SW is assumed); in "
+        "more wind, the UAVs of the data sheet cannot fly. Limits are found by "
+        "bisection to 5 % on 30 missions of the",
         "The data: up to 24 MB/h (3 MB/h is assumed); no more was tried.",
     ),
     (

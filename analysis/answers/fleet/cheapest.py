@@ -223,6 +223,15 @@ class FleetAnswer:
             text += f" The tightest requirement is the {self.tightest_first[0].metric.within}."
         return text
 
+    def measured_in_words(self) -> str:
+        """What was measured of it by each requirement, as ``success 99.7 % [98.1, 99.9]``."""
+        texts = []
+        for requirement in self.tightest_first:
+            row = self.estimates(requirement.column)
+            measured = requirement.metric.written(*row[interval_columns(requirement.column)])
+            texts.append(f"{requirement.metric.within} {measured}")
+        return numbers.join_words(texts)
+
     def home_sentence(self) -> str:
         """Whether the UAVs of the fleet could fly home, where missions may end in the air."""
         if not self.points or not may_end_in_the_air(self.results):
@@ -359,8 +368,19 @@ class FleetSearch:
 
     @cached_property
     def best(self) -> FleetAnswer:
-        """The cheapest fleet of any policy under all conditions; that of the first one if none."""
-        return min(self.answers_for_all_conditions, key=lambda answer: answer.cost)
+        """The cheapest fleet of any policy under all conditions; that of the first one if none.
+
+        Of fleets that cost the same, it is the one that keeps the requirements with more to spare.
+        """
+        answers = self.answers_for_all_conditions
+        fleets = pd.concat([answer.fleets for answer in answers])
+        spare = least_spare(fleets, requirements_of(self.results))
+
+        def cost_and_need(answer: FleetAnswer) -> tuple[float, float]:
+            selected = answer.fleets.index[answer.fleets["selected"]]
+            return answer.cost, -spare[selected].max()
+
+        return min(answers, key=cost_and_need)
 
     @property
     def shown_point(self) -> int:
@@ -395,7 +415,10 @@ class FleetSearch:
                 continue
             if other.fleet == self.best.fleet:
                 if self.best.points:
-                    sentences.append(f"With the policy `{other.policy}`, it is the same fleet.")
+                    sentences.append(
+                        f"With the policy `{other.policy}`, it is the same fleet, with "
+                        f"{other.measured_in_words()}."
+                    )
             elif other.points:
                 sentences.append(
                     f"With the policy `{other.policy}`, it would be **{other.fleet}** for "

@@ -179,7 +179,7 @@ def format_amount(value: float) -> str:
 
 
 def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> str:
-    """The purchase and the missions of a fleet, to follow its cost; empty if only it is paid for.
+    """The parts of the cost of a fleet, to follow it; empty if only the purchase is paid for.
 
     Args:
         results: The study.
@@ -189,9 +189,12 @@ def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> 
     prices = results.prices
     table = mean_cost_parts(results)
     rows = table[(table["policy"] == policy) & table["point"].isin(fleet)]
-    per_gb = _cost_per_gb_in_words(results, rows)
+    end = _cost_per_gb_in_words(results, rows)
+    if prices.years is not None:
+        price = prices.price_of_fleet(results.scenario(fleet[0]))
+        end += f"; to buy it costs {numbers.format_money(price, prices.currency)}"
     if not prices.pays_for_missions:
-        return per_gb
+        return end
     means = rows[[*prices.part_names]].mean()
 
     def money(value: float) -> str:
@@ -206,7 +209,7 @@ def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> 
     return (
         f": {money(means[PURCHASE])} for the purchase and {total} for "
         f"{numbers.format_count(prices.paid_missions, 'mission')} "
-        f"({numbers.join_words(running)}){per_gb}"
+        f"({numbers.join_words(running)}){end}"
     )
 
 

@@ -18,6 +18,7 @@ from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.study.prices import has_priced_types
 from dess.analysis.tables import INTERVALS
 from dess.scenario.fields import ZONE_PADS
+from dess.scenario.scenario import ScenarioSpace
 
 _COUNTED = ("uavs", "pads", ZONE_PADS)  # the numbers of what has a price
 
@@ -85,11 +86,19 @@ def fleets_in_words(results: Results) -> list[str]:
         if has_price or "uavs" in table:
             words.append(field_named("uavs").words(single_value([*space.uavs])))
         if prices.pad or {"pads", ZONE_PADS} & {*table}:
-            for zone, pads in enumerate(space.zone_pads, 1):
-                number = field_named("pads").words(pads)
-                words.append(number if zone == 1 else f"{number} in zone {zone}")
+            words += [
+                pads_in_words(space, zone, pads) for zone, pads in enumerate(space.zone_pads, 1)
+            ]
         fleets.append(numbers.join_words([*words, *others]) or "the fleet of the scenario")
     return fleets
+
+
+def pads_in_words(space: ScenarioSpace, zone: int, pads: int) -> str:
+    """So many pads in zone 1, 2, ... in words; the zone is left out where there is no other."""
+    number = field_named("pads").words(pads)
+    if len(space.zone_pads) == 1:
+        return number
+    return f"{number} in zone {zone}"
 
 
 @compute_once

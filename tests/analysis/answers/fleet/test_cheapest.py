@@ -173,9 +173,13 @@ def searched_sea(folder, policies, requirements, values, **rule):
 
 def test_an_answer_says_what_is_guaranteed_names_all_that_is_paid_and_its_ends(tmp_path):
     values = {"uavs": [2, 3], "pads": [1, 2], "zones.pads": [1, 3]}
-    found = searched_sea(tmp_path, ["greedy", "random"], {"success": 0.6}, values)
+    asked = {"success": 0.6, "collection_ratio": 0.11}
+    found = searched_sea(tmp_path, ["random", "greedy"], asked, values)
     text = search_of(found).sentence()
-    assert "**2 UAVs, 1 pad and 1 pad in zone 2** for 2,200 EUR" in text
+    # Of two policies with the same fleet, the answer is the one that collects more.
+    assert text.startswith("With the policy `greedy`, the cheapest fleet")
+    assert "With the policy `random`, it is the same fleet, with collection ratio " in text
+    assert "**2 UAVs, 1 pad in zone 1 and 1 pad in zone 2** for 2,200 EUR" in text
     # Of two policies.
     first, other = search_of(found).reason_sentences()
     assert "With a probability of at least 95 %, its success is at least 50 %." in first
@@ -184,7 +188,7 @@ def test_an_answer_says_what_is_guaranteed_names_all_that_is_paid_and_its_ends(t
     assert {*priced_settings(found)["cost"]} == {
         1000 * u + 100 * p for u in (2, 3) for p in (2, 3, 4, 5)
     }
-    assert "1 pad and 3 pads in zone 2" in "".join(priced_settings(found)["fleet"])
+    assert "1 pad in zone 1 and 3 pads in zone 2" in "".join(priced_settings(found)["fleet"])
 
 
 @pytest.mark.parametrize("first", [0, pytest.param(1, marks=pytest.mark.slow)])
@@ -195,7 +199,7 @@ def test_the_answer_is_the_cheapest_fleet_of_any_policy(first, tmp_path):
     found = searched_sea(tmp_path, policies[:: 1 - 2 * first], asked, values, tolerance=0.03)
     search = search_of(found)
     fleets = search.selected_fleets().set_index("policy")["setting"].to_dict()
-    one, three = (f"{uavs}, 1 pad and 1 pad in zone 2" for uavs in ("1 UAV", "3 UAVs"))
+    one, three = (f"{uavs}, 1 pad in zone 1 and 1 pad in zone 2" for uavs in ("1 UAV", "3 UAVs"))
     # Or this test says little.
     assert fleets == {"greedy": one, "nearest": three}
     text = search.sentence()
