@@ -182,8 +182,8 @@ def test_an_answer_says_what_is_guaranteed_names_all_that_is_paid_and_its_ends(t
     assert "**2 UAVs, 1 pad in zone 1 and 1 pad in zone 2** for 2,200 EUR" in text
     # Of two policies.
     first, other = search_of(found).reason_sentences()
-    assert "With a probability of at least 95 %, its success is at least 50 %." in first
-    assert "With a probability of at least 97.5 %, its success is at least 50 %." in other
+    assert "With a probability of at least 95 %, its success is at least 50 % and " in first
+    assert "With a probability of at least 97.5 %, its success is at least 50 % and " in other
     assert "Of the values asked for, 2 UAVs is the least; a cheaper one may lie beyond." in first
     assert {*priced_settings(found)["cost"]} == {
         1000 * u + 100 * p for u in (2, 3) for p in (2, 3, 4, 5)
