@@ -129,16 +129,18 @@ def table_around(results: Results) -> Table:
     differences = compare(changed_results.missions, 0, columns, correction=None, of="point")
     differences = differences.set_index(["metric", "point"])[["difference", "low", "high"]]
     for metric in map(metric_of, columns):
-        of_changes = differences.loc[metric.column].loc[data["point"][1:]]
-        changes_in_words = [metric.change(*row) for row in of_changes.to_numpy()]
-        place = cells.columns.get_loc(metric.name) + 1
-        cells.insert(place, f"Change of {metric.within}", ["", *changes_in_words])
+        of_changes = differences.loc[metric.column].loc[data["point"][1:]].to_numpy()
+        means = data[metric.column][1:]
+        cells.loc[1:, metric.name] = [
+            f"{metric.amount(mean)} ({metric.change(*row)})"
+            for mean, row in zip(means, of_changes, strict=True)
+        ]
     cells.insert(1, "Requirements", data["verdict"].astype(str))
     fleet = fleets_in_words(changed_results)[0]
     caption = (
-        f"The fleet of {fleet}, and one more of it: means, and changes on the same "
-        f"{data['n'][0]:,} missions, with {INTERVALS}; requirements are met or missed if whole "
-        "intervals say so, otherwise open"
+        f"The fleet of {fleet}, and one more of it: means, and in brackets changes on the same "
+        f"{data['n'][0]:,} missions, with {INTERVALS}; requirements are met or missed if the whole "
+        "interval of each mean says so, otherwise open"
     )
     if refused:
         refused_in_words = [_in_words(space, change) for change in refused]
