@@ -132,7 +132,7 @@ def table_around(results: Results) -> Table:
         of_changes = differences.loc[metric.column].loc[data["point"][1:]].to_numpy()
         means = data[metric.column][1:]
         cells.loc[1:, metric.name] = [
-            f"{metric.amount(mean)} ({metric.change(*row)})"
+            f"{metric.write(mean)} ({metric.change(*row)})"
             for mean, row in zip(means, of_changes, strict=True)
         ]
     cells.insert(1, "Requirements", data["verdict"].astype(str))
