@@ -39,7 +39,7 @@ from typing import Any
 import numpy as np
 import simpy
 from simpy.events import ProcessGenerator
-from simpy.resources.resource import Request
+from simpy.resources.resource import PriorityRequest, Request
 
 from dess.base.kernels import kernel
 from dess.model import channel, rules
@@ -50,7 +50,7 @@ from dess.model.record import MissionRecord, empty_records, write_records
 from dess.model.state import LOST, check_seed, spaces_of, starts_of, state_of
 from dess.model.view import decide, team_of
 from dess.model.ways_home import ways_home
-from dess.physics.charging import queue_key
+from dess.physics.charging import may_change_order, queue_key
 from dess.physics.chart import Chart
 from dess.physics.failures import strike_nodes, strike_pads, strike_uavs
 from dess.physics.landing import is_over
@@ -164,6 +164,7 @@ class Mission:
         # The zones, and what the processes wait for.
         self.env = simpy.Environment()
         self.zones = [simpy.PriorityResource(self.env, pads) for pads in scenario.zone_pads]
+        self.queues_change = may_change_order(self.mission)
         self.zone_of_pad = [zone for zone in self.zones for _ in range(int(zone.capacity))]
         self.uav_processes: list[simpy.Process] = []
         self.turns = [Signal(self.env) for _ in self.fleet]
@@ -249,10 +250,23 @@ class Mission:
                 asking.append(uav)
             else:
                 others.append(uav)
+        if self.queues_change:
+            self.sort_queues()
         asking.sort(key=self.queue_key_of)
         for uav in asking + others:
             self.turns[uav].send()
         yield from self.announce(self.repaired_pads_return)
+
+    def sort_queues(self) -> None:
+        """Bring those who wait for pads into the order of this slot."""
+        for uav in self.fleet:
+            if self.waits_for_pad(uav):
+                request = self.uav_processes[uav].target
+                assert isinstance(request, PriorityRequest)
+                key: Any = (self.queue_key_of(uav), *request.key[1:])  # SimPy expects an integer
+                request.key = key
+        for zone in self.zones:
+            zone.queue[:] = sorted(zone.queue, key=lambda request: request.key)
 
     def update_batteries(self) -> None:
         """Charge and discharge the batteries for this slot, and prepare the search of the radio."""

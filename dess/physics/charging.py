@@ -65,11 +65,22 @@ def is_before(mission, u, other):
     return u.pad_request < other.pad_request
 
 
+def may_change_order(mission: np.void) -> bool:
+    """Whether UAVs in a queue may change their order while they wait.
+
+    They do if the lowest battery comes first and hovering takes more of it for some types of UAVs.
+    """
+    if not mission["lowest_battery_first"] or mission["landing"]:
+        return False
+    return bool(mission["has_consumption"] and mission["slowest"] > 1)
+
+
 def queue_key(mission: np.void, u: np.void, uav: int) -> tuple[int, int, int]:
     """What UAVs are sorted by in the queue for the pads of a zone, in the order of ``is_before``.
 
-    The key of a UAV is the same in every slot of its wait. The battery is that in slot 0, had the
-    UAV waited since then: waiting costs the same in every slot in the air, and nothing on ground.
+    The key of a UAV is the same in every slot of its wait, but where queues may change their order
+    (``may_change_order``). The battery is that in slot 0, had the UAV waited since then: waiting
+    costs the same in every slot in the air, and nothing on ground.
 
     Args:
         mission: ``MISSION`` record.
@@ -87,7 +98,7 @@ def queue_key(mission: np.void, u: np.void, uav: int) -> tuple[int, int, int]:
     if mission["has_consumption"]:
         battery = PERCENT * battery - int(u["remainder"])
         cost *= int(mission["slot_costs"][int(u["slots_per_cell"]) * ACTIONS - 1])  # of hovering
-    if mission["landing"]:
+    if mission["landing"] or may_change_order(mission):
         cost = 0
     return battery + cost * slot, request, uav
 

@@ -220,6 +220,19 @@ class _Watcher(Script):
         return super().act(view)
 
 
+def test_a_queue_changes_its_order_where_hovering_takes_more_of_some():
+    costs = [[1] * 5 for _ in range(8)]
+    costs[3][HOVER] = 2  # of a UAV that takes four slots for a cell
+    space = ScenarioSpace.of(
+        **{"grid": 4, "zone": [0, 0, 3, 2], "nodes": [[0, 0]], "pads": 1, "quota": 5},
+        **{"uavs": 4, "flying_time": 8, "charge_start": 10, "charge_complete": [11, 20]},
+        **{"charge_rate": 3, "max_slots": 20, "charging": {"order": "lowest-battery"}},
+        **{"initial_data": 0.0, "arrival_rate": 0.0, "consumption": {"slots": costs}},
+        fleet=[{}, {"flying_time": 8, "slots_per_cell": 4}, {}],
+    )
+    assert_same_alone(space, [Fidget()], 11, range(40))
+
+
 @BOTH
 def test_uav_i_has_policy_i_modulo_the_team_and_sees_no_decision_of_the_slot(run):
     one, other = _Watcher(), _Watcher()
