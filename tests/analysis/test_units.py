@@ -99,6 +99,7 @@ def test_a_search_answers_in_costs_of_a_year_and_of_a_gb(searched):
     assert f"(battery packs {parts['packs']:,.0f} EUR and hours {parts['hours']:,.0f} EUR)" in text
     assert "for 200 missions (" in text
     assert f"{best.cost / gb:,.0f} EUR per GB collected" in text
+    assert f"; to buy it costs {2 * parts['purchase']:,.0f} EUR." in text
     assert "paid off over 2 years at 0 % interest; the fleet makes 200 missions a year" in (
         " ".join(answer.answers())
     )

@@ -198,17 +198,13 @@ class FleetAnswer:
             return ""
         texts = []
         for requirement in self.tightest_first:
-            row = self.estimates(requirement.column)
-            measured = requirement.metric.written(*row[interval_columns(requirement.column)])
             texts.append(
-                f"its {requirement.metric.within} is {measured} ({requirement.bound_in_words} "
-                "required)"
+                f"its {requirement.metric.within} is {self._measured(requirement.column)} "
+                f"({requirement.bound_in_words} required)"
             )
         if SUCCESS not in [requirement.column for requirement in self.tightest_first]:
-            row = self.estimates(SUCCESS)
-            success = metric_of(SUCCESS).written(*row[interval_columns(SUCCESS)])
-            texts.append(f"its success is {success} (none is required)")
-        missions = f"{int(row['n']):,} missions"
+            texts.append(f"its success is {self._measured(SUCCESS)} (none is required)")
+        missions = f"{int(self.estimates(SUCCESS)['n']):,} missions"
         is_checked = not self.results.checks.empty
         if is_checked:
             source = f"{missions} that check it"
@@ -225,12 +221,16 @@ class FleetAnswer:
 
     def measured_in_words(self) -> str:
         """What was measured of it by each requirement, as ``success 99.7 % [98.1, 99.9]``."""
-        texts = []
-        for requirement in self.tightest_first:
-            row = self.estimates(requirement.column)
-            measured = requirement.metric.written(*row[interval_columns(requirement.column)])
-            texts.append(f"{requirement.metric.within} {measured}")
+        texts = [
+            f"{requirement.metric.within} {self._measured(requirement.column)}"
+            for requirement in self.tightest_first
+        ]
         return numbers.join_words(texts)
+
+    def _measured(self, column: str) -> str:
+        """The mean of a metric of the fleet and its interval, in words."""
+        row = self.estimates(column)
+        return metric_of(column).written(*row[interval_columns(column)])
 
     def home_sentence(self) -> str:
         """Whether the UAVs of the fleet could fly home, where missions may end in the air."""
