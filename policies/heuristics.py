@@ -15,12 +15,11 @@ from dess.model.guard.battery import (
     late_slots,
     margin,
     margin_slots,
-    must_charge,
     slots_needed,
     usable_battery,
 )
-from dess.model.guard.moves import contest, contests, safe_moves
-from dess.model.guard.parking import parking_cell, parking_memory, stays
+from dess.model.guard.moves import contest, contests, guide_uav
+from dess.model.guard.parking import parking_memory
 from dess.model.guard.ways import path_length, round_trip, slots_of_round_trip
 from dess.model.rules import data_left, legal_moves
 from dess.model.state import HOVER, STEP_X, STEP_Y
@@ -195,12 +194,7 @@ def choose_action(
     kind, mission, team, i, data, left, sensors, nodes, circuit, chart, reach, memory
 ):
     """The action of UAV ``i``; ``left`` are all data, ``memory`` is that of its parking cell."""
-    u = team[i]
-    charge = must_charge(mission, u, left)
-    home = stays(u)
-    if charge:
-        home = parking_cell(mission, team, i, left, chart, memory, reach)
-    safe = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
+    charge, home, safe = guide_uav(mission, team, i, left, chart, memory, reach, False)
     if kind == RANDOM:
         return choose_at_random(mission, team, i, safe)
     goal_x, goal_y = home.x, home.y
@@ -367,9 +361,18 @@ def _find_round_trip(slots):
                 gain = slots[before, order[a]] + slots[order[b], after]
                 gain -= slots[before, order[b]] + slots[order[a], after]
                 if gain > 0:
-                    order[a : b + 1] = order[a : b + 1][::-1].copy()
+                    _reverse(order, a, b)
                     shorter = True
     position = np.empty(count, np.int64)
     for step in range(count):
         position[order[step]] = step
     return position
+
+
+@inlined
+def _reverse(order, first, last):
+    """Reverse a part of an order."""
+    while first < last:
+        order[first], order[last] = order[last], order[first]
+        first += 1
+        last -= 1

@@ -293,8 +293,8 @@ def _pool_products(values, bias, factors, state, moves, at):
                 factor = factors[row, part, number]
                 for c in range(width):
                     best[c] = max(best[c], factor * (values[row, number, c] + bias[c]))
-            if part == 8:
-                state[row, at[0] : at[0] + width] = best
-            else:
-                first = at[1] + part // 4 * width
-                moves[part % 4, row, first : first + width] = best
+            for c in range(width):
+                if part == 8:
+                    state[row, at[0] + c] = best[c]
+                else:
+                    moves[part % 4, row, at[1] + part // 4 * width + c] = best[c]

@@ -71,9 +71,13 @@ def distances(chart, x, y, to):
 
 
 def parking_cell(mission, uavs, i, chart, data=1e6):
-    # Called by Python, and not compiled into a function of its own, which would take seconds.
     reach = reach_of(np.array([mission]), chart)
     memory = parking.parking_memory(chart, len(uavs))
+    return _parking_cell(mission, uavs, i, data, chart, memory, reach)
+
+
+@kernel
+def _parking_cell(mission, uavs, i, data, chart, memory, reach):
     return parking.parking_cell(mission, uavs, i, data, chart, memory, reach)
 
 
@@ -81,7 +85,12 @@ def plan_of_pads(mission, uavs, i, chart, data=1e6):
     """The plan, and what UAV ``i`` must keep for waits, when it charges, and if it gives way."""
     reach = reach_of(np.array([mission]), chart)
     plan = queues.plan_memory(len(uavs))
-    return plan, queues.plan_pads(mission, uavs, i, data, chart, plan, reach)
+    return plan, _plan_pads(mission, uavs, i, data, chart, plan, reach)
+
+
+@kernel
+def _plan_pads(mission, uavs, i, data, chart, plan, reach):
+    return queues.plan_pads(mission, uavs, i, data, chart, plan, reach)
 
 
 def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):

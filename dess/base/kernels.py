@@ -124,15 +124,6 @@ def kernel(function: Callable, **options: Any) -> Any:
     return compiled
 
 
-def large_kernel(function: Callable) -> Any:
-    """Compile a function like ``kernel``; functions that call it do not take its code in.
-
-    With the code of the return guard in each place that calls it, a first run would take a fifth
-    longer.
-    """
-    return kernel(function, forceinline=False)
-
-
 def _without_literals(template: Callable, args: Any, kws: Any) -> Any:
     """The types with which a compiled function calls another: a number in the code is any number.
 
@@ -168,8 +159,22 @@ def inlined(function: Callable, choose: Callable | None = None) -> Any:
         function: The function.
         choose: Returns, for the types of the arguments, the function to compile in its place.
     """
-    options: Any = _OPTIONS | {"forceinline": True, "_nrt": False, "pipeline_class": _InlinedOnly}
+    options: Any = _OPTIONS | {"forceinline": True, "_nrt": False, "pipeline_class": _LinkedOnly}
     overload(function, jit_options=options, strict=False)(choose or (lambda *args: function))
+    return function
+
+
+def shared(function: Callable) -> Any:
+    """Let compiled functions call a function that is too large to be inlined.
+
+    A function that Python calls has one copy of it, which all calls inside of it share. It is
+    compiled with them: on its own nothing would run it. For Python, the function is not compiled.
+
+    Args:
+        function: The function.
+    """
+    options: Any = _OPTIONS | {"forceinline": False, "pipeline_class": _LinkedOnly}
+    overload(function, jit_options=options, strict=False)(lambda *args: function)
     return function
 
 
@@ -197,7 +202,7 @@ class _Linked(_Code):
         self._finalized = True
 
 
-class _InlinedOnly(_Compiler):
+class _LinkedOnly(_Compiler):
     """The compiler of inlined functions."""
 
     library = _Linked

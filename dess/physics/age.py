@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from dess.base.descriptions import Description
-from dess.base.kernels import inlined, kernel, large_kernel
+from dess.base.kernels import inlined, shared
 from dess.physics.section import Number, Section, for_sections
 
 # The most communication slots of a mission whose ages are measured: the batch engine counts the
@@ -73,7 +73,7 @@ def mean_age(mission):
     return mission.slot - mission.newest / mission.nodes
 
 
-@large_kernel
+@shared
 def write_age(mission, sensors, teeth, out):
     """Write the ages of a mission of the slotted model into an ``OPERATIONS`` record."""
     m = mission.communication_slots
@@ -95,7 +95,7 @@ def write_age(mission, sensors, teeth, out):
     out.peak_age = peaks / ended if ended > 0 else math.nan
 
 
-@kernel
+@shared
 def age_of_teeth(lows, highs, weights):
     """The mean and the 99th percentile of the age over the time that the teeth take.
 
@@ -110,20 +110,27 @@ def age_of_teeth(lows, highs, weights):
     Returns:
         The mean and the percentile [slots]; nan if the teeth take no time.
     """
-    time = (weights * (highs - lows)).sum()
+    count = len(weights)
+    falling = np.empty(2 * count)  # the ends of the teeth, with a minus sign
+    changes = np.empty(2 * count)
+    time, area = 0.0, 0.0
+    for tooth in range(count):
+        falling[tooth], changes[tooth] = -highs[tooth], weights[tooth]
+        falling[count + tooth], changes[count + tooth] = -lows[tooth], -weights[tooth]
+        spent = weights[tooth] * (highs[tooth] - lows[tooth])
+        time += spent
+        area += spent * (highs[tooth] + lows[tooth])
     if time <= 0.0:
         return math.nan, math.nan
-    mean = (weights * (highs - lows) * (highs + lows)).sum() / (2.0 * time)
-    ends = np.concatenate((highs, lows))
-    changes = np.concatenate((weights, -weights))
-    order = np.argsort(-ends)
+    mean = area / (2.0 * time)
+    order = np.argsort(falling)
     passing, above = 0.0, 0.0  # teeth that pass the present age; time spent above it
-    age = ends[order[0]]
+    age = -falling[order[0]]
     for end in order:
-        spent = passing * (age - ends[end])
+        spent = passing * (age + falling[end])
         if above + spent >= _ABOVE * time:
             break
         above += spent
         passing += changes[end]
-        age = ends[end]
+        age = -falling[end]
     return mean, age - (_ABOVE * time - above) / passing

@@ -337,14 +337,33 @@ def guide(
         if b != last:
             last = b
             data = data_left(mission, residual[b])
-        charge = must_charge(mission, team[i], data)
-        home = stays(team[i])
-        if charge or find_all:
-            home = parking_cell(mission, team, i, data, chart, memory, reach)
-        charges[row] = charge
+        charges[row], home, safe[row] = guide_uav(
+            mission, team, i, data, chart, memory, reach, find_all
+        )
         write_home(homes[row], home)
-        safe[row] = safe_moves(mission, team, i, chart, charge, home, memory.planned, reach)
     return Guidance(charges, homes, safe)
+
+
+@inlined
+def guide_uav(mission, uavs, i, data, chart, memory, reach, find_home):
+    """What the guard tells UAV ``i``: whether it must charge, where, and its safe actions.
+
+    Args:
+        mission: ``MISSION`` record.
+        uavs: (I,) ``UAV`` records.
+        i: Index of the UAV.
+        data: Residual data of all nodes together [data units].
+        chart: ``Chart``.
+        memory: ``parking_memory``.
+        reach: The table of ``reach_of``.
+        find_home: Whether to find its parking cell if it need not charge, too; without, this is its
+            present cell.
+    """
+    charge = must_charge(mission, uavs[i], data)
+    home = stays(uavs[i])
+    if charge or find_home:
+        home = parking_cell(mission, uavs, i, data, chart, memory, reach)
+    return charge, home, safe_moves(mission, uavs, i, chart, charge, home, memory.planned, reach)
 
 
 def guard(view: View) -> np.ndarray:

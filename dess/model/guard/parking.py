@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.base.kernels import inlined, kernel, large_kernel
+from dess.base.kernels import inlined, kernel, shared
 from dess.model.guard.battery import late_slots, usable_battery
 from dess.model.guard.queues import QUEUE, TURN, Plan, may_wait, plan_pads, waits_in_zone
 from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
@@ -91,7 +91,7 @@ def _home(x, y, cells):
     return Home(np.int64(x), np.int64(y), np.int64(cells), none, none, none)
 
 
-@kernel
+@inlined
 def parking_cell(mission, uavs, i, data, chart, memory, reach):
     """The ``Home`` of UAV ``i``, the zone cell where it will charge.
 
@@ -155,7 +155,7 @@ def _chooses_before(uavs, j, other, turns):
     return uavs[j].battery < uavs[other].battery
 
 
-@large_kernel
+@shared
 def _choose(mission, uavs, i, chart, memory, reach):
     """The cell of UAV ``i``: of those that no teammate takes, the one that takes least battery.
 
@@ -225,7 +225,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     return cell, cells
 
 
-@large_kernel
+@shared
 def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
     """The cell of one zone, or of all (-1), that takes least battery.
 

@@ -266,8 +266,6 @@ EXCEPTIONS = {
         ("dess/envs/observations/sets.py", "np.interp"),
     },
     "compiled, it is a loop": {
-        ("dess/physics/age.py", "(weights * (highs - lows)).sum()"),
-        ("dess/physics/age.py", "(weights * (highs - lows) * (highs + lows)).sum()"),
         ("policies/planner/policy.py", "residual[b].sum()"),
     },
     "a sum of two": {
