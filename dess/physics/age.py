@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from dess.base.descriptions import Description
-from dess.base.kernels import inlined, shared
+from dess.base.kernels import inlined, kernel, shared
 from dess.physics.section import Number, Section, for_sections
 
 # The most communication slots of a mission whose ages are measured: the batch engine counts the
@@ -95,7 +95,7 @@ def write_age(mission, sensors, teeth, out):
     out.peak_age = peaks / ended if ended > 0 else math.nan
 
 
-@shared
+@kernel
 def age_of_teeth(lows, highs, weights):
     """The mean and the 99th percentile of the age over the time that the teeth take.
 
