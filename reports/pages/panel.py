@@ -25,8 +25,9 @@ from dess import InputError, simulate_batch
 from dess.analysis.answers.fleet.requirements import Requirement
 from dess.analysis.execution.effort import seconds_of
 from dess.analysis.figures import style
-from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, choose_units, metric_of
+from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, choose_units, metric_of, size_of
 from dess.analysis.names import RANGES, field_named, value_text
+from dess.analysis.numbers import format_quantity
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS, PRICES
 from dess.analysis.wasm.image import explain_refusal, make_image
@@ -45,6 +46,7 @@ from dess.reports.pages.html import (
     write_markdown,
 )
 from dess.reports.pages.page import PANEL, hidden_element
+from dess.scenario.data_sheet import Units
 from dess.scenario.fields import dotted, is_number
 from dess.scenario.scenario import ScenarioSpace, is_scenario_name
 
@@ -83,6 +85,8 @@ _LEVELS = {
     "charge_complete": (60, 70, 80, 90, 100),
     "failures.uav_rate": (0.0, 0.0005, 0.001, 0.002, 0.005),
 }
+# The names of settings that are told as a time where the scenario has a data sheet.
+_RATES = {"failures.uav_rate": "Failures of a UAV"}
 _EXAMPLE_SETTINGS = ("uavs", "pads", "arrival_rate")
 _SIDE = 8  # of the grid, the most numbers of UAVs and of pads
 # What a search can require, by the names of the command line.
@@ -154,7 +158,7 @@ class Panel(Document):
         metrics = [*_describe_metrics(baseline, self.costs)]
         data = {
             "settings": [
-                _describe_setting(key, values, _value_of(named, key))
+                _describe_setting(key, values, baseline, _value_of(named, key))
                 for key, values in settings.items()
             ],
             # What commands have to set beside these settings.
@@ -450,18 +454,36 @@ def _describe_sea(space: ScenarioSpace, fleet: int) -> dict[str, Any]:
     }
 
 
-def _describe_setting(key: str, values: Sequence[Any], default: Any) -> dict[str, Any]:
+def _describe_setting(
+    key: str, values: Sequence[Any], space: ScenarioSpace, default: Any
+) -> dict[str, Any]:
     """A setting for the page; a command need not name the default, which the scenario has."""
     field = field_named(key)
+    place = ""
+    if key == "pads" and space.zones:  # those of the other zones are settings of their own
+        place = " in zone 1"
+    name, unit = field.name, field.unit
+    texts = [value_text(value) for value in values]
+    if key in _RATES and space.units:
+        name, unit = _RATES[key], ""
+        texts = [_time_between(rate, space.units) for rate in values]
     return {
         "default": values.index(default) if default in values else None,
         "key": key,
-        "name": field.name,
-        "unit": field.unit,
+        "name": name + place,
+        "place": place,
+        "unit": unit,
         "values": values,
-        "texts": [value_text(value) for value in values],
+        "texts": texts,
         "options": [f"{key}={toml_value(value)}" for value in values],
     }
+
+
+def _time_between(rate: float, units: Units) -> str:
+    """A rate per mission slot as the mean time from one event to the next."""
+    if rate == 0.0:
+        return "none"
+    return f"one every {format_quantity(size_of('h', units) / rate)} h"
 
 
 def _describe_prices(costs: Costs | None) -> Iterator[dict[str, Any]]:
@@ -534,7 +556,7 @@ def describe_example() -> dict[str, Any]:
         "data": {
             "policy": "greedy",
             "settings": [
-                _describe_setting(key, values, _value_of(space, key))
+                _describe_setting(key, values, space, _value_of(space, key))
                 for key, values in settings.items()
             ],
             "metrics": [metric for metric in _describe_metrics(space, None) if metric["isOffered"]],

@@ -207,10 +207,12 @@ function fill() {
     if (!required.length) return;
     if (keyOfGrid() !== gridKey) {
         const error = GRID_ERROR / choices.length / required.length;
-        const textOf = (key, position) => data.settings.find((setting) => setting.key === key).texts[position];
+        const counted = (key, position, noun) => {
+            const {texts, place} = data.settings.find((setting) => setting.key === key);
+            return `${texts[position]} ${noun}${texts[position] === "1" ? "" : "s"}${place}`;
+        };
         const cells = choices.map(([uavs, pads, chosen]) => {
-            const counts = [[textOf("uavs", uavs), "UAV"], [textOf("pads", pads), "pad"]];
-            const name = counts.map(([count, noun]) => `${count} ${noun}${count === "1" ? "" : "s"}`).join(", ");
+            const name = `${counted("uavs", uavs, "UAV")}, ${counted("pads", pads, "pad")}`;
             return {uavs, pads, name, track: trackOf(`${uavs} ${pads}`, chosen, error)};
         });
         grid = new Grid(cells, required, data.metrics.find(({key}) => key === "cost"));

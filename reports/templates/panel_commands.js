@@ -12,6 +12,7 @@
  * @property {string} key
  * @property {string} name
  * @property {string} unit
+ * @property {string} place - in which of several zones; otherwise empty
  * @property {string[]} texts - of its values
  * @property {string[]} options - of the command line, for each value
  * @property {number | null} default - the position that a command need not name

@@ -68,17 +68,17 @@ def plot_costs(
         else:
             named = best
         for n, row in enumerate(named.to_dict("records") if len(named) <= MOST_NAMES else ()):
-            # so that neighbours do not overlap
+            # Above its interval or below it, in turn, so that neighbours do not overlap.
             if n % 2:
-                side = ("top", -5)
+                end, side, gap = row[f"{metric}_low"], "top", -5
             else:
-                side = ("bottom", 5)
-            ax.annotate(row["fleet"].replace(" and ", "\n"), (row[COST], row[metric]), va=side[0],
-                        fontsize=8, xytext=(7, side[1]), textcoords="offset points",
-                        **style.OUTLINED)  # fmt: skip
+                end, side, gap = row[f"{metric}_high"], "bottom", 5
+            ax.annotate(row["fleet"].replace(", ", "\n").replace(" and ", "\n"), (row[COST], end),
+                        va=side, ha="center", fontsize=8, xytext=(0, gap),
+                        textcoords="offset points", **style.OUTLINED)  # fmt: skip
         if required is not None:
             ax.axhline(required, color=style.MUTED, linestyle="--", linewidth=1.1, label="required")
-        ax.margins(x=0.12, y=0.12)
+        ax.margins(x=0.12, y=0.25)
         style.set_axis_unit(ax.xaxis, "", 5)
         if table[COST].max() > WIDE * table[COST].min() > 0:
             ax.set_xscale("log")

@@ -73,6 +73,19 @@ def test_every_whole_number_can_be_chosen():
         assert settings["pads"] == [*range(1, 17)]
 
 
+def test_settings_of_a_data_sheet_are_told_in_its_words():
+    """Which zone's pads they are, and failures as a time: 1 in 2000 slots of 21 s is 11.7 h."""
+    space = load_scenario("jade-bight")
+    told = {
+        key: panels._describe_setting(key, values, space, None)
+        for key, values in (("pads", [1, 2]), ("failures.uav_rate", [0.0, 0.0005]))
+    }
+    assert told["pads"]["name"] == "Number of charging pads in zone 1"
+    assert told["failures.uav_rate"]["texts"] == ["none", "one every 11.67 h"]
+    of_paper = panels._describe_setting("pads", [1, 2], load_scenario("paper"), None)
+    assert of_paper["name"] == "Number of charging pads"
+
+
 @pytest.mark.parametrize("name", ["paper", "bay", "jade-bight"])
 def test_the_settings_begin_with_those_of_the_scenario(name):
     """Where they stand at first, they change no byte of the arrays."""
