@@ -13,7 +13,7 @@ from dess.model.state import ACTION_NAMES, constants_of
 from dess.physics.arrivals import MOST_MESSAGES
 from dess.physics.consumption import PERCENT
 from dess.scenario.quantities import printed
-from dess.scenario.scenario import ScenarioSpace
+from dess.scenario.scenario import Constants, ScenarioSpace
 
 FAR_CELLS = 10  # the second distance [cells] of which the rate is told, if there is no range
 _MOST_STEPS = 6  # of which all are told
@@ -46,8 +46,8 @@ def sheet_facts(space: ScenarioSpace) -> dict[str, Any]:
         "messages_per_slot": [min(space.message_rates), max(space.message_rates)],
         "reach_m": reach.cells * units.cell,
         "has_limit": reach.has_limit,
-        "out_of_reach": _titles(space, reach.lost),
-        "beyond_margins": _titles(space, reach.margins),
+        "out_of_reach": node_titles(space, reach.lost),
+        "beyond_margins": node_titles(space, reach.margins),
         "largest_ratio": reach.largest_ratio,
         "assumed": space.data_sheet.assumed,
     }
@@ -151,10 +151,10 @@ def _reach_in_words(space: ScenarioSpace, reach: Reach) -> list[str]:
     if not reach.has_limit:
         sentences.append("every node is in range: no limit: give range or rates")
     if reach.lost:
-        names = listed(_titles(space, reach.lost))
+        names = listed(node_titles(space, reach.lost))
         sentences.append(f"out of reach of a UAV from a full battery: {names}")
     if reach.margins:
-        names = listed(_titles(space, reach.margins))
+        names = listed(node_titles(space, reach.margins))
         fleet = numbers.format_count(space.uavs[1], "UAV")
         sentences.append(f"beyond the margins that the return guard keeps for {fleet}: {names}")
     if _is_short(reach):
@@ -163,7 +163,7 @@ def _reach_in_words(space: ScenarioSpace, reach: Reach) -> list[str]:
     return sentences
 
 
-def _titles(space: ScenarioSpace, nodes: tuple[int, ...]) -> list[str]:
+def node_titles(space: Constants, nodes: Iterable[int]) -> list[str]:
     """The names of nodes, or their cells."""
     return [space.names[k] if space.names else f"{[*space.nodes[k]]}" for k in nodes]
 

@@ -16,6 +16,7 @@ from dess.analysis.results import parquet
 from dess.analysis.results.event_log import Events
 from dess.analysis.results.resimulate import Mission, resimulate
 from dess.analysis.results.tables import Results
+from dess.analysis.sheet import node_titles
 from dess.analysis.stats.intervals import summary
 from dess.base.files.reading import paths_in
 
@@ -97,6 +98,31 @@ def map_caption(mission: Mission, fleet: str) -> str:
         f"A mission with the policy {mission.policy} and {fleet}, replication "
         f"{mission.replication}: {fate_in_words(mission)}. n = 1."
     )
+
+
+def neglected_sentence(mission: Mission) -> str:
+    """From which ``NEGLECTED`` nodes the least share of their data is collected, in a sentence.
+
+    Args:
+        mission: The mission.
+
+    Returns:
+        The sentence; empty if no node had data.
+    """
+    nodes = len(mission.scenario.nodes)
+    had = data_by_node(mission.events, nodes)
+    collected = of_nodes(mission.events, ["communication"], nodes)
+    with_data = np.flatnonzero(had)
+    shares = collected[with_data] / had[with_data]
+    least = np.argsort(shares, kind="stable")[:NEGLECTED]
+    titles = node_titles(mission.scenario, with_data[least].tolist())
+    parts = [
+        f"{title} ({numbers.format_percent(share)} of its data)"
+        for title, share in zip(titles, shares[least], strict=True)
+    ]
+    if not parts:
+        return ""
+    return f"Least is collected from {numbers.join_words(parts)}."
 
 
 def typical_replication(missions: pd.DataFrame, metric: str) -> int:
@@ -237,6 +263,10 @@ def _mission_outcome(mission: Mission) -> dict[str, Any]:
         "Data left": f"{max(float(total) - float(collected), 0.0):.1f}",  # as they are printed
         "Fullest node left": f"{fullest['value']:.1f} at ({fullest['x']:.0f}, {fullest['y']:.0f})",
     }
+
+
+# How many nodes are named of which the least is collected.
+NEGLECTED = 3
 
 
 # A node counts as left behind if less than this share of all its data was collected.

@@ -14,7 +14,7 @@ from dess.analysis.answers import summary
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import prices_in_words
 from dess.analysis.answers.fleet.requirements import requirements_of
-from dess.analysis.answers.missions import map_caption, typical_replication
+from dess.analysis.answers.missions import map_caption, neglected_sentence, typical_replication
 from dess.analysis.answers.settings.baseline import check_baseline
 from dess.analysis.answers.settings.points import (
     fleets_in_words,
@@ -271,7 +271,8 @@ def draw_typical_mission(results: Results) -> list[Drawing]:
     fleet = fleets_in_words(results)[search.shown_point]
     alt = "Map of a typical mission of the fleet, with the names of the nodes"
     figure = map_figure(mission.events, mission.scenario)
-    caption = f"{map_caption(mission, fleet)} Its {metric_of(column).within} is the median."
+    median = f"Its {metric_of(column).within} is the median."
+    caption = f"{map_caption(mission, fleet)} {median} {neglected_sentence(mission)}"
     return [Drawing(figure, alt, caption)]
 
 

@@ -74,6 +74,17 @@ def test_what_is_collected_and_held():
     assert missions.left_behind(EVENTS, 2).tolist() == [False, True]
 
 
+def test_nodes_are_named_of_which_the_least_is_collected():
+    """1 of 5 data units, and 3.5 of 6; of a node without data nothing can be."""
+    space = load_scenario("paper", nodes=[[1, 1], [2, 2], [3, 3]])
+    mission = SimpleNamespace(scenario=space, events=EVENTS)
+    assert missions.neglected_sentence(mission) == (
+        "Least is collected from [2, 2] (20.0 % of its data) and [1, 1] (58.3 % of its data)."
+    )
+    silent = SimpleNamespace(scenario=space, events=pd.DataFrame(EVENTS).query("node < 0"))
+    assert missions.neglected_sentence(silent) == ""
+
+
 def test_the_far_edges_of_the_paper():
     far = missions.far_edges(PAPER)
     assert sorted(map(tuple, PAPER[far])) == sorted(
