@@ -21,6 +21,7 @@ from dess.analysis.stats.intervals import summary
 from dess.base.files.reading import paths_in
 
 FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
+NEGLECTED = 3  # how many nodes are named of which the least is collected
 
 
 def shared_collection_sentence(missions: Sequence[Mission]) -> str:
@@ -263,10 +264,6 @@ def _mission_outcome(mission: Mission) -> dict[str, Any]:
         "Data left": f"{max(float(total) - float(collected), 0.0):.1f}",  # as they are printed
         "Fullest node left": f"{fullest['value']:.1f} at ({fullest['x']:.0f}, {fullest['y']:.0f})",
     }
-
-
-# How many nodes are named of which the least is collected.
-NEGLECTED = 3
 
 
 # A node counts as left behind if less than this share of all its data was collected.

@@ -167,8 +167,9 @@ def inlined(function: Callable, choose: Callable | None = None) -> Any:
 def shared(function: Callable) -> Any:
     """Let compiled functions call a function that is too large to be inlined.
 
-    A function that Python calls has one copy of it, which all calls inside of it share. It is
-    compiled with them: on its own nothing would run it. For Python, the function is not compiled.
+    Each function that Python calls has one copy of it, which all calls inside of it share, and
+    which is compiled with it. Unlike an inlined function, it may create and return arrays. For
+    Python, it is not compiled either.
 
     Args:
         function: The function.
@@ -179,7 +180,7 @@ def shared(function: Callable) -> Any:
 
 
 class _Linked(_Code):
-    """The code of an inlined function: optimized and emitted with the functions that call it.
+    """The code of an inlined or shared function, optimized and emitted with those that call it.
 
     On its own nothing would run it, and both would take half of the time of a first run.
     """
@@ -203,7 +204,7 @@ class _Linked(_Code):
 
 
 class _LinkedOnly(_Compiler):
-    """The compiler of inlined functions."""
+    """The compiler of inlined and of shared functions."""
 
     library = _Linked
 

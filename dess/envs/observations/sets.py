@@ -112,7 +112,7 @@ def sea_kinds(missions: np.ndarray) -> np.ndarray:
         field = missions[name].reshape(len(missions), -1)
         if (field == field[0]).all():  # the usual case, and quick
             continue
-        for values in field.T:
+        for values in field.T[(field != field[0]).any(axis=0)]:
             numbers = np.unique(values, return_inverse=True)[1]
             kinds = np.unique(kinds * len(missions) + numbers, return_inverse=True)[1]
     return kinds
