@@ -164,7 +164,7 @@ def inlined(function: Callable, choose: Callable | None = None) -> Any:
     return function
 
 
-def shared(function: Callable) -> Any:
+def shared_kernel(function: Callable) -> Any:
     """Let compiled functions call a function that is too large to be inlined.
 
     Each function that Python calls has one copy of it, which all calls inside of it share, and

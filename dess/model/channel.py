@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dess.base.elementary import exp, hypot, log1p, log10
-from dess.base.kernels import inlined, kernel, shared
+from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.model.state import STEP_X, STEP_Y
 from dess.physics import fleet, streams
 from dess.physics.chart import Chart, read_only
@@ -164,7 +164,7 @@ def mean_snr_at(scenario: Fields, horizontal: np.ndarray) -> np.ndarray:
     return np.where(distance <= reach, scenario.edge_snr - loss, -math.inf)
 
 
-@shared
+@shared_kernel
 def _fill_row(u, row, nodes, mean_snr, order, means):
     """Fill the row of a step: the nodes by descending mean SNR (ties: lower index), and the SNR.
 

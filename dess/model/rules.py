@@ -18,7 +18,7 @@ three go on (see ``advance_without_uavs``).
 """
 
 from dess.base.elementary import exp
-from dess.base.kernels import inlined, kernel, shared
+from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.model import channel
 from dess.model.state import (
     ACTIVE,
@@ -493,7 +493,7 @@ def advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, se
     return True
 
 
-@shared
+@shared_kernel
 def _advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, search):
     """New data arrive, and pads and nodes fail and are repaired; nothing else happens."""
     mission.slot_collected = 0.0

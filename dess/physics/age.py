@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from dess.base.descriptions import Description
-from dess.base.kernels import inlined, kernel, shared
+from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.physics.section import Number, Section, for_sections
 
 # The most communication slots of a mission whose ages are measured: the batch engine counts the
@@ -73,7 +73,7 @@ def mean_age(mission):
     return mission.slot - mission.newest / mission.nodes
 
 
-@shared
+@shared_kernel
 def write_age(mission, sensors, teeth, out):
     """Write the ages of a mission of the slotted model into an ``OPERATIONS`` record."""
     m = mission.communication_slots

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from dess.base.descriptions import Description
-from dess.base.kernels import inlined, kernel, shared
+from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.physics.consumption import ACTIONS, PERCENT, has_consumption
 from dess.physics.section import Integer, Section, for_sections
 
@@ -220,7 +220,7 @@ def share_power(mission, uavs):
     return mission.power > 0
 
 
-@shared
+@shared_kernel
 def _share_power(mission, uavs, zone):
     """Charge the UAVs on the pads of a zone with its limited power, one after the other.
 

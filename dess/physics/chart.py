@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dess.base.kernels import inlined, kernel, shared
+from dess.base.kernels import inlined, kernel, shared_kernel
 
 Cell = tuple[int, int]
 Rectangle = tuple[int, int, int, int]  # x, y, width and height
@@ -189,7 +189,7 @@ def fill_ways(zones, neighbours, places, ways):
             _spread(neighbours, places[number : number + 1], ways[number], nearest)
 
 
-@shared
+@shared_kernel
 def length_around(zones, ways, rows, closed, x, y, to_x, to_y):
     """The cells on the shortest way between two cells that avoids closed cells, or ``FAR``.
 
@@ -281,7 +281,7 @@ def _distance(ways, rows, zones, x, y, to_x, to_y):
     return _distance_on_large_grid(ways, rows, zones, cell, to)
 
 
-@shared
+@shared_kernel
 def _distance_on_large_grid(ways, rows, zones, cell, to):
     if rows[to] >= 0:
         return np.int64(ways[rows[to], cell])

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.base.kernels import inlined, kernel, shared
+from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.model.guard.battery import late_slots, usable_battery
 from dess.model.guard.queues import QUEUE, TURN, Plan, may_wait, plan_pads, waits_in_zone
 from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
@@ -155,7 +155,7 @@ def _chooses_before(uavs, j, other, turns):
     return uavs[j].battery < uavs[other].battery
 
 
-@shared
+@shared_kernel
 def _choose(mission, uavs, i, chart, memory, reach):
     """The cell of UAV ``i``: of those that no teammate takes, the one that takes least battery.
 
@@ -225,7 +225,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     return cell, cells
 
 
-@shared
+@shared_kernel
 def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
     """The cell of one zone, or of all (-1), that takes least battery.
 

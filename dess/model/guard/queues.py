@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.base.kernels import inlined, shared
+from dess.base.kernels import inlined, shared_kernel
 from dess.model.guard.battery import battery_left, dearest_slot, must_charge
 from dess.model.guard.ways import battery_of_way
 from dess.model.state import HOVER
@@ -126,7 +126,7 @@ def _needs_pad(mission, u, data):
     return u.active and not u.grounded and (u.pad_request >= 0 or must_charge(mission, u, data))
 
 
-@shared
+@shared_kernel
 def plan_pads(mission, uavs, i, data, chart, plan, reach):
     """Plan where and when all UAVs charge that must; see the text of the module.
 
@@ -248,7 +248,7 @@ def _choose_zones(mission, uavs, chart, plan):
         _price(mission, uavs, chart, zone, plan)
 
 
-@shared
+@shared_kernel
 def _price(mission, uavs, chart, zone, plan):
     """The price of the best order in which a zone can charge its UAVs, which is written down."""
     count, asked = 0, True
@@ -278,7 +278,7 @@ def _price(mission, uavs, chart, zone, plan):
     return least + LACKING * max(count - chart.sizes[zone], 0)
 
 
-@shared
+@shared_kernel
 def _serve(mission, uavs, zone, order, plan):
     """Play the queue of a zone forward in an order; the price is returned."""
     pads = min(working_pads(mission, zone), mission.uavs)

@@ -4,7 +4,7 @@ import heapq
 
 import numpy as np
 
-from dess.base.kernels import inlined, shared
+from dess.base.kernels import inlined, shared_kernel
 from dess.model.guard.battery import (
     cannot_leave,
     dearest_slot,
@@ -79,7 +79,7 @@ def _closed(mission, uavs, i, j, chart, planned):
     return -1, -1
 
 
-@shared
+@shared_kernel
 def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     """The way around all cells that teammates close.
 
@@ -95,7 +95,7 @@ def _length_around(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     return min(around, through + longest_charge(mission, uavs))
 
 
-@shared
+@shared_kernel
 def _closed_cells(mission, uavs, i, chart, planned, to_x, to_y):
     """The numbers of the cells, counted row by row, that teammates close on the way to a cell."""
     width = chart.zones.shape[1]
@@ -134,7 +134,7 @@ def cells_home(mission, uavs, i, chart, planned, x, y, home):
     return path_length(mission, uavs, i, chart, None, x, y, home.x, home.y)
 
 
-@shared
+@shared_kernel
 def is_late(mission, uavs, i, chart, planned, home, kept, reach):
     """Whether the battery of UAV ``i`` is too low for its way home and the slots that it keeps.
 
@@ -148,7 +148,7 @@ def is_late(mission, uavs, i, chart, planned, home, kept, reach):
     return spent + dearest_slot(mission) + kept > usable_battery(mission, u)
 
 
-@shared
+@shared_kernel
 def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
     """The battery that UAV ``i`` needs to its parking cell, as it is and not as it may be most.
 
