@@ -441,10 +441,10 @@ class Cheapest(StrictTable):
         low, high = (self._in_words(shift) for shift in (-self.tolerance, self.tolerance))
         saving = numbers.format_money(self.indifference, search.settings[0].currency)
         words = (
-            f"for each policy by itself, with probability at least {self.confidence:g}, all of "
-            f"this holds: a setting that was found to meet the requirements has {low}; one that "
-            f"was found to miss them does not have {high}; a selected setting costs at most "
-            f"{saving} more than any that has {high}. The statement on costs takes "
+            f"for each policy by itself, three statements hold together with a probability of at "
+            f"least {self.confidence:g}. Each setting that is said to meet the requirements has "
+            f"{low}. No setting that is said to miss them has {high}. The selected setting costs "
+            f"at most {saving} more than any that has {high}. The statement on costs takes "
             "the differences of costs as nearly normal, apart from the losses of UAVs; where a "
             "rare mission is much more expensive than the others, it holds less often"
         )

@@ -32,9 +32,10 @@ TERMS = {
     "replication": "the number of a mission, which fixes all its random draws",
     "paired": "taken in missions with the same random draws",
     "upper bound": "no policy can expect to collect more",
-    "95 % intervals": "Wilson's for success; that of a bounded mean for the other shares, which is "
-    "wider and not symmetric; Student's t with a correction for skewness for other means, and with "
-    "an allowance for rare failures for differences",
+    "95 % intervals": "such an interval holds the true value in 95 of 100 studies. Of success it "
+    "is Wilson's; of other shares it holds for all distributions between 0 and 1, so it is wider; "
+    "of other means it is Student's t, corrected for skewness. Intervals of differences allow for "
+    "failures that are too rare to be seen",
     "Holm": "a correction of p-values for the number of comparisons",
 }
 _TERM = re.compile(rf"\b({'|'.join(TERMS)})\b")
