@@ -166,6 +166,10 @@ class Results:
         """The scenario of a design point."""
         return self.store.manifest.scenarios[point]
 
+    def given_values(self, point: int = 0) -> dict[str, Any]:
+        """The fields of the study's scenario that a design point sets, as they were given."""
+        return dict(self.study.set) | dict(self.store.manifest.points[point].values)
+
     def events(self, policy: str, point: int = 0, replication: int = 0) -> pd.DataFrame:
         """The event log of a mission, with the columns of ``dess.model.events.EventLog``.
 

@@ -93,7 +93,8 @@ html.write_markdown("{reading}", reading=READING)
 # With other settings, another policy or another number.
 
 # %%
-make_another(fig4.scenario(points[-1]), fig4.study.scenario, [shown_policy], seed)
+space, given = fig4.scenario(points[-1]), fig4.given_values(points[-1])
+make_another(space, fig4.study.scenario, [shown_policy], seed, given)
 
 # %% [markdown]
 # ## Two policies in step

@@ -54,7 +54,8 @@ html.lead_figure(
 )
 
 # %%
-make_panel(found.scenario(0), found.scenario(1), scenario, found.policies, seed)
+sides = found.scenario(0), found.scenario(1)
+make_panel(*sides, scenario, found.policies, seed, given=found.given_values(0))
 
 # %% [markdown]
 # ## Why

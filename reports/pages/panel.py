@@ -14,6 +14,7 @@ from base64 import b64decode
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
+from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any
 
@@ -48,9 +49,9 @@ from dess.reports.pages.html import (
 from dess.reports.pages.page import PANEL, hidden_element
 from dess.scenario.data_sheet import Units
 from dess.scenario.fields import dotted, is_number
-from dess.scenario.scenario import ScenarioSpace, is_scenario_name
+from dess.scenario.scenario import SEA, ScenarioSpace, is_scenario_name
 
-PAPER = "paper"  # the scenario that commands begin with where there is no other name
+PAPER = "paper"  # the scenario of the example of the index
 PORTION = 25  # the most missions of a call of the module
 MISSIONS = 1000  # of a run, unless the reader asks for others
 CHECKED = 100  # of the baseline, which are compared with those of Python
@@ -98,8 +99,9 @@ class Panel(Document):
     """What a panel is made of, which its page keeps, so that the panel can be made again.
 
     Attributes:
-        scenario: The name of the scenario on the command line.
-        named: The values of this scenario, which commands need not name.
+        scenario: The scenario on the command line: its name, or the name of its file.
+        given: The fields of this scenario that the page sets, and their values in A. Commands
+            repeat them.
         baseline: The values of the scenario that A begins with.
         variation: Those that B begins with.
         policy: The policy of both.
@@ -112,7 +114,7 @@ class Panel(Document):
     """
 
     scenario: str
-    named: dict[str, Any]
+    given: dict[str, Any]
     baseline: dict[str, Any]
     variation: dict[str, Any]
     policy: str
@@ -151,18 +153,16 @@ class Panel(Document):
             side: [values.index(_value_of(space, key)) for key, values in settings.items()]
             for side, space in zip(SIDES, (baseline, variation), strict=True)
         }
-        named = ScenarioSpace.of(**self.named)
-        ours, theirs = (dotted(space.model_dump(mode="json")) for space in (baseline, named))
-        fixed = [key for key in ours if key not in settings and ours[key] != theirs.get(key)]
+        fixed = [key for key in self.given if key not in settings]
         fleet = len(image.arrays["uavs"][0])
         metrics = [*_describe_metrics(baseline, self.costs)]
         data = {
             "settings": [
-                _describe_setting(key, values, baseline, _value_of(named, key))
+                _describe_setting(key, values, baseline, self._default_of(baseline, key))
                 for key, values in settings.items()
             ],
             # What commands have to set beside these settings.
-            "fixed": [f"{key}={toml_value(ours[key])}" for key in fixed],
+            "fixed": [f"{key}={toml_value(self.given[key])}" for key in fixed],
             "policies": [name for name in KINDS if name != "random-unguarded"],
             "metrics": metrics,
             "prices": [*_describe_prices(self.costs)],
@@ -171,6 +171,7 @@ class Panel(Document):
             "sea": _describe_sea(baseline, fleet),
             "product": METRICS.index(PRODUCT),
             "scenario": self.scenario,
+            "isFile": not is_scenario_name(self.scenario),
             "seed": self.seed,
             "check": {
                 "policy": self.policy,
@@ -192,6 +193,12 @@ class Panel(Document):
                 required=[*_describe_requirements(self.requirements, metrics)],
             ).data
         )
+
+    def _default_of(self, baseline: ScenarioSpace, key: str) -> Any:
+        """The value of a setting that commands need not name: that of the scenario, if known."""
+        if key in self.given:
+            return None
+        return _value_of(baseline, key)
 
     def _grid(self, settings: Mapping[str, Sequence[Any]]) -> dict[str, list[int]] | None:
         """The positions of the fleets of the buyer's grid: those of a search with prices."""
@@ -217,20 +224,22 @@ def make_panel(
     costs: Costs | None = None,
     requirements: Sequence[Requirement] = (),
     varied: Mapping[str, Sequence[Any]] = MappingProxyType({}),
+    given: Mapping[str, Any] = MappingProxyType({}),
 ) -> HTML | Markdown:
     """The panel of a baseline and a variation; a sentence instead where it is not possible.
 
     Args:
         baseline: The scenario that A begins with.
         variation: The one that B begins with.
-        scenario: The name of the scenario, or its file, which a reader may not have: commands then
-            set all fields.
+        scenario: The name of the scenario, or the path of its file. Commands name the file alone,
+            since a page has no path of a machine.
         policies: The policies of the page; the first that the module knows is the one to begin
             with, otherwise ``greedy``.
         seed: The seed of the missions.
         costs: The prices, if the missions have costs. The panel has no costs of a year.
         requirements: Those that the page is about.
         varied: By setting, the values that the study of the page has, which the panel has too.
+        given: The fields of the scenario that the page sets, and their values in A.
     """
     note = _NO_NOTE
     if costs is not None and costs.years is not None:
@@ -250,12 +259,16 @@ def make_panel(
             if key in _OFFERED
         },
     }
-    panel = _panel_of(baseline, variation, scenario, policies, seed).model_copy(update=more)
-    return _show_panel(panel, note)
+    panel = _panel_of(baseline, variation, scenario, policies, seed, given)
+    return _show_panel(panel.model_copy(update=more), note)
 
 
 def make_another(
-    space: ScenarioSpace, scenario: str, policies: Sequence[str], seed: int
+    space: ScenarioSpace,
+    scenario: str,
+    policies: Sequence[str],
+    seed: int,
+    given: Mapping[str, Any] = MappingProxyType({}),
 ) -> HTML | Markdown:
     """What shows any single mission of a scenario, or of settings that its reader chooses.
 
@@ -264,8 +277,9 @@ def make_another(
         scenario: Its name, as in ``make_panel``.
         policies: The policies of the page, as in ``make_panel``.
         seed: The seed of the missions.
+        given: The fields of the scenario that the page sets, and their values.
     """
-    panel = _panel_of(space, space, scenario, policies, seed)
+    panel = _panel_of(space, space, scenario, policies, seed, given)
     return _show_panel(panel.model_copy(update={"is_single": True}))
 
 
@@ -275,12 +289,13 @@ def _panel_of(
     scenario: str,
     policies: Sequence[str],
     seed: int,
+    given: Mapping[str, Any],
 ) -> Panel:
     """A panel of two scenarios without costs and requirements."""
-    named = scenario if is_scenario_name(scenario) else PAPER
+    name = scenario if is_scenario_name(scenario) else PurePath(scenario).name
     return Panel(
-        scenario=named,
-        named=ScenarioSpace.of(named).model_dump(mode="json"),
+        scenario=name,
+        given={field: value for field, value in dotted(dict(given)).items() if field != SEA},
         baseline=baseline.model_dump(mode="json"),
         variation=variation.model_dump(mode="json"),
         policy=next((name for name in policies if name in KINDS), "greedy"),

@@ -249,7 +249,8 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
     space, manifest = results.scenario(point), results.store.manifest
     name = manifest.points[point].values.get(SEA, results.study.scenario)
     about = results.study.costs, requirements_of(results), varied_values(results)
-    return make_panel(space, space, name, [policy], manifest.seed, *about)
+    given = results.given_values(point)
+    return make_panel(space, space, name, [policy], manifest.seed, *about, given)
 
 
 def draw_typical_mission(results: Results) -> list[Drawing]:

@@ -6,6 +6,7 @@
 const root = document.getElementById("another");
 const data = JSON.parse(document.getElementById("panel-data").textContent);
 const MOST = 99_999; // the largest number of a mission
+const BEFORE = "The mission below is of the settings before. Press Show this mission for the new one.";
 /** @type {(name: string) => any} */
 const find = (name) => root.querySelector(`[data-panel="${name}"]`);
 /** @type {(name: string) => any} */
@@ -15,6 +16,7 @@ const sliders = data.settings.map(({key}) => named(`a-${key}`)), policy = named(
 let module;
 /** @type {Image} */
 let image;
+let shown = ""; // what the mission that is shown was simulated with
 
 /** @returns {Choice} */
 const choice = () => ({positions: sliders.map((input) => Number(input.value)), policy: policy.value});
@@ -26,13 +28,18 @@ function show() {
         sliders[n].setAttribute("aria-valuetext", text);
         sliders[n].parentElement.querySelector("output").textContent = text;
     });
-    find("command").textContent = simulateCommand(data, choice(), asked());
+    const command = simulateCommand(data, choice(), asked()), isStale = shown !== "" && command !== shown;
+    find("command").textContent = shown || command;
+    find("results").classList.toggle("stale", isStale);
+    find("before").hidden = !isStale;
+    find("before").textContent = isStale ? BEFORE : "";
 }
 
 // Simulate the mission and show it from its beginning.
 function play() {
     const chosen = choice(), replication = asked();
     number.value = replication;
+    shown = simulateCommand(data, chosen, replication);
     const setting = Object.fromEntries(data.settings.map(({key}, n) => [key, chosen.positions[n]]));
     const engine = new Engine(module, image, setting);
     engine.follow(image.policies[chosen.policy]);

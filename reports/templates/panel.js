@@ -8,6 +8,7 @@ const root = document.getElementById("panel");
 const data = JSON.parse(document.getElementById("panel-data").textContent);
 const SIDES = ["a", "b"], NAMES = {a: "A", b: "B"};
 const MOST_MISSIONS = 100_000; // of a run
+const BEFORE = "The results below are of the settings before. Press Run for those of the new settings.";
 const NARROW = "(max-width: 40rem)"; // where settings are folded at first
 
 /** @type {(name: string) => any} */
@@ -47,6 +48,9 @@ const choice = (side) => ({
 const settingOf = ({positions}) => Object.fromEntries(data.settings.map(({key}, n) => [key, positions[n]]));
 const isSame = () => keyOf(choice("a")) === keyOf(choice("b"));
 const asked = () => Math.min(Math.max(Math.round(Number(missions.value)) || 0, 1), MOST_MISSIONS);
+// What the results of a run depend on; not the number of missions, nor what is required.
+const keyOfRun = () => [...SIDES.map((side) => keyOf(choice(side))), ...prices()].join(" ");
+const isStale = () => run !== null && run.key !== keyOfRun();
 /** @type {(chosen: Choice) => boolean} */
 const isChecked = (chosen) => keyOf(chosen) === keyOf(data.check);
 
@@ -68,6 +72,8 @@ class Run extends Comparison {
         super(Object.fromEntries(sides.map((side) => [side, trackOf(side, choice(side))])), asked());
         /** @type {Record<string, Choice>} */
         this.choices = Object.fromEntries(sides.map((side) => [side, choice(side)]));
+        this.key = keyOfRun();
+        this.command = commandOf();
     }
 
     next() {
@@ -115,7 +121,6 @@ function start() {
     stop();
     tidy();
     find("mission").hidden = true;
-    find("results").classList.remove("stale");
     data.check.compared = 0;
     data.check.differing = null;
     run = new Run();
@@ -148,10 +153,13 @@ function show(why = "") {
     showRequired();
     if (!run) return;
     find("results").hidden = false;
+    find("results").classList.toggle("stale", isStale());
+    find("before").hidden = !isStale();
     data.metrics.forEach(showMetric);
     showVerdicts();
     showDots();
-    find("status").textContent = [stateInWords(isRunning), why, checkInWords()].filter(Boolean).join(" ");
+    const states = isStale() ? [BEFORE] : [stateInWords(isRunning), why, checkInWords()];
+    find("status").textContent = states.filter(Boolean).join(" ");
 }
 
 /** @param {string} side */
@@ -420,17 +428,14 @@ function playerOf(side) {
     return figure;
 }
 
+// The study of what is chosen: both settings with both policies.
 function commandOf() {
-    const [a, b] = SIDES.map(choice), count = Math.max(asked(), 2);
-    const common = [`--scenario ${quoted(data.scenario)}`, `--seed ${data.seed}`, `--missions ${count}`];
-    const isEqual = (_, n) => a.positions[n] === b.positions[n], areEqual = data.settings.every(isEqual);
-    if (a.policy === b.policy && !areEqual)
-        return ["dess what-if", `--policy ${quoted(a.policy)}`, ...allOptionsOf(data, a, "--baseline"),
-            ...optionsOf(data, b, "--set", isEqual), ...common].join(" ");
-    const evaluate = (chosen, policies) => ["dess evaluate", ...policies.map((policy) => `--policy ${quoted(policy)}`),
-        ...allOptionsOf(data, chosen, "--set"), ...common].join(" ");
-    if (areEqual) return evaluate(a, [...new Set([a.policy, b.policy])]);
-    return [a, b].map((chosen) => evaluate(chosen, [chosen.policy])).join("\n");
+    const [a, b] = SIDES.map(choice), policies = [...new Set([a.policy, b.policy])].join(",");
+    const common = [`--policy ${quoted(policies)}`, `--scenario ${quoted(data.scenario)}`,
+        `--seed ${data.seed}`, `--missions ${Math.max(asked(), 2)}`];
+    const isEqual = (_, n) => a.positions[n] === b.positions[n];
+    if (data.settings.every(isEqual)) return ["dess sweep", ...allOptionsOf(data, a, "--set"), ...common].join(" ");
+    return ["dess what-if", ...allOptionsOf(data, a, "--baseline"), ...optionsOf(data, b, "--set", isEqual), ...common].join(" ");
 }
 
 // The state of the panel in the address, after #: text of strangers, of which only known names and
@@ -487,12 +492,9 @@ async function copy(button, text) {
     setTimeout(() => { button.textContent = label; }, 1500);
 }
 
-// What is shown is of the settings before, until the reader runs the missions of the new ones.
 function change() {
     if (crew.job) stop();
     else show();
-    find("results").classList.toggle("stale", Boolean(run));
-    if (run) find("status").textContent = "These numbers are of the settings before: press Run.";
 }
 
 // The intervals hold for any requirement, so that it may be changed without new missions.
@@ -547,8 +549,8 @@ async function open() {
     find("link").addEventListener("click", (event) => copy(event.target, addressOf()));
     find("copy").addEventListener("click", (event) => copy(event.target, commandOf()));
     find("dots").addEventListener("click", pick);
-    const saveTable = (name, rows) => save(name, new Blob([csvOf(rows, commandOf())], {type: "text/csv"}));
-    find("csv").addEventListener("click", () => saveTable("exploration.csv", rowsOfMissions()));
+    find("csv").addEventListener("click", () => save("exploration.csv",
+        new Blob([csvOf(rowsOfMissions(), run.command)], {type: "text/csv"})));
     find("picture").addEventListener("click", () => find("dots").toBlob((content) => save("exploration.png", content)));
     for (const kind of /** @type {const} */ (["typical", "loss", "worst"])) find(kind).addEventListener("click", () => pickKind(kind));
     show();

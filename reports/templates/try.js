@@ -17,6 +17,9 @@ let image;
 let crew;
 /** @type {Comparison | null} */
 let run = null;
+let runKey = ""; // the positions of its settings
+const BEFORE = "The results below are of the settings before. Press Run for those of the new settings.";
+const keyOfChoice = () => sliders.map(({value}) => value).join(" ");
 
 /** @type {(name: string, positions: number[]) => Track} */
 function trackOf(name, positions) {
@@ -27,6 +30,7 @@ function trackOf(name, positions) {
 
 function start() {
     crew.end();
+    runKey = keyOfChoice();
     const positions = sliders.map((input) => Number(input.value));
     const comparison = run = new Comparison({a: trackOf("a", data.start.a), b: trackOf("b", positions)}, MISSIONS);
     crew.begin({
@@ -36,7 +40,6 @@ function start() {
         take: (answer) => { comparison.take(answer); show(); },
     });
     find("results").hidden = false;
-    find("results").classList.remove("stale");
     show();
 }
 
@@ -49,8 +52,9 @@ function show(why = "") {
     const isRunning = Boolean(crew.job && !crew.job.isOver);
     find("stop").disabled = !isRunning;
     if (!run) return;
-    const count = Math.min(run.count("a"), run.count("b"));
-    find("status").textContent = `${grouped(count)} missions of each${isRunning ? ", running" : ""}. ${why}`.trim();
+    const count = Math.min(run.count("a"), run.count("b")), isStale = runKey !== keyOfChoice();
+    find("results").classList.toggle("stale", isStale);
+    find("status").textContent = isStale ? BEFORE : `${grouped(count)} missions of each${isRunning ? ", running" : ""}. ${why}`.trim();
     for (const metric of data.metrics)
         run.inWords(metric)?.forEach((text, n) => {
             root.querySelectorAll(`tr[data-metric="${metric.column}"] td`)[n].textContent = text;
@@ -64,10 +68,7 @@ async function open() {
     crew = new Crew(document.getElementById("panel-worker").textContent, {module, image}, stop);
     root.hidden = false;
     root.querySelectorAll("fieldset").forEach((fieldset) => { fieldset.disabled = false; });
-    root.addEventListener("input", () => {
-        stop();
-        find("results").classList.toggle("stale", Boolean(run));
-    });
+    root.addEventListener("input", () => stop());
     find("run").addEventListener("click", start);
     find("stop").addEventListener("click", () => stop());
     show();

@@ -39,7 +39,10 @@ PATIENCE = 60_000  # ms
 def panel() -> str:
     baseline, variation = (load_scenario("paper", uavs=uavs) for uavs in (1, 2))
     costs = Costs(uav=1000, pad=300, charge=40)
-    return str(make_panel(baseline, variation, "paper", ["planner", "greedy"], SEED, costs).data)
+    panel = make_panel(
+        baseline, variation, "paper", ["planner", "greedy"], SEED, costs, given={"uavs": 1}
+    )
+    return str(panel.data)
 
 
 @pytest.fixture(scope="module")
@@ -211,7 +214,7 @@ def test_the_page_simulates_what_python_does(visit, document):
     assert product[2].startswith("+") and product[3].startswith("decided: B is higher")
     command = opened.page.locator("[data-panel=command]").text_content()
     assert command == (
-        "dess what-if --policy greedy --baseline uavs=1 --set uavs=2 --scenario paper "
+        "dess what-if --baseline uavs=1 --set uavs=2 --policy greedy --scenario paper "
         f"--seed {SEED} --missions {MISSIONS}"
     )
     assert opened.complaints == []
@@ -227,7 +230,7 @@ def test_a_reader_changes_settings_with_the_keyboard(visit, document):
     shown = cells_of(tab, metric_of("collection_ratio").name)
     assert shown[1].startswith(f"{100 * means_of(1, 'nearest')['collection_ratio']:.1f} % [")
     command = tab.locator("[data-panel=command]").text_content()
-    assert "--policy greedy --policy nearest --set uavs=1" in command
+    assert "dess sweep --set uavs=1 --policy greedy,nearest" in command
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
 
 
@@ -304,6 +307,43 @@ def test_numbers_of_other_settings_are_said_to_be_so(visit, document):
     assert tab.locator("[data-panel=mission]").is_hidden()
 
 
+def test_what_is_saved_of_a_run_is_of_its_own_settings(visit, document):
+    """CSV and players are those of the run, whatever has been moved since; a requirement may be."""
+    tab = visit(document, 1280).page
+    run(tab)
+    command = str(tab.locator("[data-panel=command]").text_content())
+    tab.locator("[name=a-uavs]").press("End")
+    tab.locator("[name=require-0]").select_option("collection_ratio")
+    assert "of the settings before" in str(tab.locator("[data-panel=status]").text_content())
+    assert tab.locator("[data-panel=before]").is_visible()
+    assert str(tab.locator("[data-panel=command]").text_content()) != command
+    with tab.expect_download() as saved:
+        tab.get_by_role("button", name="Save the missions as CSV").click()
+    assert Path(saved.value.path()).read_text("utf-8").split("\n")[1] == f"# {command}"
+    tab.locator("[name=a-uavs]").press("Home")
+    assert tab.locator("[data-panel=before]").is_hidden()
+
+
+def test_commands_name_the_file_of_a_sea_and_what_was_set(visit, tmp_path):
+    """Not its cells; a policy beside another one is a sweep, which has a page."""
+    space = load_scenario("jade-bight", uavs=2)
+    given = {"uavs": 2, "data_sheet.data_rate": "6 MB/h"}
+    panel = make_panel(space, space, "/home/me/my-sea.toml", ["greedy"], SEED, given=given)
+    shown = {"title": "A panel", "outcome": "", "library": "", "player": panel.data}
+    path = tmp_path / "page.html"
+    path.write_text(fill_page("mission.html", simulates=True, **shown), "utf-8")
+    tab = visit(path, 390).page
+    tab.locator("summary", has_text="Settings").click()
+    tab.locator("[name=b-policy]").select_option("tour")
+    assert "/home" not in str(panel.data)
+    assert str(tab.locator("[data-panel=command]").text_content()) == (
+        "dess sweep --set 'data_sheet.data_rate=\"6 MB/h\"' --set uavs=2 --policy greedy,tour "
+        f"--scenario my-sea.toml --seed {SEED} --missions 1000"
+    )
+    assert "my-sea.toml is the file" in tab.locator("#panel").inner_text()
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+
+
 def test_a_requirement_is_judged_by_the_intervals(visit, document):
     """It may be changed without new missions: an interval is on one side of it, or around it."""
     tab = visit(document, 390).page
@@ -347,7 +387,8 @@ def searched(tmp_path_factory) -> Path:
     space, required = load_scenario("paper", uavs=2, pads=1), Requirement(metric_of(PRODUCT), 0.7)
     fleets = {"uavs": [1, 2], "pads": [1, 4]}
     costs = Costs(uav=1000, pad=300)
-    panel = make_panel(space, space, "paper", ["greedy"], SEED, costs, [required], fleets)
+    about = costs, [required], fleets, {"uavs": 2, "pads": 1}
+    panel = make_panel(space, space, "paper", ["greedy"], SEED, *about)
     shown = {"title": "A panel", "outcome": "", "library": "", "player": panel.data}
     path = tmp_path_factory.mktemp("panel") / "page.html"
     path.write_text(fill_page("mission.html", simulates=True, **shown), "utf-8")
@@ -468,7 +509,7 @@ def test_another_mission_is_played(visit, tmp_path):
     """It is the one of Python: the page compares its records, and ends after as many slots."""
     space = load_scenario("paper", uavs=2)
     shown = {"title": "Another", "outcome": "", "library": player_script().data}
-    shown["player"] = make_another(space, "paper", ["ddqn"], SEED).data
+    shown["player"] = make_another(space, "paper", ["ddqn"], SEED, {"uavs": 2}).data
     path = tmp_path / "page.html"
     path.write_text(fill_page("mission.html", scripts=True, simulates=True, **shown), "utf-8")
     assert not any(check.differing for check in verify_page(path, 1, 0))
@@ -486,11 +527,15 @@ def test_another_mission_is_played(visit, tmp_path):
     assert f"collection ratio {100 * record['collection_ratio']:.1f} %" in str(
         status.text_content()
     )
+    assert tab.locator("[data-panel=before]").is_hidden()
     assert f"of {record['slots']} · " in str(tab.locator("#another output").last.text_content())
     command = str(tab.locator("[data-panel=command]").text_content())
     assert command == (
         f"dess simulate --policy greedy --scenario paper --set uavs=3 --seed {SEED} --replication 6"
     )
+    tab.locator("[name=a-uavs]").press("ArrowRight")
+    assert "of the settings before" in tab.locator("[data-panel=before]").inner_text()
+    assert str(tab.locator("[data-panel=command]").text_content()) == command
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
     assert opened.complaints == []
 
