@@ -40,8 +40,14 @@ POLICIES = PAGES["docs/concepts/policies.md"]
 
 
 def blocks(text: str, language: str) -> list[str]:
-    """The fenced blocks of a language."""
-    return re.findall(rf"^```{language}\n(.*?)^```", text, re.M | re.S)
+    """The fenced blocks of a language; a command on several lines is one line."""
+    found = re.findall(rf"^ *```{language}\n(.*?)^ *```", text, re.M | re.S)
+    return [join_lines(block) for block in found]
+
+
+def join_lines(text: str) -> str:
+    """A text with commands on one line each, which a backslash breaks."""
+    return re.sub(r" \\\n *", " ", text)
 
 
 def every(language: str) -> list[Any]:
@@ -363,7 +369,7 @@ def test_the_readme_says_how_often_uavs_have_the_battery_for_the_way_home(capsys
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [0, 1])
 def test_the_readme_quotes_the_answers_of_its_commands(tmp_path, monkeypatch, capsys, number):
-    line = re.findall(r"^ *dess (sweep --.*)$", README, re.M)[number]
+    line = re.findall(r"^ *dess (sweep --.*)$", join_lines(README), re.M)[number]
     quoted = re.findall(r"\*(With the policy .*?)\*", README, re.S)[number]
     monkeypatch.chdir(tmp_path)
     assert cli.main(shlex.split(line)) == 0
