@@ -269,21 +269,25 @@ def notes_after() -> Iterator[None]:
     finally:
         _held.reset(token)
     for line in notes:
-        _note(line)
+        tell(line)
 
 
 def _note(line: str) -> None:
+    tell(f"no_fly: {line}")
+
+
+def tell(line: str) -> None:
     """Tell once what a user should know, or keep it for the end of ``notes_after``."""
     notes = _held.get()
     if notes is None:
-        _tell(line)
+        _tell_once(line)
     else:
         notes.append(line)
 
 
 @cache
-def _tell(line: str) -> None:
-    logging.getLogger(__name__).warning("note: no_fly: %s", line)
+def _tell_once(line: str) -> None:
+    logging.getLogger(__name__).warning("note: %s", line)
 
 
 def _statements(values: Mapping[str, Any], within: str = "") -> Iterator[tuple[str, Any]]:

@@ -87,6 +87,26 @@ class Projection(NamedTuple):
         """
         return (places - np.array(self.size) / 2) / self._degree + self.centre
 
+    def distance_error(self, places: np.ndarray) -> float:
+        """The largest error of distances in the rectangle around (K, 2) places [cells], as a share.
+
+        Distances between its corners, and from them a hundredth of a cell to the east, are compared
+        with those on the Earth (great circles).
+        """
+        low, high = places.min(0), places.max(0)
+        corners = np.array([low, high, [low[0], high[1]], [high[0], low[1]]])
+        spots = np.concatenate([corners, corners + [0.01, 0]])
+        first, second = np.triu_indices(len(spots), 1)
+        across = spots[first] - spots[second]
+        on_grid = np.sqrt((across**2).sum(1)) * self.cell_size
+        degrees = np.radians(self.degrees(spots))
+        half = np.sin((degrees[first] - degrees[second]) / 2) ** 2
+        lats = np.cos(degrees[:, 1])
+        on_earth = np.arcsin(np.sqrt(half[:, 1] + lats[first] * lats[second] * half[:, 0]))
+        is_known = on_grid > 0
+        errors = on_grid[is_known] / (2 * EARTH_RADIUS * on_earth[is_known]) - 1
+        return float(np.abs(errors).max())
+
     def shapes(self, rings: list[np.ndarray]) -> Iterator[list[np.ndarray]]:
         """The rings of a shape on the grid [cells]; once more for each turn around the Earth.
 

@@ -6,6 +6,7 @@ The files are small ones of the same kinds as those that were tried.
 import hashlib
 import json
 import logging
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from dess.model.batch import simulate_batch
 from dess.physics.chart import chart_at, spread
 from dess.policies import load_team
 from dess.scenario import no_fly
+from dess.scenario.consistency import distance_error
 from dess.scenario.no_fly import NoFlyFile
 from dess.scenario.nodes import NodesFile, NodesFound
 from dess.scenario.places import Projection
@@ -507,6 +509,26 @@ def test_all_bad_nodes_are_named_at_once(sea):
         load_scenario(sea(lines + islands, n_csv=table))
     with pytest.raises(InputError, match=r"line 4 \(C\) at \[7, 7\], line 5 \(D\) at .* off the"):
         load_scenario(sea(lines.replace("8", "5"), n_csv=table))
+
+
+def test_the_error_of_distances_is_told_and_refused(sea, caplog):
+    """Along the parallel at 60 + d degrees they are too long by cos(60) / cos(60 + d)."""
+    lines = 'nodes = "n.csv"\ngrid = 60\ncell_size = 8000\nzone = [30, 30, 1, 1]\nuavs = 1\n'
+
+    def load(half: float) -> Any:
+        return load_scenario(sea(lines, n_csv=f"lon,lat\n8,{60 - half}\n8,{60 + half}\n"))
+
+    def error(half: float) -> float:
+        return math.cos(math.radians(60)) / math.cos(math.radians(60 + half)) - 1
+
+    with caplog.at_level(logging.WARNING):
+        assert distance_error(load(0.3)) == pytest.approx(error(0.3), abs=1e-3)
+        assert not caplog.messages
+        assert distance_error(load(1.0)) == pytest.approx(error(1.0), abs=1e-3)
+    assert "sea.toml: distances between nodes and zones are up to 3 % wrong" in caplog.text
+    with pytest.raises(InputError, match=r"centre: distances .* up to 6\.. % wrong.*less than 5 %"):
+        load(2.0)
+    assert distance_error(load_scenario("paper")) == 0
 
 
 def test_charging_zones_are_places_on_the_earth(sea):
